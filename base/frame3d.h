@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frame3D: one reconstructed, time-stamped surface with texture. Plain data, move-only because it is large.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/image.h"
+
+namespace relievo {
+
+using Vec2f = std::array<float, 2>;
+using Vec3f = std::array<float, 3>;
+using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise seen from the camera
+
+/// Where a vertex was measured: the stripe boundary it lies on and the camera line it was found in.
+struct GridPoint {
+  std::uint16_t boundary = 0;  // of the pattern: between stripes `boundary` and `boundary` + 1
+  std::uint16_t line = 0;      // detection line, top first: camera row `line * line_step_px`
+  float column_px = 0;         // sub-pixel camera column, distorted image coordinates
+};
+
+/// Camera frame: x right, y down, z forward, metres. Vectors beside `positions` are empty or as long as it.
+struct Surface {
+  std::vector<Vec3f> positions;
+  std::vector<Vec3f> normals;  // unit, towards the camera
+  std::vector<Vec2f>
+      texture_coordinates;      // glTF: (0, 0) the texture's upper left corner, (1, 1) the lower right
+  std::vector<GridPoint> grid;  // empty where the surface did not come from stripes
+  std::vector<Triangle> triangles;
+};
+
+struct Frame3D {
+  Frame3D() = default;
+  Frame3D(Frame3D&&) = default;
+  Frame3D& operator=(Frame3D&&) = default;
+
+  std::uint64_t number = 0;  // the camera frame that completed it, counted by the source from 0
+  std::int64_t time_ns = 0;  // start of that camera frame's first field
+  Surface surface;
+  Image8 texture;  // RGB, registered to the camera's picture
+};
+
+}  // namespace relievo

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/rig.h"
+
+#include <cstdio>
+#include <span>
+
+namespace relievo {
+namespace {
+
+std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  std::string out = text;
+  // FileStorage reads a bare integer as an int; the decimal point keeps it a real.
+  if (out.find_first_of(".en") == std::string::npos) out += ".0";
+  return out;
+}
+
+std::string matrix(std::string_view name, int rows, int cols, std::span<const double> values) {
+  std::string out(name);
+  out += ": !!opencv-matrix\n   rows: " + std::to_string(rows) + "\n   cols: " + std::to_string(cols) +
+         "\n   dt: d\n   data: [ ";
+  for (std::size_t i = 0; i < values.size(); ++i) out += (i ? ", " : "") + number(values[i]);
+  return out + " ]\n";
+}
+
+std::string pinhole(const std::string& name, const PinholeModel& model) {
+  return name + "_width: " + std::to_string(model.width) + "\n" + name +
+         "_height: " + std::to_string(model.height) + "\n" + matrix(name + "_matrix", 3, 3, model.matrix) +
+         matrix(name + "_distortion", 1, 5, model.distortion);
+}
+
+}  // namespace
+
+std::string_view to_string(Scan scan) {
+  return scan == Scan::kInterlaced ? "interlaced" : "progressive";
+}
+
+std::string to_yaml(const Rig& rig) {
+  std::string out = "%YAML:1.0\n---\nscan: " + std::string(to_string(rig.scan)) +
+                    "\nframe_rate: " + number(rig.frame_rate) + "\n";
+  out += pinhole("camera", rig.camera);
+  out += pinhole("projector", rig.projector);
+  out += matrix("projector_from_camera_rotation", 3, 3, rig.projector_from_camera_rotation);
+  out += matrix("projector_from_camera_translation", 3, 1, rig.projector_from_camera_translation);
+  out += matrix("colour_matrix", 3, 3, rig.colour_matrix);
+  return out;
+}
+
+}  // namespace relievo

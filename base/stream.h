@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is said about a stream: its description for late joiners and the server's running counts. Plain data
+// that transports (DDS, WebSocket, recordings) carry.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/pattern.h"
+#include "base/rig.h"
+
+namespace relievo {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// Sent once to every reader, early or late; enough to interpret every frame of the stream.
+struct StreamInfo {
+  std::string stream;           // unique name in its DDS domain: [A-Za-z0-9_.-]{1,64}
+  std::string source;           // what it was captured from, e.g. "sim:face"
+  std::int64_t started_ns = 0;  // UTC
+  Rig rig;
+  Pattern pattern;
+};
+
+/// One encoded frame on its way: the bytes of codec/FORMAT.md and what a transport needs to know beside them.
+struct FrameMessage {
+  std::uint64_t sequence = 0;         // counts published frames of the stream without gaps, from 0
+  std::uint64_t number = 0;           // Frame3D::number
+  std::int64_t capture_time_ns = 0;   // UTC, start of the camera frame's first field
+  std::int64_t publish_time_ns = 0;   // UTC, when the server handed it to its sinks
+  std::shared_ptr<const Bytes> data;  // shared by all sinks, never changed
+};
+
+enum class StreamState : std::uint8_t { kStarting, kRunning, kStalled, kEnded };
+
+/// "starting", "running", "stalled" or "ended".
+inline std::string_view to_string(StreamState state) {
+  switch (state) {
+    case StreamState::kStarting:
+      return "starting";
+    case StreamState::kRunning:
+      return "running";
+    case StreamState::kStalled:
+      return "stalled";
+    case StreamState::kEnded:
+      return "ended";
+  }
+  return "unknown";
+}
+
+/// Running counts of one stream, published about once a second.
+struct ServerStatus {
+  std::string stream;
+  std::int64_t time_ns = 0;  // UTC
+  StreamState state = StreamState::kStarting;
+  std::string message;    // for a person; empty when all is well
+  double frame_rate = 0;  // published frames a second over the last few seconds
+  std::uint64_t frames_captured = 0;
+  std::uint64_t frames_published = 0;
+  std::uint64_t drops_capture = 0;  // lost between camera and queue, known from sequence numbers or content
+  std::uint64_t drops_reconstruct = 0;  // queue before reconstruction was full
+  std::uint64_t drops_encode = 0;       // queue before encoding was full
+  std::uint64_t drops_publish = 0;      // queue before publishing was full
+  double reconstruct_ms = 0;            // medians over the last few seconds
+  double encode_ms = 0;
+  double latency_ms = 0;  // capture to publish
+};
+
+/// True where `name` may name a stream: [A-Za-z0-9_.-]{1,64}, not starting with a dot.
+inline bool valid_stream_name(const std::string& name) {
+  if (name.empty() || name.size() > 64 || name[0] == '.') return false;
+  for (const char c : name) {
+    const bool ok = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+                    c == '-' || c == '.';
+    if (!ok) return false;
+  }
+  return true;
+}
+
+}  // namespace relievo

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// Geometry codecs on the same surfaces: size, time, error. The table of rows is below.
+#include <CLI/CLI.hpp>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <span>
+
+#include "base/time.h"
+#include "bench/frames.h"
+#include "bench/report.h"
+#include "bench/suites.h"
+#include "bench/surface_error.h"
+#include "codec/draco_mesh.h"
+#include "server/options.h"
+#include "server/pipeline.h"
+#include "server/working_volume.h"
+
+namespace relievo::bench {
+namespace {
+
+struct Options {
+  std::string source = "sim:object";
+  int frames = 20;
+  int rounds = 3;
+  Decoder decoder = ReconstructOptions{}.decoder;
+  bool json = false;
+};
+
+/// How a stream would code this surface: its box, and the bits that the pipeline's resolution takes in it.
+struct Job {
+  const Surface& surface;
+  Volume volume;
+  int pipeline_bits;
+};
+
+struct Coded {
+  Bytes bytes;
+  std::uint32_t vertices = 0, triangles = 0;
+};
+
+struct Codec {
+  std::string name;
+  std::function<int(const Job&)> bits;  // a coordinate, of positions
+  std::function<Result<Coded>(const Job&)> encode;
+  std::function<Result<Surface>(const Coded&)> decode;
+};
+
+template <typename T>
+void store(Bytes& out, const std::vector<T>& values) {
+  const std::size_t at = out.size();
+  out.resize(at + values.size() * sizeof(T));
+  if (!values.empty()) std::memcpy(out.data() + at, values.data(), values.size() * sizeof(T));
+}
+
+template <typename T>
+void fetch(std::span<const std::uint8_t>& in, std::size_t count, std::vector<T>& values) {
+  values.resize(count);
+  if (count > 0) std::memcpy(values.data(), in.data(), count * sizeof(T));
+  in = in.subspan(count * sizeof(T));
+}
+
+/// The reference: the memory of positions, texture coordinates and triangles as it is.
+Codec raw() {
+  return {"raw-float32", [](const Job&) { return 32; },
+          [](const Job& job) -> Result<Coded> {
+            Coded coded;
+            coded.vertices = static_cast<std::uint32_t>(job.surface.positions.size());
+            coded.triangles = static_cast<std::uint32_t>(job.surface.triangles.size());
+            store(coded.bytes, job.surface.positions);
+            store(coded.bytes, job.surface.texture_coordinates);
+            store(coded.bytes, job.surface.triangles);
+            return coded;
+          },
+          [](const Coded& coded) -> Result<Surface> {
+            Surface surface;
+            std::span<const std::uint8_t> in(coded.bytes);
+            fetch(in, coded.vertices, surface.positions);
+            fetch(in, coded.vertices, surface.texture_coordinates);
+            fetch(in, coded.triangles, surface.triangles);
+            return surface;
+          }};
+}
+
+/// `bits` 0: as the pipeline chooses.
+Codec draco(int speed, int bits) {
+  const auto bits_of = [bits](const Job& job) { return bits > 0 ? bits : job.pipeline_bits; };
+  return {
+      "draco-mesh-s" + std::to_string(speed) + (bits > 0 ? "-" + std::to_string(bits) + "bit" : "-pipeline"),
+      bits_of,
+      [speed, bits_of](const Job& job) -> Result<Coded> {
+        EncodeOptions options;
+        options.position_bits = bits_of(job);
+        options.draco_speed = speed;
+        options.volume = job.volume;
+        auto encoded = encode_draco(job.surface, options);
+        if (!encoded) return encoded.error();
+        return Coded{std::move(encoded->bytes), encoded->vertices, encoded->triangles};
+      },
+      [](const Coded& coded) { return decode_draco(coded.bytes, coded.vertices, coded.triangles); }};
+}
+
+/// A codec is a row here.
+std::vector<Codec> codecs() {
+  std::vector<Codec> all{raw()};
+  for (const int bits : {12, 0})
+    for (const int speed : {0, 4, 5, 7, 9}) all.push_back(draco(speed, bits));
+  return all;
+}
+
+struct Samples {
+  std::vector<double> bits, bytes, bits_a_vertex, encode_ms, decode_ms, rms_mm, max_mm;
+};
+
+Status measure(const Codec& codec, const Job& job, Samples& samples) {
+  const std::int64_t begin = steady_now_ns();
+  const auto coded = codec.encode(job);
+  const std::int64_t encoded = steady_now_ns();
+  if (!coded) return coded.error().in(codec.name);
+  const std::int64_t decode_begin = steady_now_ns();
+  const auto decoded = codec.decode(*coded);
+  const std::int64_t end = steady_now_ns();
+  if (!decoded) return decoded.error().in(codec.name);
+  const auto error = surface_error(job.surface, *decoded);
+  if (!error) return error.error().in(codec.name);
+  const auto bytes = static_cast<double>(coded->bytes.size());
+  samples.bits.push_back(codec.bits(job));
+  samples.bytes.push_back(bytes);
+  samples.bits_a_vertex.push_back(8 * bytes / static_cast<double>(decoded->positions.size()));
+  samples.encode_ms.push_back(milliseconds(encoded - begin));
+  samples.decode_ms.push_back(milliseconds(end - decode_begin));
+  samples.rms_mm.push_back(1e3 * error->rms_m);
+  samples.max_mm.push_back(1e3 * error->max_m);
+  return {};
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  const auto loop = FrameLoop::load(options.source, options.frames + 1, stop);
+  if (!loop) return loop.error();
+  if (!*loop) return {};
+  const auto frames = reconstruct_all(**loop, options.decoder, stop);
+  if (!frames) return frames.error();
+  if (!*frames) return {};
+
+  std::vector<Job> jobs;
+  std::vector<double> vertices, triangles;
+  WorkingVolume volume{Volume{}};
+  for (const Frame3D& frame : **frames) {
+    const Volume& box = volume.fit(frame.surface.positions);
+    jobs.push_back({frame.surface, box, volume.bits(PipelineOptions{}.depth_resolution)});
+    vertices.push_back(static_cast<double>(frame.surface.positions.size()));
+    triangles.push_back(static_cast<double>(frame.surface.triangles.size()));
+  }
+
+  // Round by round, so that whatever else the machine does meets all codecs alike.
+  const std::vector<Codec> all = codecs();
+  std::vector<Samples> samples(all.size());
+  Samples warm_up;
+  for (int round = 0; round < options.rounds; ++round) {
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      if (const Status done = measure(all[c], jobs.front(), warm_up); !done) return done;
+      for (const Job& job : jobs) {
+        if (stop.stopped()) return {};
+        if (const Status done = measure(all[c], job, samples[c]); !done) return done;
+      }
+    }
+  }
+  std::vector<Row> rows;
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    const Samples& of = samples[c];
+    rows.push_back({all[c].name,
+                    {{"bits", spread_of(of.bits)},
+                     {"bytes", spread_of(of.bytes)},
+                     {"bits_per_vertex", spread_of(of.bits_a_vertex)},
+                     {"encode_ms", spread_of(of.encode_ms)},
+                     {"decode_ms", spread_of(of.decode_ms)},
+                     {"rms_mm", spread_of(of.rms_mm)},
+                     {"max_mm", spread_of(of.max_mm)}}});
+  }
+  print({.suite = "codec",
+         .settings = {{"source", options.source},
+                      {"frames", static_cast<double>(jobs.size())},
+                      {"rounds", static_cast<double>(options.rounds)},
+                      {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")}},
+         .figures = {{"vertices", spread_of(vertices)},
+                     {"triangles", spread_of(triangles)},
+                     {"volume_m", static_cast<double>(jobs.back().volume.size_m)}},
+         .rows = std::move(rows),
+         .notes = {"Reference: raw-float32. Errors are distances from the surface that was encoded, vertex "
+                   "by vertex; "
+                   "\"pipeline\": the bits that serve would choose."}},
+        options.json);
+  return {};
+}
+
+}  // namespace
+
+Command codec_suite() {
+  return {"codec", "Geometry codecs: bytes, time and error", [](CLI::App& app) {
+            auto options = std::make_shared<Options>();
+            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
+                ->capture_default_str();
+            app.add_option("--frames", options->frames, "Frames to code")
+                ->check(CLI::Range(1, 10000))
+                ->capture_default_str();
+            app.add_option("--rounds", options->rounds, "Times that each codec codes all of them")
+                ->check(CLI::Range(1, 1000))
+                ->capture_default_str();
+            add_decoder_option(app, options->decoder);
+            app.add_flag("--json", options->json, "Print JSON");
+            return [options](StopSignal& stop) { return run(*options, stop); };
+          }};
+}
+
+}  // namespace relievo::bench

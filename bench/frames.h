@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Camera frames in memory, so that a benchmark measures neither a renderer nor a disk.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "capture/reconstruct/reconstructor.h"
+#include "capture/source/field_source.h"
+#include "cli/stop_signal.h"
+
+namespace relievo::bench {
+
+/// The first frames of a source. Played to and fro (0 1 2 1 0 1 ...): slides keep alternating and nothing
+/// jumps, however few there are.
+class FrameLoop {
+ public:
+  /// Reads `count` frames (two at least), fewer where the source ends or 1 GiB is full. Nothing once stopped.
+  static Result<std::optional<FrameLoop>> load(const std::string& uri, int count, StopSignal& stop);
+
+  const SourceInfo& info() const { return info_; }
+  std::size_t size() const { return frames_.size(); }
+  /// Bytes of a frame's two fields.
+  std::size_t frame_bytes() const;
+  /// The n-th frame played; number and time as stored.
+  const CapturedFrame& at(std::uint64_t n) const;
+
+  /// A source that plays copies without end, numbers and times going on; not live, so a pipeline paces it.
+  /// The loop must outlive it.
+  std::unique_ptr<FieldSource> play() const;
+
+ private:
+  SourceInfo info_;
+  std::vector<CapturedFrame> frames_;
+};
+
+/// Surfaces and textures of the loop's frames, in order. The error says where none could be reconstructed.
+/// Nothing once stopped.
+Result<std::optional<std::vector<Frame3D>>> reconstruct_all(const FrameLoop& loop, Decoder decoder,
+                                                            StopSignal& stop);
+
+}  // namespace relievo::bench

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/calibrate/colour.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "capture/calibrate/white_target.h"
+
+namespace relievo {
+namespace {
+
+constexpr Primary kBlack = 0, kWhite = 7;
+constexpr int kSaturated = 254;
+
+/// A capture's target: mean colour, and the noise of one pixel.
+struct Response {
+  Primary colour;
+  std::string name;
+  Eigen::Vector3d mean;
+  Eigen::Vector3d noise;
+};
+
+std::string percent(double share) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%.1f %%", 100 * share);
+  return text;
+}
+
+std::string whole(double value) {
+  return std::to_string(std::lround(value));
+}
+
+Eigen::Vector3d projected(Primary colour) {
+  return {colour & 1 ? 255.0 : 0.0, colour & 2 ? 255.0 : 0.0, colour & 4 ? 255.0 : 0.0};
+}
+
+Response respond(const ColourCapture& capture, const std::vector<std::uint8_t>& target) {
+  Response out{capture.colour, capture.name, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  const int width = capture.picture.width();
+  std::array<std::vector<int>, 3> steps;  // between neighbours: the target is smooth, so they are noise
+  std::size_t pixels = 0;
+  for (int y = 0; y < capture.picture.height(); ++y) {
+    const std::uint8_t* rgb = capture.picture.row(y);
+    const std::uint8_t* in = target.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+    for (int x = 0; x < width; ++x) {
+      if (in[x] == 0) continue;
+      ++pixels;
+      for (int c = 0; c < 3; ++c) {
+        out.mean[c] += rgb[3 * x + c];
+        if (x > 0 && in[x - 1])
+          steps[static_cast<std::size_t>(c)].push_back(std::abs(rgb[3 * x + c] - rgb[3 * x - 3 + c]));
+      }
+    }
+  }
+  out.mean /= static_cast<double>(std::max<std::size_t>(1, pixels));
+  for (int c = 0; c < 3; ++c) {
+    double squares = 0;
+    const auto& all = steps[static_cast<std::size_t>(c)];
+    for (const int step : all) squares += double{1} * step * step;
+    out.noise[c] = all.empty() ? 0 : std::sqrt(squares / static_cast<double>(all.size()) / 2);
+  }
+  return out;
+}
+
+/// Which captures must be taken again, and how.
+Status check_exposure(const std::vector<ColourCapture>& captures, const std::vector<Response>& responses,
+                      const std::vector<std::uint8_t>& target, const ColourOptions& options) {
+  const auto pixels = static_cast<double>(std::count(target.begin(), target.end(), 1));
+  std::string saturated;
+  double most = 0;
+  for (const ColourCapture& capture : captures) {
+    double worst = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::size_t full = 0;
+      for (std::size_t i = 0; i < target.size(); ++i) {
+        full += target[i] != 0 && capture.picture.data()[3 * i + c] >= kSaturated;
+      }
+      worst = std::max(worst, static_cast<double>(full) / pixels);
+    }
+    if (worst > options.saturated_share) saturated += (saturated.empty() ? "" : ", ") + capture.name;
+    most = std::max(most, worst);
+  }
+  if (!saturated.empty()) {
+    return Error{
+        saturated + ": saturated, up to " + percent(most) +
+        " of the target is full in a channel; shorten the exposure or close the iris, and take all captures "
+        "again with the same setting"};
+  }
+  double white = 0;
+  for (const Response& r : responses) {
+    if (r.colour != kWhite) continue;
+    white = r.mean.maxCoeff();
+    if (white < options.dimmest_white) {
+      return Error{r.name + " is under-exposed: the target reaches " + whole(white) + " of 255, at least " +
+                   whole(options.dimmest_white) +
+                   " is needed; lengthen the exposure or open the iris, and take all captures again with the "
+                   "same setting"};
+    }
+  }
+  Eigen::Vector3d black = Eigen::Vector3d::Zero();
+  for (const Response& r : responses) {
+    if (r.colour == kBlack) black = r.mean;
+  }
+  for (const Response& r : responses) {
+    if (r.colour == kBlack && r.mean.maxCoeff() > options.ambient_share * white) {
+      return Error{r.name + ": the target is at " + whole(r.mean.maxCoeff()) +
+                   " of 255 without projected light; darken the room"};
+    }
+    if (r.colour != kBlack && (r.mean - black).maxCoeff() < 0.1 * white) {
+      return Error{r.name + " is under-exposed: the target is hardly brighter than under black (" +
+                   whole(r.mean.maxCoeff()) + " of 255); is it the picture of colour " +
+                   primary_name(r.colour) + ", and the exposure that of the others?"};
+    }
+  }
+  return {};
+}
+
+Status check_set(const std::vector<ColourCapture>& captures) {
+  const auto has = [&](Primary colour) {
+    return std::any_of(captures.begin(), captures.end(),
+                       [&](const ColourCapture& c) { return c.colour == colour; });
+  };
+  for (const Primary needed : {kBlack, kWhite}) {
+    if (!has(needed)) {
+      return Error{"the capture under " + std::string(needed == kBlack ? "black, 000" : "white, 111") +
+                   ".png, is missing"};
+    }
+  }
+  const ColourCapture& first = captures.front();
+  for (const ColourCapture& c : captures) {
+    if (c.picture.width() != first.picture.width() || c.picture.height() != first.picture.height()) {
+      return Error{c.name + " is " + std::to_string(c.picture.width()) + "x" +
+                   std::to_string(c.picture.height()) + ", " + first.name + " " +
+                   std::to_string(first.picture.width()) + "x" + std::to_string(first.picture.height()) +
+                   ": all captures must be of one size"};
+    }
+  }
+  return {};
+}
+
+/// Captures of one colour become one response.
+std::vector<Response> average(const std::vector<Response>& all) {
+  std::vector<Response> out;
+  for (Primary colour = 0; colour < 8; ++colour) {
+    Response sum{colour, "", Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    int count = 0;
+    for (const Response& r : all) {
+      if (r.colour != colour) continue;
+      sum.mean += r.mean;
+      sum.noise += r.noise;
+      sum.name = r.name;
+      ++count;
+    }
+    if (count == 0) continue;
+    sum.mean /= count;
+    sum.noise /= count;
+    out.push_back(sum);
+  }
+  return out;
+}
+
+/// Eq. 2 by least squares: M (C C') = S C'.
+Result<Eigen::Matrix3d> solve(const std::vector<Response>& responses) {
+  Eigen::Matrix3d cc = Eigen::Matrix3d::Zero(), sc = Eigen::Matrix3d::Zero();
+  for (const Response& r : responses) {
+    cc += r.mean * r.mean.transpose();
+    sc += projected(r.colour) * r.mean.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(cc);
+  if (!(spread.eigenvalues()[0] > 1e-5 * spread.eigenvalues()[2])) {
+    return Error{
+        "the captures do not tell three colours apart: the folder needs red, green and blue (100, 010, 001) "
+        "or "
+        "their complements, each under its own light"};
+  }
+  const Eigen::Matrix3d solved = cc.ldlt().solve(sc.transpose());
+  return Eigen::Matrix3d(solved.transpose());
+}
+
+/// What the difference of a colour and its complement leaves for detection (5.2).
+void weigh_detection(const Eigen::Matrix3d& m, const std::vector<Response>& responses, double brightest,
+                     const Response& r, ColourReport& report) {
+  const auto of = [&](Primary colour) -> const Response* {
+    const auto at = std::find_if(responses.begin(), responses.end(),
+                                 [&](const Response& x) { return x.colour == colour; });
+    return at == responses.end() ? nullptr : &*at;
+  };
+  const Response* complement = of(static_cast<Primary>(r.colour ^ 7));
+  // Light adds up: what a complement that was not captured would have been.
+  const Eigen::Vector3d other = complement ? complement->mean : of(kWhite)->mean + of(kBlack)->mean - r.mean;
+  const Eigen::Vector3d other_noise = complement ? complement->noise : r.noise;
+  const Eigen::Vector3d difference = m * (r.mean - other) * (255 / brightest);
+  report.weakest_difference = 1e9;
+  for (int c = 0; c < 3; ++c) {
+    const double right = (r.colour >> c & 1) ? difference[c] : -difference[c];
+    double variance = 0;
+    for (int k = 0; k < 3; ++k) {
+      variance += std::pow(m(c, k) * 255 / brightest, 2) *
+                  (r.noise[k] * r.noise[k] + other_noise[k] * other_noise[k]);
+    }
+    if (right >= report.weakest_difference) continue;
+    report.weakest_difference = right;
+    report.weakest_channel = c;
+    report.weakest_in_sigmas = right / std::max(1e-9, std::sqrt(variance));
+  }
+}
+
+}  // namespace
+
+Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& captures,
+                                           const ColourOptions& options) {
+  if (captures.empty()) return Error{"there are no captures"};
+  if (const Status complete = check_set(captures); !complete) return complete.error();
+  auto target = find_white_target(captures, options.roi);
+  if (!target) return target.error();
+  std::vector<Response> each;
+  for (const ColourCapture& capture : captures) each.push_back(respond(capture, target->mask));
+  if (const Status good = check_exposure(captures, each, target->mask, options); !good) return good.error();
+  const std::vector<Response> responses = average(each);
+  const auto matrix = solve(responses);
+  if (!matrix) return matrix.error();
+  const Eigen::Matrix3d& m = *matrix;
+
+  ColourCalibration out;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.matrix.data()) = m;
+  out.target = target->box;
+  out.target_pixels = target->pixels;
+  double brightest = 0, squares = 0, noise = 0;
+  for (const Response& r : responses) brightest = std::max(brightest, (m * r.mean).maxCoeff());
+  for (const Response& r : responses) {
+    ColourReport report{.colour = r.colour};
+    const Eigen::Vector3d estimated = m * r.mean;
+    for (int c = 0; c < 3; ++c) {
+      report.captured[static_cast<std::size_t>(c)] = r.mean[c];
+      report.estimated[static_cast<std::size_t>(c)] = estimated[c];
+    }
+    const Eigen::Vector3d off = estimated - projected(r.colour);
+    report.residual = std::sqrt(off.squaredNorm() / 3);
+    squares += off.squaredNorm();
+    noise += r.noise.squaredNorm();
+    if (r.colour != kBlack && r.colour != kWhite) weigh_detection(m, responses, brightest, r, report);
+    out.colours.push_back(report);
+  }
+  const auto values = 3.0 * static_cast<double>(responses.size());
+  out.residual = std::sqrt(squares / values);
+  out.noise = std::sqrt(noise / values);
+  return out;
+}
+
+std::string primary_name(Primary colour) {
+  return {colour & 1 ? '1' : '0', colour & 2 ? '1' : '0', colour & 4 ? '1' : '0'};
+}
+
+std::optional<Primary> primary_of(const std::string& name) {
+  if (name.size() != 3 || name.find_first_not_of("01") != std::string::npos) return std::nullopt;
+  return static_cast<Primary>((name[0] - '0') | (name[1] - '0') << 1 | (name[2] - '0') << 2);
+}
+
+}  // namespace relievo

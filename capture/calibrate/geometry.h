@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Geometric calibration of a rig from views of a chessboard under Gray code: intrinsics and distortion of the
+// camera and of the projector, which is treated as a camera that looks backwards, and the pose between them.
+//
+// Corners are found in the camera's picture; where the projector sees them follows from the code around them
+// (local_homography.h). OpenCV's calibrateCamera starts both lenses; a bundle adjustment (bundle.h) finishes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/result.h"
+#include "base/rig.h"
+#include "capture/calibrate/board.h"
+#include "capture/calibrate/bundle.h"
+#include "capture/pattern/gray_decode.h"
+
+namespace relievo {
+
+/// What one view shows of the board.
+struct MeasuredView {
+  std::string name;
+  std::vector<CornerSight> corners;  // seen by both devices
+  std::string refused;               // why the view cannot be used; empty where it can
+};
+
+/// Finds the board in the stack's picture and each corner in the projector. A view is refused where the whole
+/// board is not seen, or fewer than three quarters of its corners have a place in the projector.
+MeasuredView measure_view(const std::string& name, const GrayStack& stack, const Board& board,
+                          const GrayDecodeOptions& options, WorkerPool& pool);
+
+struct GeometryOptions {
+  BundlePriors priors;
+  /// A view whose stereo RMS is over `bad_view` times the median of all and over `bad_view_px` is left out,
+  /// the worst first, while more than `min_views` are left. A corner off by more than `bad_corner` robust
+  /// sigmas and `bad_corner_px` in either device is left out.
+  double bad_view = 2.5;
+  double bad_view_px = 0.5;
+  double bad_corner = 5;
+  double bad_corner_px = 1;
+  std::size_t min_views = 3;
+};
+
+/// Pixels, but for the plane. An RMS is over distances in the picture, as cv::stereoCalibrate reports it.
+struct ViewReport {
+  std::string name;
+  bool used = false;
+  std::string why;  // it was left out
+  std::size_t corners = 0;
+  std::size_t corners_left_out = 0;
+  double camera_rms = 0, projector_rms = 0, stereo_rms = 0;
+  double plane_rms_m = 0;  // of the triangulated corners around their plane
+};
+
+/// A corner and how far from it the calibrated rig puts it, for a picture.
+struct CornerResidual {
+  std::size_t view = 0;
+  Vec2d camera_px{}, camera_off_px{};
+  Vec2d projector_px{}, projector_off_px{};
+};
+
+struct Geometry {
+  PinholeModel camera, projector;
+  std::array<double, 9> projector_from_camera_rotation{};
+  std::array<double, 3> projector_from_camera_translation{};
+  std::array<double, 8> sigma_px{};    // fx fy cx cy of camera, then of projector
+  std::size_t views = 0, corners = 0;  // used
+  double camera_rms = 0, projector_rms = 0, stereo_rms = 0;
+  double stereo_rms_all = 0;  // with the corners that were left out of used views
+  double distance_m = 0;      // median depth of the corners
+  double plane_rms_m = 0;
+  double square_error_m = 0;              // RMS of the distances between neighbouring triangulated corners
+  std::vector<ViewReport> reports;        // every view, in the order given
+  std::vector<CornerResidual> residuals;  // of used corners
+};
+
+/// Sizes are pixels of the two devices. Fails where fewer than `min_views` views can be used or they do not
+/// determine the rig; the error says which views and why.
+Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, const PinholeModel& camera_size,
+                                    const PinholeModel& projector_size, const GeometryOptions& options);
+
+/// Residuals as arrows, 200 times as long, over the camera's picture (left) and the projector's (right). RGB.
+Image8 draw_residuals(const Geometry& geometry);
+
+}  // namespace relievo

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads a folder of Gray-code pictures as other programs and our own write them. Two layouts:
+//
+// - tagged: names with [AXIS-BIT-INVERSE] or [AXIS-BIT-INVERSE_NUMBER], e.g. "123.4_[00-10-01_01]_img.jpg":
+//   axis 0 columns, 1 rows; bit 0 the finest; 1 for the inverse. No white or black picture needed.
+// - numbered: the pictures in the order of their names are gray_slides(): columns coarsest first, each before
+//   its inverse, then rows. White and black come last or first, in either order, or are left out.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "base/result.h"
+#include "capture/pattern/gray_decode.h"
+
+namespace relievo {
+
+/// `.png`, `.jpg`, `.jpeg`, `.bmp`, `.tif`, `.tiff` and `.pgm` directly in `folder`; other files are ignored.
+/// Errors name the folder or the file, and the count of pictures expected.
+/// `on_picture(done, of)` is called before each picture and stops the reading, with an error, by returning
+/// false.
+Result<GrayStack> read_gray_stack(const std::filesystem::path& folder, int projector_width,
+                                  int projector_height,
+                                  const std::function<bool(std::size_t, std::size_t)>& on_picture = {});
+
+/// Writes every slide to project, NN.png, in the numbered layout. The folder is made where it is missing.
+Status write_gray_slides(const std::filesystem::path& folder, int projector_width, int projector_height);
+
+}  // namespace relievo

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of any common format, for calibration and import.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+
+namespace relievo {
+
+/// Pictures directly in `folder`, in the order of their names, where "2" is before "10". Fails where the
+/// folder cannot be read.
+Result<std::vector<std::filesystem::path>> pictures_in(const std::filesystem::path& folder);
+
+/// 8 bits, RGB. The error names the file.
+Result<Image8> read_rgb(const std::filesystem::path& file);
+
+/// (R + 2 G + B) / 4.
+Image8 grey_of(const Image8& rgb);
+
+/// One or three channels, as PNG, written whole or not at all. The error names the file.
+Status write_png(const std::filesystem::path& file, const Image8& picture);
+
+/// Writes `content` beside `file` and renames it, so that `file` is the old one or the new one, whole. The
+/// error names the file.
+Status write_atomically(const std::filesystem::path& file, const std::string& content);
+
+}  // namespace relievo

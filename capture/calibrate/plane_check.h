@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// How flat and how large a calibrated rig finds the board: its corners triangulated, against a plane and
+// against their true distances. The board's own pose is not used, so this is what a user of the rig will get.
+#pragma once
+
+#include <vector>
+
+#include "capture/calibrate/bundle.h"
+
+namespace relievo {
+
+struct PlaneCheck {
+  std::size_t corners = 0, lengths = 0;
+  double plane_rms_m = 0;   // distance of triangulated corners from the plane fitted to them
+  double length_rms_m = 0;  // error of the distance between neighbouring corners
+};
+
+PlaneCheck check_plane(const PinholeModel& camera, const PinholeModel& projector,
+                       const Pose& projector_from_camera, const BoardView& view);
+
+/// RMS over all corners and lengths of several views.
+PlaneCheck together(const std::vector<PlaneCheck>& checks);
+
+}  // namespace relievo

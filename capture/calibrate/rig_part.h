@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A rig.yaml as calibration builds it, step by step: colour and geometry come from different captures, in
+// either order, so one may be there before the other.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "base/result.h"
+#include "base/rig.h"
+
+namespace relievo {
+
+struct RigPart {
+  std::optional<Rig> whole;  // where all of it is there; then the others are too
+  std::optional<Scan> scan;
+  std::optional<double> frame_rate;
+  std::optional<std::array<double, 9>> colour_matrix;
+};
+
+/// A whole rig.yaml, or one of the keys above alone. Errors name the file and the key.
+Result<RigPart> read_rig_part(const std::filesystem::path& file);
+
+/// The text of a rig.yaml that has a colour matrix only.
+std::string colour_yaml(const std::array<double, 9>& colour_matrix);
+
+}  // namespace relievo

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// How good a reconstruction is, against a take's truth: which of the boundaries that the camera can see were
+// found, how many points are wrong, and how exact the right ones are.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/frame3d.h"
+#include "base/image.h"
+#include "base/pattern.h"
+#include "base/rig.h"
+
+namespace relievo {
+
+/// Errors are of depth along the camera's z axis, in micrometres per metre of depth.
+struct Score {
+  std::size_t frames = 0;  // scored
+  std::size_t of = 0;      // with truth and a slide other than the frame before's
+  double vertices_per_frame = 0;
+  double completeness =
+      0;  // of the visible boundary pixels, those with a right vertex within 1.2 px along the line
+  double outliers = 0;         // of the vertices, those over 2 % of depth off, or where nothing is
+  double median_um_per_m = 0;  // of the right vertices
+  double rms_um_per_m = 0;
+  double p95_um_per_m = 0;
+};
+
+/// Collects frames of one take. One thread.
+class Scorer {
+ public:
+  Scorer(const Rig& rig, const Pattern& pattern);
+
+  /// `truth` is depth in metres, camera height x width, 0 where there is nothing; `surface` null where the
+  /// frame should have been reconstructed and was not.
+  void add(const ImageF& truth, const Surface* surface);
+  Score score() const;
+
+ private:
+  struct Expected {
+    int row;
+    float column_px;
+  };
+  /// Where the camera sees lit boundaries: pixel pairs on one line whose stripes differ by one, away from
+  /// depth steps.
+  std::vector<Expected> expected(const ImageF& truth) const;
+
+  Rig rig_;
+  Pattern pattern_;
+  std::vector<float> ray_x_, ray_y_;  // x/z, y/z of each camera pixel
+  std::size_t frames_ = 0, of_ = 0, vertices_ = 0, right_ = 0, expected_ = 0, hit_ = 0;
+  std::vector<float> errors_;  // relative, right vertices
+};
+
+}  // namespace relievo

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/pattern/slides.h"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace relievo {
+namespace {
+
+void draw_row(const Pattern& pattern, int slide, bool complement, int width, std::uint8_t* row) {
+  for (int x = 0; x < width; ++x) {
+    // Stripe whose share of the width holds x + 1/2, in integers.
+    const auto stripe =
+        static_cast<int>((2 * static_cast<std::int64_t>(x) + 1) * pattern.stripes() / (2 * width));
+    const Primary colour = pattern.colour(stripe, slide);
+    const int lit = complement ? colour ^ 7 : colour;
+    for (int c = 0; c < 3; ++c) row[3 * x + c] = (lit >> c) & 1 ? 255 : 0;
+  }
+}
+
+}  // namespace
+
+Image8 draw_slide(const Pattern& pattern, int slide, bool complement, int width, int height) {
+  Image8 out(width, height, 3);
+  draw_row(pattern, slide, complement, width, out.row(0));
+  for (int y = 1; y < height; ++y) std::copy_n(out.row(0), out.stride(), out.row(y));
+  return out;
+}
+
+Image8 draw_interlaced(const Pattern& pattern, int slide, int width, int height) {
+  Image8 out(width, height, 3);
+  for (int y = 0; y < height; ++y) draw_row(pattern, slide, y % 2 != 0, width, out.row(y));
+  return out;
+}
+
+}  // namespace relievo

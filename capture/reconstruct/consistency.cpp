@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/consistency.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace relievo {
+namespace {
+// Smoothing, in standard deviations of a column: a straight line fits to within the first (root mean square),
+// a quadratic to within the second (the worst of its lines).
+constexpr float kStraightFit = 1.4F;
+constexpr float kBentFit = 3.F;
+constexpr float kLeastNoise_px = 0.01F;
+
+// Where a neighbourhood is no longer taken to be straight.
+constexpr float kBendAcross_px = 0.4F;     // second difference over boundaries, and
+constexpr float kBendAcrossShare = 0.08F;  // of their spacing more
+constexpr float kBendNoise = 2.F;          // standard deviations more, for both
+constexpr float kBendAlong_px = 0.25F;     // second difference over lines
+
+// Standard deviations of what neighbours predict, measured on simulated scenes.
+constexpr float kPrediction_px = 0.06F;  // from three of them, in line
+constexpr float kPredictionBend = 0.5F;  // more for each pixel that the three are out of line
+constexpr float kBendShare = 0.7F;       // of a bend that is taken to go on
+constexpr float kTwoAcross_px = 0.5F;    // more, from two only
+constexpr float kTwoAlong_px = 0.1F;
+constexpr float kTrusted_px = 0.15F;      // neighbours worse than this predict nothing
+constexpr float kOwn_px = 0.02F;          // least for a boundary's own place, and more of it
+constexpr float kDoubtAlong_px = 0.2F;    // where lines above or below are other surfaces
+constexpr float kDoubtAcross_px = 0.05F;  // where boundaries beside it are
+
+// What is settled and what is given up.
+constexpr float kSuspect_px = 0.1F;       // worse than this, a boundary is weighed against its neighbours
+constexpr float kAgree = 3.F;             // standard deviations between a boundary and a prediction of it
+constexpr float kAlone_px = 0.08F;        // beside a step, without a prediction that agrees
+constexpr float kAtStep_px = 0.36F;       // beside a step, after weighing
+constexpr float kNoisy = 1.2F;            // or, where noise is strong, this many times its part
+constexpr float kAtMost_px = 0.5F;        // elsewhere, for instance where texture spoils it
+constexpr float kLean_px = 2.5F;          // a boundary hangs together over lines that differ by less
+constexpr float kWidest_px = 40.F;        // and with the next one over less
+constexpr std::int32_t kLeastPiece = 25;  // boundaries; smaller pieces of surface are wrong codes
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr int kMargin = 3;
+
+constexpr std::uint8_t kOpenAcross = 1;  // no neighbour on one side in the line
+constexpr std::uint8_t kBentAcross = 2;  // both, but not straight
+constexpr std::uint8_t kOpenAlong = 4;   // the same over lines
+constexpr std::uint8_t kBentAlong = 8;
+
+/// Beside a depth step, as far as the neighbours tell: what is doubtful there is given up.
+bool beside_step(std::uint8_t state) {
+  return (state & kOpenAcross) || ((state & kBentAcross) && (state & (kOpenAlong | kBentAlong)));
+}
+
+bool known(float x) {
+  return x == x;
+}
+
+}  // namespace
+
+float* ConsistencyCheck::row(std::vector<float>& grid, int line) const {
+  return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+}
+const float* ConsistencyCheck::row(const std::vector<float>& grid, int line) const {
+  return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+}
+
+/// Median standard deviation of the decoded edges.
+float ConsistencyCheck::usual_sigma(const EdgeImage& edges, const SequenceResult& result) {
+  sigmas_.clear();
+  for (std::size_t i = 0; i < edges.edges.size(); ++i)
+    if (result.boundary[i] >= 0) sigmas_.push_back(edges.edges[i].sigma_px);
+  if (sigmas_.empty()) return kLeastNoise_px;
+  const auto middle = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);
+  std::nth_element(sigmas_.begin(), middle, sigmas_.end());
+  return std::max(kLeastNoise_px, *middle);
+}
+
+void ConsistencyCheck::fill(const EdgeImage& edges, SequenceResult& result) {
+  measured_.assign(stride_ * static_cast<std::size_t>(lines_ + 2 * kMargin), kNone);
+  noise_.assign(measured_.size(), 0);
+  for (int line = 0; line < lines_; ++line) {
+    float* columns = row(measured_, line);
+    float* noises = row(noise_, line);
+    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+      if (result.boundary[e] < 0) continue;
+      columns[result.boundary[e]] = edges.edges[e].column_px;
+      noises[result.boundary[e]] = edges.edges[e].noise_px;
+    }
+  }
+}
+
+/// Quadratics over 7 or else 5 lines (Savitzky-Golay), where they fit as well as noise lets them. Missing
+/// neighbours are NaN, which no comparison lets through.
+void ConsistencyCheck::smooth_line(int line, float noise_px) {
+  std::array<const float*, 7> x{};
+  for (int i = -3; i <= 3; ++i) x[static_cast<std::size_t>(i + 3)] = row(measured_, line + i);
+  float* out = row(smooth_, line);
+  const float limit = kBentFit * noise_px;
+  for (int b = 0; b < boundaries_; ++b) {
+    const float a = x[0][b], c = x[1][b], d = x[2][b], e = x[3][b], f = x[4][b], g = x[5][b], h = x[6][b];
+    const float five = (17 * e + 12 * (d + f) - 3 * (c + g)) * (1.F / 35);
+    const float slope5 = (2 * (g - c) + (f - d)) * 0.1F;
+    const float bend5 = (2 * (c + g) - (d + f) - 2 * e) * (1.F / 14);
+    const float worst5 = std::max(
+        {std::fabs(five - e), std::fabs(five - slope5 + bend5 - d), std::fabs(five + slope5 + bend5 - f),
+         std::fabs(five - 2 * slope5 + 4 * bend5 - c), std::fabs(five + 2 * slope5 + 4 * bend5 - g)});
+    const float seven = (7 * e + 6 * (d + f) + 3 * (c + g) - 2 * (a + h)) * (1.F / 21);
+    const float slope7 = (3 * (h - a) + 2 * (g - c) + (f - d)) * (1.F / 28);
+    const float bend7 = (5 * (a + h) - 3 * (d + f) - 4 * e) * (1.F / 84);
+    const float worst7 = std::max(
+        {std::fabs(seven - e), std::fabs(seven - slope7 + bend7 - d), std::fabs(seven + slope7 + bend7 - f),
+         std::fabs(seven - 2 * slope7 + 4 * bend7 - c), std::fabs(seven + 2 * slope7 + 4 * bend7 - g),
+         std::fabs(seven - 3 * slope7 + 9 * bend7 - a), std::fabs(seven + 3 * slope7 + 9 * bend7 - h)});
+    const float line7 = (a + c + d + e + f + g + h) * (1.F / 7);
+    const float square7 = (a - line7 + 3 * slope7) * (a - line7 + 3 * slope7) +
+                          (c - line7 + 2 * slope7) * (c - line7 + 2 * slope7) +
+                          (d - line7 + slope7) * (d - line7 + slope7) + (e - line7) * (e - line7) +
+                          (f - line7 - slope7) * (f - line7 - slope7) +
+                          (g - line7 - 2 * slope7) * (g - line7 - 2 * slope7) +
+                          (h - line7 - 3 * slope7) * (h - line7 - 3 * slope7);
+    const bool straight7 = square7 <= 7 * kStraightFit * kStraightFit * noise_px * noise_px;
+    // max() drops a NaN it meets second, so the values themselves are asked.
+    const bool good5 = worst5 <= limit && five == five;
+    const bool good7 = worst7 <= limit && seven == seven;
+    out[b] = straight7 ? line7 : good7 ? seven : good5 ? five : e;
+  }
+}
+
+void ConsistencyCheck::suspect_line(int line) {
+  const float* above = row(smooth_, line - 1);
+  const float* here = row(smooth_, line);
+  const float* below = row(smooth_, line + 1);
+  const float* noise = row(noise_, line);
+  std::uint8_t* state =
+      state_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
+  for (int b = 0; b < boundaries_; ++b) {
+    const float across = here[b - 1] - 2 * here[b] + here[b + 1];
+    const float spacing = 0.5F * (here[b + 1] - here[b - 1]);
+    const float along = above[b] - 2 * here[b] + below[b];
+    std::uint8_t s = 0;
+    if (!known(across)) {
+      s |= kOpenAcross;
+    } else if (std::fabs(across) > kBendAcross_px + kBendAcrossShare * spacing + kBendNoise * noise[b]) {
+      s |= kBentAcross;
+    }
+    if (!known(along)) {
+      s |= kOpenAlong;
+    } else if (std::fabs(along) > kBendAlong_px + kBendNoise * noise[b]) {
+      s |= kBentAlong;
+    }
+    state[b] = s;
+  }
+}
+
+/// Size of the piece of surface each boundary belongs to: what hangs together along boundaries and lines.
+void ConsistencyCheck::measure_pieces() {
+  const auto cells = static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_);
+  piece_.resize(cells);
+  size_.assign(cells, 1);
+  const auto root = [&](std::int32_t i) {
+    while (piece_[static_cast<std::size_t>(i)] != i) {
+      auto& up = piece_[static_cast<std::size_t>(i)];
+      up = piece_[static_cast<std::size_t>(up)];
+      i = up;
+    }
+    return i;
+  };
+  const auto join = [&](std::int32_t a, std::int32_t b) {
+    a = root(a);
+    b = root(b);
+    if (a == b) return;
+    if (a > b) std::swap(a, b);
+    piece_[static_cast<std::size_t>(b)] = a;
+    size_[static_cast<std::size_t>(a)] += size_[static_cast<std::size_t>(b)];
+  };
+  for (int line = 0; line < lines_; ++line) {
+    const float* here = row(measured_, line);
+    const float* above = row(measured_, line - 1);
+    for (int b = 0; b < boundaries_; ++b) {
+      const std::int32_t i = line * boundaries_ + b;
+      piece_[static_cast<std::size_t>(i)] = i;
+      if (!known(here[b])) continue;
+      if (std::fabs(here[b] - above[b]) < kLean_px) join(i - boundaries_, i);
+      if (std::fabs(here[b] - here[b - 1]) < kWidest_px) join(i - 1, i);
+    }
+  }
+  for (std::size_t i = 0; i < cells; ++i)
+    size_[i] = size_[static_cast<std::size_t>(root(static_cast<std::int32_t>(i)))];
+}
+
+/// Weighs a suspect boundary's own place against what its neighbours predict. False where it is to be given
+/// up.
+bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate& out) const {
+  const float sigma_px = edge.sigma_px;
+  const std::uint8_t state = state_[static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_) +
+                                    static_cast<std::size_t>(boundary)];
+  const float own = row(smooth_, line)[boundary];
+  std::array<Estimate, 4> predictions{};
+  std::size_t count = 0;
+  // From three, or two, neighbours in one direction.
+  const auto predict = [&](float a, float b, float c, float one) {
+    const float bend = a - 2 * b + c;
+    const float straight = 2 * a - b;
+    if (known(bend)) {
+      predictions[count++] = {straight + kBendShare * bend,
+                              kPrediction_px + kPredictionBend * std::fabs(bend)};
+    } else if (known(straight)) {
+      predictions[count++] = {straight, kPrediction_px + one};
+    } else if (known(b) && known(c)) {
+      predictions[count++] = {3 * b - 2 * c, kPrediction_px + 2 * one};
+    }
+  };
+  const float* here = row(trusted_, line);
+  predict(here[boundary - 1], here[boundary - 2], here[boundary - 3], kTwoAcross_px);
+  predict(here[boundary + 1], here[boundary + 2], here[boundary + 3], kTwoAcross_px);
+  const auto at = [&](int l) { return row(trusted_, line + l)[boundary]; };
+  predict(at(-1), at(-2), at(-3), kTwoAlong_px);
+  predict(at(1), at(2), at(3), kTwoAlong_px);
+  float own_variance = sigma_px * sigma_px + kOwn_px * kOwn_px;
+  if (state & (kOpenAlong | kBentAlong)) own_variance += kDoubtAlong_px * kDoubtAlong_px;
+  if (state & (kOpenAcross | kBentAcross)) own_variance += kDoubtAcross_px * kDoubtAcross_px;
+  out = {own, sigma_px};
+  const bool along = (state & (kOpenAlong | kBentAlong)) != 0;
+  const bool step = beside_step(state);
+  const float alone_px = std::max(kAlone_px, kNoisy * edge.noise_px);
+  const float at_step_px = std::max(kAtStep_px, kNoisy * edge.noise_px);
+  if (count == 0) return sigma_px < (step ? alone_px : kAtMost_px);
+  // The nearest prediction is on the boundary's side of the step.
+  const Estimate* best = nullptr;
+  float least = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float off = predictions[i].column_px - own;
+    const float chi = off * off / (predictions[i].sigma_px * predictions[i].sigma_px + own_variance);
+    if (best == nullptr || chi < least) {
+      best = &predictions[i];
+      least = chi;
+    }
+  }
+  if (least > kAgree * kAgree) return step ? sigma_px < alone_px && !along : sigma_px < kAtMost_px;
+  const float own_weight = 1 / own_variance;
+  const float weight = 1 / (best->sigma_px * best->sigma_px);
+  out.column_px = (own_weight * own + weight * best->column_px) / (own_weight + weight);
+  out.sigma_px = 1 / std::sqrt(own_weight + weight);
+  return out.sigma_px <= (step ? at_step_px : kAtMost_px);
+}
+
+ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, SequenceResult& result,
+                                          EdgeImage& edges) {
+  boundaries_ = boundaries;
+  lines_ = edges.lines;
+  stride_ = static_cast<std::size_t>(boundaries + 2 * kMargin);
+  fill(edges, result);
+  smooth_.assign(measured_.size(), kNone);
+  state_.resize(static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_));
+  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  const float noise = usual_sigma(edges, result);
+  pool.for_ranges(lines_, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) smooth_line(line, noise);
+  });
+  measure_pieces();
+  trusted_ = smooth_;
+  pool.for_ranges(lines_, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) {
+      suspect_line(line);
+      float* trusted = row(trusted_, line);
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        if (result.boundary[e] >= 0 && edges.edges[e].sigma_px > kTrusted_px)
+          trusted[result.boundary[e]] = kNone;
+      }
+    }
+  });
+  pool.for_ranges(lines_, [&](int begin, int end, int worker) {
+    ConsistencyCounts& counts = counts_[static_cast<std::size_t>(worker)];
+    for (int line = begin; line < end; ++line) {
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        const int b = result.boundary[e];
+        if (b < 0) continue;
+        Edge& edge = edges.edges[e];
+        const auto cell = static_cast<std::size_t>(line * boundaries_ + b);
+        const std::uint8_t s = state_[cell];
+        Estimate settled{row(smooth_, line)[b], edge.sigma_px};
+        const bool replaced = row(measured_, line)[b] != edge.column_px;
+        const bool is_step = edge.at_step && beside_step(s);
+        const bool suspect = s != 0 || edge.sigma_px > kSuspect_px;
+        if (replaced || is_step || size_[cell] < kLeastPiece ||
+            (suspect && !settle(line, b, edge, settled))) {
+          result.boundary[e] = -1;
+          ++counts.rejected;
+          continue;
+        }
+        counts.moved += s != 0;
+        edge.column_px = settled.column_px;
+        edge.sigma_px = settled.sigma_px;
+      }
+    }
+  });
+  ConsistencyCounts total;
+  for (const ConsistencyCounts& c : counts_) {
+    total.rejected += c.rejected;
+    total.moved += c.moved;
+  }
+  return total;
+}
+
+}  // namespace relievo

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Decoded boundaries against the surface they lie on. Seen as columns over (line, boundary), a surface is
+// smooth: along a boundary over a few lines more so than noise is, so noise is averaged away; and up to a
+// depth step, beside which edges are drawn towards it by blur or are the step's own, so there a boundary is
+// put back on the surface that its neighbours on the same side of the step show, or given up.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/parallel.h"
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+
+/// Every count is of decoded boundaries.
+struct ConsistencyCounts {
+  std::size_t rejected = 0;  // that no surface passes through
+  std::size_t moved = 0;     // beside a step, put back on the surface
+};
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class ConsistencyCheck {
+ public:
+  /// Gives up boundaries of `result` (-1), moves columns of `edges` and updates their standard deviations.
+  /// Where a line has a boundary twice, the last counts and the others are given up.
+  ConsistencyCounts check(int boundaries, WorkerPool& pool, SequenceResult& result, EdgeImage& edges);
+
+ private:
+  struct Estimate {
+    float column_px;
+    float sigma_px;
+  };
+  float* row(std::vector<float>& grid, int line) const;
+  const float* row(const std::vector<float>& grid, int line) const;
+  void fill(const EdgeImage& edges, SequenceResult& result);
+  float usual_sigma(const EdgeImage& edges, const SequenceResult& result);
+  void smooth_line(int line, float noise_px);
+  void suspect_line(int line);
+  void measure_pieces();
+  bool settle(int line, int boundary, const Edge& edge, Estimate& out) const;
+
+  int boundaries_ = 0;
+  int lines_ = 0;
+  std::size_t stride_ = 0;           // of the grids below, which have kMargin more on all sides
+  std::vector<float> measured_;      // [line][boundary]: column, NaN where there is none
+  std::vector<float> noise_;         // the same: standard deviation that noise alone gives
+  std::vector<float> smooth_;        // the same, noise averaged along the boundary
+  std::vector<float> trusted_;       // of these, those that no contrast in the scene draws off their place
+  std::vector<std::uint8_t> state_;  // [line][boundary]: what the neighbourhood is like (see consistency.cpp)
+  std::vector<std::int32_t> piece_, size_;  // [line][boundary]: of the connected piece of surface
+  std::vector<float> sigmas_;
+  std::vector<ConsistencyCounts> counts_;  // one a worker
+};
+
+}  // namespace relievo

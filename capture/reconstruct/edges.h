@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stripe edges of one frame with everything that can be said about them from that frame: for decoders that
+// weigh evidence instead of deciding pixel by pixel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/parallel.h"
+#include "capture/reconstruct/field_difference.h"
+
+namespace relievo {
+
+/// Three channels' difference beside an edge, in units in which 1 is clearly of that sign and the noise is
+/// small.
+using SideEvidence = std::array<float, 3>;
+
+struct Edge {
+  float column_px = 0;
+  float sigma_px =
+      0;  // standard deviation of column_px, from slope and noise (Cramer-Rao for the samples used)
+  float noise_px = 0;  // the part of sigma_px that is noise; the rest is what the scene around it does
+  float slope = 0;     // root of the sum of the channels' squared slopes, difference units a pixel
+  float contrast = 0;  // 0..1, of the scene in white light around the edge: what draws an edge off its place
+  bool at_step = false;     // the scene itself has a step just here: perhaps it is what was found
+  float left_reach_px = 0;  // how far to the left evidence was gathered, less than half way to the next edge
+  float right_reach_px = 0;
+  SideEvidence left{};  // of the frame the edge was found in
+  SideEvidence right{};
+};
+
+struct EdgeImage {
+  int lines = 0;
+  std::vector<std::uint32_t>
+      line_start;           // lines + 1 entries: edges of line l are [line_start[l], line_start[l + 1])
+  std::vector<Edge> edges;  // by line, then left to right
+};
+
+/// Evidence of colours at `column_px` - reach (left) or + reach (right) on a line of any frame's difference
+/// image.
+SideEvidence evidence_left(const DifferenceImage& image, int line, float column_px, float reach_px);
+SideEvidence evidence_right(const DifferenceImage& image, int line, float column_px, float reach_px);
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class EdgeFinder {
+ public:
+  /// Zero crossings of at least one channel that stand out of the noise; crossings of several channels at one
+  /// place are one edge, weighed by their slopes. `out` is overwritten; its memory is reused.
+  void find(const DifferenceImage& image, WorkerPool& pool, EdgeImage& out);
+
+ private:
+  struct Crossing {
+    float column_px;
+    float slope;
+  };
+  struct Scratch {
+    std::vector<Crossing> crossings;
+    std::vector<Edge> edges;
+    std::vector<std::uint32_t> counts;
+  };
+  static void edges_of_line(const DifferenceImage& image, int line, Scratch& scratch);
+
+  std::vector<Scratch> scratch_;
+};
+
+}  // namespace relievo

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The difference image of a frame's two fields (paper 5.2.1): what every decoder starts from.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "base/parallel.h"
+#include "capture/source/field_source.h"
+
+namespace relievo {
+
+/// D of 5.2.1: calibrated slide minus calibrated complement, low-passed along and across lines, not
+/// normalised. Line l lies at camera row 2 l of an interlaced frame, at row l of a progressive one.
+struct DifferenceImage {
+  int width = 0;
+  int lines = 0;
+  std::vector<float> values;  // [line][channel][width]
+  std::vector<float> white;   // [line][width]: luma of the fields' sum, what the scene shows in white light
+  float largest = 0;          // of the calibrated fields, all channels: 255 of the paper's normalised scale
+  float noise = 0;            // standard deviation of a value, from the picture itself
+
+  const float* white_line(int l) const {
+    return white.data() + static_cast<std::size_t>(l) * static_cast<std::size_t>(width);
+  }
+  const float* line(int l) const {
+    return values.data() + static_cast<std::size_t>(l) * 3 * static_cast<std::size_t>(width);
+  }
+};
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class Differencer {
+ public:
+  explicit Differencer(const std::array<double, 9>& colour_matrix);
+
+  /// Low-pass, colour matrix (Eq. 3) and difference. `out` is overwritten; its memory is reused.
+  void difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+
+ private:
+  struct Scratch {
+    std::vector<float> rows;  // calibrated rows of both fields, each with its luma as a fourth plane
+    float largest = 0;
+  };
+  void raw_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+
+  std::array<float, 9> matrix_;
+  std::vector<float> raw_;  // [line][3 channels, white][width], before the low-pass across lines
+  std::vector<Scratch> scratch_;
+};
+
+}  // namespace relievo

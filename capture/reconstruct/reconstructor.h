@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole of paper sections 5.2 to 5.4: camera frames in, surfaces out.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "base/frame3d.h"
+#include "base/pattern.h"
+#include "base/result.h"
+#include "base/rig.h"
+#include "capture/source/field_source.h"
+
+namespace relievo {
+
+enum class Decoder {
+  kOrdered,  // by the sequence's order along and across lines (capture/reconstruct/sequence.h)
+  kPaper,    // as the paper writes it (5.2, 5.3): the readable reference
+};
+
+struct ReconstructOptions {
+  Decoder decoder = Decoder::kOrdered;
+  int threads = 1;  // 1 is the serial reference; more give the same result
+  bool texture = true;
+};
+
+/// Milliseconds of each stage of the last frame, and what each decided.
+struct ReconstructReport {
+  double detect_ms = 0, match_ms = 0, triangulate_ms = 0, surface_ms = 0, texture_ms = 0;
+  std::size_t boundaries = 0;  // detected in this frame
+  std::size_t matched = 0;     // of which decoded with the frame before
+  bool same_slide = false;     // this frame shows the slide of the one before: a frame was dropped (5.2.3)
+};
+
+/// One stream's decoder: holds the frame before. One thread at a time.
+class Reconstructor {
+ public:
+  /// Fails where rig and pattern do not fit (see read_pattern for what a valid pattern is).
+  static Result<Reconstructor> create(const Rig& rig, const Pattern& pattern,
+                                      const ReconstructOptions& options);
+  Reconstructor(Reconstructor&&) noexcept;
+  Reconstructor& operator=(Reconstructor&&) noexcept;
+  ~Reconstructor();
+
+  /// The surface this frame completes with the last one under the other slide: the frame before, unless
+  /// frames were dropped (5.2.3). Nothing until both slides were seen. Fails where the frame's size is not
+  /// the rig's.
+  Result<std::optional<Frame3D>> add(const CapturedFrame& frame);
+
+  /// Of the last add().
+  const ReconstructReport& report() const;
+
+ private:
+  struct State;
+  explicit Reconstructor(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace relievo

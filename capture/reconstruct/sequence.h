@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which projected boundary each edge is, from the order of the sequence. Beyond paper 5.3: boundaries come
+// along a line in the order in which they were projected, so a line is decoded as a whole; and neighbouring
+// lines see the same boundaries, so each line's result is checked and completed by the others'. One frame's
+// colours and the order nearly suffice; the other slide's frame adds evidence where the scene held still, and
+// cannot veto where it moved.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/pattern.h"
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/match.h"
+
+namespace relievo {
+
+/// Every count is of edges.
+struct SequenceCounts {
+  std::size_t in_order = 0;     // decoded along their line
+  std::size_t unsupported = 0;  // of which given up, since no neighbour agreed
+  std::size_t completed = 0;    // decoded by the lines above and below
+};
+
+struct SequenceResult {
+  std::vector<std::int16_t> boundary;  // one an edge: its index in the pattern, or -1
+  SequenceCounts counts;
+  double score = 0;  // sum over the lines: the greater, the better the slides' order explains the frame
+};
+
+/// The frames before, as far as there are any.
+struct SequenceContext {
+  SlideOrder order{};
+  const DifferenceImage* other = nullptr;  // the last frame under the other slide
+  const DifferenceImage* same = nullptr;   // the last frame before that under the slide that the edges are of
+};
+
+/// Constant after construction but for scratch memory. One thread.
+class SequenceDecoder {
+ public:
+  explicit SequenceDecoder(const Pattern& pattern);
+
+  /// `out` is overwritten; its memory is reused.
+  void decode(const EdgeImage& edges, const SequenceContext& context, WorkerPool& pool, SequenceResult& out);
+
+  /// Colours to the left and right of each boundary, under the slide that the newer frame shows.
+  const std::vector<std::array<Primary, 2>>& shown_colours(SlideOrder order) const {
+    return slides_[order == SlideOrder::kNewerIsFirst ? 0 : 1].colours;
+  }
+
+ private:
+  static constexpr int kCandidates = 8;
+  struct Candidate {
+    std::int16_t boundary;
+    float gain;         // of calling the edge this boundary, evidence alone
+    float best;         // of the best path that ends here
+    std::int32_t from;  // index of the candidate before it on that path, -1 where the path starts
+    std::int32_t same;  // index of the candidate before it for the same boundary, -1 where there is none
+  };
+  struct Scratch {
+    std::vector<Candidate> candidates;  // of one line
+    std::vector<std::int32_t>
+        edge_begin;                     // candidates of the line's edge e: [edge_begin[e], edge_begin[e + 1])
+    std::vector<std::int32_t> edge_of;  // of a candidate
+    std::vector<std::int32_t> last;     // of each boundary: its last candidate on the line so far, or -1
+    double score = 0;
+    std::size_t in_order = 0;
+  };
+  struct Slide {
+    std::array<std::vector<std::int16_t>, 64>
+        by_transition;                            // boundaries with these colours left * 8 + right
+    std::vector<std::array<Primary, 2>> colours;  // of each boundary
+  };
+
+  /// What the other slide's frame shows on an edge's sides.
+  struct Beside {
+    SideEvidence left, right;
+    bool tracked;  // the edge was found two frames ago, so this belongs to it
+  };
+
+  static Beside look_beside(const Edge& edge, int line, const SequenceContext& context);
+  void find_candidates(const Edge& edge, const Beside& beside, const SequenceContext& context,
+                       Scratch& scratch) const;
+  void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
+                   SequenceResult& out) const;
+  void check_and_complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
+  bool convincing(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
+  float gain(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
+
+  const Slide& shown_slide(const SequenceContext& c) const {
+    return slides_[c.order == SlideOrder::kNewerIsFirst ? 0 : 1];
+  }
+  const Slide& other_slide(const SequenceContext& c) const {
+    return slides_[c.order == SlideOrder::kNewerIsFirst ? 1 : 0];
+  }
+
+  std::array<Slide, 2> slides_;
+  int boundaries_;
+  std::vector<Scratch> scratch_;
+  std::vector<Beside> beside_;      // one an edge
+  std::vector<std::int32_t> grid_;  // [line][boundary]: edge or -1
+};
+
+/// True where both pictures were taken under the same slide (5.2.3): the signs of what stands out agree.
+bool same_slide(const DifferenceImage& a, const DifferenceImage& b);
+
+}  // namespace relievo

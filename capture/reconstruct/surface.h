@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// From decoded boundaries to a surface on the stripe x line grid (paper 5.4, 6: "connectivity is given by the
+// nearest boundaries in image space"), cut at depth steps.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/frame3d.h"
+
+namespace relievo {
+
+/// A measured point with its place on the grid.
+struct GridVertex {
+  GridPoint at;
+  Vec3f position{};  // metres, camera frame
+  float slope = 0;   // of the boundary it came from: the better of two at one place is kept
+};
+
+struct SurfaceOptions {
+  // A cell's edge is cut where its depth step exceeds this many times its extent across the view.
+  float depth_step_ratio = 4;
+  // Triangles seen more edge-on than this are the curtains that wrong points hang between surfaces: 0.2 keeps
+  // surfaces up to 78 degrees off the view's plane.
+  float least_facing = 0.2F;
+  // Connected pieces with fewer vertices are most often wrong codes; 0 keeps vertices in no triangle, too.
+  int least_component = 10;
+};
+
+/// What a surface lost to its filters, in vertices.
+struct SurfaceCounts {
+  std::size_t duplicate = 0;        // at a grid place that a better vertex has
+  std::size_t small_component = 0;  // in pieces below least_component
+};
+
+/// Grows with use and is kept from frame to frame.
+struct SurfaceScratch {
+  std::vector<std::int32_t> grid;  // [line][boundary]: vertex or -1
+  std::vector<std::int32_t> kept;
+  std::vector<std::int32_t> parent;  // union-find over vertices
+  std::vector<std::int32_t> size;    // of a root's component
+};
+
+/// `vertices` in any order. Fills positions, normals, grid and triangles of `out`, in order of line and
+/// boundary.
+SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundaries, int lines,
+                            const SurfaceOptions& options, SurfaceScratch& scratch, Surface& out);
+
+}  // namespace relievo

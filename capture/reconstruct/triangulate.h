@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a boundary seen at a camera pixel to a point in space: the camera's ray against the light sheet of the
+// projected boundary (paper 5.4), with the lens distortion of both.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/frame3d.h"
+#include "base/pattern.h"
+#include "base/rig.h"
+
+namespace relievo {
+
+/// Normalised image coordinates (x/z, y/z) of a distorted pixel, by Newton's method on the Brown-Conrady
+/// model. Nothing where the model has no inverse near the pixel (it folds over far outside what was
+/// calibrated).
+std::optional<std::array<double, 2>> undistort(const PinholeModel& model, double column_px, double row_px);
+
+/// Distorted pixel of normalised image coordinates.
+std::array<double, 2> distort(const PinholeModel& model, double x, double y);
+
+/// Precomputed for one rig, pattern and line spacing; immutable, so any number of threads may share it.
+class Triangulator {
+ public:
+  Triangulator(const Rig& rig, const Pattern& pattern, int lines, int line_step_px);
+
+  /// The point, in metres in the camera's frame, of pattern boundary `boundary` seen at `column_px` on
+  /// `line`. Nothing where ray and sheet do not meet in front of both camera and projector.
+  std::optional<Vec3f> point(int boundary, int line, float column_px) const;
+
+ private:
+  std::array<float, 2> ray(int line, float column_px) const;
+  double sheet(int boundary, double y) const;
+
+  int ray_samples_;                         // a line
+  std::vector<std::array<float, 2>> rays_;  // [line][every kRayStep columns]: x/z, y/z of the camera's ray
+  int sheet_samples_;
+  double sheet_first_, sheet_step_;  // y/z of the first sample, and between samples
+  std::vector<float> sheets_;        // [boundary][sample]: x/z in the projector's frame
+  bool straight_sheets_;             // no projector distortion: the first sample holds for all
+  std::array<double, 9> rotation_;
+  std::array<double, 3> translation_;
+};
+
+}  // namespace relievo

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where fields come from: a take on disk, the simulator, a camera. One interface, one compliance suite
+// (tests/unit/capture/source_compliance_test.cpp) that every source must pass.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/image.h"
+#include "base/pattern.h"
+#include "base/result.h"
+#include "base/rig.h"
+
+namespace relievo {
+
+/// One camera frame: the exposure under a slide and the one under its complement. Owns its pixels.
+struct CapturedFrame {
+  std::uint64_t number = 0;  // counted by the source from 0; a looping source keeps counting
+  std::int64_t time_ns = 0;  // start of the first field, since the source's own start (see SourceInfo::live)
+  Scan scan = Scan::kInterlaced;
+  Image8 picture;     // RGB: the interlaced picture, or the progressive one under the slide
+  Image8 complement;  // progressive only: the picture under the complement
+
+  /// The exposure under the slide: even rows of an interlaced picture, or the whole first picture.
+  View8 slide_field() const { return scan == Scan::kInterlaced ? picture.view().field(0) : picture.view(); }
+  /// The exposure under the complement: odd rows of an interlaced picture, or the whole second picture.
+  View8 complement_field() const {
+    return scan == Scan::kInterlaced ? picture.view().field(1) : complement.view();
+  }
+};
+
+struct SourceInfo {
+  std::string name;  // as asked for, e.g. "take:bunny"
+  Rig rig;
+  Pattern pattern;
+  bool live = false;                    // true: next() returns at the camera's own pace and times are UTC
+  std::optional<std::uint64_t> frames;  // how many there are in one pass, where the source is finite
+};
+
+/// Lives on one thread at a time: construct, next() until it ends, destroy. Only request_stop() may be called
+/// from another thread. A source does not pace itself unless it is live; whoever plays it does, by
+/// CapturedFrame::time_ns.
+class FieldSource {
+ public:
+  virtual ~FieldSource() = default;
+
+  /// Constant for the source's life.
+  virtual const SourceInfo& info() const = 0;
+
+  /// The next frame in order; nothing at the end or once stopped. After an error the source may be asked
+  /// again: it goes on behind what it could not read where that is possible, and ends otherwise.
+  virtual Result<std::optional<CapturedFrame>> next() = 0;
+
+  /// Makes a waiting next() return soon, and every later one return nothing. Any thread.
+  virtual void request_stop() = 0;
+};
+
+struct SourceOptions {
+  bool loop = false;  // start again at the end, times and numbers going on
+};
+
+/// Opens "sim:SCENE" or "take:DIR". The error says what is wrong with the name or the source and how to mend
+/// it.
+Result<std::unique_ptr<FieldSource>> open_source(const std::string& uri, const SourceOptions& options);
+
+}  // namespace relievo

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/source/npy.h"
+
+#include <bit>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+namespace relievo {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "truth is written as it lies in memory");
+
+constexpr char kMagic[] = "\x93NUMPY\x01";  // and a zero: version 1.0
+constexpr std::size_t kPreamble = 10;       // magic, version, length of the header
+
+}  // namespace
+
+Result<ImageF> read_npy(const std::filesystem::path& file) {
+  const std::string name = file.string();
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return Error{name + " cannot be opened"};
+  char preamble[kPreamble];
+  if (!in.read(preamble, kPreamble) || std::memcmp(preamble, kMagic, 8) != 0) {
+    return Error{name + " is no .npy file of version 1.0"};
+  }
+  const auto byte = [&](std::size_t i) {
+    return static_cast<std::size_t>(static_cast<unsigned char>(preamble[i]));
+  };
+  std::string header(byte(8) + 256 * byte(9), '\0');
+  if (!in.read(header.data(), static_cast<std::streamsize>(header.size())))
+    return Error{name + " is cut short"};
+  const std::size_t shape = header.find("'shape': (");
+  int height = 0, width = 0, used = 0;
+  if (header.find("'<f4'") == std::string::npos ||
+      header.find("'fortran_order': False") == std::string::npos || shape == std::string::npos ||
+      std::sscanf(header.c_str() + shape, "'shape': (%d, %d)%n", &height, &width, &used) != 2 || used == 0 ||
+      height <= 0 || width <= 0 || height > 1 << 16 || width > 1 << 16) {
+    return Error{name + " must hold float32 of shape (height, width) in C order"};
+  }
+  std::error_code code;
+  const auto bytes = static_cast<std::uintmax_t>(height) * static_cast<std::uintmax_t>(width) * sizeof(float);
+  if (std::filesystem::file_size(file, code) != kPreamble + header.size() + bytes || code) {
+    return Error{name + " does not have the size that its header says"};
+  }
+  ImageF image(width, height, 1);
+  if (!in.read(reinterpret_cast<char*>(image.data()), static_cast<std::streamsize>(bytes))) {
+    return Error{name + " is cut short"};
+  }
+  return image;
+}
+
+Status write_npy(const std::filesystem::path& file, const ImageF& image) {
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
+                       std::to_string(image.height()) + ", " + std::to_string(image.width()) + "), }";
+  header.append(64 - (kPreamble + header.size() + 1) % 64, ' ');  // data aligned to 64 bytes
+  header += '\n';
+  std::ofstream out(file, std::ios::binary);
+  out.write(kMagic, 8);
+  out.put(static_cast<char>(header.size() & 255));
+  out.put(static_cast<char>(header.size() >> 8));
+  out << header;
+  out.write(reinterpret_cast<const char*>(image.data()),
+            static_cast<std::streamsize>(image.size() * sizeof(float)));
+  out.close();
+  if (!out) return Error{file.string() + " cannot be written: is the disk full?"};
+  return {};
+}
+
+}  // namespace relievo

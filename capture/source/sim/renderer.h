@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// The simulated rig: casts a ray a pixel and lights it with the projector's stripes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "base/image.h"
+#include "base/pattern.h"
+#include "base/rig.h"
+#include "capture/source/sim/scene.h"
+#include "capture/source/sim/sim_options.h"
+#include "capture/source/sim/stripe_light.h"
+
+namespace relievo::sim {
+
+/// The rig that films a scene with these options.
+Rig make_rig(const SimOptions& options, const SceneView& view);
+
+/// One camera frame as rendered.
+struct RenderedFrame {
+  Image8 picture, complement;  // complement: progressive only
+  ImageF truth;                // depth along z in metres, 0 = none; where asked for
+};
+
+/// Immutable: any number of threads may render at once.
+class Renderer {
+ public:
+  Renderer(const SimOptions& options, const Rig& rig, const Pattern& pattern,
+           std::shared_ptr<const Scene> scene);
+
+  /// Camera frame `index`, lost ones counted: it shows slide index % slides. Each field is rendered at its
+  /// own time, half a frame apart; each row of the truth at its field's time, a progressive truth at the
+  /// first picture's. The same index gives the same bytes on every thread.
+  RenderedFrame render(std::uint64_t index, bool with_truth) const;
+
+ private:
+  struct Row;
+  struct Placed;
+  struct Field {
+    const StripeLight* light;
+    bool complement;
+    double time_s;
+    int first_row, row_step;
+    std::uint64_t noise_key;
+  };
+
+  void render_field(const Field& field, Image8& out, ImageF* truth) const;
+  void trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const;
+  Vec3 shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,
+             Vec3 direction, Vec3 direction_step) const;
+  void blur_chroma(Row& row) const;
+  void quantise(const Row& row, std::uint64_t noise_key, std::uint8_t* out) const;
+
+  SimOptions options_;
+  Rig rig_;
+  std::shared_ptr<const Scene> scene_;
+  std::vector<StripeLight> lights_;    // one a slide
+  std::vector<Vec3> rays_;             // one a pixel, z = 1
+  Mat3 camera_colour_from_projected_;  // crosstalk, inverse of Eq. 1's M
+  Mat3 projector_from_camera_;
+  Vec3 projector_translation_, projector_centre_;
+  bool projector_distorts_ = false;
+  float exposure_ = 0;                // 8-bit value of white albedo facing the projector at 1 m, times m^2
+  float ambient_value_ = 0;           // 8-bit value of white albedo in ambient light
+  std::vector<float> chroma_kernel_;  // one side, centre first
+  std::vector<float> noise_;          // normal deviates times sigma
+};
+
+}  // namespace relievo::sim

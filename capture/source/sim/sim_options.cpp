@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/source/sim/sim_options.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+#include <variant>
+
+namespace relievo::sim {
+namespace {
+
+struct Key {
+  std::string_view name;
+  std::variant<int SimOptions::*, double SimOptions::*, std::uint32_t SimOptions::*> field;
+  double low, high;
+  std::string_view meaning;
+};
+
+constexpr Key kKeys[] = {
+    {"width", &SimOptions::width, 32, 4096, "camera pixels"},
+    {"height", &SimOptions::height, 32, 4096, "camera pixels"},
+    {"rate", &SimOptions::rate, 1, 1000, "frames a second"},
+    {"frames", &SimOptions::frames, 0, 1e6, "frames of one pass, 0: one period"},
+    {"period", &SimOptions::period, 2, 10000, "frames until all motion repeats"},
+    {"drop", &SimOptions::drop, 0, 1e6, "every n-th camera frame is lost, 0: none"},
+    {"projector_width", &SimOptions::projector_width, 32, 8192, "projector pixels"},
+    {"projector_height", &SimOptions::projector_height, 32, 8192, "projector pixels"},
+    {"base", &SimOptions::base, 3, 6, "colours of the code"},
+    {"slides", &SimOptions::slides, 1, 6, "slides projected in turn"},
+    {"stripes", &SimOptions::stripes, 2, 8192, "stripes across the projector"},
+    {"first", &SimOptions::first, 0, 1e9, "first stripe within the code's path"},
+    {"noise", &SimOptions::noise, 0, 100, "sigma, of 255"},
+    {"chroma", &SimOptions::chroma, 0, 20, "sigma of the chroma blur, camera pixels"},
+    {"defocus", &SimOptions::defocus, 0, 8, "sigma of the projector's blur, projector pixels"},
+    {"ambient", &SimOptions::ambient, 0, 10, "light that is not the projector's, of its white"},
+    {"gloss", &SimOptions::gloss, 0, 100, "times each material's gloss"},
+    {"albedo", &SimOptions::albedo, 0, 2, "times each material's albedo"},
+    {"crosstalk", &SimOptions::crosstalk, 0, 1, "of the colour channels, 0: none"},
+    {"exposure", &SimOptions::exposure, 0.01, 100, "times the scene's own"},
+    {"distortion", &SimOptions::distortion, 0, 2, "times a cheap lens's distortion"},
+    {"seed", &SimOptions::seed, 0, 4294967295.0, "of the noise"},
+};
+
+std::string text(double value) {
+  char out[32];
+  std::snprintf(out, sizeof out, "%.10g", value);
+  return out;
+}
+
+std::string key_names() {
+  std::string out = "scan";
+  for (const Key& key : kKeys) out += ", " + std::string(key.name);
+  return out;
+}
+
+Status set(SimOptions& options, const std::string& name, const std::string& value) {
+  if (name == "scan") {
+    if (value != "interlaced" && value != "progressive") {
+      return Error{"scan=" + value + ": give interlaced or progressive"};
+    }
+    options.scan = value == "interlaced" ? Scan::kInterlaced : Scan::kProgressive;
+    return {};
+  }
+  for (const Key& key : kKeys) {
+    if (name != key.name) continue;
+    double number = 0;
+    const auto [end, code] = std::from_chars(value.data(), value.data() + value.size(), number);
+    const bool whole = !std::holds_alternative<double SimOptions::*>(key.field);
+    if (code != std::errc{} || end != value.data() + value.size() ||
+        !(number >= key.low && number <= key.high) || (whole && number != std::floor(number))) {
+      return Error{name + "=" + value + ": give a " + (whole ? "whole number " : "number ") + text(key.low) +
+                   " to " + text(key.high) + " (" + std::string(key.meaning) + ")"};
+    }
+    if (const auto* i = std::get_if<0>(&key.field)) options.*(*i) = static_cast<int>(number);
+    if (const auto* d = std::get_if<1>(&key.field)) options.*(*d) = number;
+    if (const auto* u = std::get_if<2>(&key.field)) options.*(*u) = static_cast<std::uint32_t>(number);
+    return {};
+  }
+  return Error{"unknown key \"" + name + "\": give one of " + key_names()};
+}
+
+}  // namespace
+
+Result<SimOptions> parse_sim_options(const std::string& spec) {
+  SimOptions options;
+  std::size_t at = spec.find(',');
+  options.scene = spec.substr(0, at);
+  while (at != std::string::npos) {
+    const std::size_t end = spec.find(',', at + 1);
+    const std::string item = spec.substr(at + 1, end == std::string::npos ? end : end - at - 1);
+    const std::size_t equals = item.find('=');
+    if (equals == std::string::npos)
+      return Error{"\"" + item + "\" is no key=value; keys are " + key_names()};
+    if (const Status status = set(options, item.substr(0, equals), item.substr(equals + 1)); !status) {
+      return status.error();
+    }
+    at = end;
+  }
+  if (options.period % options.slides != 0 || options.period % 2 != 0) {
+    return Error{"period=" + std::to_string(options.period) + ": give an even number that slides=" +
+                 std::to_string(options.slides) + " divides, so that a loop goes on with the right slide"};
+  }
+  if (options.scan == Scan::kInterlaced && options.height % 2 != 0) {
+    return Error{"height=" + std::to_string(options.height) + ": an interlaced picture has an even height"};
+  }
+  if (options.drop == 1) return Error{"drop=1 loses every frame: give 0 or 2 and above"};
+  if (options.stripes * 2 > options.projector_width) {
+    return Error{"stripes=" + std::to_string(options.stripes) +
+                 ": give at most half of projector_width=" + std::to_string(options.projector_width)};
+  }
+  return options;
+}
+
+std::string sim_options_help() {
+  const SimOptions defaults;
+  std::string out = "scan=interlaced|progressive (interlaced)\n";
+  for (const Key& key : kKeys) {
+    const double value =
+        std::visit([&](auto field) { return static_cast<double>(defaults.*field); }, key.field);
+    out += std::string(key.name) + "=" + text(key.low) + ".." + text(key.high) + " (" + text(value) +
+           "): " + std::string(key.meaning) + "\n";
+  }
+  return out;
+}
+
+}  // namespace relievo::sim

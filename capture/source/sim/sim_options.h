@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can be asked of the simulator: "SCENE[,key=value...]".
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "base/result.h"
+#include "base/rig.h"
+
+namespace relievo::sim {
+
+/// Defaults follow the paper's system: NTSC, 90 stripes of a (6,2) code.
+struct SimOptions {
+  std::string scene = "face";
+  int width = 640, height = 480;  // camera pixels
+  Scan scan = Scan::kInterlaced;
+  double rate = 29.97;  // frames a second
+  int frames = 0;       // frames of one pass; 0: one period
+  int period = 80;      // frames until all motion repeats; a looped source renders these once
+  int drop = 0;         // every n-th camera frame is lost; 0: none
+
+  int projector_width = 1024, projector_height = 768;
+  int base = 6, slides = 2, stripes = 90;
+  int first = 0;  // first stripe within the code's whole path
+
+  double noise = 1.2;       // sigma, of 255
+  double chroma = 1.0;      // sigma of the chroma blur along a line, camera pixels
+  double defocus = 0.7;     // sigma of the projector's blur, projector pixels
+  double ambient = 0.04;    // light that is not the projector's, of its white
+  double gloss = 1.0;       // times each material's own gloss
+  double albedo = 1.0;      // times each material's own albedo: dark scenes
+  double crosstalk = 1.0;   // 0: the camera sees the projector's primaries as they are
+  double exposure = 1.0;    // times the exposure that puts white at working distance to 230
+  double distortion = 0.0;  // times the lens distortion of a cheap camera and projector
+  std::uint32_t seed = 1;
+};
+
+/// Errors name the key or value and list the valid ones.
+Result<SimOptions> parse_sim_options(const std::string& spec);
+
+/// One line a key: name, range, default. For help texts.
+std::string sim_options_help();
+
+}  // namespace relievo::sim

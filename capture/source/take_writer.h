@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes a take folder (docs/TAKES.md).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+
+#include "base/result.h"
+#include "capture/source/sim/sim_source.h"
+
+namespace relievo {
+
+struct TakeOptions {
+  std::uint64_t frames = 0;                                  // at most; 0: until the source ends
+  std::function<void(std::uint64_t written)> progress = {};  // after each frame
+  const std::atomic<bool>* stop = nullptr;  // once true, nothing is left behind and an error returned
+};
+
+/// Writes the frames of `source`, and their truth where it has any, into the new folder `take`. The folder
+/// appears when it is complete: until then a sibling ".NAME.partial-PID" holds it, which is removed on every
+/// failure. A folder that is there already and is not empty is refused.
+Status write_take(const std::filesystem::path& take, SimSource& source, const TakeOptions& options);
+
+}  // namespace relievo

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/program.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <string_view>
+#include <utility>
+
+#include "base/log.h"
+#include "cli/help.h"
+
+namespace relievo {
+namespace {
+
+struct Verbosity {
+  bool verbose = false;
+  bool quiet = false;
+  bool version = false;
+};
+
+// Every command has the common flags itself, so that they work behind the verb and show in its --help.
+void add_common_flags(CLI::App& app, Verbosity& verbosity) {
+  auto* verbose = app.add_flag("-v,--verbose", verbosity.verbose, "Log more");
+  app.add_flag("-q,--quiet", verbosity.quiet, "Log errors only, draw no progress bar")->excludes(verbose);
+  app.add_flag_callback(
+      "--version", [] { throw CLI::CallForVersion(RELIEVO_VERSION, 0); }, "Print the version and exit");
+}
+
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  for (char& c : text) {
+    if (c == '\n') c = ' ';
+  }
+  return text;
+}
+
+int usage_error(const std::string& name, const std::string& message) {
+  std::fprintf(stderr, "%s: %s (see %s --help)\n", name.c_str(), one_line(message).c_str(), name.c_str());
+  return kExitUsage;
+}
+
+// What stands where the command should, or nothing.
+std::string first_word(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    if (argv[i][0] != '-') return argv[i];
+  }
+  return {};
+}
+
+// Results that could not be written (a full disk, a closed pipe) are a failure, not silence.
+int flush_results(const std::string& name, int code) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::cout.good()) return code;
+  std::fprintf(stderr,
+               "%s: error: cannot write the results to standard output: it is closed or its disk is full\n",
+               name.c_str());
+  return code == kExitDone ? kExitFailed : code;
+}
+
+int parse_and_run(const std::string& name, const std::string& description,
+                  const std::vector<Command>& commands, int argc, char** argv) {
+  StopSignal stop;
+  CLI::App app(description, name);
+  app.formatter(make_help_formatter());  // the verbs inherit it
+  Verbosity verbosity;
+  add_common_flags(app, verbosity);
+  app.require_subcommand(1);
+  std::vector<std::pair<CLI::App*, std::function<Status(StopSignal&)>>> actions;
+  for (const Command& command : commands) {
+    CLI::App* sub = app.add_subcommand(command.name, command.description)->group("Commands");
+    add_common_flags(*sub, verbosity);
+    actions.emplace_back(sub, command.define(*sub));
+  }
+
+  std::string chosen = name;
+  const std::string word = first_word(argc, argv);
+  const bool known =
+      std::any_of(commands.begin(), commands.end(), [&](const Command& c) { return c.name == word; });
+  if (!word.empty() && !known) {  // CLI11 would say that a command is required
+    return usage_error(name, "there is no command '" + word + "'");
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForVersion&) {
+    std::printf("%s %s\n", name.c_str(), RELIEVO_VERSION);
+    return flush_results(name, kExitDone);
+  } catch (const CLI::Success& e) {  // --help, in its kinds
+    return flush_results(name, app.exit(e));
+  } catch (const CLI::ParseError& e) {
+    for (const CLI::App* sub : app.get_subcommands()) chosen = name + ' ' + sub->get_name();
+    const bool no_verb = std::string_view(e.what()).starts_with("A subcommand is required");
+    return usage_error(chosen, no_verb ? "which command?" : e.what());
+  }
+
+  if (verbosity.verbose) set_log_level(LogLevel::kDebug);
+  if (verbosity.quiet) set_log_level(LogLevel::kError);
+  for (const auto& [sub, action] : actions) {
+    if (!sub->parsed()) continue;
+    const Status status = action(stop);
+    if (status.ok()) return flush_results(name, kExitDone);
+    std::cout.flush();
+    std::fflush(stdout);
+    std::fprintf(stderr, "%s %s: error: %s\n", name.c_str(), sub->get_name().c_str(),
+                 one_line(status.error().message).c_str());
+    return kExitFailed;
+  }
+  return kExitUsage;  // not reached: one command is required
+}
+
+}  // namespace
+
+int run_program(const std::string& name, const std::string& description, const std::vector<Command>& commands,
+                int argc, char** argv) {
+  try {
+    return parse_and_run(name, description, commands, argc, argv);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s: error: %s\n", name.c_str(), one_line(e.what()).c_str());
+    return kExitFailed;
+  }
+}
+
+}  // namespace relievo

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ctrl-C and SIGTERM as a flag, a wait and a callback, so that a command ends with nothing lost.
+#pragma once
+
+#include <chrono>
+#include <functional>
+
+namespace relievo {
+
+/// Takes over SIGINT and SIGTERM and ignores SIGPIPE for its life; one a process, made by run_program before
+/// any other thread. The third signal ends the process at once, for a command that hangs while stopping.
+/// Every function may be called from any thread.
+class StopSignal {
+ public:
+  StopSignal();
+  StopSignal(const StopSignal&) = delete;
+  StopSignal& operator=(const StopSignal&) = delete;
+  ~StopSignal();
+
+  bool stopped() const;
+  /// Returns true as soon as stopped, false after `timeout`.
+  bool wait_for(std::chrono::nanoseconds timeout) const;
+  /// Waits until stopped.
+  void wait() const;
+
+  /// Calls `callback` once when stopped, on a thread of its own, at once where that was before. It must not
+  /// call on_stop or clear_on_stop. Clear it before what it refers to is destroyed: clear_on_stop() waits
+  /// for a running callback.
+  void on_stop(std::function<void()> callback);
+  void clear_on_stop();
+
+  /// Stops as a signal would.
+  void request();
+
+ private:
+  struct State;
+  State* state_;
+};
+
+}  // namespace relievo

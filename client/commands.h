@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verbs of `relievo`, one file each; main.cpp lists them.
+#pragma once
+
+#include "cli/program.h"
+
+namespace relievo {
+
+Command streams_command();
+Command record_command();
+Command play_command();
+Command info_command();
+Command export_command();
+Command web_command();
+
+}  // namespace relievo

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "cli/checks.h"
+#include "cli/progress.h"
+#include "client/commands.h"
+#include "client/options.h"
+#include "client/recorded_stream.h"
+#include "codec/frame3d_codec.h"
+#include "idl/cdr.h"
+
+namespace relievo {
+namespace {
+
+struct Options {
+  std::shared_ptr<DomainOptions> domain;
+  std::string what;
+  std::string stream;
+  double wait_s = 3;
+  bool json = false;
+};
+
+// What frames add up to, in a file or over a while of a live stream.
+struct FrameTotals {
+  std::uint64_t frames = 0;
+  std::uint64_t lost = 0;        // gaps in the frame sequence
+  std::uint64_t unreadable = 0;  // frames whose bytes are of no version we know
+  std::uint64_t geometry_bytes = 0, texture_bytes = 0, other_bytes = 0;
+  std::uint64_t vertices = 0, triangles = 0;
+  std::set<std::string> geometry_codecs, texture_codecs;
+  std::uint32_t texture_width = 0, texture_height = 0;  // of the last frame
+  std::int64_t first_ns = 0, last_ns = 0;               // publish times
+  std::uint64_t last_sequence = 0;
+
+  double rate() const {
+    return frames > 1 && last_ns > first_ns ? static_cast<double>(frames - 1) / seconds(last_ns - first_ns)
+                                            : 0;
+  }
+  std::uint64_t bytes() const { return geometry_bytes + texture_bytes + other_bytes; }
+};
+
+std::string codec_name(GeometryCodec codec) {
+  return codec == GeometryCodec::kDracoMesh ? "draco-mesh" : std::to_string(static_cast<int>(codec));
+}
+std::string codec_name(TextureCodec codec) {
+  if (codec == TextureCodec::kNone) return "none";
+  return codec == TextureCodec::kJpeg ? "jpeg" : std::to_string(static_cast<int>(codec));
+}
+
+void add_frame(FrameTotals& totals, std::uint64_t sequence, std::int64_t publish_time_ns,
+               std::span<const std::uint8_t> data) {
+  if (totals.frames > 0 && sequence > totals.last_sequence)
+    totals.lost += sequence - totals.last_sequence - 1;
+  totals.last_sequence = sequence;
+  if (totals.frames++ == 0) totals.first_ns = publish_time_ns;
+  totals.last_ns = publish_time_ns;
+  const auto header = read_frame_header(data);
+  if (!header) {
+    ++totals.unreadable;
+    totals.other_bytes += data.size();
+    return;
+  }
+  totals.geometry_bytes += header->geometry_bytes;
+  totals.texture_bytes += header->texture_bytes;
+  totals.other_bytes += data.size() - header->geometry_bytes - header->texture_bytes;
+  totals.vertices += header->vertices;
+  totals.triangles += header->triangles;
+  totals.geometry_codecs.insert(codec_name(header->geometry));
+  totals.texture_codecs.insert(codec_name(header->texture));
+  totals.texture_width = header->texture_width;
+  totals.texture_height = header->texture_height;
+}
+
+std::string joined(const std::set<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+nlohmann::json frames_json(const FrameTotals& totals) {
+  const std::uint64_t read = totals.frames - totals.unreadable;
+  return {{"frames", totals.frames},
+          {"lost", totals.lost},
+          {"unreadable", totals.unreadable},
+          {"frame_rate", totals.rate()},
+          {"bytes",
+           {{"geometry", totals.geometry_bytes},
+            {"texture", totals.texture_bytes},
+            {"other", totals.other_bytes}}},
+          {"geometry_codecs", totals.geometry_codecs},
+          {"texture_codecs", totals.texture_codecs},
+          {"texture_size", {totals.texture_width, totals.texture_height}},
+          {"mean_vertices", read > 0 ? totals.vertices / read : 0},
+          {"mean_triangles", read > 0 ? totals.triangles / read : 0}};
+}
+
+nlohmann::json pinhole_json(const PinholeModel& model) {
+  return {{"size", {model.width, model.height}}, {"matrix", model.matrix}, {"distortion", model.distortion}};
+}
+
+nlohmann::json info_json(const StreamInfo& info) {
+  return {
+      {"stream", info.stream},
+      {"source", info.source},
+      {"started", utc_text(info.started_ns)},
+      {"rig",
+       {{"scan", to_string(info.rig.scan)},
+        {"frame_rate", info.rig.frame_rate},
+        {"camera", pinhole_json(info.rig.camera)},
+        {"projector", pinhole_json(info.rig.projector)},
+        {"projector_from_camera_rotation", info.rig.projector_from_camera_rotation},
+        {"projector_from_camera_translation", info.rig.projector_from_camera_translation},
+        {"colour_matrix", info.rig.colour_matrix}}},
+      {"pattern",
+       {{"base", info.pattern.base}, {"slides", info.pattern.slides}, {"stripes", info.pattern.stripes()}}}};
+}
+
+void print_info(const StreamInfo& info) {
+  std::printf("source      %s, started %s\n", info.source.c_str(), utc_text(info.started_ns).c_str());
+  std::printf("camera      %d x %d %s, %.2f frames/s, focal length %.1f px\n", info.rig.camera.width,
+              info.rig.camera.height, std::string(to_string(info.rig.scan)).c_str(), info.rig.frame_rate,
+              info.rig.camera.fx());
+  const auto& t = info.rig.projector_from_camera_translation;
+  std::printf("projector   %d x %d, %.3f m from the camera; %d stripes, base %d, %d slides\n",
+              info.rig.projector.width, info.rig.projector.height,
+              std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]), info.pattern.stripes(), info.pattern.base,
+              info.pattern.slides);
+}
+
+void print_frames(const FrameTotals& totals) {
+  std::printf("frames      %llu at %.2f/s, %llu lost\n", static_cast<unsigned long long>(totals.frames),
+              totals.rate(), static_cast<unsigned long long>(totals.lost));
+  if (totals.frames == 0) return;
+  const std::uint64_t read = totals.frames - totals.unreadable;
+  std::printf("a frame     %s: geometry %s, texture %s, other %s\n",
+              bytes_text(totals.bytes() / totals.frames).c_str(),
+              bytes_text(totals.geometry_bytes / totals.frames).c_str(),
+              bytes_text(totals.texture_bytes / totals.frames).c_str(),
+              bytes_text(totals.other_bytes / totals.frames).c_str());
+  if (read > 0) {
+    std::printf("surface     %llu vertices, %llu triangles on average\n",
+                static_cast<unsigned long long>(totals.vertices / read),
+                static_cast<unsigned long long>(totals.triangles / read));
+    std::printf("codecs      geometry %s; texture %s, %u x %u\n", joined(totals.geometry_codecs).c_str(),
+                joined(totals.texture_codecs).c_str(), totals.texture_width, totals.texture_height);
+  }
+  if (totals.unreadable > 0) {
+    std::printf("unreadable  %llu frames are of no format this version reads\n",
+                static_cast<unsigned long long>(totals.unreadable));
+  }
+}
+
+void print_json(const nlohmann::json& j) {
+  std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+}
+
+Status describe_file(const Options& options, StopSignal& stop) {
+  auto recorded = RecordedStream::open(options.what, options.stream);
+  if (!recorded) return recorded.error();
+  FrameTotals totals;
+  std::optional<StreamInfo> info;
+  Progress progress("read", "frames", recorded->frames());
+  while (!stop.stopped()) {
+    auto sample = recorded->next();
+    if (!sample) return sample.error();
+    if (!*sample) break;
+    if ((*sample)->topic == Topic::kInfo && !info) {
+      if (auto read = read_info_cdr((*sample)->cdr)) info = std::move(*read);
+    }
+    if ((*sample)->topic != Topic::kFrame) continue;
+    const auto frame = read_frame_cdr((*sample)->cdr);
+    if (!frame) {
+      ++totals.unreadable;
+      ++totals.frames;
+      continue;
+    }
+    add_frame(totals, frame->sequence, frame->publish_time_ns, frame->data);
+    progress.update(totals.frames);
+  }
+  progress.finish();
+  if (stop.stopped()) return Error{"stopped before the whole file was read"};
+
+  const RecordingSummary& summary = recorded->summary();
+  std::error_code ignored;
+  const auto file_bytes = std::filesystem::file_size(options.what, ignored);
+  const double duration_s = seconds(summary.end_ns - summary.start_ns);
+  if (options.json) {
+    nlohmann::json j = frames_json(totals);
+    j["file"] = options.what;
+    j["stream"] = recorded->stream();
+    j["file_bytes"] = file_bytes;
+    j["recorded"] = utc_text(summary.start_ns);
+    j["duration_s"] = duration_s;
+    j["recovered"] = summary.recovered;
+    j["lost_bytes"] = summary.lost_bytes;
+    j["damaged_parts"] = recorded->damaged();
+    j["attachments"] = nlohmann::json::array();
+    for (const auto& attachment : summary.attachments) j["attachments"].push_back(attachment.name);
+    if (info) j["info"] = info_json(*info);
+    print_json(j);
+    return {};
+  }
+  std::printf("file        %s, %s\n", options.what.c_str(), bytes_text(file_bytes).c_str());
+  std::printf("stream      %s, recorded %s, %s\n", recorded->stream().c_str(),
+              utc_text(summary.start_ns).c_str(), duration_text(duration_s).c_str());
+  if (info) print_info(*info);
+  print_frames(totals);
+  if (summary.recovered) {
+    std::printf("recovered   the recording was cut short; all but the last %s were readable\n",
+                bytes_text(summary.lost_bytes).c_str());
+  }
+  if (recorded->damaged() > 0) {
+    std::printf("damaged     %llu parts could not be read\n",
+                static_cast<unsigned long long>(recorded->damaged()));
+  }
+  return {};
+}
+
+Status describe_live(const Options& options, StopSignal& stop) {
+  std::mutex mutex;
+  FrameTotals totals;
+  std::optional<StreamInfo> info;
+  std::optional<ServerStatus> status;
+  Subscriber::Callbacks callbacks;
+  callbacks.info = [&](const StreamInfo& i) {
+    std::lock_guard lock(mutex);
+    info = i;
+  };
+  callbacks.status = [&](const ServerStatus& s) {
+    std::lock_guard lock(mutex);
+    status = s;
+  };
+  callbacks.frame = [&](const std::string&, const FrameMessage& f) {
+    std::lock_guard lock(mutex);
+    add_frame(totals, f.sequence, f.publish_time_ns, *f.data);
+  };
+  auto subscriber = Subscriber::create(*options.domain, options.what, callbacks);
+  if (!subscriber) return subscriber.error();
+  stop.wait_for(std::chrono::nanoseconds(static_cast<std::int64_t>(options.wait_s * 1e9)));
+  subscriber->reset();
+  if (!info) {
+    return Error{"'" + options.what + "' is neither a file nor a live stream in domain " +
+                 std::to_string(options.domain->domain) + "; `relievo streams` lists what there is"};
+  }
+  if (options.json) {
+    nlohmann::json j = frames_json(totals);
+    j["stream"] = options.what;
+    j["info"] = info_json(*info);
+    if (status) j["state"] = to_string(status->state);
+    print_json(j);
+    return {};
+  }
+  std::printf("stream      %s, live%s\n", options.what.c_str(),
+              status ? (", " + std::string(to_string(status->state))).c_str() : "");
+  print_info(*info);
+  print_frames(totals);
+  return {};
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  std::error_code ignored;
+  if (std::filesystem::exists(options.what, ignored)) return describe_file(options, stop);
+  if (!valid_stream_name(options.what) || options.what.ends_with(".mcap")) {
+    return Error{"there is no file " + options.what};
+  }
+  return describe_live(options, stop);
+}
+
+}  // namespace
+
+Command info_command() {
+  return {"info", "Describe a recording or a live stream", [](CLI::App& app) {
+            auto options = std::make_shared<Options>();
+            options->domain = add_domain_options(app);
+            app.add_option("what", options->what, "A recording's file or a live stream's name")
+                ->type_name("FILE|STREAM")
+                ->required();
+            app.add_option("--stream", options->stream, "Which stream, where the file holds several")
+                ->type_name("NAME");
+            app.add_option("--wait", options->wait_s, "How long to watch a live stream, seconds")
+                ->check(number(0.1, 3600))
+                ->capture_default_str();
+            app.add_flag("--json", options->json, "Print JSON");
+            app.footer("Examples:\n  relievo info face.mcap --json\n  relievo info face --wait 10");
+            return [options](StopSignal& stop) { return run(*options, stop); };
+          }};
+}
+
+}  // namespace relievo

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace relievo;
+  return run_program(
+      "relievo", "Views, records and plays live 3D video",
+      {streams_command(), record_command(), play_command(), info_command(), export_command(), web_command()},
+      argc, argv);
+}

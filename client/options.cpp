@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/options.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <ctime>
+
+#include "base/time.h"
+
+namespace relievo {
+
+std::shared_ptr<DomainOptions> add_domain_options(CLI::App& app) {
+  auto options = std::make_shared<DomainOptions>();
+  app.add_option("--domain", options->domain, "DDS domain")->check(CLI::Range(0, 230))->capture_default_str();
+  app.add_option("--interface", options->interface,
+                 "Network interface, by name or address (default: the first that "
+                 "reaches others; lo for this machine alone)")
+      ->type_name("NAME");
+  return options;
+}
+
+std::string bytes_text(std::uint64_t bytes) {
+  char text[32];
+  const auto value = static_cast<double>(bytes);
+  if (bytes < 1000) {
+    std::snprintf(text, sizeof text, "%.0f B", value);
+  } else if (bytes < 1'000'000) {
+    std::snprintf(text, sizeof text, "%.1f kB", value / 1e3);
+  } else if (bytes < 1'000'000'000) {
+    std::snprintf(text, sizeof text, "%.1f MB", value / 1e6);
+  } else {
+    std::snprintf(text, sizeof text, "%.2f GB", value / 1e9);
+  }
+  return text;
+}
+
+std::string duration_text(double s) {
+  char text[48];
+  if (s < 60) {
+    std::snprintf(text, sizeof text, "%.2f s", s);
+  } else {
+    const auto whole = static_cast<long long>(s);
+    std::snprintf(text, sizeof text, "%lld min %lld s", whole / 60, whole % 60);
+  }
+  return text;
+}
+
+std::string utc_text(std::int64_t ns) {
+  const auto s = static_cast<std::time_t>(ns / kNanosecondsPerSecond);
+  std::tm parts{};
+  gmtime_r(&s, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+}  // namespace relievo

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "cli/checks.h"
+#include "cli/progress.h"
+#include "client/commands.h"
+#include "client/options.h"
+#include "client/player.h"
+#include "client/recorded_stream.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::int64_t kBriefWait_ns = kNanosecondsPerSecond;
+
+struct Options {
+  std::shared_ptr<DomainOptions> domain;
+  std::string file;
+  std::string stream;
+  PlayOptions play;
+  bool once = false;
+  int readers = -1;  // below 0: wait for one, briefly
+  bool json = false;
+};
+
+// Frames written before a reader is matched never reach it.
+void wait_for_readers(const Options& options, const RawPublisher& publisher, StopSignal& stop) {
+  const std::int64_t start_ns = steady_now_ns();
+  const int wanted = options.readers < 0 ? 1 : options.readers;
+  bool said = false;
+  while (publisher.matched_readers() < wanted && !stop.wait_for(std::chrono::milliseconds(10))) {
+    const std::int64_t waited_ns = steady_now_ns() - start_ns;
+    if (options.readers < 0 && waited_ns > kBriefWait_ns) return;
+    if (!said && waited_ns > kBriefWait_ns) {
+      log_info("waiting for " + std::to_string(wanted) + " readers");
+      said = true;
+    }
+  }
+  // Matched here does not yet mean matched there.
+  if (publisher.matched_readers() > 0) stop.wait_for(std::chrono::milliseconds(200));
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  auto recorded = RecordedStream::open(options.file, options.stream);
+  if (!recorded) return recorded.error();
+  auto info = recorded->find_info();
+  if (!info) return info.error();
+  auto publisher = RawPublisher::create(*options.domain, recorded->stream());
+  if (!publisher) return publisher.error();
+  Bytes current_info;
+  if (*info) {
+    if (auto status = (*publisher)->publish(**info); !status) return status;
+    current_info = (*info)->cdr;
+  } else {
+    log_warning(options.file + " holds no description of its stream: viewers will lack its calibration");
+  }
+  log_info("playing " + options.file + " as stream '" + recorded->stream() + "' in domain " +
+           std::to_string(options.domain->domain));
+  wait_for_readers(options, **publisher, stop);
+
+  std::uint64_t frames = 0, refused = 0;
+  Progress progress("play", "frames", options.play.loop ? 0 : recorded->frames());
+  const Status played = play(*recorded, options.play, stop, [&](const RawSample& sample) -> Status {
+    if (sample.topic == Topic::kInfo && sample.cdr == current_info) return {};
+    if (auto status = (*publisher)->publish(sample); !status) {
+      if (++refused == 1) log_warning(status.error().message + " (skipped; further ones silently)");
+      return {};
+    }
+    if (sample.topic == Topic::kInfo) current_info = sample.cdr;
+    if (sample.topic == Topic::kFrame) progress.update(++frames);
+    return {};
+  });
+  progress.finish();
+  publisher->reset();  // returns when the last frames have arrived
+  if (!played) return played;
+  if (frames == 0 && refused > 0) return Error{"no sample of " + options.file + " could be published"};
+  if (options.json) {
+    std::puts(nlohmann::json({{"stream", recorded->stream()},
+                              {"frames", frames},
+                              {"refused", refused},
+                              {"damaged", recorded->damaged()}})
+                  .dump(2)
+                  .c_str());
+  } else {
+    std::printf("%llu frames played\n", static_cast<unsigned long long>(frames));
+  }
+  return {};
+}
+
+}  // namespace
+
+Command play_command() {
+  return {"play", "Play a recording onto the network at its original pace", [](CLI::App& app) {
+            auto options = std::make_shared<Options>();
+            options->domain = add_domain_options(app);
+            app.add_option("file", options->file, "Recording")->type_name("FILE")->required();
+            app.add_option("--stream", options->stream, "Which stream, where the file holds several")
+                ->type_name("NAME");
+            app.add_option("--speed", options->play.speed, "Speed: 2 is twice as fast")
+                ->check(number(0.01, 100))
+                ->capture_default_str();
+            auto* loop = app.add_flag("--loop", options->play.loop, "Start again at the end, until stopped");
+            app.add_flag("--once", options->once, "Stop at the end (the default)")->excludes(loop);
+            app.add_option("--wait-readers", options->readers,
+                           "Start when this many readers are there (default: one, but wait a second at most)")
+                ->check(whole_number(0, 1000));
+            app.add_flag("--json", options->json, "Print the result as JSON");
+            app.footer("Example:\n  relievo play face.mcap --loop --speed 0.5");
+            return [options](StopSignal& stop) { return run(*options, stop); };
+          }};
+}
+
+}  // namespace relievo

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/player.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "base/time.h"
+
+namespace relievo {
+namespace {
+
+// A longer pause in a recording (the stream was gone meanwhile) is shortened to this.
+constexpr std::int64_t kLongestPause_ns = 5 * kNanosecondsPerSecond;
+
+Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
+                 const std::function<Status(const RawSample&)>& publish) {
+  std::int64_t due_ns = steady_now_ns();
+  std::optional<std::int64_t> last_ns;
+  for (;;) {
+    auto sample = recorded.next();
+    if (!sample) return sample.error();
+    if (!*sample) return {};
+    const std::int64_t time_ns = (*sample)->receive_time_ns;
+    const std::int64_t step_ns =
+        std::clamp<std::int64_t>(time_ns - last_ns.value_or(time_ns), 0, kLongestPause_ns);
+    last_ns = time_ns;
+    due_ns += static_cast<std::int64_t>(static_cast<double>(step_ns) / options.speed);
+    if (stop.wait_for(std::chrono::nanoseconds(due_ns - steady_now_ns()))) return {};
+    if (auto status = publish(**sample); !status) return status;
+  }
+}
+
+}  // namespace
+
+Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
+            const std::function<Status(const RawSample&)>& publish) {
+  do {
+    if (auto status = recorded.rewind(); !status) return status;
+    const std::int64_t start_ns = steady_now_ns();
+    if (auto status = play_once(recorded, options, stop, publish); !status) return status;
+    // A recording of a single moment must not loop as fast as the machine can.
+    if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + 30'000'000 - steady_now_ns()));
+  } while (options.loop && !stop.stopped());
+  return {};
+}
+
+}  // namespace relievo

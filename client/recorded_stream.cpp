@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/recorded_stream.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "base/log.h"
+
+namespace relievo {
+namespace {
+
+// How far into a file a description is looked for: it is received with the first frames.
+constexpr int kInfoWithinSamples = 1000;
+
+std::optional<Topic> topic_of(const RecordingChannel& channel) {
+  if (channel.message_encoding != "cdr") return std::nullopt;
+  for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
+    if (channel.topic == topic_type(topic).topic_name) return topic;
+  }
+  return std::nullopt;
+}
+
+std::string stream_of(const RecordingChannel& channel) {
+  for (const auto& [key, value] : channel.metadata) {
+    if (key == "stream" && valid_stream_name(value)) return value;
+  }
+  return {};
+}
+
+std::string joined(const std::set<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, const std::string& stream) {
+  auto reader = RecordingReader::open(file);
+  if (!reader) return reader.error();
+  RecordedStream recorded;
+  recorded.reader_ = std::move(reader).value();
+  const RecordingSummary& summary = recorded.reader_->summary();
+
+  std::set<std::string> streams;
+  for (const RecordingChannel& channel : summary.channels) {
+    if (topic_of(channel) && !stream_of(channel).empty()) streams.insert(stream_of(channel));
+  }
+  if (streams.empty()) {
+    return Error{file.string() + " holds no 3D video stream" +
+                 (summary.recovered ? ": it was cut short before anything was recorded" : "")};
+  }
+  if (stream.empty() && streams.size() > 1) {
+    return Error{file.string() + " holds several streams: choose one with --stream (" + joined(streams) +
+                 ")"};
+  }
+  recorded.stream_ = stream.empty() ? *streams.begin() : stream;
+  if (streams.count(recorded.stream_) == 0) {
+    return Error{file.string() + " holds no stream '" + stream + "', only " + joined(streams)};
+  }
+  for (const RecordingChannel& channel : summary.channels) {
+    recorded.topics_.push_back(stream_of(channel) == recorded.stream_ ? topic_of(channel) : std::nullopt);
+  }
+  return recorded;
+}
+
+std::uint64_t RecordedStream::frames() const {
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i < topics_.size() && i < summary().channel_messages.size(); ++i) {
+    if (topics_[i] == Topic::kFrame) count += summary().channel_messages[i];
+  }
+  return count;
+}
+
+Result<std::optional<RawSample>> RecordedStream::next() {
+  for (;;) {
+    auto message = reader_->next();
+    if (!message) {
+      ++damaged_;
+      log_warning("skipped a damaged part of the recording: " + message.error().message);
+      continue;
+    }
+    if (!*message) return std::optional<RawSample>();
+    RecordedMessage& m = **message;
+    if (m.channel >= topics_.size() || !topics_[m.channel]) continue;
+    return std::optional(
+        RawSample{*topics_[m.channel], stream_, m.publish_time_ns, m.log_time_ns, std::move(m.data)});
+  }
+}
+
+Status RecordedStream::rewind() {
+  return reader_->seek(summary().start_ns);
+}
+
+Result<std::optional<RawSample>> RecordedStream::find_info() {
+  std::optional<RawSample> info;
+  for (int i = 0; i < kInfoWithinSamples && !info; ++i) {
+    auto sample = next();
+    if (!sample) return sample.error();
+    if (!*sample) break;
+    if ((*sample)->topic == Topic::kInfo) info = std::move(*sample);
+  }
+  if (auto status = rewind(); !status) return status.error();
+  return info;
+}
+
+}  // namespace relievo

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// One stream of a recording, read back as the DDS samples it was recorded from.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "codec/recording.h"
+#include "idl/transport.h"
+
+namespace relievo {
+
+/// One thread.
+class RecordedStream {
+ public:
+  /// `stream` empty: the only one there is. Fails where the file is no recording, or holds no such stream, or
+  /// several, naming them.
+  static Result<RecordedStream> open(const std::filesystem::path& file, const std::string& stream);
+
+  const std::string& stream() const { return stream_; }
+  const RecordingSummary& summary() const { return reader_->summary(); }
+  /// Number of frames, as the file's index has it.
+  std::uint64_t frames() const;
+
+  /// The next sample in the order they were received (RawSample::receive_time_ns is the log time); nothing at
+  /// the end. A damaged part of the file is skipped, counted and logged.
+  Result<std::optional<RawSample>> next();
+  /// The next next() returns the first sample again.
+  Status rewind();
+  /// Damaged parts skipped since opening.
+  std::uint64_t damaged() const { return damaged_; }
+
+  /// The first description in the file, wherever it lies; rewinds. Nothing where there is none.
+  Result<std::optional<RawSample>> find_info();
+
+ private:
+  RecordedStream() = default;
+
+  std::string stream_;
+  std::unique_ptr<RecordingReader> reader_;
+  std::vector<std::optional<Topic>> topics_;  // of each channel; nothing where it is not of this stream
+  std::uint64_t damaged_ = 0;
+};
+
+}  // namespace relievo

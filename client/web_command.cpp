@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <set>
+#include <thread>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "cli/checks.h"
+#include "cli/listen_address.h"
+#include "client/commands.h"
+#include "client/options.h"
+#include "client/player.h"
+#include "client/recorded_stream.h"
+#include "idl/cdr.h"
+#include "web/gateway/gateway.h"
+
+namespace relievo {
+namespace {
+
+struct Options {
+  std::shared_ptr<DomainOptions> domain;
+  std::vector<std::string> inputs;
+  std::string listen = "127.0.0.1:8080";
+};
+
+Subscriber::Callbacks forward_to(Gateway& gateway) {
+  Subscriber::Callbacks callbacks;
+  callbacks.info = [&](const StreamInfo& info) { gateway.announce(info); };
+  callbacks.frame = [&](const std::string& stream, const FrameMessage& frame) {
+    gateway.publish(stream, frame);
+  };
+  callbacks.status = [&](const ServerStatus& status) { gateway.publish(status); };
+  callbacks.gone = [&](const std::string& stream) { gateway.withdraw(stream); };
+  return callbacks;
+}
+
+// A recording played in a loop on a thread of its own, straight into the gateway.
+class LoopedFile {
+ public:
+  LoopedFile(std::string file, RecordedStream recorded, Gateway& gateway, StopSignal& stop)
+      : file_(std::move(file)), recorded_(std::move(recorded)), gateway_(gateway) {
+    // Before anyone is told the address: who follows it at once finds the stream.
+    if (auto info = recorded_.find_info(); info && *info) (void)publish(**info).ok();
+    thread_ = std::thread([this, &stop] { run(stop); });
+  }
+  LoopedFile(const LoopedFile&) = delete;
+  LoopedFile& operator=(const LoopedFile&) = delete;
+  /// The stop signal must be given before.
+  ~LoopedFile() { thread_.join(); }
+
+ private:
+  void run(StopSignal& stop) {
+    const Status status =
+        play(recorded_, {.loop = true}, stop, [this](const RawSample& sample) { return publish(sample); });
+    if (!status) {
+      log_error(file_ + ": " + status.error().message);
+      gateway_.withdraw(recorded_.stream());
+    }
+  }
+
+  // Unreadable samples are skipped: the viewer counts the gap.
+  Status publish(const RawSample& sample) {
+    if (sample.topic == Topic::kInfo) {
+      if (auto info = read_info_cdr(sample.cdr)) gateway_.announce(*info);
+    } else if (sample.topic == Topic::kStatus) {
+      if (auto status = read_status_cdr(sample.cdr)) gateway_.publish(*status);
+    } else if (auto frame = read_frame_cdr(sample.cdr)) {
+      FrameMessage message;
+      message.sequence = sequence_++;  // goes on over the loop's seam
+      message.number = frame->number;
+      // As if it were captured now with its latency of then: viewers show the way from here to them.
+      message.publish_time_ns = utc_now_ns();
+      message.capture_time_ns = message.publish_time_ns - (frame->publish_time_ns - frame->capture_time_ns);
+      message.data = std::make_shared<const Bytes>(frame->data.begin(), frame->data.end());
+      gateway_.publish(frame->stream, message);
+    }
+    return {};
+  }
+
+  std::string file_;
+  RecordedStream recorded_;
+  Gateway& gateway_;
+  std::uint64_t sequence_ = 0;
+  std::thread thread_;
+};
+
+struct Inputs {
+  std::vector<std::pair<std::string, RecordedStream>> files;
+  std::vector<std::string> live;  // "" for all of the domain
+};
+
+Result<Inputs> sort_inputs(const std::vector<std::string>& names) {
+  Inputs inputs;
+  std::set<std::string> streams;
+  for (const std::string& name : names) {
+    std::error_code ignored;
+    std::string stream = name;
+    if (std::filesystem::exists(name, ignored)) {
+      auto recorded = RecordedStream::open(name, "");
+      if (!recorded) return recorded.error();
+      stream = recorded->stream();
+      inputs.files.emplace_back(name, std::move(*recorded));
+    } else if (!valid_stream_name(name) || name.ends_with(".mcap")) {
+      return Error{"there is no file " + name};
+    } else {
+      inputs.live.push_back(name);
+    }
+    if (!streams.insert(stream).second) {
+      return Error{"stream '" + stream + "' is given twice: serve one of them at another address"};
+    }
+  }
+  if (names.empty()) inputs.live.emplace_back();
+  return inputs;
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  auto address = parse_listen_address(options.listen);
+  if (!address) return address.error();
+  auto inputs = sort_inputs(options.inputs);
+  if (!inputs) return inputs.error();
+  auto gateway =
+      Gateway::start({.host = address->host,
+                      .port = address->port,
+                      .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
+                                    " yet: start relievo-server serve there."});
+  if (!gateway) return gateway.error();
+
+  std::vector<std::unique_ptr<Subscriber>> subscribers;
+  for (const std::string& stream : inputs->live) {
+    auto subscriber = Subscriber::create(*options.domain, stream, forward_to(**gateway));
+    if (!subscriber) return subscriber.error();
+    subscribers.push_back(std::move(*subscriber));
+  }
+  std::vector<std::unique_ptr<LoopedFile>> files;
+  for (auto& [file, recorded] : inputs->files) {
+    files.push_back(std::make_unique<LoopedFile>(file, std::move(recorded), **gateway, stop));
+  }
+  std::printf("viewer %s\n", browser_address({address->host, (*gateway)->port()}).c_str());
+  std::fflush(stdout);  // whoever waits for the address reads a pipe
+  stop.wait();
+  return {};
+}
+
+}  // namespace
+
+Command web_command() {
+  return {"web", "Serve the viewer for live streams and recordings", [](CLI::App& app) {
+            auto options = std::make_shared<Options>();
+            options->domain = add_domain_options(app);
+            app.add_option("inputs", options->inputs,
+                           "Recordings, played in a loop, and live streams (default: all of the domain)")
+                ->type_name("FILE|STREAM");
+            app.add_option("--listen", options->listen,
+                           "Where browsers find the viewer; :PORT for every interface")
+                ->type_name("HOST:PORT")
+                ->check(listen_address())
+                ->capture_default_str();
+            app.footer("Examples:\n  relievo web face.mcap\n  relievo web --listen :8080");
+            return [options](StopSignal& stop) { return run(*options, stop); };
+          }};
+}
+
+}  // namespace relievo

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/export.h"
+
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <string>
+
+#include "codec/byte_io.h"
+#include "codec/surface_check.h"
+#include "codec/whole_file.h"
+
+namespace relievo {
+namespace {
+
+using Colour = std::array<std::uint8_t, 3>;
+constexpr Colour kNoTexture{200, 200, 200};
+
+/// Bilinear, at glTF coordinates: (0, 0) is the outer corner of the first pixel.
+Colour sample(View8 texture, const Vec2f& at) {
+  const float x = std::clamp(at[0] * static_cast<float>(texture.width) - 0.5f, 0.0f,
+                             static_cast<float>(texture.width - 1));
+  const float y = std::clamp(at[1] * static_cast<float>(texture.height) - 0.5f, 0.0f,
+                             static_cast<float>(texture.height - 1));
+  const int x0 = static_cast<int>(x);
+  const int y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, texture.width - 1);
+  const int y1 = std::min(y0 + 1, texture.height - 1);
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  Colour colour{};
+  for (int c = 0; c < 3; ++c) {
+    const int channel = std::min(c, texture.channels - 1);
+    const auto value = [&](int column, int row) {
+      return static_cast<float>(texture.row(row)[column * texture.channels + channel]);
+    };
+    const float top = value(x0, y0) + fx * (value(x1, y0) - value(x0, y0));
+    const float bottom = value(x0, y1) + fx * (value(x1, y1) - value(x0, y1));
+    colour[static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::lround(top + fy * (bottom - top)));
+  }
+  return colour;
+}
+
+void append_text(Bytes& out, std::string_view text) {
+  out.insert(out.end(), text.begin(), text.end());
+}
+
+/// Shortest text that reads back as the same float.
+void append_numbers(Bytes& out, std::string_view keyword, std::span<const float> numbers) {
+  append_text(out, keyword);
+  for (const float number : numbers) {
+    std::array<char, 32> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
+    out.push_back(' ');
+    append_text(out, {text.data(), end});
+  }
+  out.push_back('\n');
+}
+
+}  // namespace
+
+Status write_ply(const std::filesystem::path& path, const Surface& surface, View8 texture) {
+  if (auto status = check_surface(surface); !status) return status;
+  const std::vector<Vec3f> derived =
+      surface.normals.empty() ? surface_normals(surface) : std::vector<Vec3f>();
+  const std::vector<Vec3f>& normals = surface.normals.empty() ? derived : surface.normals;
+  const bool coloured = !texture.empty() && !surface.texture_coordinates.empty();
+  Bytes out;
+  out.reserve(512 + surface.positions.size() * 27 + surface.triangles.size() * 13);
+  append_text(out,
+              "ply\nformat binary_little_endian 1.0\n"
+              "comment relievo " RELIEVO_VERSION
+              ": metres, camera frame: x right, y down, z forward\n"
+              "element vertex " +
+                  std::to_string(surface.positions.size()) +
+                  "\nproperty float x\nproperty float y\nproperty float z\n"
+                  "property float nx\nproperty float ny\nproperty float nz\n"
+                  "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                  "element face " +
+                  std::to_string(surface.triangles.size()) +
+                  "\nproperty list uchar int vertex_indices\nend_header\n");
+  for (std::size_t i = 0; i < surface.positions.size(); ++i) {
+    for (const float x : surface.positions[i]) append(out, x);
+    for (const float x : normals[i]) append(out, x);
+    append_bytes(out, coloured ? sample(texture, surface.texture_coordinates[i]) : kNoTexture);
+  }
+  for (const Triangle& triangle : surface.triangles) {
+    append(out, std::uint8_t{3});
+    for (const std::uint32_t index : triangle) append(out, static_cast<std::int32_t>(index));
+  }
+  return write_whole_file(path, out);
+}
+
+Status write_obj(const std::filesystem::path& path, const Frame3D& frame) {
+  const Surface& surface = frame.surface;
+  if (auto status = check_surface(surface); !status) return status;
+  const bool textured = !frame.texture.empty() && !surface.texture_coordinates.empty();
+  const std::string name = path.stem().string();
+  Bytes out;
+  append_text(out, "# relievo " RELIEVO_VERSION ": metres, x right, y up, z backward\n");
+  if (textured) {
+    std::filesystem::path picture = path;
+    if (auto status = write_png(picture.replace_extension(".png"), frame.texture.view()); !status)
+      return status;
+    const std::string material =
+        "newmtl texture\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd " + name + ".png\n";
+    std::filesystem::path library = path;
+    if (auto status =
+            write_whole_file(library.replace_extension(".mtl"), Bytes(material.begin(), material.end()));
+        !status)
+      return status;
+    append_text(out, "mtllib " + name + ".mtl\nusemtl texture\n");
+  }
+  const auto turned = [](const Vec3f& v) { return Vec3f{v[0], -v[1], -v[2]}; };
+  for (const Vec3f& p : surface.positions) append_numbers(out, "v", turned(p));
+  if (textured)
+    for (const Vec2f& c : surface.texture_coordinates) append_numbers(out, "vt", Vec2f{c[0], 1 - c[1]});
+  for (const Vec3f& n : surface.normals.empty() ? surface_normals(surface) : surface.normals)
+    append_numbers(out, "vn", turned(n));
+  for (const Triangle& triangle : surface.triangles) {
+    append_text(out, "f");
+    for (const std::uint32_t index : triangle) {
+      const std::string i = std::to_string(index + 1);
+      append_text(out, " " + i + "/" + (textured ? i : "") + "/" + i);
+    }
+    out.push_back('\n');
+  }
+  return write_whole_file(path, out);
+}
+
+Status write_png(const std::filesystem::path& path, View8 picture) {
+  if (picture.empty() || (picture.channels != 1 && picture.channels != 3))
+    return Error{"cannot write " + path.string() + ": the picture is empty or neither RGB nor grey"};
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(picture.width);
+  header.height = static_cast<png_uint_32>(picture.height);
+  header.format = picture.channels == 3 ? PNG_FORMAT_RGB : PNG_FORMAT_GRAY;
+  const auto stride = static_cast<png_int_32>(picture.stride);
+  png_alloc_size_t size = 0;
+  Bytes out;
+  if (png_image_write_to_memory(&header, nullptr, &size, 0, picture.data, stride, nullptr) != 0) {
+    out.resize(size);
+    if (png_image_write_to_memory(&header, out.data(), &size, 0, picture.data, stride, nullptr) != 0) {
+      out.resize(size);
+      return write_whole_file(path, out);
+    }
+  }
+  return Error{"cannot write " + path.string() + ": " + header.message};
+}
+
+}  // namespace relievo

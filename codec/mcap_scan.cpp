@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/mcap_scan.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <map>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "codec/byte_io.h"
+
+namespace relievo::mcap {
+namespace {
+
+constexpr std::uint64_t kMaxSummaryBytes = 256u << 20;
+constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels
+
+/// The first one of an id counts; the specification has all of an id equal.
+bool add_schema(Contents& contents, std::optional<Schema> schema) {
+  if (schema && schema->id != 0) contents.schemas.try_emplace(schema->id, *schema);
+  return schema.has_value();
+}
+
+bool add_channel(Contents& contents, std::optional<Channel> channel) {
+  if (channel) contents.channels.try_emplace(channel->id, *channel);
+  return channel.has_value();
+}
+
+/// From the summary at the file's end; nothing where there is none or any byte of it is wrong.
+std::optional<Contents> read_index(const File& file) {
+  if (file.size() < 2 * kMagic.size() + kFooterBytes) return std::nullopt;
+  const std::uint64_t footer_at = file.size() - kMagic.size() - kFooterBytes;
+  const auto end = file.read(footer_at, kFooterBytes + kMagic.size());
+  if (!end || !std::equal(kMagic.begin(), kMagic.end(), end->end() - kMagic.size())) return std::nullopt;
+  std::span<const std::uint8_t> end_bytes(*end);
+  const auto footer_record = take_record(end_bytes);
+  if (!footer_record || footer_record->op != Op::kFooter) return std::nullopt;
+  const auto footer = read_footer(footer_record->content);
+  if (!footer || footer->summary_start == 0 || footer->summary_start > footer_at ||
+      footer_at - footer->summary_start > kMaxSummaryBytes)
+    return std::nullopt;
+  const auto summary = file.read(footer->summary_start, footer_at - footer->summary_start);
+  if (!summary) return std::nullopt;
+  const auto footer_covered = std::span(*end).first(kFooterBytes - sizeof(footer->summary_crc));
+  if (footer->summary_crc != 0 && crc32(footer_covered, crc32(*summary)) != footer->summary_crc)
+    return std::nullopt;
+
+  Contents contents;
+  bool has_statistics = false;
+  std::span<const std::uint8_t> rest(*summary);
+  while (!rest.empty()) {
+    const auto record = take_record(rest);
+    if (!record) return std::nullopt;
+    bool ok = true;
+    if (record->op == Op::kSchema) {
+      ok = add_schema(contents, read_schema(record->content));
+    } else if (record->op == Op::kChannel) {
+      ok = add_channel(contents, read_channel(record->content));
+    } else if (record->op == Op::kChunkIndex) {
+      auto index = read_chunk_index(record->content);
+      ok = index.has_value();
+      if (ok) contents.chunks.push_back(std::move(*index));
+    } else if (record->op == Op::kAttachmentIndex) {
+      auto index = read_attachment_index(record->content);
+      ok = index.has_value();
+      if (ok) contents.attachments.push_back(std::move(*index));
+    } else if (record->op == Op::kStatistics) {
+      auto statistics = read_statistics(record->content);
+      ok = has_statistics = statistics.has_value();
+      if (ok) contents.statistics = std::move(*statistics);
+    }
+    if (!ok) return std::nullopt;
+  }
+  // Without these a reader could not tell what the file holds: go through it.
+  if (!has_statistics || contents.statistics.chunks != contents.chunks.size()) return std::nullopt;
+  if (contents.statistics.messages > 0 && contents.statistics.channel_messages.empty()) return std::nullopt;
+  return contents;
+}
+
+/// Goes through a file from its start.
+class Scan {
+ public:
+  explicit Scan(const File& file) : file_(file) {}
+
+  Result<Contents> run() {
+    std::uint64_t at = kMagic.size();
+    bool ended = false;
+    while (!ended) {
+      const auto head = file_.read(at, kRecordHeaderBytes);
+      if (!head) break;
+      ByteReader reader(*head);
+      const auto op = static_cast<Op>(reader.read<std::uint8_t>());
+      const auto length = reader.read<std::uint64_t>();
+      if (length > file_.size() - at - kRecordHeaderBytes) break;
+      if (static_cast<int>(op) == 0) break;  // not a record: zeros that a power loss left
+      if (op == Op::kMessage) return Error{file_.name() + ": messages outside chunks are not supported"};
+      if (!read_record(op, at, at + kRecordHeaderBytes, length)) break;
+      at += kRecordHeaderBytes + length;
+      ended = op == Op::kFooter;
+    }
+    const auto magic = file_.read(at, kMagic.size());
+    const bool whole = ended && magic && at + kMagic.size() == file_.size() &&
+                       std::equal(kMagic.begin(), kMagic.end(), magic->begin());
+    contents_.recovered = !whole || !plain_end_;
+    contents_.lost_bytes = whole ? 0 : file_.size() - at;
+    for (const auto& [id, count] : counts_) contents_.statistics.channel_messages.emplace_back(id, count);
+    contents_.statistics.chunks = static_cast<std::uint32_t>(contents_.chunks.size());
+    return std::move(contents_);
+  }
+
+ private:
+  /// False where the record cannot be: all behind it is lost.
+  bool read_record(Op op, std::uint64_t at, std::uint64_t content_at, std::uint64_t length) {
+    if (op == Op::kChunk) return read_chunk(at, content_at, length);
+    if (op == Op::kSchema || op == Op::kChannel || op == Op::kFooter) {
+      const auto content = length <= kMaxSmallRecordBytes ? file_.read(content_at, length) : Error{""};
+      if (!content) return false;
+      if (op == Op::kSchema) return add_schema(contents_, read_schema(*content));
+      if (op == Op::kChannel) return add_channel(contents_, read_channel(*content));
+      const auto footer = read_footer(*content);
+      // A footer that points to a summary means that the summary was there, but not as it should be.
+      plain_end_ = footer && footer->summary_start == 0;
+      return footer.has_value();
+    }
+    if (op == Op::kAttachment && !behind_data_) {
+      // Its data may be large; the name is all that is wanted here.
+      const auto start = file_.read(content_at, std::min<std::uint64_t>(length, 4096));
+      if (!start) return false;
+      ByteReader reader(*start);
+      reader.take(16);
+      AttachmentIndex index;
+      index.offset = at;
+      index.length = kRecordHeaderBytes + length;
+      index.name = reader.read_string();
+      contents_.attachments.push_back(std::move(index));
+      return true;
+    }
+    if (op == Op::kDataEnd) behind_data_ = true;
+    return true;
+  }
+
+  bool read_chunk(std::uint64_t at, std::uint64_t content_at, std::uint64_t length) {
+    const auto start = file_.read(content_at, std::min<std::uint64_t>(length, 256));
+    if (!start) return false;
+    const auto header = read_chunk_header(*start);
+    if (!header || header->second + header->first.records_size > length) return false;
+    const ChunkIndex chunk{.start_time = header->first.start_time,
+                           .end_time = header->first.end_time,
+                           .offset = at,
+                           .length = kRecordHeaderBytes + length,
+                           .message_index_offsets = {},
+                           .message_index_length = 0,
+                           .compression = header->first.compression,
+                           .compressed_size = header->first.records_size,
+                           .uncompressed_size = header->first.uncompressed_size};
+    contents_.chunks.push_back(chunk);
+    // A damaged chunk stays listed: whoever reads on meets its error.
+    if (const auto records = read_chunk_records(file_, chunk); records) count(*records);
+    return true;
+  }
+
+  void count(std::span<const std::uint8_t> records) {
+    while (!records.empty()) {
+      const auto record = take_record(records);
+      if (!record) return;
+      if (record->op == Op::kSchema) add_schema(contents_, read_schema(record->content));
+      if (record->op == Op::kChannel) add_channel(contents_, read_channel(record->content));
+      if (record->op != Op::kMessage) continue;
+      const auto message = read_message(record->content);
+      if (!message) return;
+      Statistics& statistics = contents_.statistics;
+      const std::uint64_t time = message->first.log_time;
+      statistics.start_time = statistics.messages == 0 ? time : std::min(statistics.start_time, time);
+      statistics.end_time = std::max(statistics.end_time, time);
+      ++statistics.messages;
+      ++counts_[message->first.channel_id];
+    }
+  }
+
+  const File& file_;
+  Contents contents_;
+  std::map<std::uint16_t, std::uint64_t> counts_;
+  bool behind_data_ = false;
+  bool plain_end_ = false;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<File>> File::open(const std::filesystem::path& path) {
+  const int handle = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (handle < 0)
+    return Error{"cannot open " + path.string() + ": " + std::generic_category().message(errno)};
+  struct stat info {};
+  const bool known = ::fstat(handle, &info) == 0;
+  if (!known || !S_ISREG(info.st_mode)) {
+    ::close(handle);
+    return Error{"cannot open " + path.string() + ": it is not a file"};
+  }
+  return std::unique_ptr<File>(new File(handle, path.string(), static_cast<std::uint64_t>(info.st_size)));
+}
+
+File::~File() {
+  ::close(handle_);
+}
+
+Result<Bytes> File::read(std::uint64_t offset, std::uint64_t length) const {
+  if (offset > size_ || length > size_ - offset)
+    return Error{"bytes " + std::to_string(offset) + " to " + std::to_string(offset) + " + " +
+                 std::to_string(length) + " are behind the end of the file"};
+  Bytes bytes(static_cast<std::size_t>(length));
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got =
+        ::pread(handle_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return Error{"cannot read " + name_ + ": " + std::generic_category().message(errno)};
+    if (got == 0) return Error{name_ + " became shorter while it was read"};
+    done += static_cast<std::size_t>(got);
+  }
+  return bytes;
+}
+
+Result<Contents> read_contents(const File& file) {
+  const std::uint64_t start_bytes = std::min<std::uint64_t>(file.size(), kMagic.size());
+  const auto magic = file.read(0, start_bytes);
+  if (!magic) return magic.error();
+  if (!std::equal(magic->begin(), magic->end(), kMagic.begin()))
+    return Error{file.name() + " is not a recording: it does not start as an MCAP file does"};
+  if (file.size() < kMagic.size()) {
+    Contents nothing;
+    nothing.recovered = true;
+    nothing.lost_bytes = file.size();
+    return nothing;
+  }
+  if (auto contents = read_index(file)) return std::move(*contents);
+  return Scan(file).run();
+}
+
+Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk) {
+  if (chunk.length > kMaxChunkBytes)
+    return Error{"its " + std::to_string(chunk.length) + " bytes are more than the limit of " +
+                 std::to_string(kMaxChunkBytes)};
+  auto bytes = file.read(chunk.offset, chunk.length);
+  if (!bytes) return bytes.error();
+  std::span<const std::uint8_t> rest(*bytes);
+  const auto record = take_record(rest);
+  if (!record || record->op != Op::kChunk || !rest.empty()) return Error{"no chunk is there"};
+  const auto header = read_chunk_header(record->content);
+  if (!header || header->first.records_size > record->content.size() - header->second)
+    return Error{"its header is malformed"};
+  if (!header->first.compression.empty())
+    return Error{"it is compressed with " + header->first.compression +
+                 ", which is not supported: rewrite the file without compression"};
+  const auto records =
+      record->content.subspan(header->second, static_cast<std::size_t>(header->first.records_size));
+  if (header->first.uncompressed_size != records.size()) return Error{"its sizes disagree"};
+  if (header->first.uncompressed_crc != 0 && header->first.uncompressed_crc != crc32(records))
+    return Error{"its CRC is wrong"};
+  return Bytes(records.begin(), records.end());
+}
+
+}  // namespace relievo::mcap

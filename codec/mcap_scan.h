@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an MCAP file holds: from its index or, where that is missing, by going through it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/stream.h"
+#include "codec/mcap_records.h"
+
+namespace relievo::mcap {
+
+/// A file opened for reading. Any offset and length may be asked for.
+class File {
+ public:
+  static Result<std::unique_ptr<File>> open(const std::filesystem::path& path);
+  ~File();
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  const std::string& name() const { return name_; }
+  std::uint64_t size() const { return size_; }  // when it was opened
+  /// Fails, before it allocates, where the file does not hold these bytes.
+  Result<Bytes> read(std::uint64_t offset, std::uint64_t length) const;
+
+ private:
+  File(int handle, std::string name, std::uint64_t size)
+      : handle_(handle), name_(std::move(name)), size_(size) {}
+
+  const int handle_;
+  const std::string name_;
+  const std::uint64_t size_;
+};
+
+struct Contents {
+  std::map<std::uint16_t, Schema> schemas;    // by id, none 0
+  std::map<std::uint16_t, Channel> channels;  // by id
+  std::vector<ChunkIndex> chunks;
+  std::vector<AttachmentIndex> attachments;
+  Statistics statistics;
+  bool recovered = false;
+  std::uint64_t lost_bytes = 0;
+};
+
+/// Fails where the file is no MCAP file or cannot be read; a file cut short gives what is whole.
+Result<Contents> read_contents(const File& file);
+
+/// A chunk's records, checked against its CRC. Errors name no file or place: the caller knows both.
+Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk);
+
+}  // namespace relievo::mcap

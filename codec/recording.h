@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings: MCAP files (https://mcap.dev/spec) of any message bytes with their schema, chunked, indexed,
+// with CRCs. Knows nothing of DDS: a message is a topic, times and bytes (here CDR with its 4-byte
+// encapsulation header).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/stream.h"
+
+namespace relievo {
+
+struct RecordingSchema {
+  std::string name;      // the message type's name, e.g. "relievo::Frame"
+  std::string encoding;  // "omgidl"
+  std::string text;      // self-contained
+};
+
+struct RecordingChannel {
+  std::string topic;                                          // e.g. "relievo/frame"
+  std::string message_encoding;                               // "cdr"
+  std::string schema;                                         // a RecordingSchema's name
+  std::vector<std::pair<std::string, std::string>> metadata;  // e.g. {"stream", "face"}
+};
+
+struct RecordingAttachment {
+  std::string name;        // "rig.yaml"
+  std::string media_type;  // "application/yaml"
+  std::int64_t time_ns = 0;
+  Bytes data;
+};
+
+struct RecordedMessage {
+  std::uint16_t channel = 0;  // id: from add_channel, or an index into RecordingSummary::channels
+  std::uint32_t sequence = 0;
+  std::int64_t log_time_ns = 0;      // when the recorder received it
+  std::int64_t publish_time_ns = 0;  // when it was published
+  Bytes data;
+};
+
+/// Writes one file. Chunks are closed and put on the disk (fdatasync) at most `chunk_ns` after their first
+/// message or at `chunk_bytes`, so a crash or a power loss loses at most that much. write() may therefore
+/// wait for the disk: call it from a thread of its own. One thread.
+class RecordingWriter {
+ public:
+  struct Options {
+    std::int64_t chunk_ns = 500'000'000;
+    std::size_t chunk_bytes = 4u << 20;
+  };
+  /// Fails, saying why, where the file exists already or cannot be made; never touches an existing file.
+  static Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& file,
+                                                         const Options& options);
+  virtual ~RecordingWriter() = default;  // finishes the file as finish() does, errors lost
+
+  /// Schemas of one name are written once and must be equal.
+  virtual Result<std::uint16_t> add_channel(const RecordingSchema& schema,
+                                            const RecordingChannel& channel) = 0;
+  virtual Status add_attachment(const RecordingAttachment& attachment) = 0;
+  /// After a failed write (a full disk) the file is closed with what fits, readable, and every later call
+  /// fails.
+  virtual Status write(const RecordedMessage& message) = 0;
+  /// Closes the open chunk where it is older than chunk_ns: call while no messages come.
+  virtual Status flush_if_due(std::int64_t now_ns) = 0;
+  /// Writes the index and closes.
+  virtual Status finish() = 0;
+};
+
+struct RecordingSummary {
+  std::vector<RecordingSchema> schemas;
+  std::vector<RecordingChannel> channels;       // index = RecordedMessage::channel when reading
+  std::vector<std::uint64_t> channel_messages;  // count of each channel
+  std::vector<RecordingAttachment> attachments;
+  std::int64_t start_ns = 0;  // log times of the first and last message
+  std::int64_t end_ns = 0;
+  std::uint64_t messages = 0;
+  std::vector<std::string> damage;  // a line for each attachment left out because its bytes are wrong
+  bool recovered = false;           // the file was cut short; its index was rebuilt from what is whole
+  std::uint64_t lost_bytes = 0;     // at its end, not readable
+};
+
+/// Reads a file, whole or cut short (never changing it). One thread.
+class RecordingReader {
+ public:
+  static Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& file);
+  virtual ~RecordingReader() = default;
+
+  virtual const RecordingSummary& summary() const = 0;
+  /// The next message in log-time order; nothing at the end. Fails on a chunk whose CRC is wrong, naming its
+  /// place; the call after that goes on behind it.
+  virtual Result<std::optional<RecordedMessage>> next() = 0;
+  /// The next next() returns the first message at or after this log time.
+  virtual Status seek(std::int64_t log_time_ns) = 0;
+};
+
+}  // namespace relievo

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+// The file grows by whole records only: what a crash cuts off is at most the chunk being written.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <system_error>
+
+#include "codec/byte_io.h"
+#include "codec/mcap_records.h"
+#include "codec/recording.h"
+#include "codec/whole_file.h"
+
+namespace relievo {
+namespace {
+
+class Writer final : public RecordingWriter {
+ public:
+  Writer(int file, std::filesystem::path path, const Options& options)
+      : file_(file), path_(std::move(path)), options_(options) {}
+  ~Writer() override {
+    static_cast<void>(finish().ok());
+    if (file_ >= 0) ::close(file_);
+  }
+
+  Status start() {
+    Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
+    mcap::append_header(bytes, "relievo " RELIEVO_VERSION);
+    return write_whole({bytes});
+  }
+
+  Result<std::uint16_t> add_channel(const RecordingSchema& schema, const RecordingChannel& channel) override {
+    if (auto status = check_open(); !status) return status.error();
+    if (schema.name != channel.schema)
+      return Error{"channel " + channel.topic + " names schema " + channel.schema + ", not " + schema.name};
+    if (channels_.size() >= std::numeric_limits<std::uint16_t>::max())
+      return Error{"a recording cannot hold more than 65535 channels"};
+    Bytes records;
+    const auto known = std::ranges::find(schemas_, schema.name, &mcap::Schema::name);
+    const bool is_new = known == schemas_.end();
+    if (!is_new && (known->data != schema.text || known->encoding != schema.encoding))
+      return Error{"the recording holds another schema of the name " + schema.name};
+    const auto schema_id = is_new ? static_cast<std::uint16_t>(schemas_.size() + 1) : known->id;
+    const mcap::Schema new_schema{schema_id, schema.name, schema.encoding, schema.text};
+    if (is_new) mcap::append(records, new_schema);
+    const auto id = static_cast<std::uint16_t>(channels_.size());
+    const mcap::Channel new_channel{id, schema_id, channel.topic, channel.message_encoding, channel.metadata};
+    mcap::append(records, new_channel);
+    if (auto status = write_or_close({records}); !status) return status.error();
+    if (is_new) schemas_.push_back(new_schema);
+    channels_.push_back(new_channel);
+    statistics_.channel_messages.emplace_back(id, 0);
+    return id;
+  }
+
+  Status add_attachment(const RecordingAttachment& attachment) override {
+    if (auto status = check_open(); !status) return status;
+    const auto time = static_cast<std::uint64_t>(std::max<std::int64_t>(attachment.time_ns, 0));
+    Bytes record;
+    mcap::append(record,
+                 mcap::Attachment{time, time, attachment.name, attachment.media_type, attachment.data});
+    const mcap::AttachmentIndex index{
+        offset_, record.size(), time, time, attachment.data.size(), attachment.name, attachment.media_type};
+    if (auto status = write_or_close({record}); !status) return status;
+    attachments_.push_back(index);
+    return {};
+  }
+
+  Status write(const RecordedMessage& message) override {
+    if (auto status = check_open(); !status) return status;
+    if (message.channel >= channels_.size())
+      return Error{"no channel " + std::to_string(message.channel) + " in the recording"};
+    if (message.log_time_ns < 0 || message.publish_time_ns < 0)
+      return Error{"a recording cannot hold times before 1970"};
+    if (message.data.size() > mcap::kMaxChunkBytes / 2)
+      return Error{"a message of " + std::to_string(message.data.size()) + " bytes is too large to record"};
+    if (auto status = flush_if_due(message.log_time_ns); !status) return status;
+    const auto log_time = static_cast<std::uint64_t>(message.log_time_ns);
+    if (chunk_.empty()) {
+      chunk_opened_ns_ = message.log_time_ns;
+      chunk_header_ = {};
+      chunk_header_.start_time = chunk_header_.end_time = log_time;
+    }
+    chunk_header_.start_time = std::min(chunk_header_.start_time, log_time);
+    chunk_header_.end_time = std::max(chunk_header_.end_time, log_time);
+    chunk_index_[message.channel].emplace_back(log_time, chunk_.size());
+    mcap::append(
+        chunk_,
+        {message.channel, message.sequence, log_time, static_cast<std::uint64_t>(message.publish_time_ns)},
+        message.data);
+    if (chunk_.size() >= options_.chunk_bytes) return flush();
+    return {};
+  }
+
+  Status flush_if_due(std::int64_t now_ns) override {
+    if (auto status = check_open(); !status) return status;
+    // The clock may have been set back: never wait for it.
+    const bool due = now_ns - chunk_opened_ns_ >= options_.chunk_ns || now_ns < chunk_opened_ns_;
+    return !chunk_.empty() && due ? flush() : Status();
+  }
+
+  Status finish() override {
+    if (!failure_.empty()) return Error{failure_};
+    if (file_ < 0) return {};
+    if (!chunk_.empty())
+      if (auto status = flush(); !status) return status;
+    if (auto status = write_index(); !status) return fail(status.error());
+    return close_file();
+  }
+
+ private:
+  using Parts = std::initializer_list<std::span<const std::uint8_t>>;
+
+  Status check_open() const {
+    if (!failure_.empty()) return Error{failure_};
+    if (file_ < 0) return Error{path_.string() + ": the recording is finished"};
+    return {};
+  }
+
+  Status write_all(std::span<const std::uint8_t> bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(file_, bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0)
+        return Error{"cannot write " + path_.string() + ": " + write_failure(written < 0 ? errno : ENOSPC)};
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+    return {};
+  }
+
+  /// All parts or, after a failure, none: the file is cut back to where it was.
+  Status write_whole(Parts parts) {
+    std::uint32_t crc = crc_;
+    std::uint64_t size = 0;
+    for (const auto part : parts) {
+      if (auto status = write_all(part); !status) {
+        if (::ftruncate(file_, static_cast<off_t>(offset_)) == 0)
+          static_cast<void>(::lseek(file_, static_cast<off_t>(offset_), SEEK_SET));
+        return status;
+      }
+      crc = mcap::crc32(part, crc);
+      size += part.size();
+    }
+    crc_ = crc;
+    offset_ += size;
+    return {};
+  }
+
+  /// The first failure ends the recording: with its index where that still fits, else as it is, which readers
+  /// recover.
+  Status fail(const Error& error) {
+    failure_ = error.message;
+    chunk_.clear();
+    static_cast<void>(write_index().ok());
+    static_cast<void>(close_file().ok());
+    return error;
+  }
+  Status write_or_close(Parts parts) {
+    if (auto status = write_whole(parts); !status) return fail(status.error());
+    return {};
+  }
+
+  Status flush() {
+    chunk_header_.uncompressed_size = chunk_.size();
+    chunk_header_.records_size = chunk_.size();
+    chunk_header_.uncompressed_crc = mcap::crc32(chunk_);
+    Bytes head;
+    mcap::append_chunk_header(head, chunk_header_);
+    mcap::ChunkIndex index{.start_time = chunk_header_.start_time,
+                           .end_time = chunk_header_.end_time,
+                           .offset = offset_,
+                           .length = head.size() + chunk_.size(),
+                           .message_index_offsets = {},
+                           .message_index_length = 0,
+                           .compression = "",
+                           .compressed_size = chunk_.size(),
+                           .uncompressed_size = chunk_.size()};
+    Bytes tail;
+    for (auto& [channel, entries] : chunk_index_) {
+      index.message_index_offsets.emplace_back(channel, offset_ + index.length + tail.size());
+      mcap::append(tail, mcap::MessageIndex{channel, entries});
+    }
+    index.message_index_length = tail.size();
+    if (auto status = write_or_close({head, chunk_, tail}); !status) return status;
+    if (::fdatasync(file_) != 0 && errno != EINVAL && errno != EROFS)
+      return fail({"cannot write " + path_.string() + ": " + write_failure(errno)});
+    for (const auto& [channel, entries] : chunk_index_) {
+      statistics_.channel_messages[channel].second += entries.size();
+      statistics_.messages += entries.size();
+    }
+    if (chunks_.empty()) statistics_.start_time = index.start_time;
+    statistics_.start_time = std::min(statistics_.start_time, index.start_time);
+    statistics_.end_time = std::max(statistics_.end_time, index.end_time);
+    chunks_.push_back(std::move(index));
+    chunk_.clear();
+    chunk_index_.clear();
+    return {};
+  }
+
+  /// Data end, summary, footer and closing magic, at once.
+  Status write_index() {
+    Bytes data_end;
+    mcap::append_data_end(data_end, crc_);
+    const std::uint64_t summary_start = offset_ + data_end.size();
+    Bytes summary;
+    Bytes offsets;
+    const auto group = [&](mcap::Op op, const auto& records) {
+      const std::size_t start = summary.size();
+      for (const auto& record : records) mcap::append(summary, record);
+      if (summary.size() > start)
+        mcap::append_summary_offset(offsets, op, summary_start + start, summary.size() - start);
+    };
+    statistics_.schemas = static_cast<std::uint16_t>(schemas_.size());
+    statistics_.channels = static_cast<std::uint32_t>(channels_.size());
+    statistics_.attachments = static_cast<std::uint32_t>(attachments_.size());
+    statistics_.chunks = static_cast<std::uint32_t>(chunks_.size());
+    group(mcap::Op::kSchema, schemas_);
+    group(mcap::Op::kChannel, channels_);
+    group(mcap::Op::kStatistics, std::span(&statistics_, 1));
+    group(mcap::Op::kChunkIndex, chunks_);
+    group(mcap::Op::kAttachmentIndex, attachments_);
+    const std::uint64_t offsets_start = summary_start + summary.size();
+    append_bytes(summary, offsets);
+    Bytes footer;
+    mcap::append_footer(footer, summary,
+                        {.summary_start = summary_start, .summary_offset_start = offsets_start});
+    append_bytes(footer, mcap::kMagic);
+    return write_whole({data_end, summary, footer});
+  }
+
+  Status close_file() {
+    const bool synced = ::fsync(file_) == 0 || errno == EINVAL || errno == EROFS;
+    const int sync_error = errno;
+    const bool closed = ::close(std::exchange(file_, -1)) == 0;
+    if (synced && closed) return {};
+    failure_ = "cannot write " + path_.string() + ": " + write_failure(synced ? errno : sync_error);
+    return Error{failure_};
+  }
+
+  int file_ = -1;  // -1: closed
+  const std::filesystem::path path_;
+  const Options options_;
+  std::string failure_;  // the first one; empty while all is well
+  std::uint64_t offset_ = 0;
+  std::uint32_t crc_ = 0;  // of everything before offset_
+
+  std::vector<mcap::Schema> schemas_;
+  std::vector<mcap::Channel> channels_;
+  std::vector<mcap::ChunkIndex> chunks_;
+  std::vector<mcap::AttachmentIndex> attachments_;
+  mcap::Statistics statistics_;
+
+  Bytes chunk_;  // records of the open chunk
+  mcap::ChunkHeader chunk_header_;
+  std::int64_t chunk_opened_ns_ = 0;  // log time of its first message
+  std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> chunk_index_;
+};
+
+/// So that a power loss does not take the new name with it. Not all file systems can; no reason to fail.
+void sync_folder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  const int handle = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (handle < 0) return;
+  static_cast<void>(::fsync(handle));
+  ::close(handle);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std::filesystem::path& file,
+                                                                 const Options& options) {
+  if (options.chunk_bytes == 0 || options.chunk_bytes > mcap::kMaxChunkBytes / 2 || options.chunk_ns < 0)
+    return Error{"chunk_bytes must be 1 to 536870912 and chunk_ns not negative"};
+  const int handle = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  if (handle < 0) {
+    if (errno == EEXIST)
+      return Error{"cannot record to " + file.string() +
+                   ": it exists already; give another name or remove it"};
+    return Error{"cannot record to " + file.string() + ": " + write_failure(errno)};
+  }
+  auto writer = std::make_unique<Writer>(handle, file, options);
+  if (auto status = writer->start(); !status) {
+    ::unlink(file.c_str());
+    return status.error();
+  }
+  sync_folder(file);
+  return std::unique_ptr<RecordingWriter>(std::move(writer));
+}
+
+}  // namespace relievo

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/surface_check.h"
+
+#include <cmath>
+#include <string>
+
+namespace relievo {
+namespace {
+
+template <std::size_t N>
+bool all_finite(const std::vector<std::array<float, N>>& values) {
+  for (const auto& value : values)
+    for (const float x : value)
+      if (!std::isfinite(x)) return false;
+  return true;
+}
+
+/// False, and unchanged, where there is no direction.
+bool normalise(Vec3f& v) {
+  const double length = std::hypot(v[0], v[1], v[2]);
+  if (!(length > 0)) return false;
+  for (float& x : v) x = static_cast<float>(x / length);
+  return true;
+}
+
+}  // namespace
+
+Status check_surface(const Surface& surface) {
+  const std::size_t count = surface.positions.size();
+  const auto matches = [count](std::size_t size) { return size == 0 || size == count; };
+  if (!matches(surface.normals.size()) || !matches(surface.texture_coordinates.size()))
+    return Error{"surface has " + std::to_string(count) + " positions, but " +
+                 std::to_string(surface.normals.size()) + " normals and " +
+                 std::to_string(surface.texture_coordinates.size()) +
+                 " texture coordinates: give none or one a vertex"};
+  if (!all_finite(surface.positions) || !all_finite(surface.normals) ||
+      !all_finite(surface.texture_coordinates))
+    return Error{"surface has a position, normal or texture coordinate that is not finite"};
+  for (const Triangle& triangle : surface.triangles)
+    for (const std::uint32_t index : triangle)
+      if (index >= count)
+        return Error{"surface has a triangle on vertex " + std::to_string(index) + " of " +
+                     std::to_string(count)};
+  return {};
+}
+
+std::vector<Vec3f> surface_normals(const Surface& surface) {
+  const std::vector<Vec3f>& p = surface.positions;
+  std::vector<Vec3f> normals(p.size(), Vec3f{});
+  for (const Triangle& t : surface.triangles) {
+    Vec3f a{};
+    Vec3f b{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      a[i] = p[t[1]][i] - p[t[0]][i];
+      b[i] = p[t[2]][i] - p[t[0]][i];
+    }
+    const Vec3f cross{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    for (const std::uint32_t index : t)
+      for (std::size_t i = 0; i < 3; ++i) normals[index][i] += cross[i];
+  }
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    if (normalise(normals[v])) continue;
+    normals[v] = {-p[v][0], -p[v][1], -p[v][2]};
+    if (!normalise(normals[v])) normals[v] = {0, 0, -1};
+  }
+  return normals;
+}
+
+}  // namespace relievo

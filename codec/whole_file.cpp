@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/whole_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+
+namespace relievo {
+
+std::string write_failure(int error) {
+  if (error == ENOSPC || error == EDQUOT) return "no space left: make room or write elsewhere";
+  if (error == EFBIG) return "the file may not grow further (a limit of the system or its file system)";
+  if (error == ENOENT) return "there is no such folder";
+  return std::generic_category().message(error);
+}
+
+Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  const auto failed = [&](int error) {
+    return Error{"cannot write " + path.string() + ": " + write_failure(error)};
+  };
+  const std::string temporary = path.string() + ".part" + std::to_string(::getpid());
+  const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (file < 0) return failed(errno);
+  int error = 0;
+  while (!bytes.empty() && error == 0) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written >= 0)
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    else if (errno != EINTR)
+      error = errno;
+  }
+  if (::close(file) != 0 && error == 0) error = errno;
+  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  if (error == 0) return {};
+  ::unlink(temporary.c_str());
+  return failed(error);
+}
+
+}  // namespace relievo

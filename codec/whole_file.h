@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files that appear whole or not at all, and errors of files in words.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "base/result.h"
+
+namespace relievo {
+
+/// Writes under a temporary name beside `path`, then renames: replaces a file of that name, leaves nothing
+/// behind on failure.
+Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+
+/// Why a file could not be written, from errno, with what to do about it where that is known.
+std::string write_failure(int error);
+
+}  // namespace relievo

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <dds/dds.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "idl/domain.h"
+#include "idl/live_streams.h"
+#include "idl/topics.h"
+#include "idl/transport.h"
+#include "relievo.h"
+
+namespace relievo {
+namespace {
+
+// dds_write reads these and keeps nothing, so samples borrow our memory; the generated C types are not const.
+char* borrow(const std::string& text) {
+  return const_cast<char*>(text.c_str());
+}
+dds_sequence_octet borrow(const Bytes& bytes) {
+  const auto size = static_cast<std::uint32_t>(bytes.size());
+  return {size, size, const_cast<std::uint8_t*>(bytes.data()), false};
+}
+
+relievo_PinholeModel to_dds(const PinholeModel& model) {
+  relievo_PinholeModel out{};
+  out.width = static_cast<std::uint32_t>(model.width);
+  out.height = static_cast<std::uint32_t>(model.height);
+  std::copy(model.matrix.begin(), model.matrix.end(), out.matrix);
+  std::copy(model.distortion.begin(), model.distortion.end(), out.distortion);
+  return out;
+}
+
+relievo_Rig to_dds(const Rig& rig) {
+  relievo_Rig out{};
+  out.scan = rig.scan == Scan::kInterlaced ? relievo_SCAN_INTERLACED : relievo_SCAN_PROGRESSIVE;
+  out.frame_rate = rig.frame_rate;
+  out.camera = to_dds(rig.camera);
+  out.projector = to_dds(rig.projector);
+  std::copy(rig.projector_from_camera_rotation.begin(), rig.projector_from_camera_rotation.end(),
+            out.projector_from_camera_rotation);
+  std::copy(rig.projector_from_camera_translation.begin(), rig.projector_from_camera_translation.end(),
+            out.projector_from_camera_translation);
+  std::copy(rig.colour_matrix.begin(), rig.colour_matrix.end(), out.colour_matrix);
+  return out;
+}
+
+relievo_StreamState to_dds(StreamState state) {
+  switch (state) {
+    case StreamState::kStarting:
+      return relievo_STATE_STARTING;
+    case StreamState::kRunning:
+      return relievo_STATE_RUNNING;
+    case StreamState::kStalled:
+      return relievo_STATE_STALLED;
+    case StreamState::kEnded:
+      return relievo_STATE_ENDED;
+  }
+  return relievo_STATE_ENDED;
+}
+
+Status written(dds_return_t code, Topic topic) {
+  if (code < 0) return dds_error(code, "cannot publish on " + topic_type(topic).topic_name);
+  return {};
+}
+
+class DdsPublisher final : public Publisher {
+ public:
+  static Result<std::unique_ptr<Publisher>> open(const DomainOptions& options, const StreamInfo& info) {
+    if (!valid_stream_name(info.stream)) {
+      return Error{"'" + info.stream +
+                   "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.', no dot first"};
+    }
+    auto domain = Domain::open(options);
+    if (!domain) return domain.error();
+    if (auto free = check_name_is_free(**domain, info.stream, kDiscoveryWait); !free) return free.error();
+
+    auto publisher = std::make_unique<DdsPublisher>();
+    publisher->stream_ = info.stream;
+    publisher->domain_ = std::move(domain).value();
+    const std::int32_t participant = publisher->domain_->participant();
+    auto group = create_group(participant, true, info.stream);
+    if (!group) return group.error();
+    publisher->group_ = std::move(group).value();
+    for (const Topic topic : kTopics) {
+      auto writer = create_writer(participant, publisher->group_.get(), topic);
+      if (!writer) return writer.error();
+      publisher->writers_[static_cast<std::size_t>(topic)] = std::move(writer).value();
+    }
+    if (auto status = publisher->publish(info); !status) return status.error();
+    return std::unique_ptr<Publisher>(std::move(publisher));
+  }
+
+  Status publish(const FrameMessage& frame) override {
+    if (frame.data->size() > std::numeric_limits<std::uint32_t>::max() / 2) {
+      return Error{"a frame of " + std::to_string(frame.data->size()) + " bytes is too large to publish"};
+    }
+    relievo_Frame sample{};
+    sample.stream = borrow(stream_);
+    sample.sequence_number = frame.sequence;
+    sample.frame_number = frame.number;
+    sample.capture_time_ns = frame.capture_time_ns;
+    sample.publish_time_ns = frame.publish_time_ns;
+    sample.data = borrow(*frame.data);
+    return written(dds_write(writer(Topic::kFrame), &sample), Topic::kFrame);
+  }
+
+  Status publish(const ServerStatus& status) override {
+    relievo_ServerStatus sample{};
+    sample.stream = borrow(stream_);
+    sample.time_ns = status.time_ns;
+    sample.state = to_dds(status.state);
+    sample.message = borrow(status.message);
+    sample.frame_rate = status.frame_rate;
+    sample.frames_captured = status.frames_captured;
+    sample.frames_published = status.frames_published;
+    sample.drops_capture = status.drops_capture;
+    sample.drops_reconstruct = status.drops_reconstruct;
+    sample.drops_encode = status.drops_encode;
+    sample.drops_publish = status.drops_publish;
+    sample.reconstruct_ms = status.reconstruct_ms;
+    sample.encode_ms = status.encode_ms;
+    sample.latency_ms = status.latency_ms;
+    return written(dds_write(writer(Topic::kStatus), &sample), Topic::kStatus);
+  }
+
+  int matched_readers() const override {
+    dds_publication_matched_status_t status{};
+    dds_get_publication_matched_status(writer(Topic::kFrame), &status);
+    return static_cast<int>(status.current_count);
+  }
+
+ private:
+  Status publish(const StreamInfo& info) {
+    std::vector<std::uint32_t> stripes(info.pattern.sequence.begin(), info.pattern.sequence.end());
+    relievo_StreamInfo sample{};
+    sample.stream = borrow(stream_);
+    sample.source = borrow(info.source);
+    sample.started_ns = info.started_ns;
+    sample.rig = to_dds(info.rig);
+    sample.pattern.colours = static_cast<std::uint32_t>(info.pattern.base);
+    sample.pattern.slides = static_cast<std::uint32_t>(info.pattern.slides);
+    sample.pattern.palette = borrow(info.pattern.palette);
+    sample.pattern.stripes._maximum = sample.pattern.stripes._length =
+        static_cast<std::uint32_t>(stripes.size());
+    sample.pattern.stripes._buffer = stripes.data();
+    return written(dds_write(writer(Topic::kInfo), &sample), Topic::kInfo);
+  }
+
+  std::int32_t writer(Topic topic) const { return writers_[static_cast<std::size_t>(topic)].get(); }
+
+  std::string stream_;
+  std::shared_ptr<Domain> domain_;
+  Entity group_;
+  std::array<Entity, kTopics.size()> writers_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Publisher>> Publisher::create(const DomainOptions& domain, const StreamInfo& info) {
+  return DdsPublisher::open(domain, info);
+}
+
+}  // namespace relievo

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recorded samples back onto the network, byte for byte: through Cyclone's serialised-data interface instead
+// of its C types.
+#include <dds/dds.h>
+#include <dds/ddsi/ddsi_serdata.h>
+#include <dds/ddsi/ddsi_sertype.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "idl/cdr.h"
+#include "idl/domain.h"
+#include "idl/live_streams.h"
+#include "idl/topics.h"
+#include "idl/transport.h"
+#include "relievo.h"
+
+namespace relievo {
+namespace {
+
+// Cyclone 0.10 tells the serialiser of a topic only through a sample, so one is written to ourselves, in a
+// partition nobody else reads. The returned reference is ours.
+Result<ddsi_sertype*> sertype_of(std::int32_t participant, Topic topic) {
+  static std::atomic<unsigned> count = 0;
+  const std::string partition =
+      ".relievo-probe-" + std::to_string(getpid()) + '-' + std::to_string(count.fetch_add(1));
+  const char* partitions[] = {partition.c_str()};
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_partition(qos, 1, partitions);
+  auto publisher = take_entity(dds_create_publisher(participant, qos, nullptr), "publisher");
+  auto subscriber = take_entity(dds_create_subscriber(participant, qos, nullptr), "subscriber");
+  dds_delete_qos(qos);
+  if (!publisher) return publisher.error();
+  if (!subscriber) return subscriber.error();
+  auto reader = create_reader(participant, subscriber->get(), topic);
+  if (!reader) return reader.error();
+  auto writer = create_writer(participant, publisher->get(), topic);
+  if (!writer) return writer.error();
+
+  // All topic types begin with the key, and Cyclone writes null strings as empty ones.
+  static char name[] = "probe";
+  relievo_StreamInfo info{};
+  relievo_Frame frame{};
+  relievo_ServerStatus status{};
+  info.stream = frame.stream = status.stream = name;
+  const void* samples[] = {&info, &frame, &status};
+  const auto code = dds_write(writer->get(), samples[static_cast<std::size_t>(topic)]);
+  if (code < 0) return dds_error(code, "cannot prepare raw publishing");
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    ddsi_serdata* data = nullptr;
+    dds_sample_info_t sample_info;
+    if (dds_takecdr(reader->get(), &data, 1, &sample_info, DDS_ANY_STATE) == 1) {
+      ddsi_sertype* type = sample_info.valid_data ? ddsi_sertype_ref(data->type) : nullptr;
+      ddsi_serdata_unref(data);
+      if (type != nullptr) return type;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return Error{"cannot prepare raw publishing: no sample came back within a second"};
+}
+
+Result<std::string> stream_of(const RawSample& sample) {
+  switch (sample.topic) {
+    case Topic::kInfo: {
+      auto info = read_info_cdr(sample.cdr);
+      return info ? Result<std::string>(info->stream) : info.error();
+    }
+    case Topic::kFrame: {
+      auto frame = read_frame_cdr(sample.cdr);
+      return frame ? Result<std::string>(frame->stream) : frame.error();
+    }
+    case Topic::kStatus: {
+      auto status = read_status_cdr(sample.cdr);
+      return status ? Result<std::string>(status->stream) : status.error();
+    }
+  }
+  return Error{"a sample of no known topic"};
+}
+
+class DdsRawPublisher final : public RawPublisher {
+ public:
+  ~DdsRawPublisher() override {
+    for (ddsi_sertype* type : types_) {
+      if (type != nullptr) ddsi_sertype_unref(type);
+    }
+  }
+
+  static Result<std::unique_ptr<RawPublisher>> open(const DomainOptions& options, const std::string& stream) {
+    if (!valid_stream_name(stream)) return Error{"'" + stream + "' cannot name a stream"};
+    auto domain = Domain::open(options);
+    if (!domain) return domain.error();
+    if (auto free = check_name_is_free(**domain, stream, kDiscoveryWait); !free) return free.error();
+
+    auto publisher = std::make_unique<DdsRawPublisher>();
+    publisher->stream_ = stream;
+    publisher->domain_ = std::move(domain).value();
+    const std::int32_t participant = publisher->domain_->participant();
+    auto group = create_group(participant, true, stream);
+    if (!group) return group.error();
+    publisher->group_ = std::move(group).value();
+    for (const Topic topic : kTopics) {
+      const auto index = static_cast<std::size_t>(topic);
+      auto type = sertype_of(participant, topic);
+      if (!type) return type.error();
+      publisher->types_[index] = *type;
+      auto writer = create_writer(participant, publisher->group_.get(), topic);
+      if (!writer) return writer.error();
+      publisher->writers_[index] = std::move(writer).value();
+    }
+    return std::unique_ptr<RawPublisher>(std::move(publisher));
+  }
+
+  Status publish(const RawSample& sample) override {
+    auto stream = stream_of(sample);
+    if (!stream) return stream.error().in("cannot publish a recorded sample");
+    if (*stream != stream_) {
+      return Error{"cannot publish a recorded sample of stream '" + *stream + "' as '" + stream_ + "'"};
+    }
+    const auto index = static_cast<std::size_t>(sample.topic);
+    ddsrt_iovec_t bytes{};
+    bytes.iov_base = const_cast<std::uint8_t*>(sample.cdr.data());  // only read
+    bytes.iov_len = sample.cdr.size();
+    ddsi_serdata* data = ddsi_serdata_from_ser_iov(types_[index], SDK_DATA, 1, &bytes, sample.cdr.size());
+    if (data == nullptr) {
+      return Error{"cannot publish a recorded sample: it is not a valid " +
+                   topic_type(sample.topic).type_name};
+    }
+    const auto code = dds_writecdr(writers_[index].get(), data);  // takes our reference
+    if (code < 0) return dds_error(code, "cannot publish on " + topic_type(sample.topic).topic_name);
+    return {};
+  }
+
+  int matched_readers() const override {
+    dds_publication_matched_status_t status{};
+    dds_get_publication_matched_status(writers_[static_cast<std::size_t>(Topic::kFrame)].get(), &status);
+    return static_cast<int>(status.current_count);
+  }
+
+ private:
+  std::string stream_;
+  std::shared_ptr<Domain> domain_;
+  Entity group_;
+  std::array<Entity, kTopics.size()> writers_;
+  std::array<ddsi_sertype*, kTopics.size()> types_{};
+};
+
+}  // namespace
+
+Result<std::unique_ptr<RawPublisher>> RawPublisher::create(const DomainOptions& domain,
+                                                           const std::string& stream) {
+  return DdsRawPublisher::open(domain, stream);
+}
+
+}  // namespace relievo

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "idl/recorder.h"
+
+#include <utility>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "idl/cdr.h"
+
+namespace relievo {
+namespace {
+
+RecordingAttachment attachment(const char* name, const std::string& text) {
+  return {name, "application/yaml", utc_now_ns(), Bytes(text.begin(), text.end())};
+}
+
+std::uint32_t sequence_of(const RawSample& sample) {
+  if (sample.topic != Topic::kFrame) return 0;
+  const auto frame = read_frame_cdr(sample.cdr);
+  return frame ? static_cast<std::uint32_t>(frame->sequence) : 0;
+}
+
+}  // namespace
+
+Recorder::Recorder(Options options) : options_(std::move(options)) {}
+
+Subscriber::Callbacks Recorder::callbacks() {
+  Subscriber::Callbacks callbacks;
+  callbacks.raw = [this](const RawSample& sample) {
+    std::lock_guard lock(mutex_);
+    add(sample);
+  };
+  callbacks.info = [this](const StreamInfo& info) {
+    std::lock_guard lock(mutex_);
+    counts_.live = true;
+    add_attachments(info);
+  };
+  callbacks.lost = [this](const std::string&, std::uint64_t count) {
+    std::lock_guard lock(mutex_);
+    if (!limit_reached_) counts_.lost += count;
+  };
+  callbacks.gone = [this](const std::string& stream) {
+    std::lock_guard lock(mutex_);
+    counts_.live = false;
+    if (!limit_reached_) log_info("stream '" + stream + "' has gone; recording goes on if it comes back");
+  };
+  return callbacks;
+}
+
+Recorder::Counts Recorder::counts() const {
+  std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+bool Recorder::done() const {
+  std::lock_guard lock(mutex_);
+  return limit_reached_ || error_.has_value();
+}
+
+Status Recorder::status() const {
+  std::lock_guard lock(mutex_);
+  return error_ ? Status(*error_) : Status();
+}
+
+void Recorder::tick(std::int64_t now_ns) {
+  std::lock_guard lock(mutex_);
+  if (writer_ && !error_) fail(writer_->flush_if_due(now_ns));
+  if (options_.max_s > 0 && first_frame_ns_ > 0 && seconds(now_ns - first_frame_ns_) >= options_.max_s) {
+    limit_reached_ = true;
+  }
+}
+
+Status Recorder::finish() {
+  std::lock_guard lock(mutex_);
+  if (writer_) {
+    const Status finished = writer_->finish();
+    if (!error_) fail(finished);
+    writer_.reset();
+  }
+  limit_reached_ = true;
+  return error_ ? Status(*error_) : Status();
+}
+
+void Recorder::add(const RawSample& sample) {
+  if (limit_reached_ || error_) return;
+  const bool is_frame = sample.topic == Topic::kFrame;
+  if (is_frame && options_.max_s > 0 && first_frame_ns_ > 0 &&
+      seconds(sample.receive_time_ns - first_frame_ns_) >= options_.max_s) {
+    limit_reached_ = true;
+    return;
+  }
+  if (!writer_) fail(open_file());
+  if (!error_) fail(write(sample));
+  if (error_) return;
+  counts_.bytes += sample.cdr.size();
+  counts_.live = true;
+  if (!is_frame) return;
+  if (first_frame_ns_ == 0) first_frame_ns_ = sample.receive_time_ns;
+  ++counts_.frames;
+  counts_.duration_s = seconds(sample.receive_time_ns - first_frame_ns_);
+  limit_reached_ = options_.max_frames > 0 && counts_.frames >= options_.max_frames;
+}
+
+void Recorder::add_attachments(const StreamInfo& info) {
+  if (!writer_ || error_ || limit_reached_) return;  // raw comes before, so there is a writer
+  // A server that came back with the same calibration does not make the file longer.
+  if (const std::string yaml = to_yaml(info.rig); yaml != rig_yaml_) {
+    rig_yaml_ = yaml;
+    fail(writer_->add_attachment(attachment("rig.yaml", yaml)));
+  }
+  if (const std::string yaml = to_yaml(info.pattern); !error_ && yaml != pattern_yaml_) {
+    pattern_yaml_ = yaml;
+    fail(writer_->add_attachment(attachment("pattern.yaml", yaml)));
+  }
+}
+
+Status Recorder::open_file() {
+  auto writer = RecordingWriter::create(options_.file, {});
+  if (!writer) return writer.error();
+  writer_ = std::move(writer).value();
+  for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
+    const TopicType& type = topic_type(topic);
+    auto channel =
+        writer_->add_channel({type.type_name, "omgidl", type.idl},
+                             {type.topic_name, "cdr", type.type_name, {{"stream", options_.stream}}});
+    if (!channel) return channel.error();
+    channels_[static_cast<std::size_t>(topic)] = *channel;
+  }
+  return {};
+}
+
+Status Recorder::write(const RawSample& sample) {
+  RecordedMessage message;
+  message.channel = channels_[static_cast<std::size_t>(sample.topic)];
+  message.sequence = sequence_of(sample);
+  message.log_time_ns = sample.receive_time_ns;
+  message.publish_time_ns = sample.source_time_ns;
+  message.data = sample.cdr;
+  return writer_->write(message);
+}
+
+void Recorder::fail(const Status& status) {
+  if (!status && !error_) error_ = status.error();
+}
+
+}  // namespace relievo

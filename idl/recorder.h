@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes one stream's samples to a recording as they come: of `relievo record` and of a server that records.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "base/result.h"
+#include "codec/recording.h"
+#include "idl/transport.h"
+
+namespace relievo {
+
+/// Fed by a Subscriber's thread, watched by another: every function may be called from any thread. It writes
+/// on the feeding thread; while the disk is slow, samples wait in DDS's own bounded queue, and what that
+/// loses is counted.
+class Recorder {
+ public:
+  struct Options {
+    std::filesystem::path file;
+    std::string stream;
+    std::uint64_t max_frames = 0;  // 0: no limit
+    double max_s = 0;              // after the first frame; 0: no limit
+  };
+  struct Counts {
+    std::uint64_t frames = 0;
+    std::uint64_t lost = 0;
+    std::uint64_t bytes = 0;  // of samples
+    double duration_s = 0;    // first to last frame
+    bool live = false;        // the stream is there now
+  };
+
+  explicit Recorder(Options options);
+
+  /// What a Subscriber is to call. The recorder must outlive it.
+  Subscriber::Callbacks callbacks();
+
+  Counts counts() const;
+  /// The limit of frames or seconds is reached, or writing has failed.
+  bool done() const;
+  /// Ok, or why writing has failed.
+  Status status() const;
+  /// To be called about ten times a second: bounds what a crash loses while no samples come.
+  void tick(std::int64_t now_ns);
+  /// Completes the file. The first error of all there were; ok where nothing was ever received, and then
+  /// there is no file.
+  Status finish();
+
+ private:
+  void add(const RawSample& sample);
+  void add_attachments(const StreamInfo& info);
+  Status open_file();
+  Status write(const RawSample& sample);
+  void fail(const Status& status);
+
+  const Options options_;
+  mutable std::mutex mutex_;
+  std::unique_ptr<RecordingWriter> writer_;  // made with the first sample, so that no empty file is left
+  std::uint16_t channels_[3] = {};
+  std::string rig_yaml_, pattern_yaml_;  // as attached last
+  std::optional<Error> error_;
+  Counts counts_;
+  std::int64_t first_frame_ns_ = 0;
+  bool limit_reached_ = false;
+};
+
+}  // namespace relievo

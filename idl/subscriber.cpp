@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <dds/dds.h>
+#include <dds/ddsi/ddsi_serdata.h>
+
+#include <map>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "idl/cdr.h"
+#include "idl/domain.h"
+#include "idl/topics.h"
+#include "idl/transport.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::uint32_t kTakeAtOnce = 16;
+constexpr std::size_t kMaxStreams = 256;  // what a hostile peer can make us remember
+
+// The serialised bytes of a taken sample, lent without a copy.
+class LentBytes {
+ public:
+  explicit LentBytes(ddsi_serdata* data) : data_(data) {
+    reference_ = ddsi_serdata_to_ser_ref(data_, 0, ddsi_serdata_size(data_), &bytes_);
+  }
+  LentBytes(const LentBytes&) = delete;
+  LentBytes& operator=(const LentBytes&) = delete;
+  ~LentBytes() { ddsi_serdata_to_ser_unref(reference_, &bytes_); }
+
+  std::span<const std::uint8_t> span() const {
+    return {static_cast<const std::uint8_t*>(bytes_.iov_base), bytes_.iov_len};
+  }
+
+ private:
+  ddsi_serdata* data_;
+  ddsi_serdata* reference_;
+  ddsrt_iovec_t bytes_{};
+};
+
+// What is remembered of a stream.
+struct Known {
+  std::optional<StreamInfo> info;
+  bool live = false;
+  std::uint64_t frame_writer = 0;  // DDS handle of the writer of the last frame; 0 before the first
+  std::uint64_t last_sequence = 0;
+};
+
+class DdsSubscriber final : public Subscriber {
+ public:
+  static Result<std::unique_ptr<Subscriber>> open(const DomainOptions& options, const std::string& stream,
+                                                  Callbacks callbacks) {
+    if (!stream.empty() && !valid_stream_name(stream)) {
+      return Error{"'" + stream +
+                   "' cannot name a stream: names are up to 64 letters, digits, '_', '-' and '.'"};
+    }
+    auto domain = Domain::open(options);
+    if (!domain) return domain.error();
+    auto subscriber = std::make_unique<DdsSubscriber>();
+    if (auto status = subscriber->start(std::move(domain).value(), stream, std::move(callbacks)); !status) {
+      return status.error();
+    }
+    return std::unique_ptr<Subscriber>(std::move(subscriber));
+  }
+
+  ~DdsSubscriber() override {
+    if (!thread_.joinable()) return;
+    dds_set_guardcondition(stop_.get(), true);
+    thread_.join();
+  }
+
+ private:
+  Status start(std::shared_ptr<Domain> domain, const std::string& stream, Callbacks callbacks) {
+    domain_ = std::move(domain);
+    stream_ = stream;
+    callbacks_ = std::move(callbacks);
+    const std::int32_t participant = domain_->participant();
+    const auto keep = [](Result<Entity> made, Entity& entity) -> Status {
+      if (!made) return made.error();
+      entity = std::move(made).value();
+      return {};
+    };
+    if (auto s = keep(create_group(participant, false, stream), group_); !s) return s;
+    if (auto s = keep(take_entity(dds_create_waitset(participant), "waitset"), waitset_); !s) return s;
+    if (auto s = keep(take_entity(dds_create_guardcondition(participant), "condition"), stop_); !s) return s;
+    dds_waitset_attach(waitset_.get(), stop_.get(), 0);
+    for (const Topic topic : kTopics) {
+      if (topic == Topic::kFrame && !wants_frames()) continue;
+      const auto i = static_cast<std::size_t>(topic);
+      if (auto s = keep(create_reader(participant, group_.get(), topic), readers_[i]); !s) return s;
+      if (auto s = keep(take_entity(dds_create_readcondition(readers_[i].get(), DDS_ANY_STATE), "condition"),
+                        conditions_[i]);
+          !s) {
+        return s;
+      }
+      dds_waitset_attach(waitset_.get(), conditions_[i].get(), 0);
+    }
+    thread_ = std::thread([this] { run(); });
+    return {};
+  }
+
+  void run() {
+    for (;;) {
+      dds_attach_t triggered[4];
+      const auto count = dds_waitset_wait(waitset_.get(), triggered, 4, DDS_INFINITY);
+      bool stopping = false;
+      if (count < 0 || dds_read_guardcondition(stop_.get(), &stopping) < 0 || stopping) return;
+      ended_.clear();
+      for (const Topic topic : kTopics) {
+        if (readers_[static_cast<std::size_t>(topic)].get() != 0) take(topic);
+      }
+      // Only now, so that a stream's last frames come before its end.
+      for (const std::string& stream : ended_) tell_gone(stream);
+    }
+  }
+
+  // Everything there is, but bounded, so that no topic starves the others.
+  void take(Topic topic) {
+    for (int round = 0; round < 4; ++round) {
+      if (take_some(topic) < static_cast<std::int32_t>(kTakeAtOnce)) return;
+    }
+  }
+
+  std::int32_t take_some(Topic topic) {
+    ddsi_serdata* samples[kTakeAtOnce] = {};
+    dds_sample_info_t infos[kTakeAtOnce];
+    const auto count = dds_takecdr(readers_[static_cast<std::size_t>(topic)].get(), samples, kTakeAtOnce,
+                                   infos, DDS_ANY_STATE);
+    for (std::int32_t i = 0; i < count; ++i) {
+      if (infos[i].valid_data) {
+        const LentBytes bytes(samples[i]);
+        if (auto status = deliver(topic, bytes.span(), infos[i]); !status) refuse(topic, status.error());
+      }
+      if (topic == Topic::kInfo && infos[i].instance_state != DDS_IST_ALIVE) {
+        const auto ended = stream_of_.find(infos[i].instance_handle);
+        if (ended != stream_of_.end()) ended_.insert(ended->second);
+      }
+      ddsi_serdata_unref(samples[i]);
+    }
+    return count;
+  }
+
+  Status deliver(Topic topic, std::span<const std::uint8_t> cdr, const dds_sample_info_t& sample) {
+    switch (topic) {
+      case Topic::kInfo: {
+        auto info = read_info_cdr(cdr);
+        if (!info) return info.error();
+        if (!wanted(info->stream)) return {};
+        Known* known = remember(info->stream);
+        if (known == nullptr) return Error{"more streams than can be followed"};
+        raw(topic, info->stream, cdr, sample);
+        stream_of_[sample.instance_handle] = info->stream;
+        known->info = std::move(*info);
+        known->live = true;
+        if (callbacks_.info) callbacks_.info(*known->info);
+        return {};
+      }
+      case Topic::kFrame: {
+        auto frame = read_frame_cdr(cdr);
+        if (!frame) return frame.error();
+        if (!wanted(frame->stream)) return {};
+        Known* known = remember(frame->stream);
+        if (known == nullptr) return Error{"more streams than can be followed"};
+        revive(*known);
+        count_lost(*known, *frame, sample.publication_handle);
+        raw(topic, frame->stream, cdr, sample);
+        if (!callbacks_.frame) return {};
+        FrameMessage message;
+        message.sequence = frame->sequence;
+        message.number = frame->number;
+        message.capture_time_ns = frame->capture_time_ns;
+        message.publish_time_ns = frame->publish_time_ns;
+        message.data = std::make_shared<const Bytes>(frame->data.begin(), frame->data.end());
+        callbacks_.frame(frame->stream, message);
+        return {};
+      }
+      case Topic::kStatus: {
+        auto status = read_status_cdr(cdr);
+        if (!status) return status.error();
+        if (!wanted(status->stream)) return {};
+        Known* known = remember(status->stream);
+        if (known == nullptr) return Error{"more streams than can be followed"};
+        raw(topic, status->stream, cdr, sample);
+        if (callbacks_.status) callbacks_.status(*status);
+        return {};
+      }
+    }
+    return {};
+  }
+
+  bool wants_frames() const { return callbacks_.frame || callbacks_.raw || callbacks_.lost; }
+  bool wanted(const std::string& stream) const { return stream_.empty() || stream == stream_; }
+
+  Known* remember(const std::string& stream) {
+    const auto found = known_.find(stream);
+    if (found != known_.end()) return &found->second;
+    if (known_.size() >= kMaxStreams) {
+      std::erase_if(known_, [](const auto& entry) { return !entry.second.live; });
+      std::erase_if(stream_of_, [&](const auto& entry) { return known_.count(entry.second) == 0; });
+    }
+    if (known_.size() >= kMaxStreams) return nullptr;
+    return &known_[stream];
+  }
+
+  // A writer that was silent for its lease (a machine that stood still) and goes on does not send its
+  // description again: ours still holds.
+  void revive(Known& known) {
+    if (known.live || !known.info) return;
+    known.live = true;
+    if (callbacks_.info) callbacks_.info(*known.info);
+  }
+
+  void count_lost(Known& known, const FrameView& frame, std::uint64_t writer) {
+    const bool follows = known.frame_writer == writer && frame.sequence > known.last_sequence;
+    const std::uint64_t lost = follows ? frame.sequence - known.last_sequence - 1 : 0;
+    known.frame_writer = writer;
+    known.last_sequence = frame.sequence;
+    if (lost > 0 && callbacks_.lost) callbacks_.lost(frame.stream, lost);
+  }
+
+  void raw(Topic topic, const std::string& stream, std::span<const std::uint8_t> cdr,
+           const dds_sample_info_t& sample) {
+    if (!callbacks_.raw) return;
+    callbacks_.raw({topic, stream, sample.source_timestamp, utc_now_ns(), Bytes(cdr.begin(), cdr.end())});
+  }
+
+  void tell_gone(const std::string& stream) {
+    const auto found = known_.find(stream);
+    if (found == known_.end() || !found->second.live) return;
+    found->second.live = false;
+    if (callbacks_.gone) callbacks_.gone(stream);
+  }
+
+  void refuse(Topic topic, const Error& error) {
+    ++refused_;
+    const std::string line = "refused a sample on " + topic_type(topic).topic_name + ": " + error.message;
+    if (refused_ == 1) {
+      log_warning(line + " (further ones are logged with -v only)");
+    } else {
+      log_debug(line + " (" + std::to_string(refused_) + " so far)");
+    }
+  }
+
+  std::string stream_;
+  Callbacks callbacks_;
+  std::shared_ptr<Domain> domain_;
+  Entity group_;
+  std::array<Entity, kTopics.size()> readers_;
+  std::array<Entity, kTopics.size()> conditions_;
+  Entity stop_;
+  Entity waitset_;
+  std::thread thread_;
+  // Of the thread alone:
+  std::map<std::string, Known> known_;
+  std::map<std::uint64_t, std::string> stream_of_;  // by the info topic's instance
+  std::set<std::string> ended_;
+  std::uint64_t refused_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Subscriber>> Subscriber::create(const DomainOptions& domain, const std::string& stream,
+                                                       Callbacks callbacks) {
+  return DdsSubscriber::open(domain, stream, std::move(callbacks));
+}
+
+}  // namespace relievo

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "idl/topics.h"
+
+#include <dds/dds.h>
+
+#include <memory>
+
+#include "idl/idl_text.h"
+#include "relievo.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::int64_t kLiveliness_ns = 1'500'000'000;  // a killed writer's stream is gone after this
+constexpr std::int64_t kMaxBlocking_ns = 100'000'000;   // a publisher waits no longer for its socket
+constexpr int kMaxStreams = 256;                        // of a reader: what a hostile peer can make it hold
+
+struct TopicRow {
+  const dds_topic_descriptor_t* type;
+  dds_durability_kind_t durability;
+  int writer_depth;  // samples a stream kept for retransmission and late joiners
+  int reader_depth;  // samples a stream waiting for a slow callback
+};
+
+// Always RELIABLE and KEEP_LAST: with KEEP_ALL one stopped reader would stall the writer and so everybody.
+const TopicRow& row(Topic topic) {
+  static const TopicRow rows[] = {
+      {&relievo_StreamInfo_desc, DDS_DURABILITY_TRANSIENT_LOCAL, 1, 1},
+      {&relievo_Frame_desc, DDS_DURABILITY_VOLATILE, 8, 32},
+      {&relievo_ServerStatus_desc, DDS_DURABILITY_TRANSIENT_LOCAL, 1, 4},
+  };
+  return rows[static_cast<std::size_t>(topic)];
+}
+
+struct QosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
+
+Qos common_qos(Topic topic) {
+  Qos qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking_ns);
+  dds_qset_durability(qos.get(), row(topic).durability);
+  const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
+  dds_qset_data_representation(qos.get(), 1, &representation);
+  return qos;
+}
+
+Result<Entity> create_topic(std::int32_t participant, Topic topic) {
+  return take_entity(
+      dds_create_topic(participant, row(topic).type, topic_type(topic).topic_name.c_str(), nullptr, nullptr),
+      "topic " + topic_type(topic).topic_name);
+}
+
+}  // namespace
+
+const TopicType& topic_type(Topic topic) {
+  static const TopicType types[] = {
+      {"relievo::StreamInfo", "relievo/info", kIdlText},
+      {"relievo::Frame", "relievo/frame", kIdlText},
+      {"relievo::ServerStatus", "relievo/status", kIdlText},
+  };
+  return types[static_cast<std::size_t>(topic)];
+}
+
+Result<Entity> create_group(std::int32_t participant, bool writing, const std::string& stream) {
+  Qos qos(dds_create_qos());
+  const char* partitions[] = {stream.c_str(), ""};
+  if (writing) {
+    dds_qset_partition(qos.get(), 2, partitions);
+  } else if (!stream.empty()) {
+    dds_qset_partition(qos.get(), 1, partitions);
+  }
+  return writing ? take_entity(dds_create_publisher(participant, qos.get(), nullptr), "publisher")
+                 : take_entity(dds_create_subscriber(participant, qos.get(), nullptr), "subscriber");
+}
+
+Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic) {
+  auto dds_topic = create_topic(participant, topic);
+  if (!dds_topic) return dds_topic.error();
+  const Qos qos = common_qos(topic);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, row(topic).writer_depth);
+  dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, kLiveliness_ns);
+  // Otherwise a server's exit would read as "stream deleted" and a late joiner would get one sample at most.
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  if (row(topic).durability == DDS_DURABILITY_TRANSIENT_LOCAL) {
+    dds_qset_durability_service(qos.get(), 0, DDS_HISTORY_KEEP_LAST, row(topic).writer_depth,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  }
+  return take_entity(dds_create_writer(group, dds_topic->get(), qos.get(), nullptr),
+                     "writer of " + topic_type(topic).topic_name);
+}
+
+Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic) {
+  auto dds_topic = create_topic(participant, topic);
+  if (!dds_topic) return dds_topic.error();
+  const Qos qos = common_qos(topic);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, row(topic).reader_depth);
+  dds_qset_resource_limits(qos.get(), DDS_LENGTH_UNLIMITED, kMaxStreams, DDS_LENGTH_UNLIMITED);
+  return take_entity(dds_create_reader(group, dds_topic->get(), qos.get(), nullptr),
+                     "reader of " + topic_type(topic).topic_name);
+}
+
+}  // namespace relievo

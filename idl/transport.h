@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stream's topics over Cyclone DDS: publisher, subscriber, raw samples for recording and replay. Types:
+// idl/relievo.idl; names and QoS: idl/topics.h.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/stream.h"
+
+namespace relievo {
+
+struct DomainOptions {
+  int domain = 0;
+  std::string interface;  // IP address or name; empty: Cyclone's own choice
+};
+
+/// Which of a stream's topics a sample belongs to.
+enum class Topic : std::uint8_t { kInfo, kFrame, kStatus };
+
+/// A sample exactly as on the wire: CDR with its 4-byte encapsulation header.
+struct RawSample {
+  Topic topic{};
+  std::string stream;               // the key
+  std::int64_t source_time_ns = 0;  // the writer's time stamp
+  std::int64_t receive_time_ns = 0;
+  Bytes cdr;
+};
+
+/// The self-contained OMG IDL of a topic's type, its name and its DDS topic name ("relievo/frame").
+struct TopicType {
+  std::string type_name;
+  std::string topic_name;
+  std::string idl;
+};
+const TopicType& topic_type(Topic topic);
+
+/// Writes one stream. Any thread, one call at a time.
+class Publisher {
+ public:
+  /// Publishes `info` for late joiners at once. Fails where another live writer in the domain has that stream
+  /// name.
+  static Result<std::unique_ptr<Publisher>> create(const DomainOptions& domain, const StreamInfo& info);
+  virtual ~Publisher() = default;
+
+  /// Serialises and sends on the caller's thread and keeps nothing of the argument. Never waits for a reader;
+  /// fails where the socket takes nothing for 0.1 s.
+  virtual Status publish(const FrameMessage& frame) = 0;
+  virtual Status publish(const ServerStatus& status) = 0;
+  /// Readers of the frames, in all processes.
+  virtual int matched_readers() const = 0;
+};
+
+/// Writes recorded samples unchanged: the bytes readers get are the recorded ones. Any thread, one call at a
+/// time.
+class RawPublisher {
+ public:
+  /// Fails as Publisher::create() does.
+  static Result<std::unique_ptr<RawPublisher>> create(const DomainOptions& domain, const std::string& stream);
+  virtual ~RawPublisher() = default;
+  /// Fails on bytes that are no sample of the topic, or of another stream.
+  virtual Status publish(const RawSample& sample) = 0;
+  virtual int matched_readers() const = 0;
+};
+
+/// Reads one stream, or every stream where the name is empty. Callbacks run on the subscriber's own thread,
+/// one at a time, and never after the destructor has returned. Frames may come before the stream's
+/// description. Samples that are malformed, or of a stream with an impossible name, are refused and logged
+/// once. Without a frame, raw or lost callback no frame travels.
+class Subscriber {
+ public:
+  struct Callbacks {
+    std::function<void(const StreamInfo&)>
+        info;  // again when it changes and when a stream that was gone is back
+    std::function<void(const std::string& stream, const FrameMessage&)> frame;
+    std::function<void(const ServerStatus&)> status;
+    std::function<void(const RawSample&)> raw;            // each sample besides, before the typed callback
+    std::function<void(const std::string& stream)> gone;  // the stream's writer left or died
+    std::function<void(const std::string& stream, std::uint64_t count)> lost;  // gap in the frame sequence
+  };
+  static Result<std::unique_ptr<Subscriber>> create(const DomainOptions& domain, const std::string& stream,
+                                                    Callbacks callbacks);
+  virtual ~Subscriber() = default;
+};
+
+}  // namespace relievo

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "base/log.h"
+#include "capture/calibrate/colour.h"
+#include "capture/calibrate/pictures.h"
+#include "capture/calibrate/rig_part.h"
+#include "server/calibrate_commands.h"
+
+namespace relievo {
+namespace {
+
+constexpr const char* kChannels[] = {"red", "green", "blue"};
+
+struct Options {
+  std::string captures;
+  std::string out;
+  std::string update;
+  std::vector<int> roi;
+  bool json = false;
+};
+
+/// "100.png", or "100_anything.png" where a colour was captured several times.
+std::optional<Primary> colour_of(const std::filesystem::path& file) {
+  const std::string stem = file.stem().string();
+  if (stem.size() > 3 && stem[3] != '_' && stem[3] != '-') return std::nullopt;
+  return primary_of(stem.substr(0, 3));
+}
+
+Result<std::vector<ColourCapture>> read_captures(const std::string& folder) {
+  auto files = pictures_in(folder);
+  if (!files) return files.error();
+  std::vector<ColourCapture> out;
+  for (const auto& file : *files) {
+    const auto colour = colour_of(file);
+    if (!colour) {
+      log_warning(file.string() + " is not used: its name says no colour such as 100 (red)");
+      continue;
+    }
+    auto picture = read_rgb(file);
+    if (!picture) return picture.error();
+    out.push_back({file.filename().string(), *colour, std::move(*picture)});
+  }
+  if (out.empty()) {
+    return Error{
+        folder +
+        " has no captures: name each picture by the projected colour, 100.png (red), 010.png, 001.png, "
+        "011.png, 101.png, 110.png, 000.png (black), 111.png (white)"};
+  }
+  return out;
+}
+
+bool is_palette(Primary colour) {
+  return colour != 0 && colour != 7;
+}
+
+void print_json(const ColourCalibration& c, const std::string& out) {
+  nlohmann::json colours = nlohmann::json::array();
+  for (const ColourReport& r : c.colours) {
+    nlohmann::json colour = {{"colour", primary_name(r.colour)},
+                             {"captured", r.captured},
+                             {"estimated", r.estimated},
+                             {"residual", r.residual}};
+    if (is_palette(r.colour)) {
+      colour["weakest_difference"] = r.weakest_difference;
+      colour["margin"] = r.weakest_difference - kDetectionThreshold;
+      colour["weakest_in_sigmas"] = r.weakest_in_sigmas;
+      colour["weakest_channel"] = kChannels[r.weakest_channel];
+    }
+    colours.push_back(colour);
+  }
+  const nlohmann::json json = {
+      {"colour_matrix", c.matrix},
+      {"residual", c.residual},
+      {"noise", c.noise},
+      {"threshold", kDetectionThreshold},
+      {"target",
+       {{"box", {c.target.x, c.target.y, c.target.width, c.target.height}}, {"pixels", c.target_pixels}}},
+      {"colours", colours},
+      {"rig", out}};
+  std::printf("%s\n", json.dump(2).c_str());
+}
+
+void print(const ColourCalibration& c, const std::string& out) {
+  std::printf("target     %zu pixels in %d,%d,%d,%d; noise %.2f of 255\n", c.target_pixels, c.target.x,
+              c.target.y, c.target.width, c.target.height, c.noise);
+  std::printf("colour     captured          estimated         residual  margin over %.0f\n",
+              kDetectionThreshold);
+  for (const ColourReport& r : c.colours) {
+    std::printf("%s        %4.0f %4.0f %4.0f    %4.0f %4.0f %4.0f    %6.1f", primary_name(r.colour).c_str(),
+                r.captured[0], r.captured[1], r.captured[2], r.estimated[0], r.estimated[1], r.estimated[2],
+                r.residual);
+    if (is_palette(r.colour)) {
+      std::printf("    %+6.1f in %s, %.0f sigmas of noise", r.weakest_difference - kDetectionThreshold,
+                  kChannels[r.weakest_channel], r.weakest_in_sigmas);
+    }
+    std::printf("\n");
+  }
+  const auto& m = c.matrix;
+  for (int row = 0; row < 3; ++row) {
+    const auto at = static_cast<std::size_t>(3 * row);
+    std::printf("%s  %8.4f %8.4f %8.4f\n", row == 0 ? "matrix   " : "         ", m[at], m[at + 1], m[at + 2]);
+  }
+  std::printf("residual   %.2f of 255 (RMS)\nwritten    %s\n", c.residual, out.c_str());
+}
+
+void warn_of_weak_colours(const ColourCalibration& c) {
+  for (const ColourReport& r : c.colours) {
+    if (!is_palette(r.colour) || r.weakest_difference > kDetectionThreshold) continue;
+    log_warning(
+        "colour " + primary_name(r.colour) + " will hardly be detected: its " + kChannels[r.weakest_channel] +
+        " channel differs too little from the complement's; check that capture and the projector's colours");
+  }
+}
+
+Status run(const Options& options) {
+  RigPart before;
+  if (!options.update.empty()) {
+    auto part = read_rig_part(options.update);
+    if (!part) return part.error();
+    before = *part;
+  }
+  auto captures = read_captures(options.captures);
+  if (!captures) return captures.error();
+  ColourOptions how;
+  if (!options.roi.empty()) how.roi = Roi{options.roi[0], options.roi[1], options.roi[2], options.roi[3]};
+  const auto calibration = calibrate_colour(*captures, how);
+  if (!calibration) return calibration.error().in(options.captures);
+
+  const std::string out = options.out.empty() ? options.update : options.out;
+  std::string text = colour_yaml(calibration->matrix);
+  if (before.whole) {
+    before.whole->colour_matrix = calibration->matrix;
+    text = to_yaml(*before.whole);
+  }
+  if (const Status written = write_atomically(out, text); !written) return written;
+  if (options.json) {
+    print_json(*calibration, out);
+  } else {
+    print(*calibration, out);
+  }
+  warn_of_weak_colours(*calibration);
+  return {};
+}
+
+}  // namespace
+
+std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
+  auto o = std::make_shared<Options>();
+  app.add_option(
+         "captures", o->captures,
+         "Folder of captures of a white target, named by the projected colour: 100.png is red, 000.png black")
+      ->required();
+  auto* out = app.add_option("-o,--out", o->out,
+                             "The rig.yaml to write: with colours only, unless --update gives the rest");
+  auto* update =
+      app.add_option("--update", o->update,
+                     "A rig.yaml: keep all but its colour matrix; written back unless --out says otherwise");
+  app.add_option("--roi", o->roi, "The target, where it should not be looked for: X,Y,WIDTH,HEIGHT")
+      ->delimiter(',')
+      ->expected(4);
+  app.add_flag("--json", o->json, "Print the report as JSON");
+  app.final_callback([out, update] {
+    if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");
+  });
+  return [o](StopSignal&) { return run(*o); };
+}
+
+}  // namespace relievo

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "capture/calibrate/board_scene.h"
+#include "capture/calibrate/colour.h"
+#include "capture/calibrate/pictures.h"
+#include "capture/source/sim/renderer.h"
+#include "cli/progress.h"
+#include "server/calibrate_commands.h"
+#include "server/size_option.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string out;
+  std::string spec = "object,distortion=1";
+  std::string board = "chessboard:9x7:25mm";
+  int views = 8;
+  std::uint32_t seed = 1;
+  bool json = false;
+};
+
+Status write_view(const fs::path& folder, const std::vector<Image8>& pictures) {
+  if (const Status made = make_folder(folder); !made) return made;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "gray_%02zu.png", i);
+    if (const Status written = write_png(folder / name, pictures[i]); !written) return written;
+  }
+  return {};
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  auto spec = sim::parse_sim_options(options.spec);
+  if (!spec) return spec.error();
+  auto scene = sim::make_scene(spec->scene);
+  if (!scene) return scene.error();
+  auto board = parse_board(options.board);
+  if (!board) return board.error();
+  const Rig rig = sim::make_rig(*spec, (*scene)->view());
+  const double distance_m = (*scene)->view().distance_m;
+  const auto poses = example_poses(rig, *board, distance_m, options.views, options.seed);
+  if (static_cast<int>(poses.size()) < options.views) {
+    return Error{"the board does not fit before the rig at " + std::to_string(options.views) +
+                 " poses: use a smaller one, with --board"};
+  }
+  const fs::path out = options.out;
+  Progress progress("example", "views", static_cast<std::uint64_t>(options.views));
+  for (int i = 0; i < options.views && !stop.stopped(); ++i) {
+    const BoardSceneOptions how{
+        .noise = spec->noise, .ambient = spec->ambient, .seed = options.seed + static_cast<std::uint32_t>(i)};
+    char name[32];
+    std::snprintf(name, sizeof name, "view_%02d", i);
+    const Status written = write_view(out / "views" / name,
+                                      render_gray_view(rig, *board, poses[static_cast<std::size_t>(i)], how));
+    if (!written) return written;
+    progress.update(static_cast<std::uint64_t>(i) + 1);
+  }
+  if (stop.stopped()) return {};
+  if (const Status made = make_folder(out / "colours"); !made) return made;
+  for (Primary colour = 0; colour < 8; ++colour) {
+    const Image8 picture = render_colour_capture(
+        rig, colour, distance_m, {.noise = spec->noise, .ambient = spec->ambient, .seed = options.seed});
+    if (const Status written = write_png(out / "colours" / (primary_name(colour) + ".png"), picture);
+        !written)
+      return written;
+  }
+  if (const Status written = write_atomically(out / "truth.yaml", to_yaml(rig)); !written) return written;
+  progress.finish();
+  const std::string size = std::to_string(rig.projector.width) + "x" + std::to_string(rig.projector.height);
+  if (options.json) {
+    const nlohmann::json json = {{"views", (out / "views").string()},
+                                 {"colours", (out / "colours").string()},
+                                 {"truth", (out / "truth.yaml").string()},
+                                 {"board", options.board},
+                                 {"projector", size}};
+    std::printf("%s\n", json.dump(2).c_str());
+    return {};
+  }
+  std::printf("%d views of a chessboard and 8 captures of a white sheet, in %s. Next:\n", options.views,
+              options.out.c_str());
+  std::printf("  relievo-server calibrate colour %s/colours --out rig.yaml\n", options.out.c_str());
+  std::printf(
+      "  relievo-server calibrate geometry %s/views --board %s --projector %s --update rig.yaml --compare "
+      "%s/truth.yaml\n",
+      options.out.c_str(), options.board.c_str(), size.c_str(), options.out.c_str());
+  return {};
+}
+
+}  // namespace
+
+std::function<Status(StopSignal&)> define_calibrate_example(CLI::App& app) {
+  auto o = std::make_shared<Options>();
+  app.add_option("-o,--out", o->out, "Folder for views/, colours/ and truth.yaml")->required();
+  app.add_option("--rig", o->spec, "Whose rig, as for sim: sources: SCENE[,key=value...]")
+      ->capture_default_str();
+  app.add_option("--board", o->board, "The chessboard")->capture_default_str();
+  app.add_option("--views", o->views, "Poses of the board")->check(CLI::Range(3, 100))->capture_default_str();
+  app.add_option("--seed", o->seed, "Of poses and noise")->capture_default_str();
+  app.add_flag("--json", o->json, "Print what was written as JSON");
+  return [o](StopSignal& stop) { return run(*o, stop); };
+}
+
+}  // namespace relievo

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+
+#include "base/log.h"
+#include "capture/calibrate/compare_rigs.h"
+#include "capture/calibrate/geometry.h"
+#include "capture/calibrate/gray_stack.h"
+#include "capture/calibrate/pictures.h"
+#include "capture/calibrate/rig_part.h"
+#include "capture/rig_file.h"
+#include "cli/progress.h"
+#include "server/calibrate_commands.h"
+#include "server/size_option.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string views;
+  std::string board;
+  Size projector;
+  std::string out;
+  std::string update;
+  std::string scan = "interlaced";
+  double frame_rate = 29.97;
+  std::string pictures;
+  std::string compare;
+  int threads = 2;
+  bool json = false;
+};
+
+/// The folders of VIEWS, in the order of their names; VIEWS itself where it holds pictures is a usual
+/// mistake.
+Result<std::vector<fs::path>> views_in(const std::string& folder) {
+  std::error_code code;
+  if (!fs::is_directory(folder, code)) return Error{folder + " is no folder"};
+  std::vector<fs::path> out;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    std::error_code ignored;
+    if (it->is_directory(ignored)) out.push_back(it->path());
+  }
+  if (code) return Error{"cannot read the folder " + folder + ": " + code.message()};
+  std::sort(out.begin(), out.end());
+  if (out.empty())
+    return Error{folder + " has no folders: a calibration needs several views, a folder of pictures each"};
+  return out;
+}
+
+struct Measured {
+  std::vector<MeasuredView> views;
+  PinholeModel camera;  // its size
+};
+
+Result<Measured> measure(const Options& options, const Board& board, StopSignal& stop) {
+  auto folders = views_in(options.views);
+  if (!folders) return folders.error();
+  Measured out;
+  WorkerPool pool(options.threads);
+  Progress progress("calibrate", "views", folders->size());
+  for (const fs::path& folder : *folders) {
+    const std::string name = folder.filename().string();
+    auto stack = read_gray_stack(folder, options.projector.width, options.projector.height,
+                                 [&](std::size_t, std::size_t) { return !stop.stopped(); });
+    if (stop.stopped()) return Error{"stopped"};
+    if (!stack) {
+      // A folder of something else, or a capture cut short: the others may do.
+      out.views.push_back({.name = name, .refused = stack.error().message});
+    } else if (out.camera.width != 0 &&
+               (out.camera.width != stack->width() || out.camera.height != stack->height())) {
+      return Error{folder.string() + " has pictures of another size than the views before it"};
+    } else {
+      out.camera.width = stack->width();
+      out.camera.height = stack->height();
+      out.views.push_back(measure_view(name, *stack, board, {}, pool));
+    }
+    if (!out.views.back().refused.empty())
+      log_warning("view " + name + " is left out: " + out.views.back().refused);
+    progress.update(out.views.size());
+  }
+  if (out.camera.width == 0)
+    return Error{"no view of " + options.views + " can be used: " + out.views.front().refused};
+  return out;
+}
+
+nlohmann::json lens_json(const PinholeModel& lens, const double* sigma) {
+  return {{"focal_px", {lens.fx(), lens.fy()}},
+          {"focal_sigma_px", {sigma[0], sigma[1]}},
+          {"centre_px", {lens.cx(), lens.cy()}},
+          {"centre_sigma_px", {sigma[2], sigma[3]}},
+          {"distortion", lens.distortion}};
+}
+
+void print_json(const Geometry& g, const std::optional<RigDifference>& d, const std::string& out) {
+  nlohmann::json views = nlohmann::json::array();
+  for (const ViewReport& r : g.reports) {
+    nlohmann::json view = {
+        {"name", r.name}, {"used", r.used}, {"corners", r.corners}, {"corners_left_out", r.corners_left_out}};
+    if (r.used) {
+      view["camera_rms_px"] = r.camera_rms;
+      view["projector_rms_px"] = r.projector_rms;
+      view["stereo_rms_px"] = r.stereo_rms;
+      view["plane_rms_mm"] = 1000 * r.plane_rms_m;
+    } else {
+      view["why"] = r.why;
+    }
+    views.push_back(view);
+  }
+  nlohmann::json json = {{"stereo_rms_px", g.stereo_rms},
+                         {"stereo_rms_all_corners_px", g.stereo_rms_all},
+                         {"distance_m", g.distance_m},
+                         {"camera_rms_px", g.camera_rms},
+                         {"projector_rms_px", g.projector_rms},
+                         {"plane_rms_mm", 1000 * g.plane_rms_m},
+                         {"square_error_mm", 1000 * g.square_error_m},
+                         {"views_used", g.views},
+                         {"corners_used", g.corners},
+                         {"camera", lens_json(g.camera, g.sigma_px.data())},
+                         {"projector", lens_json(g.projector, g.sigma_px.data() + 4)},
+                         {"baseline_mm", 1000 * std::hypot(g.projector_from_camera_translation[0],
+                                                           g.projector_from_camera_translation[1],
+                                                           g.projector_from_camera_translation[2])},
+                         {"views", views},
+                         {"rig", out}};
+  if (d) {
+    json["compare"] = {{"camera_focal_percent", 100 * d->camera_focal},
+                       {"projector_focal_percent", 100 * d->projector_focal},
+                       {"camera_centre_px", d->camera_centre_px},
+                       {"projector_centre_px", d->projector_centre_px},
+                       {"baseline_mm", 1000 * d->baseline_m},
+                       {"rotation_deg", d->rotation_rad * 180 / std::numbers::pi},
+                       {"depth_rms_mm", 1000 * d->depth_rms_m},
+                       {"depth_mean_mm", 1000 * d->depth_mean_m}};
+  }
+  std::printf("%s\n", json.dump(2).c_str());
+}
+
+void print_lens(const char* name, const PinholeModel& lens, const double* sigma) {
+  std::printf("%s  focal %.1f x %.1f px (+- %.1f), centre (%.1f, %.1f) px (+- %.1f, %.1f)\n", name, lens.fx(),
+              lens.fy(), sigma[0], lens.cx(), lens.cy(), sigma[2], sigma[3]);
+}
+
+void print(const Geometry& g, const std::optional<RigDifference>& d, const std::string& out) {
+  std::printf("view                  corners  camera  projector  stereo   plane\n");
+  for (const ViewReport& r : g.reports) {
+    if (r.used) {
+      std::printf("%-20s  %4zu/%-3zu %5.3f      %5.3f   %5.3f px  %.2f mm\n", r.name.c_str(),
+                  r.corners - r.corners_left_out, r.corners, r.camera_rms, r.projector_rms, r.stereo_rms,
+                  1000 * r.plane_rms_m);
+    } else {
+      std::printf("%-20s  left out: %s\n", r.name.c_str(), r.why.c_str());
+    }
+  }
+  std::printf("all                   %4zu     %5.3f      %5.3f   %5.3f px  %.2f mm\n", g.corners,
+              g.camera_rms, g.projector_rms, g.stereo_rms, 1000 * g.plane_rms_m);
+  std::printf("           %.3f px with the corners left out of these views\n", g.stereo_rms_all);
+  std::printf("squares    distances between neighbouring corners are wrong by %.2f mm (RMS)\n",
+              1000 * g.square_error_m);
+  print_lens("camera   ", g.camera, g.sigma_px.data());
+  print_lens("projector", g.projector, g.sigma_px.data() + 4);
+  if (g.projector.cy() < 0 || g.projector.cy() > g.projector.height - 1) {
+    std::printf(
+        "           its centre is above or below its picture, as projectors that throw upwards have it\n");
+  }
+  const auto& t = g.projector_from_camera_translation;
+  std::printf("baseline   %.1f mm\n", 1000 * std::hypot(t[0], t[1], t[2]));
+  if (d) {
+    std::printf(
+        "compared   focal lengths off by %.2f %% and %.2f %%, centres by %.1f and %.1f px (camera, "
+        "projector);\n",
+        100 * d->camera_focal, 100 * d->projector_focal, d->camera_centre_px, d->projector_centre_px);
+    std::printf("           baseline off by %.2f mm, rotation by %.3f degrees;\n", 1000 * d->baseline_m,
+                d->rotation_rad * 180 / std::numbers::pi);
+    std::printf("           so depth at %.2f m is off by %.2f mm (RMS), %+.2f mm on average\n", g.distance_m,
+                1000 * d->depth_rms_m, 1000 * d->depth_mean_m);
+  }
+  std::printf("written    %s\n", out.c_str());
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  auto board = parse_board(options.board);
+  if (!board) return board.error();
+  RigPart before;
+  if (!options.update.empty()) {
+    auto part = read_rig_part(options.update);
+    if (!part) return part.error();
+    before = *part;
+  }
+  std::optional<Rig> reference;
+  if (!options.compare.empty()) {
+    auto read = read_rig(options.compare);
+    if (!read) return read.error();
+    reference = *read;
+  }
+  const std::string out = options.out.empty() ? options.update : options.out;
+  auto measured = measure(options, *board, stop);
+  if (stop.stopped()) return {};
+  if (!measured) return measured.error();
+  PinholeModel projector;
+  projector.width = options.projector.width;
+  projector.height = options.projector.height;
+  const auto geometry = calibrate_geometry(measured->views, measured->camera, projector, {});
+  if (!geometry) return geometry.error();
+
+  Rig rig;
+  rig.scan = before.scan.value_or(options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive);
+  rig.frame_rate = before.frame_rate.value_or(options.frame_rate);
+  rig.colour_matrix = before.colour_matrix.value_or(std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
+  rig.camera = geometry->camera;
+  rig.projector = geometry->projector;
+  rig.projector_from_camera_rotation = geometry->projector_from_camera_rotation;
+  rig.projector_from_camera_translation = geometry->projector_from_camera_translation;
+  if (const Status written = write_atomically(out, to_yaml(rig)); !written) return written;
+  if (!options.pictures.empty()) {
+    if (const Status made = make_folder(options.pictures); !made) return made;
+    const Status drawn = write_png(fs::path(options.pictures) / "residuals.png", draw_residuals(*geometry));
+    if (!drawn) return drawn;
+  }
+  std::optional<RigDifference> difference;
+  if (reference) {
+    auto compared = compare_rigs(rig, *reference, geometry->distance_m);
+    if (!compared) return compared.error().in(options.compare);
+    difference = *compared;
+  }
+  if (options.json) {
+    print_json(*geometry, difference, out);
+  } else {
+    print(*geometry, difference, out);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
+  auto o = std::make_shared<Options>();
+  app.add_option("views", o->views, "Folder of views, each a folder of Gray-code pictures of the board")
+      ->required();
+  app.add_option("--board", o->board,
+                 "chessboard:COLUMNSxROWS:SIDE, inner corners and a square's side, e.g. chessboard:9x7:75mm")
+      ->required();
+  add_size_option(app, "--projector", o->projector, "The projector's size in pixels")->required();
+  auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
+  auto* update =
+      app.add_option("--update", o->update,
+                     "A rig.yaml, or one with colours only: keep its scan, frame rate and colour matrix; "
+                     "written back unless --out says otherwise");
+  app.add_option("--scan", o->scan, "How the camera scans, for a new rig.yaml")
+      ->check(CLI::IsMember({"interlaced", "progressive"}))
+      ->capture_default_str();
+  app.add_option("--frame-rate", o->frame_rate, "Frames a second, for a new rig.yaml")
+      ->check(CLI::Range(0.001, 10000.0))
+      ->capture_default_str();
+  app.add_option("--pictures", o->pictures, "Folder for residuals.png");
+  app.add_option("--compare", o->compare,
+                 "Another rig.yaml of the same devices: report how far this one is from it");
+  app.add_option("--threads", o->threads, "Threads; any number gives the same result")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  app.add_flag("--json", o->json, "Print the report as JSON");
+  app.final_callback([out, update] {
+    if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");
+  });
+  return [o](StopSignal& stop) { return run(*o, stop); };
+}
+
+}  // namespace relievo

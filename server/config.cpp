@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/config.h"
+
+#include <toml++/toml.h>
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string_view>
+#include <vector>
+
+namespace relievo {
+namespace {
+
+std::string place(const std::filesystem::path& file, const toml::source_region& at) {
+  return file.string() + ":" + std::to_string(at.begin.line) + ": ";
+}
+
+/// Reads one table, remembering the first thing wrong.
+class Reader {
+ public:
+  Reader(const std::filesystem::path& file, const toml::table& table) : file_(file), table_(table) {}
+
+  void text(std::string_view key, std::string& out) {
+    if (const toml::node* node = take(key)) {
+      if (const auto value = node->value_exact<std::string>())
+        out = *value;
+      else
+        refuse(*node, key, "must be a string in quotes");
+    }
+  }
+  void decoder(std::string_view key, Decoder& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    if (value == "ordered") {
+      out = Decoder::kOrdered;
+    } else if (value == "paper") {
+      out = Decoder::kPaper;
+    } else {
+      refuse(*node, key, "must be \"ordered\" or \"paper\"");
+    }
+  }
+  void flag(std::string_view key, bool& out) {
+    if (const toml::node* node = take(key)) {
+      if (const auto value = node->value_exact<bool>())
+        out = *value;
+      else
+        refuse(*node, key, "must be true or false");
+    }
+  }
+  std::optional<std::int64_t> integer(std::string_view key, std::int64_t least, std::int64_t most) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return std::nullopt;
+    const auto value = node->value_exact<std::int64_t>();
+    if (value && *value >= least && *value <= most) return *value;
+    refuse(*node, key,
+           "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+    return std::nullopt;
+  }
+  void integer(std::string_view key, std::int64_t least, std::int64_t most, int& out) {
+    if (const auto value = integer(key, least, most)) out = static_cast<int>(*value);
+  }
+
+  Status finish() {
+    for (const auto& [key, node] : table_) {
+      if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) continue;
+      std::string all;
+      for (const std::string_view name : known_) all += " " + std::string(name);
+      refuse(node, key.str().empty() ? "\"\"" : key.str(), "is no setting; there are:" + all);
+    }
+    return error_ ? Status(*error_) : Status();
+  }
+
+ private:
+  const toml::node* take(std::string_view key) {
+    known_.push_back(key);
+    return table_.get(key);
+  }
+  void refuse(const toml::node& node, std::string_view key, const std::string& why) {
+    if (!error_) error_ = Error{place(file_, node.source()) + std::string(key) + " " + why};
+  }
+
+  const std::filesystem::path& file_;
+  const toml::table& table_;
+  std::vector<std::string_view> known_;  // string literals
+  std::optional<Error> error_;
+};
+
+}  // namespace
+
+Status read_config(const std::filesystem::path& file, ServeConfig& config) {
+  std::ifstream in(file);
+  std::error_code ignored;
+  if (!in || std::filesystem::is_directory(file, ignored))  // a folder opens, and reads as an empty file
+    return Error{"cannot read the configuration " + file.string() + ": does it exist and may you read it?"};
+  std::stringstream text;
+  text << in.rdbuf();
+  toml::table table;
+  try {
+    table = toml::parse(text.str(), file.string());
+  } catch (const toml::parse_error& error) {
+    return Error{place(file, error.source()) + std::string(error.description())};
+  }
+  Reader reader(file, table);
+  reader.text("source", config.source);
+  reader.text("stream", config.stream);
+  reader.integer("domain", 0, 230, config.domain);
+  reader.text("interface", config.interface);
+  reader.text("web", config.web);
+  reader.text("record", config.record);
+  if (const auto frames = reader.integer("frames", 1, std::numeric_limits<std::int64_t>::max())) {
+    config.frames = static_cast<std::uint64_t>(*frames);
+  }
+  reader.flag("loop", config.loop);
+  reader.flag("fast", config.fast);
+  reader.integer("threads", 1, 64, config.threads);
+  reader.decoder("decoder", config.decoder);
+  reader.integer("jpeg_quality", 1, 100, config.jpeg_quality);
+  reader.integer("draco_speed", 0, 9, config.draco_speed);
+  return reader.finish();
+}
+
+}  // namespace relievo

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `serve` does: from a TOML file and from flags, flags winning.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "base/result.h"
+#include "capture/reconstruct/reconstructor.h"
+
+namespace relievo {
+
+struct ServeConfig {
+  std::string source = "sim:face";
+  std::string stream;  // empty: named after the source
+  int domain = 0;
+  std::string interface;               // empty: Cyclone DDS chooses
+  std::string web = "127.0.0.1:8080";  // "none": no gateway
+  std::string record;                  // empty: not recorded
+  std::optional<std::uint64_t> frames;
+  bool loop = false;
+  bool fast = false;
+  int threads = 1;
+  Decoder decoder = ReconstructOptions{}.decoder;
+  int jpeg_quality = 80;
+  int draco_speed = 4;
+};
+
+/// Sets the fields that `file` names. Errors say file, line and what is wrong: an unknown key, a wrong type,
+/// a value out of range.
+Status read_config(const std::filesystem::path& file, ServeConfig& config);
+
+}  // namespace relievo

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "capture/calibrate/gray_stack.h"
+#include "capture/pattern/bcsl.h"
+#include "capture/pattern/gray_code.h"
+#include "capture/pattern/slides.h"
+#include "capture/rig_file.h"
+#include "codec/export.h"
+#include "codec/whole_file.h"
+#include "server/commands.h"
+#include "server/size_option.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string out;
+  std::string pattern;
+  int base = 6;
+  int slides = 2;
+  int first = 0;
+  int stripes = 90;
+  Size size{1024, 768};
+  bool interlaced = false;
+  bool gray = false;
+  bool json = false;
+};
+
+Status write_gray(const Options& options) {
+  if (const Status written = write_gray_slides(options.out, options.size.width, options.size.height);
+      !written) {
+    return written;
+  }
+  const std::size_t count = gray_slides(options.size.width, options.size.height).size();
+  if (options.json) {
+    std::printf("%s\n", nlohmann::json({{"folder", options.out}, {"slides", count}}).dump(2).c_str());
+  } else {
+    std::printf(
+        "%zu slides of Gray code, %dx%d, in %s: project them in the order of their names, one picture each\n",
+        count, options.size.width, options.size.height, options.out.c_str());
+  }
+  return {};
+}
+
+Status run(const Options& options) {
+  if (options.gray) return write_gray(options);
+  auto pattern = options.pattern.empty()
+                     ? make_pattern(options.base, options.slides, options.first, options.stripes)
+                     : read_pattern(options.pattern);
+  if (!pattern) return pattern.error();
+  if (pattern->stripes() > options.size.width) {
+    return Error{std::to_string(pattern->stripes()) + " stripes do not fit " +
+                 std::to_string(options.size.width) + " projector columns: ask for fewer with --stripes"};
+  }
+  if (const Status made = make_folder(options.out); !made) return made;
+  std::vector<std::string> files;
+  const auto write = [&](const std::string& name, const Image8& picture) {
+    files.push_back(name);
+    return write_png(fs::path(options.out) / name, picture.view());
+  };
+  for (int slide = 0; slide < pattern->slides; ++slide) {
+    const std::string number = std::to_string(slide + 1);
+    const auto [width, height] = options.size;
+    if (options.interlaced) {
+      if (auto s = write("frame" + number + ".png", draw_interlaced(*pattern, slide, width, height)); !s)
+        return s;
+      continue;
+    }
+    if (auto s = write("slide" + number + ".png", draw_slide(*pattern, slide, false, width, height)); !s)
+      return s;
+    if (auto s =
+            write("slide" + number + "_complement.png", draw_slide(*pattern, slide, true, width, height));
+        !s)
+      return s;
+  }
+  const std::string yaml = to_yaml(*pattern);
+  files.emplace_back("pattern.yaml");
+  const std::vector<std::uint8_t> bytes(yaml.begin(), yaml.end());
+  if (auto s = write_whole_file(fs::path(options.out) / files.back(), bytes); !s) return s;
+  if (options.json) {
+    std::printf("%s\n",
+                nlohmann::json({{"folder", options.out}, {"files", files}, {"stripes", pattern->stripes()}})
+                    .dump(2)
+                    .c_str());
+  } else {
+    std::printf("%d stripes on %d slides, %dx%d, in %s\n", pattern->stripes(), pattern->slides,
+                options.size.width, options.size.height, options.out.c_str());
+  }
+  return {};
+}
+
+}  // namespace
+
+Command pattern_command() {
+  return {
+      "pattern", "Write the slides to project as pictures, with their pattern.yaml", [](CLI::App& app) {
+        auto o = std::make_shared<Options>();
+        app.add_option("--out", o->out, "Folder, made where it is missing")->required();
+        auto* file =
+            app.add_option("--pattern", o->pattern, "An existing pattern.yaml instead of a new pattern");
+        for (auto* option : {app.add_option("--base", o->base, "Colours: 3 to 6"),
+                             app.add_option("--slides", o->slides, "Slides shown in turn: 1 or 2 decode"),
+                             app.add_option("--first", o->first, "First stripe within the code's whole path"),
+                             app.add_option("--stripes", o->stripes, "Stripes over the projector's width")}) {
+          option->capture_default_str()->excludes(file);
+        }
+        add_size_option(app, "--size", o->size, "The projector's pixels, WIDTHxHEIGHT (default 1024x768)");
+        auto* interlaced = app.add_flag(
+            "--interlaced", o->interlaced,
+            "A frame a slide, for interlaced video: the slide on even rows, its complement on odd ones");
+        app.add_flag("--gray", o->gray,
+                     "Gray code instead of stripes: columns, rows, white and black, for calibration and "
+                     "still scenes")
+            ->excludes(file)
+            ->excludes(interlaced);
+        app.add_flag("--json", o->json, "Print the result as JSON");
+        return [o](StopSignal&) { return run(*o); };
+      }};
+}
+
+}  // namespace relievo

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/pipeline.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "base/bounded_queue.h"
+#include "base/log.h"
+#include "base/time.h"
+#include "server/stats.h"
+#include "server/working_volume.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::size_t kQueueFrames = 3;
+constexpr std::int64_t kStatusInterval_ns = kNanosecondsPerSecond;
+constexpr std::int64_t kMaxLate_ns =
+    100'000'000;                      // behind its own time stamps before a source's clock is set back
+constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
+
+struct Captured {
+  CapturedFrame frame;
+  std::int64_t capture_time_ns;
+  std::uint64_t ordinal;  // counts what the source gave
+};
+struct Reconstructed {
+  Frame3D frame;
+  std::int64_t capture_time_ns;
+};
+
+class ThreadedPipeline final : public Pipeline {
+ public:
+  ThreadedPipeline(FieldSource& source, std::vector<FrameSink*> sinks, const PipelineOptions& options,
+                   Reconstructor reconstructor)
+      : source_(source),
+        sinks_(std::move(sinks)),
+        options_(options),
+        reconstructor_(std::move(reconstructor)),
+        volume_(options.encode.volume) {}
+
+  Status run() override {
+    std::thread reconstruct([this] { reconstruct_stage(); });
+    std::thread encode([this] { encode_stage(); });
+    std::thread publish([this] { publish_stage(); });
+    const Status captured = capture_stage();
+    to_reconstruct_.close();
+    reconstruct.join();
+    to_encode_.close();
+    encode.join();
+    to_publish_.close();
+    publish.join();
+    const Status done = outcome(captured);
+    set_state(StreamState::kEnded, done ? "" : done.error().message);
+    to_sinks(status());
+    return outcome(captured);
+  }
+
+  void stop() override {
+    {
+      std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    stopped_.notify_all();
+    source_.request_stop();
+  }
+
+  ServerStatus status() const override {
+    ServerStatus s = stats_.snapshot();
+    s.stream = options_.stream;
+    s.drops_reconstruct = to_reconstruct_.drops();
+    s.drops_encode = to_encode_.drops();
+    s.drops_publish = to_publish_.drops();
+    std::lock_guard lock(mutex_);
+    s.state = state_;
+    s.message = message_;
+    return s;
+  }
+
+ private:
+  template <typename T>
+  void push(BoundedQueue<T>& queue, T item) {
+    if (options_.lossless) {
+      queue.push_wait(std::move(item));
+    } else {
+      queue.push_drop_oldest(std::move(item));
+    }
+  }
+
+  /// What run() returns: the first failure of a stage or a sink, else the source's.
+  Status outcome(const Status& captured) const {
+    std::lock_guard lock(mutex_);
+    return failure_ ? Status(*failure_) : captured;
+  }
+
+  bool stopping() const {
+    std::lock_guard lock(mutex_);
+    return stopping_;
+  }
+
+  /// False once stopping.
+  bool sleep_until(std::int64_t utc_ns) {
+    std::unique_lock lock(mutex_);
+    const auto wait = std::chrono::nanoseconds(utc_ns - utc_now_ns());
+    return !stopped_.wait_for(lock, wait, [&] { return stopping_; });
+  }
+
+  Status capture_stage() {
+    const SourceInfo& info = source_.info();
+    const bool paced = options_.paced && !info.live;
+    std::optional<std::int64_t> epoch_ns;  // UTC of the source's time 0
+    std::uint64_t delivered = 0;
+    int errors_in_a_row = 0;
+    Error last_error;
+    while (!options_.frames || delivered < *options_.frames) {
+      auto next = source_.next();
+      if (!next) {
+        // An error is logged once the source goes on behind it, or returned where it does not.
+        if (errors_in_a_row > 0 && last_error.message != next.error().message)
+          log_warning(last_error.message);
+        last_error = next.error();
+        stats_.lost_in_capture(1);
+        set_state(StreamState::kStalled, last_error.message);
+        if (++errors_in_a_row >= kMaxSourceErrors) return last_error;
+        continue;
+      }
+      if (!*next) return errors_in_a_row > 0 && !stopping() ? Status(last_error) : Status();
+      if (errors_in_a_row > 0) log_warning(last_error.message);
+      errors_in_a_row = 0;
+      set_state(StreamState::kRunning, "");
+      CapturedFrame frame = *std::move(*next);
+      std::int64_t capture_time_ns = frame.time_ns;
+      if (!info.live) {
+        const std::int64_t now = utc_now_ns();
+        // A source that cannot keep its own pace is played as fast as it comes, not in bursts to catch up.
+        if (!epoch_ns || *epoch_ns + frame.time_ns < now - kMaxLate_ns) epoch_ns = now - frame.time_ns;
+        capture_time_ns = *epoch_ns + frame.time_ns;
+        if (!paced) {
+          capture_time_ns = now;
+        } else if (!sleep_until(capture_time_ns)) {
+          return {};
+        }
+      }
+      stats_.captured();
+      ++delivered;
+      push(to_reconstruct_, Captured{std::move(frame), capture_time_ns, delivered});
+    }
+    return {};
+  }
+
+  void reconstruct_stage() {
+    std::optional<std::uint64_t> previous;
+    while (auto item = to_reconstruct_.pop()) {
+      const std::int64_t begin = steady_now_ns();
+      auto result = reconstructor_.add(item->frame);
+      if (!result) {
+        fail(result.error());
+        continue;
+      }
+      // The same slide twice tells of a frame that never came, unless it was dropped in the queue above or a
+      // take starts again.
+      const auto pass = source_.info().frames;
+      const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
+      const bool consecutive = previous && item->ordinal == *previous + 1 && !starts_again;
+      if (reconstructor_.report().same_slide && consecutive) stats_.lost_in_capture(1);
+      previous = item->ordinal;
+      if (!*result) continue;
+      stats_.reconstructed(milliseconds(steady_now_ns() - begin));
+      push(to_encode_, Reconstructed{*std::move(*result), item->capture_time_ns});
+    }
+  }
+
+  void encode_stage() {
+    while (auto item = to_encode_.pop()) {
+      const std::int64_t begin = steady_now_ns();
+      EncodeOptions encode = options_.encode;
+      encode.volume = volume_.fit(item->frame.surface.positions);
+      if (const int bits = volume_.bits(options_.depth_resolution); bits > 0) encode.position_bits = bits;
+      auto bytes = encode_frame(item->frame, encode);
+      if (!bytes) {
+        fail(bytes.error());
+        continue;
+      }
+      stats_.encoded(milliseconds(steady_now_ns() - begin));
+      FrameMessage message;
+      message.number = item->frame.number;
+      message.capture_time_ns = item->capture_time_ns;
+      message.data = std::make_shared<const Bytes>(*std::move(bytes));
+      push(to_publish_, std::move(message));
+    }
+  }
+
+  void publish_stage() {
+    std::uint64_t sequence = 0;
+    std::int64_t status_due_ns = steady_now_ns();
+    while (!to_publish_.finished()) {
+      const std::int64_t wait_ns = std::max<std::int64_t>(0, status_due_ns - steady_now_ns());
+      if (auto message = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns))) {
+        message->sequence = sequence++;
+        message->publish_time_ns = utc_now_ns();
+        stats_.published(message->capture_time_ns, message->publish_time_ns);
+        to_sinks(*message);
+      }
+      if (steady_now_ns() < status_due_ns) continue;
+      status_due_ns = steady_now_ns() + kStatusInterval_ns;
+      to_sinks(status());
+    }
+  }
+
+  template <typename T>
+  void to_sinks(const T& message) {
+    for (FrameSink* sink : sinks_) {
+      if (const Status sent = sink->consume(message); !sent) fail(sent.error());
+    }
+  }
+
+  /// The first failure ends the run; the stages go on emptying their queues.
+  void fail(const Error& error) {
+    {
+      std::lock_guard lock(mutex_);
+      if (!failure_) failure_ = error;
+    }
+    stop();
+  }
+
+  void set_state(StreamState state, const std::string& message) {
+    std::lock_guard lock(mutex_);
+    state_ = state;
+    message_ = message;
+  }
+
+  FieldSource& source_;
+  std::vector<FrameSink*> sinks_;
+  const PipelineOptions options_;
+  Reconstructor reconstructor_;
+  WorkingVolume volume_;
+  BoundedQueue<Captured> to_reconstruct_{kQueueFrames};
+  BoundedQueue<Reconstructed> to_encode_{kQueueFrames};
+  BoundedQueue<FrameMessage> to_publish_{kQueueFrames};
+  PipelineStats stats_;
+
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable stopped_;
+  bool stopping_ = false;
+  StreamState state_ = StreamState::kStarting;
+  std::string message_;
+  std::optional<Error> failure_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Pipeline>> Pipeline::create(FieldSource& source, std::vector<FrameSink*> sinks,
+                                                   const PipelineOptions& options) {
+  auto reconstructor = Reconstructor::create(source.info().rig, source.info().pattern, options.reconstruct);
+  if (!reconstructor) return reconstructor.error();
+  return std::unique_ptr<Pipeline>(
+      std::make_unique<ThreadedPipeline>(source, std::move(sinks), options, *std::move(reconstructor)));
+}
+
+}  // namespace relievo

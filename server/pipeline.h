@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// capture -> reconstruct -> encode -> publish: one thread a stage, bounded queues between them. The only
+// place in the server that has threads and queues.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/stream.h"
+#include "capture/reconstruct/reconstructor.h"
+#include "capture/source/field_source.h"
+#include "codec/frame3d_codec.h"
+
+namespace relievo {
+
+/// Where encoded frames go: DDS, the gateway, a counter in a test. Called on the publishing thread, one call
+/// at a time.
+class FrameSink {
+ public:
+  virtual ~FrameSink() = default;
+  /// A failure ends the pipeline with this error.
+  virtual Status consume(const FrameMessage& frame) = 0;
+  virtual Status consume(const ServerStatus& status) = 0;
+};
+
+struct PipelineOptions {
+  std::string stream;
+  bool paced = true;      // a source that is not live is played at its own time stamps
+  bool lossless = false;  // full queues wait instead of dropping the oldest: for tests and offline work
+  std::optional<std::uint64_t> frames;  // end after this many camera frames
+  ReconstructOptions reconstruct;
+  EncodeOptions encode;  // volume.size_m 0: fitted to the first frame, grown when a frame leaves it
+  // Step of coded positions, of the distance to the nearest part of the scene; overrides position_bits.
+  double depth_resolution = 1e-4;
+};
+
+class Pipeline {
+ public:
+  /// `source` and `sinks` must outlive the pipeline. Fails where rig and pattern do not fit.
+  static Result<std::unique_ptr<Pipeline>> create(FieldSource& source, std::vector<FrameSink*> sinks,
+                                                  const PipelineOptions& options);
+  virtual ~Pipeline() = default;
+
+  /// Runs until the source ends, a sink fails, or stop(); then every queue has been emptied into the sinks.
+  /// Fails with the sink's error, or the source's where it ended with one. Call once.
+  virtual Status run() = 0;
+
+  /// Ends run() soon. Any thread, any number of times.
+  virtual void stop() = 0;
+
+  /// Counts so far. Any thread.
+  virtual ServerStatus status() const = 0;
+};
+
+}  // namespace relievo

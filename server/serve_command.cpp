@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "capture/source/field_source.h"
+#include "cli/checks.h"
+#include "cli/listen_address.h"
+#include "idl/recorder.h"
+#include "idl/transport.h"
+#include "server/commands.h"
+#include "server/config.h"
+#include "server/pipeline.h"
+#include "server/sinks.h"
+#include "web/gateway/gateway.h"
+
+namespace relievo {
+namespace {
+
+/// "take:../shared/takes/bunny" -> "bunny", "sim:face,stripes=70" -> "face".
+std::string stream_name_of(const std::string& source) {
+  std::string name = source.substr(source.find(':') + 1);
+  name = name.substr(0, name.find(','));
+  while (!name.empty() && name.back() == '/') name.pop_back();
+  name = std::filesystem::path(name).stem().string();
+  for (char& c : name) {
+    if (!valid_stream_name(std::string(1, c)) && c != '.') c = '_';
+  }
+  return valid_stream_name(name) ? name : "stream";
+}
+
+void say_drops(const ServerStatus& s) {
+  log_info(std::to_string(s.frames_captured) + " frames captured, " + std::to_string(s.frames_published) +
+           " published; dropped: " + std::to_string(s.drops_capture) + " in capture, " +
+           std::to_string(s.drops_reconstruct) + " before reconstruction, " + std::to_string(s.drops_encode) +
+           " before encoding, " + std::to_string(s.drops_publish) + " before publishing");
+}
+
+/// The server's own recorder: a reader of the stream like any other.
+struct Recording {
+  std::optional<Recorder> recorder;
+  std::unique_ptr<Subscriber> subscriber;
+
+  Status start(const ServeConfig& config, const std::string& stream, const Publisher& publisher) {
+    if (std::filesystem::exists(config.record)) {
+      return Error{config.record + " exists already: name another file with --record, or remove it"};
+    }
+    // The recorder makes the file with the first sample; that it cannot should be said before.
+    const std::filesystem::path folder = std::filesystem::absolute(config.record).parent_path();
+    if (!std::filesystem::is_directory(folder)) {
+      return Error{"cannot record to " + config.record + ": there is no folder " + folder.string()};
+    }
+    recorder.emplace(Recorder::Options{.file = config.record, .stream = stream});
+    auto created = Subscriber::create({.domain = config.domain, .interface = config.interface}, stream,
+                                      recorder->callbacks());
+    if (!created) return created.error();
+    subscriber = *std::move(created);
+    // The first frame should be in the file: wait until reader and writer have found each other.
+    for (int tries = 0; tries < 200 && publisher.matched_readers() == 0; ++tries) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return {};
+  }
+
+  /// After the last frame was published.
+  Status finish(std::uint64_t published) {
+    if (!recorder) return {};
+    for (int tries = 0; tries < 100 && !recorder->done(); ++tries) {
+      const Recorder::Counts counts = recorder->counts();
+      if (counts.frames + counts.lost >= published) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    subscriber.reset();
+    const Status done = recorder->finish();
+    const Recorder::Counts counts = recorder->counts();
+    if (!done)
+      return done.error().in("the recording stopped after " + std::to_string(counts.frames) + " frames");
+    log_info("recorded " + std::to_string(counts.frames) + " frames, " + std::to_string(counts.lost) +
+             " lost");
+    return {};
+  }
+};
+
+Status serve(const ServeConfig& config, StopSignal& stop) {
+  StreamInfo info;
+  info.stream = config.stream.empty() ? stream_name_of(config.source) : config.stream;
+  if (!valid_stream_name(info.stream)) {
+    return Error{"'" + info.stream +
+                 "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.'"};
+  }
+  std::optional<ListenAddress> web;
+  if (config.web != "none") {
+    auto address = parse_listen_address(config.web);
+    if (!address) return address.error();
+    web = *std::move(address);
+  }
+
+  // The gateway first: a port in use should fail before anything is opened or announced.
+  std::unique_ptr<Gateway> gateway;
+  if (web) {
+    auto started = Gateway::start({.host = web->host, .port = web->port});
+    if (!started) return started.error();
+    gateway = *std::move(started);
+  }
+  auto source = open_source(config.source, {.loop = config.loop || config.source.starts_with("sim:")});
+  if (!source) return source.error();
+  info.source = config.source;
+  info.started_ns = utc_now_ns();
+  info.rig = (*source)->info().rig;
+  info.pattern = (*source)->info().pattern;
+  auto publisher = Publisher::create({.domain = config.domain, .interface = config.interface}, info);
+  if (!publisher) return publisher.error();
+  Recording recording;
+  if (!config.record.empty()) {
+    if (const Status started = recording.start(config, info.stream, **publisher); !started)
+      return started.error();
+  }
+
+  std::vector<std::unique_ptr<FrameSink>> owned;
+  owned.push_back(make_dds_sink(**publisher));
+  if (gateway) {
+    gateway->announce(info);
+    owned.push_back(make_gateway_sink(*gateway, info.stream));
+  }
+  if (recording.recorder) owned.push_back(make_recorder_sink(*recording.recorder));
+  std::vector<FrameSink*> sinks;
+  for (const auto& sink : owned) sinks.push_back(sink.get());
+
+  PipelineOptions options;
+  options.stream = info.stream;
+  options.paced = !config.fast;
+  options.lossless = config.fast;
+  options.frames = config.frames;
+  options.reconstruct.threads = config.threads;
+  options.reconstruct.decoder = config.decoder;
+  options.encode.jpeg_quality = config.jpeg_quality;
+  options.encode.draco_speed = config.draco_speed;
+  auto pipeline = Pipeline::create(**source, sinks, options);
+  if (!pipeline) return pipeline.error();
+
+  std::printf("stream %s on DDS domain %d\n", info.stream.c_str(), config.domain);
+  if (gateway) std::printf("viewer %s\n", browser_address({web->host, gateway->port()}).c_str());
+  std::fflush(stdout);  // whoever waits for the address reads a pipe
+
+  stop.on_stop([&] { (*pipeline)->stop(); });
+  const Status done = (*pipeline)->run();
+  stop.clear_on_stop();
+  if (gateway) gateway->withdraw(info.stream);
+  say_drops((*pipeline)->status());
+  const Status recorded = recording.finish((*pipeline)->status().frames_published);
+  if (!done || !recorded || stop.stopped()) return done ? recorded : done;
+  if ((*pipeline)->status().frames_published == 0) {
+    return Error{
+        config.source +
+        " ended before a frame could be published: a surface needs two frames under different slides"};
+  }
+  return {};
+}
+
+std::string stream_name(const std::string& name) {
+  return valid_stream_name(name)
+             ? ""
+             : "'" + name + "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.'";
+}
+
+/// Flags as given; what is not given leaves the file's or the default value.
+struct Flags {
+  std::optional<std::string> config, source, stream, interface, web, record;
+  std::optional<std::string> decoder;
+  std::optional<int> domain, threads, jpeg_quality, draco_speed;
+  std::optional<std::uint64_t> frames;
+  bool loop = false, fast = false;
+};
+
+Status run(const Flags& flags, StopSignal& stop) {
+  ServeConfig config;
+  if (flags.config) {
+    if (const Status read = read_config(*flags.config, config); !read) return read.error();
+  }
+  const auto set = [](const auto& flag, auto& field) {
+    if (flag) field = *flag;
+  };
+  set(flags.source, config.source);
+  set(flags.stream, config.stream);
+  set(flags.interface, config.interface);
+  set(flags.web, config.web);
+  set(flags.record, config.record);
+  set(flags.domain, config.domain);
+  set(flags.threads, config.threads);
+  if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
+  set(flags.jpeg_quality, config.jpeg_quality);
+  set(flags.draco_speed, config.draco_speed);
+  if (flags.frames) config.frames = flags.frames;
+  config.loop = config.loop || flags.loop;
+  config.fast = config.fast || flags.fast;
+  return serve(config, stop);
+}
+
+}  // namespace
+
+Command serve_command() {
+  return {
+      "serve", "Capture, reconstruct and stream", [](CLI::App& app) {
+        auto f = std::make_shared<Flags>();
+        app.add_option("--config", f->config, "TOML file with these settings; flags win")->type_name("FILE");
+        app.add_option("--source", f->source,
+                       "sim:SCENE[,KEY=VALUE...] (simulate --help lists them) or take:DIR (default sim:face)")
+            ->type_name("SOURCE");
+        app.add_option("--stream", f->stream, "Stream name (default: the source's)")
+            ->type_name("NAME")
+            ->check(stream_name);
+        app.add_option("--domain", f->domain, "DDS domain (default 0)")->check(CLI::Range(0, 230));
+        app.add_option("--interface", f->interface,
+                       "Network interface, by name or address (default: the first that reaches others; lo "
+                       "for this machine alone)")
+            ->type_name("NAME");
+        app.add_option("--web", f->web,
+                       "Where browsers find the viewer; :PORT for every interface, none for no viewer "
+                       "(default 127.0.0.1:8080)")
+            ->type_name("HOST:PORT")
+            ->check(listen_address(true));
+        app.add_option("--record", f->record, "Record the stream into this new .mcap file")
+            ->type_name("FILE");
+        app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
+        app.add_option("--decoder", f->decoder,
+                       "ordered (default: more exact) or paper (as published: three times as fast)")
+            ->check(CLI::IsMember({"ordered", "paper"}))
+            ->type_name("NAME");
+        app.add_option("--threads", f->threads, "Threads that reconstruct (default 1)")
+            ->check(CLI::Range(1, 64));
+        app.add_option("--jpeg-quality", f->jpeg_quality, "Quality of the texture (default 80)")
+            ->check(CLI::Range(1, 100));
+        app.add_option("--draco-speed", f->draco_speed,
+                       "Of the surface's coding: 0 smallest, 9 fastest (default 4)")
+            ->check(CLI::Range(0, 9));
+        app.add_flag("--loop", f->loop, "Start a take again at its end");
+        app.add_flag("--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");
+        app.footer(
+            "Examples:\n"
+            "  relievo-server serve                                        the simulated face\n"
+            "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for every machine around\n"
+            "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap");
+        return [f](StopSignal& stop) { return run(*f, stop); };
+      }};
+}
+
+}  // namespace relievo

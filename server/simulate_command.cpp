@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "capture/source/sim/scene.h"
+#include "capture/source/sim/sim_options.h"
+#include "capture/source/sim/sim_source.h"
+#include "capture/source/take_writer.h"
+#include "cli/checks.h"
+#include "cli/progress.h"
+#include "server/commands.h"
+
+namespace relievo {
+namespace {
+
+struct Options {
+  std::string scene;
+  std::uint64_t frames = 0;
+  std::string out;
+  bool json = false;
+};
+
+Status run(const Options& options, StopSignal& stop) {
+  std::string spec = options.scene;
+  if (options.frames > 0) spec += ",frames=" + std::to_string(options.frames);
+  auto source = make_sim(spec, {.truth = true});
+  if (!source) return source.error();
+  std::atomic<bool> stopped = false;
+  stop.on_stop([&] { stopped = true; });
+  std::uint64_t written = 0;
+  const std::uint64_t total = (*source)->info().frames.value_or(0);
+  Progress progress("simulate", "frames", total);
+  TakeOptions take;
+  take.progress = [&](std::uint64_t done) {
+    written = done;
+    progress.update(done);
+  };
+  take.stop = &stopped;
+  const Status done = write_take(options.out, **source, take);
+  stop.clear_on_stop();
+  progress.finish();
+  if (stopped) return {};  // asked for; nothing is left behind
+  if (!done) return done;
+  if (options.json) {
+    std::printf("%s\n", nlohmann::json({{"take", options.out}, {"frames", written}}).dump(2).c_str());
+  } else {
+    std::printf("%llu frames with truth in %s\n", static_cast<unsigned long long>(written),
+                options.out.c_str());
+  }
+  return {};
+}
+
+}  // namespace
+
+Command simulate_command() {
+  return {
+      "simulate", "Render a take of a simulated scene, with its truth", [](CLI::App& app) {
+        auto options = std::make_shared<Options>();
+        app.add_option("--scene", options->scene, "SCENE[,KEY=VALUE...], see below")
+            ->type_name("SCENE")
+            ->required();
+        app.add_option("--frames", options->frames, "Frames (default: one period of the scene's motion)")
+            ->check(whole_number(2, 1'000'000));
+        app.add_option("--out", options->out, "Take folder to make")->type_name("TAKE")->required();
+        app.add_flag("--json", options->json, "Print the result as JSON");
+        app.footer(
+            "Scenes: " + sim::scene_names() + "\n\nKeys, their values and defaults:\n" +
+            sim::sim_options_help() +
+            "\nExample:\n  relievo-server simulate --scene face,noise=3,stripes=120 --frames 60 --out TAKE");
+        return [options](StopSignal& stop) { return run(*options, stop); };
+      }};
+}
+
+}  // namespace relievo

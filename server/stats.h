@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Running counts of one pipeline: counters that only rise, and medians over the last few seconds.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <mutex>
+
+#include "base/stream.h"
+
+namespace relievo {
+
+/// The last values of one measured quantity.
+class RollingMedian {
+ public:
+  void add(double value);
+  double median() const;  // 0 where there is no value
+
+ private:
+  std::array<float, 128> values_{};
+  std::size_t count_ = 0;
+};
+
+/// Every function may be called from any thread.
+class PipelineStats {
+ public:
+  void captured();
+  void lost_in_capture(std::uint64_t frames);
+  void reconstructed(double ms);
+  void encoded(double ms);
+  void published(std::int64_t capture_time_ns, std::int64_t publish_time_ns);
+
+  /// All but `stream`, `state`, `message` and the queues' drops.
+  ServerStatus snapshot() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::uint64_t captured_ = 0;
+  std::uint64_t lost_ = 0;
+  std::uint64_t published_ = 0;
+  std::array<std::int64_t, 64> publish_times_{};  // ring of the last publish times, UTC ns
+  RollingMedian reconstruct_ms_, encode_ms_, latency_ms_;
+};
+
+}  // namespace relievo

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each suite of relievo-bench, as small as it goes: it runs, and what it prints holds what it promises. No
+// figure of time is judged.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+
+namespace relievo::test {
+namespace {
+
+using Json = nlohmann::json;
+using namespace std::chrono_literals;
+
+constexpr auto kPatience = 100s;
+const std::string kSource = "sim:object,width=160,height=120,stripes=30";
+
+Finished bench(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), program("relievo-bench").string());
+  return run(arguments, kPatience);
+}
+
+/// What a suite prints with --json; null where it failed.
+Json report_of(std::vector<std::string> arguments) {
+  const std::string suite = arguments.front();
+  arguments.push_back("--json");
+  const Finished done = bench(arguments);
+  EXPECT_EQ(done.status, 0) << done.err;
+  Json report = Json::parse(done.out, nullptr, false);
+  if (!report.is_object()) {
+    ADD_FAILURE() << "no JSON object: " << done.out << done.err;
+    return {};
+  }
+  EXPECT_EQ(report.value("suite", ""), suite);
+  EXPECT_GT(report["machine"].value("cores", 0), 0);
+  EXPECT_TRUE(report["machine"].contains("load_1min"));
+  return report;
+}
+
+/// A spread of `n` values in order, all above zero.
+void expect_spread(const Json& spread, int n, const std::string& what) {
+  ASSERT_TRUE(spread.is_object()) << what << ": " << spread;
+  for (const char* key : {"median", "p10", "p90", "p99", "min", "max", "n"})
+    ASSERT_TRUE(spread.contains(key)) << what << " has no " << key;
+  EXPECT_EQ(spread["n"], n) << what;
+  EXPECT_GT(spread["min"], 0.0) << what;
+  EXPECT_LE(spread["min"], spread["p10"]) << what;
+  EXPECT_LE(spread["p10"], spread["median"]) << what;
+  EXPECT_LE(spread["median"], spread["p90"]) << what;
+  EXPECT_LE(spread["p90"], spread["p99"]) << what;
+  EXPECT_LE(spread["p99"], spread["max"]) << what;
+}
+
+const Json& row(const Json& report, const std::string& name) {
+  static const Json none;
+  for (const Json& r : report["rows"])
+    if (r["name"] == name) return r;
+  ADD_FAILURE() << "no row " << name << " in " << report["rows"];
+  return none;
+}
+
+TEST(Bench, Reconstruct) {
+  for (const std::string decoder : {"paper", "ordered"}) {
+    const Json report = report_of({"reconstruct", "--size", "160x120", "--stripes", "30", "--threads", "2",
+                                   "--frames", "5", "--decoder", decoder});
+    ASSERT_TRUE(report.is_object());
+    EXPECT_EQ(report["settings"]["width"], 160);
+    EXPECT_EQ(report["settings"]["height"], 120);
+    EXPECT_EQ(report["settings"]["stripes"], 30);
+    EXPECT_EQ(report["settings"]["threads"], 2);
+    EXPECT_EQ(report["settings"]["decoder"], decoder);
+    expect_spread(report["frame_ms"], 5, "frame_ms");
+    expect_spread(report["points"], 5, "points");
+    for (const char* stage : {"detect", "match", "triangulate", "surface", "texture"})
+      expect_spread(report["stage_ms"][stage], 5, stage);
+    // 160 x 120 x 3 bytes; 60 lines of 29 boundaries at most.
+    EXPECT_EQ(report["frame_bytes"], 57600);
+    EXPECT_LE(report["points"]["max"], 60 * 29);
+    EXPECT_GT(report["points"]["median"], 60 * 29 / 4);
+    EXPECT_NEAR(report["bound_ms"], 57600e3 / report["read_bytes_per_s"]["max"].get<double>(), 1e-9);
+    EXPECT_GT(report["bound_ms"], 0.0);
+    EXPECT_LT(report["bound_ms"], report["frame_ms"]["min"]);
+  }
+}
+
+TEST(Bench, Codec) {
+  const Json report = report_of({"codec", "--source", kSource, "--frames", "3", "--rounds", "2"});
+  ASSERT_TRUE(report.is_object());
+  expect_spread(report["vertices"], 3, "vertices");
+  const Json& raw = row(report, "raw-float32");
+  EXPECT_EQ(raw["max_mm"]["max"], 0);
+  for (const std::string bits : {"12bit", "pipeline"}) {
+    for (const std::string speed : {"0", "4", "5", "7", "9"}) {
+      const std::string name = "draco-mesh-s" + speed + "-" + bits;
+      const Json& r = row(report, name);
+      ASSERT_TRUE(r.is_object());
+      for (const char* key : {"bytes", "bits_per_vertex", "encode_ms", "decode_ms", "rms_mm", "max_mm"})
+        expect_spread(r[key], 6, name + " " + key);
+      EXPECT_LT(r["bytes"]["max"], raw["bytes"]["min"]) << name;
+      // A coordinate is off by half a step of the box at most.
+      const double step_mm =
+          1e3 * report["volume_m"].get<double>() / ((1 << r["bits"]["min"].get<int>()) - 1);
+      EXPECT_LT(r["max_mm"]["max"], 0.5 * std::sqrt(3) * step_mm * 1.01) << name;
+      EXPECT_GT(r["rms_mm"]["max"], 0.1 * step_mm) << name;
+    }
+  }
+}
+
+TEST(Bench, Texture) {
+  const Json report = report_of({"texture", "--source", kSource, "--frames", "3", "--rounds", "2"});
+  ASSERT_TRUE(report.is_object());
+  EXPECT_EQ(report["raw_bytes"], 160 * 120 * 3);
+  const Json& png = row(report, "png");
+  EXPECT_EQ(png["lossless"], true);
+  EXPECT_TRUE(png["psnr_db"].is_null());
+  double bytes = 0;
+  double psnr = 0;
+  for (const std::string quality : {"60", "75", "80", "90", "95"}) {
+    const Json& r = row(report, "jpeg-q" + quality);
+    ASSERT_TRUE(r.is_object());
+    EXPECT_EQ(r["lossless"], false);
+    for (const char* key : {"bytes", "bits_per_pixel", "encode_ms", "decode_ms", "psnr_db"})
+      expect_spread(r[key], 6, quality + " " + key);
+    EXPECT_GT(r["bytes"]["median"], bytes);
+    EXPECT_GT(r["psnr_db"]["median"], psnr);
+    bytes = r["bytes"]["median"];
+    psnr = r["psnr_db"]["median"];
+  }
+}
+
+TEST(Bench, Chain) {
+  const Json report =
+      report_of({"chain", "--source", kSource, "--clients", "2", "--web-clients", "1", "--frames", "20"});
+  ASSERT_TRUE(report.is_object());
+  EXPECT_EQ(report["frames"]["captured"], 20);
+  const int published = report["frames"]["published"];
+  EXPECT_GT(published, 0);
+  // Every frame is somewhere. The first has no partner yet; after drops, neither may the next ones of its
+  // slide.
+  const Json& drops = report["drops"];
+  const int dropped =
+      drops["reconstruct"].get<int>() + drops["encode"].get<int>() + drops["publish"].get<int>();
+  EXPECT_LE(published + dropped, 19) << report;
+  EXPECT_GE(published + dropped, 19 - drops["capture"].get<int>()) << report;
+  const int warm_up = report["settings"]["warm_up_frames"];
+  const Json& latency = report["latency_ms"];
+  expect_spread(latency["capture_to_publish"], published - warm_up, "capture_to_publish");
+  const int decoded = latency["capture_to_decoded"]["n"];
+  EXPECT_GE(decoded, 2 * (published - warm_up) - drops["dds"].get<int>());
+  EXPECT_LE(decoded, 2 * (published - warm_up));
+  EXPECT_GE(latency["capture_to_web"]["n"].get<int>(), published - warm_up - drops["web"].get<int>());
+  EXPECT_GT(latency["capture_to_decoded"]["median"], latency["capture_to_publish"]["median"]);
+  expect_spread(report["serial_ms"]["total"], 20, "serial_ms");
+  for (const char* key : {"published", "decoded", "web"})
+    EXPECT_GT(report["frames_per_s"][key]["median"], 0.0) << key;
+  for (const char* key : {"server", "clients", "total"})
+    EXPECT_GT(report["cpu_cores"][key]["max"], 0.0) << key;
+  EXPECT_GT(report["memory_mb"]["resident"]["median"], report["memory_mb"]["before"].get<double>() / 2);
+}
+
+TEST(Bench, TableForPeople) {
+  const Finished done = bench({"codec", "--source", kSource, "--frames", "2", "--rounds", "1"});
+  EXPECT_EQ(done.status, 0) << done.err;
+  EXPECT_EQ(done.err, "");
+  for (const char* text : {"codec: median (p10..p90)", "vertices", "bits_per_vertex", "draco-mesh-s0-12bit"})
+    EXPECT_THAT(done.out, testing::HasSubstr(text));
+}
+
+TEST(Bench, FailuresAreOneLine) {
+  const Finished shaped = bench({"reconstruct", "--source", "take:nowhere", "--size", "640x480"});
+  EXPECT_EQ(shaped.status, 1);
+  EXPECT_THAT(shaped.err, testing::HasSubstr("leave them out"));
+  const Finished missing = bench({"codec", "--source", "take:nowhere"});
+  EXPECT_EQ(missing.status, 1);
+  EXPECT_THAT(missing.err, testing::HasSubstr("nowhere"));
+  const Finished unknown = bench({"everything"});
+  EXPECT_EQ(unknown.status, 2);
+  for (const Finished& f : {shaped, missing, unknown}) {
+    EXPECT_EQ(f.out, "");
+    EXPECT_EQ(std::count(f.err.begin(), f.err.end(), '\n'), 1) << f.err;
+  }
+}
+
+}  // namespace
+}  // namespace relievo::test

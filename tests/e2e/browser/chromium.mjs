@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Headless Chromium for the browser tests, which run in web/viewer, where playwright-core is installed.
+import { existsSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+
+const executablePath = ['/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'].find(existsSync);
+if (executablePath === undefined) {
+  console.log('skipped: no Chromium here; apt-get install chromium');
+  process.exit(77);
+}
+const { chromium } = createRequire(join(process.cwd(), 'package.json'))('playwright-core');
+const kFlags = [
+  '--no-sandbox',
+  '--disable-gpu',
+  '--disable-quic',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+];
+
+/** A browser of its own; who starts it closes it. */
+export const launchChromium = () => chromium.launch({ executablePath, headless: true, args: kFlags });

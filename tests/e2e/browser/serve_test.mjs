@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole chain as a person sees it: `relievo-server serve` on the simulated face, and the viewer in headless Chromium.
+// Run as: node serve_test.mjs RELIEVO_SERVER [SCREENSHOT], in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { createInterface } from 'node:readline';
+import { launchChromium } from './chromium.mjs';
+
+const [serverPath, screenshot] = process.argv.slice(2);
+
+const domain = String(1 + (process.pid % 200));
+const server = spawn(
+  serverPath,
+  ['serve', '--source', 'sim:face', '--web', '127.0.0.1:0', '--domain', domain, '--interface', 'lo'],
+  { stdio: ['ignore', 'pipe', 'inherit'] },
+);
+const exited = new Promise((resolve) => server.once('exit', (code, signal) => resolve({ code, signal })));
+let browser;
+try {
+  const address = await new Promise((resolve, reject) => {
+    createInterface({ input: server.stdout }).on('line', (line) => {
+      if (line.startsWith('viewer ')) resolve(line.slice('viewer '.length));
+    });
+    exited.then(({ code }) => reject(new Error(`the server ended with status ${code} before it served`)));
+  });
+
+  browser = await launchChromium();
+  const complaints = [];
+  const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
+  page.setDefaultTimeout(60_000); // software rendering on a busy machine
+  page.on('pageerror', (error) => complaints.push(error.message));
+  const begin = Date.now();
+  await page.goto(address);
+  const look = () => page.evaluate(() => ({ ...window.relievo.diagnostics(), pixels: window.relievo.readPixels() }));
+  const shownPast = (count) => page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
+  await shownPast(1);
+  console.log(`first picture ${Date.now() - begin} ms after the page was asked for`);
+
+  const first = await look();
+  await shownPast(first.shown + 5);
+  const second = await look();
+  assert.equal(second.state, 'live');
+  assert.ok(second.vertices > 10_000, `${second.vertices} vertices`);
+  assert.ok(second.pixels.covered > 0.15, `the surface covers ${second.pixels.covered} of the page`);
+  assert.ok(second.pixels.deviation > 10, `the picture is flat: ${second.pixels.deviation}`);
+  assert.notEqual(second.pixels.hash, first.pixels.hash, 'the picture does not move');
+  assert.ok(second.frame > first.frame, 'the frame counter stands still');
+  assert.equal(second.errors, 0, second.lastError);
+  assert.deepEqual(complaints, []);
+  const health = await page.request.get(new URL('/healthz', address).href);
+  assert.equal(health.status(), 200);
+  if (screenshot) await page.screenshot({ path: screenshot });
+
+  server.kill('SIGINT');
+  assert.deepEqual(await exited, { code: 0, signal: null });
+  await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');
+  console.log('the viewer says so when the server has gone');
+} finally {
+  await browser?.close();
+  server.kill('SIGKILL');
+}

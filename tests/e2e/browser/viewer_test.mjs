@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: the page shows a live surface (pixels, not blank, moving), says honestly what state
+// it is in, and asks no other host for anything. Run as: node viewer_test.mjs GATEWAY_FEEDER [SCREENSHOT_FOLDER],
+// in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { launchChromium } from './chromium.mjs';
+
+const [feederPath, shotsWanted] = process.argv.slice(2);
+
+const kWaitMs = 20_000; // software rendering on a busy machine
+const kRate = '8';
+
+class Feeder {
+  static async start(port = 0) {
+    const feeder = new Feeder();
+    feeder.process = spawn(feederPath, [String(port), kRate], { stdio: ['pipe', 'pipe', 'inherit'] });
+    const line = await new Promise((resolve, reject) => {
+      feeder.process.stdout.once('data', resolve);
+      feeder.process.once('exit', () => reject(new Error('the feeder did not start')));
+    });
+    feeder.port = Number(String(line).split(' ')[1]);
+    return feeder;
+  }
+  say(line) {
+    this.process.stdin.write(`${line}\n`);
+  }
+  async kill() {
+    if (this.process.exitCode !== null || this.process.signalCode !== null) return;
+    const ended = new Promise((resolve) => this.process.once('exit', resolve));
+    this.process.kill('SIGKILL');
+    await ended;
+  }
+}
+
+const scratch = mkdtempSync(join(tmpdir(), 'relievo-browser-'));
+const shots = shotsWanted ?? join(scratch, 'shots');
+mkdirSync(shots, { recursive: true });
+let feeder = await Feeder.start();
+const origin = `http://127.0.0.1:${feeder.port}`;
+const browser = await launchChromium();
+const complaints = [];
+
+async function open(path = '/', options = {}) {
+  const page = await browser.newPage({ viewport: { width: 800, height: 500 }, ...options });
+  page.setDefaultTimeout(kWaitMs);
+  page.on('pageerror', (error) => complaints.push(`page error: ${error.message}`));
+  page.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(`console: ${message.text()}`);
+  });
+  page.on('request', (request) => {
+    const url = request.url();
+    const own = url.startsWith(`${origin}/`) || url.startsWith('data:') || url.startsWith('blob:');
+    if (!own) complaints.push(`request to another host: ${url}`);
+  });
+  page.on('websocket', (socket) => {
+    if (!socket.url().startsWith(origin.replace('http', 'ws'))) complaints.push(`socket to ${socket.url()}`);
+  });
+  await page.goto(origin + path);
+  return page;
+}
+
+const look = (page) => page.evaluate(() => ({ ...window.relievo.diagnostics(), pixels: window.relievo.readPixels() }));
+const inState = (page, state) =>
+  page.waitForFunction((wanted) => window.relievo?.diagnostics().state === wanted, state);
+const shownPast = (page, count) =>
+  page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
+const more = async (page, frames) => shownPast(page, (await look(page)).shown + frames);
+const card = (page) => page.textContent('#card');
+
+const checks = {
+  async 'an empty server says how to start a stream'(page) {
+    assert.equal(await page.title(), 'Relievo');
+    await inState(page, 'empty');
+    assert.match(await card(page), /No streams yet/);
+    assert.match(await card(page), /relievo-server serve --source sim:face/);
+    assert.equal((await look(page)).pixels.covered, 0);
+  },
+
+  async 'a stream that starts appears by itself, live'(page) {
+    feeder.say('start ball');
+    await shownPast(page, 3);
+    await inState(page, 'live');
+    assert.ok(await page.isHidden('#card'));
+    assert.equal(await page.title(), 'Relievo · ball');
+    const now = await look(page);
+    assert.ok(now.pixels.covered > 0.2, `the surface covers ${now.pixels.covered} of the page`);
+    assert.ok(now.pixels.deviation > 10, `the picture is flat: ${now.pixels.deviation}`);
+    assert.ok(now.vertices > 10_000 && now.triangles > 20_000, `${now.vertices}, ${now.triangles}`);
+    assert.equal(now.errors, 0, now.lastError);
+    assert.equal(now.drops.gaps, 0);
+  },
+
+  async 'the picture moves and the frame counter grows'(page) {
+    const first = await look(page);
+    await more(page, 4);
+    const second = await look(page);
+    assert.ok(second.frame > first.frame);
+    assert.notEqual(second.pixels.hash, first.pixels.hash);
+    assert.match(await page.textContent('#statistics'), /frame\d+rate[\d.]+ \/slatency\d+ ms/);
+    assert.ok(second.latencyMs > 0 && second.latencyMs < 10_000, `latency ${second.latencyMs}`);
+  },
+
+  async 'the texture is on the right way round'(page) {
+    // The feeder paints the texture's upper left corner red and its upper right one green.
+    feeder.say('stop');
+    await page.waitForTimeout(500);
+    const png = (await page.screenshot()).toString('base64');
+    const corners = await page.evaluate(async (data) => {
+      const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+      const bitmap = await createImageBitmap(new Blob([bytes]));
+      const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+      const context = canvas.getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      const { data: rgba } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+      const centre = (match) => {
+        let [n, sx, sy] = [0, 0, 0];
+        for (let i = 0; i < rgba.length; i += 4) {
+          if (!match(rgba[i], rgba[i + 1], rgba[i + 2])) continue;
+          ++n;
+          sx += ((i / 4) % bitmap.width) / bitmap.width;
+          sy += Math.floor(i / 4 / bitmap.width) / bitmap.height;
+        }
+        return { n, x: sx / n, y: sy / n };
+      };
+      return {
+        red: centre((r, g, b) => r > 180 && g < 70 && b < 70),
+        green: centre((r, g, b) => r < 70 && g > 150 && b < 70),
+      };
+    }, png);
+    assert.ok(corners.red.n > 300 && corners.green.n > 300, JSON.stringify(corners));
+    assert.ok(corners.red.x < 0.45 && corners.red.y < 0.4, JSON.stringify(corners));
+    assert.ok(corners.green.x > 0.55 && corners.green.y < 0.4, JSON.stringify(corners));
+    feeder.say('start ball');
+    await more(page, 2);
+  },
+
+  async 'keys and buttons choose how the surface is drawn'(page) {
+    const hashes = new Set();
+    feeder.say('stop'); // the same surface in each mode: also those that the worker prepared nothing for
+    await page.waitForTimeout(400);
+    for (const [key, mode] of [['2', 'shaded'], ['3', 'wireframe'], ['4', 'points'], ['1', 'textured']]) {
+      await page.keyboard.press(key);
+      const now = await look(page);
+      assert.equal(now.mode, mode);
+      assert.ok(now.pixels.covered > 0.03, `${mode} covers ${now.pixels.covered}`);
+      hashes.add(now.pixels.hash);
+      await page.screenshot({ path: join(shots, `${mode}.png`) });
+    }
+    assert.equal(hashes.size, 4);
+    await page.click('#modes button:nth-child(2)');
+    assert.equal((await look(page)).mode, 'shaded');
+    assert.equal(await page.getAttribute('#modes button:nth-child(2)', 'aria-pressed'), 'true');
+    await page.keyboard.press('1');
+  },
+
+  async 'keys, mouse and wheel move the view, R brings it back'(page) {
+    await page.keyboard.press('r'); // the first view of the surface as it is now
+    await page.waitForTimeout(200);
+    const home = (await look(page)).pixels.hash;
+    const moved = async (what, act) => {
+      const before = (await look(page)).pixels.hash;
+      await act();
+      await page.waitForTimeout(300);
+      assert.notEqual((await look(page)).pixels.hash, before, `${what} did nothing`);
+    };
+    await moved('an arrow key', () => page.keyboard.press('ArrowLeft'));
+    await moved('shift and an arrow key', () => page.keyboard.press('Shift+ArrowUp'));
+    await moved('plus', () => page.keyboard.press('+'));
+    await moved('the wheel', async () => {
+      await page.mouse.move(400, 250);
+      await page.mouse.wheel(0, 240);
+    });
+    await moved('a drag', async () => {
+      await page.mouse.down();
+      await page.mouse.move(480, 270, { steps: 4 });
+      await page.mouse.up();
+    });
+    await page.keyboard.press('r');
+    await page.waitForTimeout(300);
+    assert.equal((await look(page)).pixels.hash, home, 'R does not bring the first view back');
+  },
+
+  async 'nothing is drawn while nothing changes'(page) {
+    await page.waitForTimeout(1500);
+    const before = (await look(page)).drawn;
+    await page.waitForTimeout(700);
+    assert.equal((await look(page)).drawn, before);
+  },
+
+  async 'a silent stream is called stalled and dimmed'(page) {
+    await inState(page, 'stalled');
+    assert.match(await card(page), /stalled/);
+    assert.ok(await page.evaluate(() => document.body.classList.contains('dim')));
+    await page.waitForTimeout(600);
+    await page.screenshot({ path: join(shots, 'stalled.png') });
+    feeder.say('start ball');
+    await inState(page, 'live');
+    feeder.say('status stalled No signal from the camera.');
+    await inState(page, 'stalled');
+    assert.match(await card(page), /No signal from the camera\./);
+    feeder.say('status running');
+    await inState(page, 'live');
+  },
+
+  async 'a corrupt frame is counted and the next ones are shown'(page) {
+    // One may be dropped on the way, like any frame this page is too slow for.
+    for (let i = 0; i < 40 && (await look(page)).errors === 0; ++i) {
+      feeder.say('corrupt');
+      await page.waitForTimeout(500);
+    }
+    assert.ok((await look(page)).errors > 0, 'no corrupt frame was counted');
+    await more(page, 4);
+    assert.match((await look(page)).lastError, /frame is cut short/);
+    await page.waitForFunction(() => /errors\d/.test(document.querySelector('#statistics').textContent));
+  },
+
+  async 'an ended and a vanished stream are told apart from a stall'(page) {
+    feeder.say('status ended The take is at its end.');
+    await inState(page, 'ended');
+    assert.match(await card(page), /The take is at its end\./);
+    feeder.say('gone');
+    await page.waitForFunction(() => /left the network/.test(document.querySelector('#card').textContent));
+    feeder.say('start ball');
+    await inState(page, 'live');
+  },
+
+  async 'a stream that does not exist is waited for'() {
+    const page = await open('/?stream=later');
+    await inState(page, 'waiting');
+    assert.match(await card(page), /Waiting for “later”/);
+    await page.waitForFunction(() => document.querySelectorAll('#streams option').length === 2);
+    await page.selectOption('#streams', 'ball');
+    await inState(page, 'live');
+    assert.match(page.url(), /stream=ball/);
+    await page.close();
+  },
+
+  async 'a phone sees everything without scrolling sideways'() {
+    const page = await open('/', { viewport: { width: 360, height: 740 }, hasTouch: true });
+    await inState(page, 'live');
+    await page.waitForTimeout(400);
+    const outside = await page.evaluate(() =>
+      [...document.querySelectorAll('header *, footer *')]
+        .filter((e) => e.getClientRects().length > 0 && !e.closest('svg, option'))
+        .filter((e) => e.getBoundingClientRect().left < -0.5 || e.getBoundingClientRect().right > innerWidth + 0.5)
+        .map((e) => e.id || e.textContent),
+    );
+    assert.deepEqual(outside, []);
+    await page.screenshot({ path: join(shots, 'phone.png') });
+    await page.close();
+  },
+
+  async 'without WebGL the page says so'() {
+    const page = await browser.newPage();
+    await page.addInitScript(() => {
+      const original = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
+      };
+    });
+    await page.goto(origin);
+    await inState(page, 'unsupported');
+    assert.match(await card(page), /WebGL 2/);
+    await page.close();
+  },
+
+  async 'until here: no error, no request to another host'() {
+    assert.deepEqual(complaints, []);
+  },
+
+  async 'a lost server is noticed, and found again'(page) {
+    const { port } = feeder;
+    await feeder.kill();
+    await inState(page, 'lost');
+    assert.match(await card(page), /Connection lost/);
+    await page.waitForFunction(() => /in \d+ s/.test(document.querySelector('#card-text').textContent));
+    await page.waitForTimeout(600);
+    await page.screenshot({ path: join(shots, 'lost.png') });
+    feeder = await Feeder.start(port);
+    feeder.say('start ball');
+    await page.click('#retry').catch(() => undefined); // it may have tried by itself meanwhile
+    await inState(page, 'live');
+    await more(page, 2);
+  },
+};
+
+let failed = 0;
+try {
+  const page = await open();
+  for (const [name, check] of Object.entries(checks)) {
+    const start = Date.now();
+    try {
+      await check(page);
+      console.log(`ok    ${name} (${Date.now() - start} ms)`);
+    } catch (error) {
+      ++failed;
+      console.log(`FAIL  ${name}: ${error.message}`);
+      console.log('      ', JSON.stringify(await page.evaluate(() => window.relievo?.diagnostics()).catch(() => null)));
+      await page.screenshot({ path: join(shots, `failed-${failed}.png`) }).catch(() => undefined);
+    }
+  }
+} finally {
+  await browser.close();
+  await feeder.kill();
+  if (failed === 0 || shotsWanted) rmSync(scratch, { recursive: true, force: true });
+  else console.log(`pictures of the failures: ${shots}`);
+}
+console.log(failed === 0 ? 'all checks passed' : `${failed} of ${Object.keys(checks).length} checks failed`);
+process.exit(failed === 0 ? 0 : 1);

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// docs/CALIBRATION.md's worked example, from nothing to a reconstruction, and how the commands refuse.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo::test {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+using nlohmann::json;
+using testing::HasSubstr;
+
+Finished server(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), program("relievo-server").string());
+  return run(arguments, 150s);
+}
+
+json report(const std::vector<std::string>& arguments) {
+  const Finished done = server(arguments);
+  EXPECT_EQ(done.status, 0) << done.err;
+  const json parsed = json::parse(done.out, nullptr, false);
+  EXPECT_FALSE(parsed.is_discarded()) << done.out;
+  return parsed.is_discarded() ? json::object() : parsed;
+}
+
+TEST(CalibrationExample, FromNothingToAReconstruction) {
+  const TempFolder folder;
+  const std::string out = (folder / "example").string(), rig = (folder / "rig.yaml").string();
+  const json example = report({"calibrate", "example", "--out", out, "--views", "6", "--json"});
+  const json colour = report({"calibrate", "colour", out + "/colours", "--out", rig, "--json"});
+  EXPECT_LT(colour.at("residual").get<double>(), 3);
+  for (const json& c : colour.at("colours")) {
+    if (c.contains("margin")) {
+      EXPECT_GT(c.at("margin").get<double>(), 150) << c;
+    }
+  }
+  const json geometry = report({"calibrate", "geometry", out + "/views", "--board", example.at("board"),
+                                "--projector", example.at("projector"), "--update", rig, "--compare",
+                                out + "/truth.yaml", "--pictures", (folder / "pictures").string(), "--json"});
+  EXPECT_LT(geometry.at("stereo_rms_px").get<double>(), 0.12);
+  EXPECT_EQ(geometry.at("views_used"), 6);
+  EXPECT_LT(geometry.at("compare").at("camera_focal_percent").get<double>(), 0.3);
+  EXPECT_LT(geometry.at("compare").at("projector_focal_percent").get<double>(), 0.3);
+  EXPECT_LT(geometry.at("compare").at("baseline_mm").get<double>(), 2);
+  EXPECT_LT(geometry.at("compare").at("depth_rms_mm").get<double>(), 1.5);
+  EXPECT_GT(fs::file_size(folder / "pictures/residuals.png"), 10000u);
+
+  // A take of the same rig, reconstructed with what was just calibrated instead of the truth.
+  const std::string take = (folder / "take").string();
+  ASSERT_EQ(server({"simulate", "--scene", "object,distortion=1", "--frames", "3", "--out", take}).status, 0);
+  const json with_truth = report({"evaluate", take, "--json"});
+  fs::copy_file(rig, take + "/rig.yaml", fs::copy_options::overwrite_existing);
+  const json calibrated = report({"evaluate", take, "--json"});
+  EXPECT_GT(calibrated.at("completeness").get<double>(), with_truth.at("completeness").get<double>() - 0.01);
+  EXPECT_LT(calibrated.at("median_um_per_m").get<double>(), 1000);
+}
+
+TEST(CalibrationExample, GraySlidesAreImportedBack) {
+  const TempFolder folder;
+  const std::string slides = (folder / "slides").string();
+  const json written = report({"pattern", "--gray", "--size", "128x96", "--out", slides, "--json"});
+  EXPECT_EQ(written.at("slides"), 30);
+  const json imported = report(
+      {"import", "gray", slides, "--projector", "128x96", "--out", (folder / "maps").string(), "--json"});
+  EXPECT_EQ(imported.at("decoded_pixels"), 128 * 96);
+  EXPECT_TRUE(fs::exists(folder / "maps/columns.npy"));
+}
+
+TEST(CalibrationExample, RefusalsAreOneLineAndExitOne) {
+  const TempFolder folder;
+  const auto refused = [](const std::vector<std::string>& arguments, const std::string& words) {
+    const Finished done = server(arguments);
+    EXPECT_EQ(done.status, 1) << done.err;
+    EXPECT_THAT(done.err, HasSubstr(words));
+    EXPECT_EQ(done.out, "");
+  };
+  const std::string rig = (folder / "rig.yaml").string(), empty = folder.path().string();
+  refused({"calibrate", "colour", empty, "--out", rig},
+          "has no captures: name each picture by the projected colour");
+  refused({"calibrate", "geometry", empty, "--board", "chessboard:9x7:25mm", "--projector", "1024x768",
+           "--out", rig},
+          "has no folders");
+  refused({"calibrate", "geometry", empty, "--board", "circles:9x7", "--projector", "1024x768", "--out", rig},
+          "is no board such as chessboard:9x7:75mm");
+  refused({"import", "gray", empty, "--out", empty + "/o", "--projector", "64x48"}, "has 0 pictures");
+  refused({"import", "gray", empty, "--out", empty + "/o"}, "--projector");
+  EXPECT_FALSE(fs::exists(rig));
+}
+
+TEST(CalibrationExample, WrongUsageExitsTwo) {
+  EXPECT_EQ(server({"calibrate"}).status, 2);
+  EXPECT_EQ(server({"calibrate", "colour", "somewhere"}).status, 2);  // neither --out nor --update
+  EXPECT_EQ(server({"import", "gray", "somewhere", "--out", "o", "--projector", "12"}).status, 2);
+  EXPECT_EQ(server({"import", "gray", "somewhere", "--out", "o", "--compare", "c.ply"}).status, 2);
+  EXPECT_EQ(server({"calibrate", "geometry", "--help"}).status, 0);
+}
+
+}  // namespace
+}  // namespace relievo::test

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// `relievo` as a user meets it: exit codes, one clear line for every failure, results on stdout.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/process.h"
+#include "tests/support/streams.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+using namespace std::chrono_literals;
+using test::program;
+using testing::HasSubstr;
+
+const std::string kDomain = std::to_string(test::own_domain());
+
+std::vector<std::string> relievo(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), program("relievo"));
+  return arguments;
+}
+
+void expect_one_line(const std::string& text) {
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+}
+
+TEST(Client, WrongUsageIsExitTwoAndOneLine) {
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"strems"},
+      {"streams", "--wait", "soon"},
+      {"streams", "--domain", "231"},
+      {"record"},
+      {"record", "face", "--frames", "0"},
+      {"record", "face", "--frames", "-3"},
+      {"play"},
+      {"play", "a.mcap", "--speed", "0"},
+      {"play", "a.mcap", "--loop", "--once"},
+      {"info"},
+      {"export", "a.mcap", "--out", "d", "--format", "stl"},
+      {"web", "--listen"},
+      {"web", "--listen", "here"},
+  };
+  for (const auto& arguments : wrong) {
+    const auto done = test::run(relievo(arguments), 10s);
+    EXPECT_EQ(done.status, 2) << testing::PrintToString(arguments) << done.err;
+    EXPECT_EQ(done.out, "");
+    expect_one_line(done.err);
+  }
+}
+
+TEST(Client, EveryVerbHasHelpAndVersion) {
+  for (const std::string verb : {"streams", "record", "play", "info", "export", "web"}) {
+    const auto help = test::run(relievo({verb, "--help"}), 10s);
+    EXPECT_EQ(help.status, 0) << verb;
+    EXPECT_THAT(help.out, HasSubstr("--quiet"));
+    const auto version = test::run(relievo({verb, "--version"}), 10s);
+    EXPECT_EQ(version.status, 0) << verb;
+    EXPECT_THAT(version.out, HasSubstr("relievo "));
+  }
+}
+
+TEST(Client, FailuresAreExitOneAndOneLine) {
+  const test::TempFolder folder;
+  std::ofstream(folder / "text.mcap") << "no recording\n";
+  const std::string text = folder / "text.mcap";
+  const std::vector<std::vector<std::string>> failing = {
+      {"info", folder / "none.mcap"},
+      {"info", text},
+      {"info", "nobody", "--wait", "0.2", "--domain", kDomain, "--interface", "lo"},
+      {"play", folder / "none.mcap"},
+      {"play", text},
+      {"export", text, "--out", folder / "out"},
+      {"web", text},
+      {"web", folder / "none.mcap"},
+      {"record", "face", "--out", text},
+      {"record", "face", "--out", folder / "no" / "folder.mcap"},
+      {"record", "face", "--out", folder / "new.mcap", "--interface", "no-such-if0"},
+      {"record", "no spaces", "--out", folder / "new.mcap"},
+      {"streams", "--interface", "no-such-if0"},
+  };
+  for (const auto& arguments : failing) {
+    const auto done = test::run(relievo(arguments), 10s);
+    EXPECT_EQ(done.status, 1) << testing::PrintToString(arguments) << done.err;
+    EXPECT_EQ(done.out, "");
+    expect_one_line(done.err);
+    EXPECT_THAT(done.err, HasSubstr("error: "));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "new.mcap"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST(Client, RecordingAnAbsentStreamSaysSoAndLeavesNoFile) {
+  const test::TempFolder folder;
+  const auto done = test::run(relievo({"record", "absent", "--domain", kDomain, "--interface", "lo", "--wait",
+                                       "1.5", "--out", folder / "a.mcap"}),
+                              10s);
+  EXPECT_EQ(done.status, 1);
+  EXPECT_THAT(done.err, HasSubstr("waiting for stream 'absent'"));
+  EXPECT_THAT(done.err, HasSubstr("error: no stream 'absent' in domain " + kDomain));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.mcap"));
+}
+
+TEST(Client, StreamsListsWhatIsLive) {
+  const auto empty = test::run(
+      relievo({"streams", "--json", "--domain", kDomain, "--interface", "lo", "--wait", "0.3"}), 10s);
+  EXPECT_EQ(empty.status, 0);
+  EXPECT_EQ(nlohmann::json::parse(empty.out), nlohmann::json::array());
+  EXPECT_THAT(empty.err, HasSubstr("no live stream in domain " + kDomain));
+
+  test::Process server({program("test_publisher"), "listed", kDomain, "100", "50", "5"});
+  ASSERT_TRUE(server.wait_for_text("done", 10s));
+  const auto listed =
+      test::run(relievo({"streams", "--json", "--domain", kDomain, "--interface", "lo"}), 10s);
+  const auto json = nlohmann::json::parse(listed.out);
+  ASSERT_EQ(json.size(), 1u) << listed.out;
+  EXPECT_EQ(json[0]["stream"], "listed");
+  EXPECT_EQ(json[0]["state"], "running");
+  EXPECT_EQ(json[0]["stripes"], 7);
+  const auto table = test::run(relievo({"streams", "--domain", kDomain, "--interface", "lo"}), 10s);
+  EXPECT_THAT(table.out, HasSubstr("listed"));
+  EXPECT_EQ(table.err, "");
+}
+
+TEST(Client, InfoDescribesALiveStream) {
+  test::Process server({program("test_publisher"), "watched", kDomain, "5000", "50", "1000"});
+  ASSERT_TRUE(server.wait_for_text("live", 10s));
+  const auto info = test::run(
+      relievo({"info", "watched", "--json", "--wait", "1", "--domain", kDomain, "--interface", "lo"}), 10s);
+  ASSERT_EQ(info.status, 0) << info.err;
+  const auto json = nlohmann::json::parse(info.out);
+  EXPECT_GT(json["frames"], 10);
+  EXPECT_EQ(json["lost"], 0);
+  EXPECT_NEAR(json["frame_rate"], 50, 10);
+  EXPECT_EQ(json["info"]["rig"]["camera"]["size"], nlohmann::json({640, 480}));
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// A gateway with a synthetic moving surface, for the browser test: what it serves is encoded by the real
+// codec. Prints "listening PORT" and obeys lines on stdin: start NAME, stop, corrupt (one frame), status
+// STATE TEXT, gone. Ends when stdin does, so that no test leaves it behind.
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "base/time.h"
+#include "codec/frame3d_codec.h"
+#include "web/gateway/gateway.h"
+
+namespace relievo {
+namespace {
+
+constexpr int kColumns = 90;
+constexpr int kRows = 120;
+constexpr int kWidth = 640;
+constexpr int kHeight = 480;
+constexpr float kFocal = 800;
+
+/// A plane at 1.2 m with a ball's worth of relief that moves and breathes.
+float depth_m(float u, float v, float t) {
+  const float cx = 0.5f + 0.12f * std::sin(t);
+  const float dx = (u - cx) * 1.33f, dy = v - 0.5f;
+  const float r2 = dx * dx + dy * dy;
+  const float bump = r2 < 0.09f ? std::sqrt(0.09f - r2) : 0.0f;
+  return 1.2f - 0.6f * bump - 0.012f * std::sin(14.0f * u + 3.0f * t) * std::cos(11.0f * v);
+}
+
+void paint(Image8& texture, float t) {
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const float u = static_cast<float>(x) / kWidth, v = static_cast<float>(y) / kHeight;
+      const bool odd = (static_cast<int>(u * 16 + t) + static_cast<int>(v * 12)) % 2 != 0;
+      const float light = 0.75f + 0.25f * std::sin(6.0f * u - 2.0f * v);
+      std::uint8_t* pixel = texture.row(y) + x * 3;
+      pixel[0] = static_cast<std::uint8_t>(light * (odd ? 214 : 60));
+      pixel[1] = static_cast<std::uint8_t>(light * (odd ? 170 : 92));
+      pixel[2] = static_cast<std::uint8_t>(light * (odd ? 140 : 130));
+    }
+  }
+  // A red upper left and a green upper right corner show whether the texture is on the right way round.
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      std::uint8_t* left = texture.row(y) + x * 3;
+      std::uint8_t* right = texture.row(y) + (kWidth - 1 - x) * 3;
+      left[0] = 230, left[1] = 20, left[2] = 20;
+      right[0] = 20, right[1] = 200, right[2] = 20;
+    }
+  }
+}
+
+Frame3D make_frame(std::uint64_t number, float t) {
+  Frame3D frame;
+  frame.number = number;
+  frame.time_ns = utc_now_ns();
+  for (int r = 0; r < kRows; ++r) {
+    for (int c = 0; c < kColumns; ++c) {
+      const float u = static_cast<float>(c) / (kColumns - 1), v = static_cast<float>(r) / (kRows - 1);
+      const float z = depth_m(u, v, t);
+      frame.surface.positions.push_back(
+          {(u - 0.5f) * kWidth / kFocal * z, (v - 0.5f) * kHeight / kFocal * z, z});
+      frame.surface.texture_coordinates.push_back({u, v});
+      if (r == 0 || c == 0) continue;
+      const auto at = [](int row, int column) { return static_cast<std::uint32_t>(row * kColumns + column); };
+      frame.surface.triangles.push_back({at(r - 1, c - 1), at(r, c - 1), at(r, c)});
+      frame.surface.triangles.push_back({at(r - 1, c - 1), at(r, c), at(r - 1, c)});
+    }
+  }
+  frame.texture = Image8(kWidth, kHeight, 3);
+  paint(frame.texture, t);
+  return frame;
+}
+
+StreamInfo make_info(const std::string& name) {
+  StreamInfo info;
+  info.stream = name;
+  info.source = "feeder:ball";
+  info.started_ns = utc_now_ns();
+  info.rig.frame_rate = 30;
+  info.rig.camera.width = kWidth;
+  info.rig.camera.height = kHeight;
+  info.rig.camera.matrix = {kFocal, 0, 319.5, 0, kFocal, 239.5, 0, 0, 1};
+  info.pattern.sequence.assign(90, 0);
+  return info;
+}
+
+/// What stdin asked for; the feeding loop looks once a frame.
+struct Orders {
+  std::mutex mutex;
+  std::string stream;  // feeding this one; empty: none
+  bool announce = false, withdraw = false, feeding = false, corrupt = false, quit = false;
+  std::string state, text;
+};
+
+void read_orders(Orders& orders) {
+  std::string line;
+  while (std::getline(std::cin, line)) {
+    std::istringstream words(line);
+    std::string verb, name;
+    words >> verb;
+    const std::lock_guard lock(orders.mutex);
+    if (verb == "start") {
+      words >> name;
+      orders.stream = name;
+      orders.announce = orders.feeding = true;
+    } else if (verb == "stop") {
+      orders.feeding = false;
+    } else if (verb == "corrupt") {
+      orders.corrupt = true;
+    } else if (verb == "gone") {
+      orders.withdraw = true;
+      orders.feeding = false;
+    } else if (verb == "status") {
+      words >> orders.state >> std::ws;
+      std::getline(words, orders.text);
+    }
+  }
+  const std::lock_guard lock(orders.mutex);
+  orders.quit = true;
+}
+
+StreamState state_named(const std::string& name) {
+  if (name == "stalled") return StreamState::kStalled;
+  if (name == "ended") return StreamState::kEnded;
+  return StreamState::kRunning;
+}
+
+int feed(std::uint16_t port, double rate) {
+  const auto started = Gateway::start({.port = port, .empty_hint = "relievo-server serve --source sim:face"});
+  if (!started.ok()) {
+    std::fprintf(stderr, "%s\n", started.error().message.c_str());
+    return 1;
+  }
+  Gateway& gateway = **started;
+  std::printf("listening %d\n", gateway.port());
+  std::fflush(stdout);
+
+  static Orders orders;  // outlives the thread that reads into it
+  std::thread reader([&] { read_orders(orders); });
+  reader.detach();  // blocked in stdin; the program ends with it
+  EncodeOptions options;
+  options.volume = {{-1, -1, 0}, 2};
+  std::uint64_t sequence = 0;
+  auto next = std::chrono::steady_clock::now();
+  for (;;) {
+    next += std::chrono::microseconds(static_cast<int>(1e6 / rate));
+    std::this_thread::sleep_until(next);
+    const std::lock_guard lock(orders.mutex);
+    if (orders.quit) return 0;
+    if (std::exchange(orders.announce, false)) gateway.announce(make_info(orders.stream));
+    if (std::exchange(orders.withdraw, false)) gateway.withdraw(orders.stream);
+    if (!orders.state.empty()) {
+      ServerStatus status;
+      status.stream = orders.stream;
+      status.state = state_named(std::exchange(orders.state, {}));
+      status.message = orders.text;
+      gateway.publish(status);
+    }
+    if (!orders.feeding) continue;
+    FrameMessage message;
+    message.capture_time_ns = utc_now_ns();
+    message.sequence = message.number = sequence++;
+    const auto bytes =
+        encode_frame(make_frame(message.number, static_cast<float>(sequence) * 0.05f), options);
+    if (!bytes.ok()) {
+      std::fprintf(stderr, "%s\n", bytes.error().message.c_str());
+      return 1;
+    }
+    Bytes data = *bytes;
+    if (std::exchange(orders.corrupt, false)) data.resize(data.size() / 2);
+    message.data = std::make_shared<const Bytes>(std::move(data));
+    message.publish_time_ns = utc_now_ns();
+    gateway.publish(orders.stream, message);
+  }
+}
+
+}  // namespace
+}  // namespace relievo
+
+int main(int argc, char** argv) {
+  const int port = argc > 1 ? std::atoi(argv[1]) : 0;
+  const double rate = argc > 2 ? std::atof(argv[2]) : 15;
+  return relievo::feed(static_cast<std::uint16_t>(port), rate);
+}

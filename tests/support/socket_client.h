@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// A bare TCP, HTTP and WebSocket client for tests: POSIX sockets only, so that it shares nothing with the
+// server it checks. Every wait is bounded.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace relievo::test {
+
+class TcpClient {
+ public:
+  explicit TcpClient(std::uint16_t port, int receive_buffer_bytes = 0);
+  TcpClient(TcpClient&& other) noexcept;
+  TcpClient& operator=(TcpClient&&) = delete;
+  ~TcpClient();
+
+  bool connected() const { return fd_ >= 0; }
+  bool send(const std::string& bytes);
+  /// Waits until at least one byte more is there; false at the end of the stream or after the time.
+  bool receive(int timeout_ms = 3000);
+  bool at_end() const { return at_end_; }  // the server closed
+  std::string& buffer() { return buffer_; }
+
+ private:
+  int fd_ = -1;
+  bool at_end_ = false;
+  std::string buffer_;
+};
+
+struct Response {
+  int status = 0;                              // 0: none came
+  std::map<std::string, std::string> headers;  // names in lower case
+  std::string body;
+};
+
+/// Reads one response; `head`: it has no body whatever its length says.
+Response read_response(TcpClient& client, bool head = false);
+/// One request on a connection of its own. `headers` end in \r\n each.
+Response request(std::uint16_t port, const std::string& method, const std::string& target,
+                 const std::string& headers = {});
+
+struct WsMessage {
+  int opcode = 0;  // 1 text, 2 binary, 8 close
+  std::string data;
+  int close_code() const {
+    return data.size() < 2 ? 0
+                           : static_cast<unsigned char>(data[0]) * 256 + static_cast<unsigned char>(data[1]);
+  }
+};
+
+class WsClient {
+ public:
+  /// Connects and upgrades; see status().
+  WsClient(std::uint16_t port, const std::string& stream, const std::string& headers = {},
+           int receive_buffer_bytes = 0);
+  int status() const { return status_; }  // 101 where upgraded
+  bool send(const std::string& text, int opcode = 1);
+  bool credit(int n) { return send(R"({"type":"credit","n":)" + std::to_string(n) + "}"); }
+  /// The next message that is no ping; nothing after the time or at the end.
+  std::optional<WsMessage> next(int timeout_ms = 3000);
+  /// Skips to the next message of a kind: "info", "status", "gone", "waiting", "time" or "frame".
+  std::optional<WsMessage> next_of(const std::string& kind, int timeout_ms = 3000);
+  bool at_end() const { return tcp_.at_end(); }
+
+ private:
+  TcpClient tcp_;
+  int status_ = 0;
+};
+
+std::uint64_t u64_at(const std::string& bytes, std::size_t at);
+
+}  // namespace relievo::test

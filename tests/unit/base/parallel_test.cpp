@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <vector>
+
+namespace relievo {
+namespace {
+
+TEST(WorkerPool, EveryIndexOnceAnyCountAnyThreads) {
+  for (const int threads : {1, 2, 3, 7, 16}) {
+    WorkerPool pool(threads);
+    EXPECT_EQ(pool.threads(), threads);
+    for (const int count : {0, 1, 2, 5, 6, 7, 8, 100, 1001}) {
+      std::vector<int> seen(static_cast<std::size_t>(count));  // not atomic: tsan sees any sharing
+      std::vector<int> calls(static_cast<std::size_t>(threads));
+      pool.for_ranges(count, [&](int begin, int end, int worker) {
+        ASSERT_TRUE(0 <= begin && begin < end && end <= count);
+        ASSERT_TRUE(0 <= worker && worker < threads);
+        ++calls[static_cast<std::size_t>(worker)];
+        for (int i = begin; i < end; ++i) ++seen[static_cast<std::size_t>(i)];
+      });
+      for (const int n : seen) ASSERT_EQ(n, 1) << count << " on " << threads;
+      for (const int n : calls) ASSERT_LE(n, 1);
+    }
+  }
+}
+
+TEST(WorkerPool, ARangeAlwaysGoesToTheSameWorker) {
+  WorkerPool pool(3);
+  std::set<std::tuple<int, int, int>> ranges;
+  std::mutex mutex;
+  for (int round = 0; round < 50; ++round) {
+    pool.for_ranges(10, [&](int begin, int end, int worker) {
+      std::lock_guard lock(mutex);
+      ranges.emplace(begin, end, worker);
+    });
+  }
+  EXPECT_EQ(ranges.size(), 3U);
+}
+
+TEST(WorkerPool, WorkOfOneCallIsSeenByTheNext) {
+  WorkerPool pool(4);
+  std::vector<int> values(64, 0);
+  for (int round = 0; round < 200; ++round) {
+    // Each worker reads what another wrote in the round before.
+    std::vector<int> next(values.size());
+    pool.for_ranges(64, [&](int begin, int end, int) {
+      for (int i = begin; i < end; ++i)
+        next[static_cast<std::size_t>(i)] = values[static_cast<std::size_t>((i + 17) % 64)] + 1;
+    });
+    values.swap(next);
+  }
+  for (const int v : values) EXPECT_EQ(v, 200);
+}
+
+TEST(WorkerPool, OneThreadRunsOnTheCallers) {
+  WorkerPool pool(1);
+  std::thread::id id;
+  pool.for_ranges(3, [&](int, int, int) { id = std::this_thread::get_id(); });
+  EXPECT_EQ(id, std::this_thread::get_id());
+}
+
+TEST(WorkerPool, NoThreadsIsOne) {
+  for (const int threads : {0, -3}) {
+    WorkerPool pool(threads);
+    EXPECT_EQ(pool.threads(), 1);
+  }
+}
+
+TEST(WorkerPool, ManyPoolsComeAndGo) {
+  std::atomic<int> sum{0};
+  for (int i = 0; i < 100; ++i) {
+    WorkerPool pool(3);
+    if (i % 2 == 0) pool.for_ranges(3, [&](int begin, int end, int) { sum += end - begin; });
+  }
+  EXPECT_EQ(sum, 150);
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+// Geometric calibration of simulated rigs, against their truth.
+#include "capture/calibrate/geometry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "capture/calibrate/board_scene.h"
+#include "capture/calibrate/compare_rigs.h"
+#include "capture/pattern/gray_code.h"
+
+namespace relievo {
+namespace {
+
+using testing::HasSubstr;
+
+Rig truth() {
+  Rig rig;
+  rig.scan = Scan::kInterlaced;
+  rig.frame_rate = 29.97;
+  rig.camera = {640, 480, {1050, 0, 325, 0, 1052, 236, 0, 0, 1}, {-0.18, 0.1, 0.0006, -0.0008, 0}};
+  // A projector that throws upwards: its principal point lies below its picture.
+  rig.projector = {800, 600, {1250, 0, 398, 0, 1251, 660, 0, 0, 1}, {-0.04, 0.05, 0.0008, 0.0005, 0}};
+  const double a = 0.2, b = 0.28;  // towards the camera's axis, and down by the lens shift
+  const std::array<double, 9> y = {std::cos(a), 0, std::sin(a), 0, 1, 0, -std::sin(a), 0, std::cos(a)};
+  const std::array<double, 9> x = {1, 0, 0, 0, std::cos(b), -std::sin(b), 0, std::sin(b), std::cos(b)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      double sum = 0;
+      for (std::size_t k = 0; k < 3; ++k) sum += x[3 * i + k] * y[3 * k + j];
+      rig.projector_from_camera_rotation[3 * i + j] = sum;
+    }
+  }
+  rig.projector_from_camera_translation = {-0.2, 0.01, 0.05};
+  rig.colour_matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  return rig;
+}
+
+constexpr Board kBoard{9, 7, 0.025};
+
+GrayStack stack_of(const Rig& rig, const std::vector<Image8>& pictures) {
+  GrayStack stack;
+  stack.projector_width = rig.projector.width;
+  stack.projector_height = rig.projector.height;
+  stack.columns.resize(static_cast<std::size_t>(gray_bits(rig.projector.width)));
+  stack.rows.resize(static_cast<std::size_t>(gray_bits(rig.projector.height)));
+  stack.picture = Image8(rig.camera.width, rig.camera.height, 3);
+  const auto slides = gray_slides(rig.projector.width, rig.projector.height);
+  for (std::size_t i = 0; i < slides.size(); ++i) {
+    if (slides[i].kind != GraySlide::Kind::kBit) continue;
+    auto& pairs = slides[i].axis == GrayAxis::kColumns ? stack.columns : stack.rows;
+    GrayPair& pair = pairs[static_cast<std::size_t>(slides[i].bit)];
+    (slides[i].inverse ? pair.inverse : pair.lit) = pictures[i].clone();
+  }
+  return stack;
+}
+
+/// Corners as ideal devices would see them, with noise: no pictures.
+std::vector<MeasuredView> ideal_views(const Rig& rig, int count, double noise_px) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0, noise_px);
+  Pose between{};
+  {  // rotation vector of truth()'s rotation
+    const auto& r = rig.projector_from_camera_rotation;
+    const double angle = std::acos((r[0] + r[4] + r[8] - 1) / 2);
+    const double scale = angle / (2 * std::sin(angle));
+    between = {scale * (r[7] - r[5]), scale * (r[2] - r[6]), scale * (r[3] - r[1]), 0, 0, 0};
+    for (std::size_t i = 0; i < 3; ++i) between[3 + i] = rig.projector_from_camera_translation[i];
+  }
+  std::vector<MeasuredView> views;
+  for (const Pose& pose : example_poses(rig, kBoard, 1.0, count, 3)) {
+    MeasuredView& view = views.emplace_back(MeasuredView{.name = "view " + std::to_string(views.size())});
+    for (int i = 0; i < kBoard.corners(); ++i) {
+      const Vec2d c = project_board(rig.camera, pose, kBoard.corner_m(i));
+      const Vec2d p = project_board(rig.projector, compose(between, pose), kBoard.corner_m(i));
+      view.corners.push_back({kBoard.corner_m(i),
+                              {c[0] + normal(random), c[1] + normal(random)},
+                              {p[0] + normal(random), p[1] + normal(random)}});
+    }
+  }
+  return views;
+}
+
+PinholeModel size_of(const PinholeModel& lens) {
+  PinholeModel out;
+  out.width = lens.width;
+  out.height = lens.height;
+  return out;
+}
+
+Result<Geometry> calibrate(const Rig& rig, const std::vector<MeasuredView>& views) {
+  return calibrate_geometry(views, size_of(rig.camera), size_of(rig.projector), {});
+}
+
+Rig rig_of(const Geometry& geometry) {
+  Rig rig = truth();
+  rig.camera = geometry.camera;
+  rig.projector = geometry.projector;
+  rig.projector_from_camera_rotation = geometry.projector_from_camera_rotation;
+  rig.projector_from_camera_translation = geometry.projector_from_camera_translation;
+  return rig;
+}
+
+TEST(Geometry, RenderedViewsGiveTheRigBack) {
+  const Rig rig = truth();
+  const auto poses = example_poses(rig, kBoard, 1.0, 6, 1);
+  ASSERT_EQ(poses.size(), 6u);
+  std::vector<MeasuredView> views;
+  WorkerPool pool(2);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto pictures = render_gray_view(rig, kBoard, poses[i], {.seed = static_cast<std::uint32_t>(i)});
+    views.push_back(measure_view("view " + std::to_string(i), stack_of(rig, pictures), kBoard, {}, pool));
+    EXPECT_EQ(views.back().refused, "");
+  }
+  const auto geometry = calibrate(rig, views);
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  EXPECT_EQ(geometry->views, 6u);
+  EXPECT_LT(geometry->stereo_rms, 0.12);
+  EXPECT_LT(geometry->plane_rms_m, 5e-5);
+  const auto off = compare_rigs(rig_of(*geometry), rig, 1.0);
+  ASSERT_TRUE(off.ok()) << off.error().message;
+  EXPECT_LT(off->camera_focal, 0.003);
+  EXPECT_LT(off->projector_focal, 0.003);
+  EXPECT_LT(off->camera_centre_px, 8);
+  EXPECT_LT(off->projector_centre_px, 10);
+  EXPECT_LT(off->baseline_m, 0.002);
+  EXPECT_LT(off->depth_rms_m, 0.0015);
+}
+
+TEST(Geometry, IdealCornersGiveTheRigBackWithinItsOwnSigmas) {
+  const Rig rig = truth();
+  const auto geometry = calibrate(rig, ideal_views(rig, 12, 0.05));
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  EXPECT_NEAR(geometry->stereo_rms, 0.05 * std::numbers::sqrt2, 0.01);
+  const std::array<double, 8> found = {
+      geometry->camera.fx(),    geometry->camera.fy(),    geometry->camera.cx(),    geometry->camera.cy(),
+      geometry->projector.fx(), geometry->projector.fy(), geometry->projector.cx(), geometry->projector.cy()};
+  const std::array<double, 8> true_values = {rig.camera.fx(),    rig.camera.fy(),    rig.camera.cx(),
+                                             rig.camera.cy(),    rig.projector.fx(), rig.projector.fy(),
+                                             rig.projector.cx(), rig.projector.cy()};
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_LT(std::fabs(found[i] - true_values[i]), 4 * geometry->sigma_px[i]) << i;
+    EXPECT_LT(geometry->sigma_px[i], 4) << i;
+  }
+  EXPECT_LT(compare_rigs(rig_of(*geometry), rig, 1.0)->depth_rms_m, 0.0004);
+}
+
+TEST(Geometry, ABadViewIsNamedAndLeftOut) {
+  const Rig rig = truth();
+  auto views = ideal_views(rig, 8, 0.05);
+  for (std::size_t i = 0; i < views[5].corners.size(); ++i) {  // the board moved between the pictures
+    views[5].corners[i].projector_px[0] += 3 + 0.05 * static_cast<double>(i);
+  }
+  const auto geometry = calibrate(rig, views);
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  for (std::size_t v = 0; v < views.size(); ++v)
+    EXPECT_EQ(geometry->reports[v].used, v != 5) << geometry->reports[v].why;
+  EXPECT_NE(geometry->reports[5].why, "");
+  EXPECT_LT(geometry->stereo_rms, 0.1);
+}
+
+TEST(Geometry, BadCornersAreLeftOut) {
+  const Rig rig = truth();
+  auto views = ideal_views(rig, 6, 0.05);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    views[v].corners[10 + v].projector_px[1] += 4;
+    views[v].corners[30 + v].camera_px[0] -= 3;
+  }
+  const auto geometry = calibrate(rig, views);
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  EXPECT_EQ(geometry->views, 6u);
+  EXPECT_EQ(geometry->corners, 6u * 61u);
+  for (const ViewReport& r : geometry->reports) EXPECT_EQ(r.corners_left_out, 2u) << r.name;
+  EXPECT_GT(geometry->stereo_rms_all, 2 * geometry->stereo_rms);
+}
+
+TEST(Geometry, TooFewViewsSayWhy) {
+  const Rig rig = truth();
+  auto views = ideal_views(rig, 4, 0.05);
+  views[1].refused = "the whole board is not seen in the pictures";
+  views[2].refused = "only 3 of 63 corners could be decoded";
+  const auto geometry = calibrate(rig, views);
+  ASSERT_FALSE(geometry.ok());
+  EXPECT_EQ(geometry.error().message,
+            "2 of 4 views can be used, at least 3 are needed: view 1 (the whole board is not seen in the "
+            "pictures); view "
+            "2 (only 3 of 63 corners could be decoded)");
+}
+
+TEST(Geometry, FewFlatViewsStayInsideReason) {
+  const Rig rig = truth();
+  auto views = ideal_views(rig, 3, 0.2);
+  const auto geometry = calibrate(rig, views);
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  EXPECT_GT(geometry->projector.cy(), -0.5 * rig.projector.height);
+  EXPECT_LT(geometry->projector.cy(), 1.5 * rig.projector.height);
+  EXPECT_NEAR(geometry->projector.cx(), rig.projector.width / 2.0, 0.25 * rig.projector.width);
+  EXPECT_NEAR(geometry->projector.fx() / geometry->projector.fy(), 1, 0.01);
+  EXPECT_LT(geometry->stereo_rms, 0.3);
+}
+
+TEST(Geometry, LensShiftUpOrDownIsFound) {
+  for (const double cy : {-120.0, 299.5, 720.0}) {
+    Rig rig = truth();
+    rig.projector.matrix[5] = cy;
+    // The same picture on the board, whatever the lens shift: the projector is turned the other way.
+    const double b = std::atan((cy - 299.5) / rig.projector.fy()), a = 0.2;
+    const double c = std::cos(b), s = std::sin(b);
+    const std::array<double, 9> y = {std::cos(a), 0, std::sin(a), 0, 1, 0, -std::sin(a), 0, std::cos(a)};
+    rig.projector_from_camera_rotation = {y[0],      0, y[2],       //
+                                          -s * y[6], c, -s * y[8],  //
+                                          c * y[6],  s, c * y[8]};
+    const auto geometry = calibrate(rig, ideal_views(rig, 5, 0.1));
+    ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+    EXPECT_NEAR(geometry->projector.cy(), cy, 25);
+    EXPECT_LT(geometry->stereo_rms, 0.16);
+  }
+}
+
+TEST(Geometry, ViewWithoutBoardIsRefused) {
+  const Rig rig = truth();
+  const auto poses = example_poses(rig, kBoard, 1.0, 1, 1);
+  ASSERT_EQ(poses.size(), 1u);
+  const auto pictures = render_gray_view(rig, kBoard, poses[0], {});
+  WorkerPool pool(2);
+  const Board larger{10, 8, 0.025};
+  const auto view = measure_view("v", stack_of(rig, pictures), larger, {}, pool);
+  EXPECT_THAT(view.refused, HasSubstr("the whole board is not seen"));
+}
+
+TEST(Geometry, ResidualPictureIsDrawn) {
+  const Rig rig = truth();
+  const auto geometry = calibrate(rig, ideal_views(rig, 4, 0.1));
+  ASSERT_TRUE(geometry.ok());
+  const Image8 picture = draw_residuals(*geometry);
+  EXPECT_EQ(picture.channels(), 3);
+  std::size_t bright = 0;
+  for (std::size_t i = 0; i < picture.size(); ++i) bright += picture.data()[i] > 100;
+  EXPECT_GT(bright, geometry->residuals.size() * 10);
+}
+
+TEST(Board, ParsesAndRefuses) {
+  const auto board = parse_board("chessboard:9x7:75mm");
+  ASSERT_TRUE(board.ok());
+  EXPECT_EQ(board->columns, 9);
+  EXPECT_EQ(board->rows, 7);
+  EXPECT_NEAR(board->square_m, 0.075, 1e-12);
+  EXPECT_NEAR(parse_board("chessboard:4x3:2.5cm")->square_m, 0.025, 1e-12);
+  for (const char* wrong : {"", "chessboard", "chessboard:9x7", "chessboard:9x7:75", "chessboard:2x7:75mm",
+                            "chessboard:9x7:0mm"}) {
+    EXPECT_FALSE(parse_board(wrong).ok()) << wrong;
+  }
+  EXPECT_THAT(parse_board("charuco:5x7:30mm").error().message, HasSubstr("use a chessboard"));
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calibrations of other programs, and rig.yaml files built step by step.
+#include "capture/calibrate/rig_import.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "capture/calibrate/rig_part.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+using test::TempFolder;
+using testing::HasSubstr;
+
+std::string matrix(const std::string& name, int rows, int cols, const std::string& data) {
+  return name + ": !!opencv-matrix\n   rows: " + std::to_string(rows) + "\n   cols: " + std::to_string(cols) +
+         "\n   dt: d\n   data: [ " + data + " ]\n";
+}
+
+std::string sltk(const std::string& translation = "-183., -23., -60.") {
+  return "%YAML:1.0\n---\n" + matrix("cam_size", 2, 1, "2592., 1944.") +
+         matrix("pro_size", 2, 1, "1280., 800.") +
+         matrix("cam_K", 3, 3, "2800., 0., 1500., 0., 2810., 1090., 0., 0., 1.") +
+         matrix("pro_K", 3, 3, "1650., 0., 620., 0., 1720., 360., 0., 0., 1.") +
+         matrix("cam_kc", 1, 5, "-0.2, 0.1, 0., 0., 0.") + matrix("pro_kc", 5, 1, "0., 1., 0., 0., 0.") +
+         matrix("R", 3, 3, "1., 0., 0., 0., 1., 0., 0., 0., 1.") + matrix("T", 3, 1, translation) +
+         "stereo_rms: 0.61\n";
+}
+
+TEST(RigImport, SltkInMillimetres) {
+  const TempFolder folder;
+  std::ofstream(folder / "c.yaml") << sltk();
+  const auto rig = import_rig(folder / "c.yaml", 0, 0);
+  ASSERT_TRUE(rig.ok()) << rig.error().message;
+  EXPECT_EQ(rig->format, "sltk");
+  EXPECT_EQ(rig->stereo_rms, 0.61);
+  EXPECT_EQ(rig->rig.camera.width, 2592);
+  EXPECT_EQ(rig->rig.projector.height, 800);
+  EXPECT_EQ(rig->rig.projector.fy(), 1720);
+  EXPECT_EQ(rig->rig.projector.distortion[1], 1);
+  EXPECT_NEAR(rig->rig.projector_from_camera_translation[0], -0.183, 1e-12);
+  EXPECT_THAT(import_rig(folder / "c.yaml", 1024, 768).error().message,
+              HasSubstr("its projector is 1280x800, not 1024x768"));
+}
+
+TEST(RigImport, ErrorsNameFileAndKey) {
+  const TempFolder folder;
+  EXPECT_THAT(import_rig(folder / "none.yaml", 0, 0).error().message, HasSubstr("none.yaml is missing"));
+  std::ofstream(folder / "short.yaml") << sltk("-183., -23.");
+  EXPECT_FALSE(import_rig(folder / "short.yaml", 0, 0).ok());
+  std::ofstream(folder / "nan.yaml") << sltk(".Nan, 1., 2.");
+  EXPECT_THAT(import_rig(folder / "nan.yaml", 0, 0).error().message,
+              HasSubstr("T holds a value that is no finite number"));
+  std::ofstream(folder / "other.yaml") << "%YAML:1.0\n---\nsomething: 1\n";
+  EXPECT_THAT(import_rig(folder / "other.yaml", 0, 0).error().message,
+              HasSubstr("no calibration known here"));
+  std::ofstream(folder / "text.yaml") << "hello";
+  EXPECT_FALSE(import_rig(folder / "text.yaml", 0, 0).ok());
+}
+
+TEST(RigPart, ColoursAloneReadBackExactly) {
+  const TempFolder folder;
+  const std::array<double, 9> colours = {1.25, -0.1, 1.0 / 3, 0, 1, 0, -1e-7, 0, 2};
+  std::ofstream(folder / "rig.yaml") << colour_yaml(colours);
+  const auto part = read_rig_part(folder / "rig.yaml");
+  ASSERT_TRUE(part.ok()) << part.error().message;
+  EXPECT_FALSE(part->whole);
+  EXPECT_EQ(part->colour_matrix, colours);
+  std::ofstream(folder / "empty.yaml") << "%YAML:1.0\n---\nscan: interlaced\n";
+  EXPECT_THAT(read_rig_part(folder / "empty.yaml").error().message, HasSubstr("is no rig.yaml"));
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Takes written by `simulate`: read back the same, and whole or not there.
+#include "capture/source/take_writer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "capture/source/npy.h"
+#include "small_take.h"
+
+namespace relievo {
+namespace {
+
+using testing::HasSubstr;
+
+std::unique_ptr<SimSource> small_sim(const std::string& more) {
+  auto source = make_sim("object,width=64,height=48,stripes=20,frames=5" + more, {.truth = true});
+  EXPECT_TRUE(source) << source.error().message;
+  return source ? *std::move(source) : nullptr;
+}
+
+std::size_t entries(const std::filesystem::path& folder) {
+  std::size_t count = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder)) ++count;
+  return count;
+}
+
+TEST(TakeWriter, WhatIsWrittenIsReadBackTheSame) {
+  for (const char* scan : {",scan=interlaced,drop=3", ",scan=progressive,distortion=1"}) {
+    test::TempFolder folder;
+    const auto take = folder.path() / "take";
+    const auto source = small_sim(scan);
+    std::uint64_t progress = 0;
+    const Status written = write_take(take, *source, {.progress = [&](std::uint64_t n) { progress = n; }});
+    ASSERT_TRUE(written) << written.error().message;
+    EXPECT_EQ(progress, 5u);
+    EXPECT_EQ(entries(folder.path()), 1u);
+
+    auto read = open_source("take:" + take.string(), {});
+    ASSERT_TRUE(read) << read.error().message;
+    const SourceInfo &a = source->info(), &b = (*read)->info();
+    EXPECT_EQ(to_yaml(a.rig), to_yaml(b.rig));
+    EXPECT_EQ(to_yaml(a.pattern), to_yaml(b.pattern));
+    const auto again = small_sim(scan);
+    for (std::uint64_t i = 0; i < 5; ++i) {
+      auto rendered = again->next(), frame = (*read)->next();
+      ASSERT_TRUE(rendered && *rendered && frame && *frame);
+      EXPECT_EQ((*frame)->number, i);
+      EXPECT_EQ((*frame)->time_ns, (*rendered)->time_ns);
+      const auto same = [](const auto& x, const auto& y) {
+        return x.size() == y.size() && std::equal(x.data(), x.data() + x.size(), y.data());
+      };
+      EXPECT_TRUE(same((*frame)->picture, (*rendered)->picture));
+      EXPECT_TRUE(same((*frame)->complement, (*rendered)->complement));
+      const auto truth = read_npy(take_truth(take, i));
+      ASSERT_TRUE(truth) << truth.error().message;
+      EXPECT_TRUE(same(*truth, again->truth()));
+    }
+    EXPECT_FALSE(*(*read)->next());
+  }
+}
+
+TEST(TakeWriter, StopsAtTheFramesAskedFor) {
+  test::TempFolder folder;
+  const auto source = small_sim("");
+  ASSERT_TRUE(write_take(folder.path() / "take", *source, {.frames = 2}));
+  EXPECT_EQ(entries(folder.path() / "take" / "frames"), 2u);
+  EXPECT_EQ(entries(folder.path() / "take" / "truth"), 2u);
+}
+
+TEST(TakeWriter, RefusesAFolderWithSomethingInIt) {
+  test::TempFolder folder;
+  test::write_text(folder.path() / "precious.txt", "x");
+  const auto source = small_sim("");
+  const Status refused = write_take(folder.path(), *source, {});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("exists already"));
+  EXPECT_EQ(test::read_text(folder.path() / "precious.txt"), "x");
+  std::filesystem::create_directory(folder.path() / "empty");
+  EXPECT_TRUE(write_take(folder.path() / "empty/", *source, {}));
+}
+
+TEST(TakeWriter, StoppedLeavesNothingBehind) {
+  test::TempFolder folder;
+  const auto source = small_sim("");
+  std::atomic<bool> stop{false};
+  const Status stopped = write_take(folder.path() / "take", *source,
+                                    {.progress = [&](std::uint64_t n) { stop = n == 2; }, .stop = &stop});
+  ASSERT_FALSE(stopped);
+  EXPECT_THAT(stopped.error().message, HasSubstr("stopped"));
+  EXPECT_EQ(entries(folder.path()), 0u);
+}
+
+TEST(TakeWriter, AFailureLeavesNothingBehind) {
+  test::TempFolder folder;
+  test::write_text(folder.path() / "file", "x");
+  const auto source = small_sim("");
+  const Status failed = write_take(folder.path() / "file" / "take", *source, {});
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().message, HasSubstr("cannot be created"));
+  EXPECT_EQ(entries(folder.path()), 1u);
+}
+
+}  // namespace
+}  // namespace relievo

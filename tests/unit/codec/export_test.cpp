@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/export.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "codec/jpeg_texture.h"
+#include "codec/surface_check.h"
+#include "tests/support/make_surface.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+std::string read_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+template <typename T>
+T at(const std::string& bytes, std::size_t offset) {
+  T value{};
+  std::memcpy(&value, bytes.data() + offset, sizeof(T));
+  return value;
+}
+
+Image8 two_colours() {  // left column black, right column (200, 100, 50)
+  Image8 image(2, 1, 3);
+  image.row(0)[3] = 200;
+  image.row(0)[4] = 100;
+  image.row(0)[5] = 50;
+  return image;
+}
+
+TEST(Export, PlyHoldsTheSurface) {
+  const test::TempFolder folder;
+  Surface surface;
+  surface.positions = {{0, 0, 1}, {0, 0.5f, 1}, {0.5f, 0, 1}};
+  surface.texture_coordinates = {{0, 0.5f}, {0.5f, 0.5f}, {1, 0.5f}};
+  surface.triangles = {{0, 1, 2}};
+  const Image8 texture = two_colours();
+  ASSERT_TRUE(write_ply(folder / "a.ply", surface, texture.view()).ok());
+  const std::string bytes = read_file(folder / "a.ply");
+  const std::size_t body = bytes.find("end_header\n") + 11;
+  EXPECT_EQ(bytes.substr(0, 37), "ply\nformat binary_little_endian 1.0\nc");
+  EXPECT_NE(bytes.find("element vertex 3\n"), std::string::npos);
+  EXPECT_NE(bytes.find("element face 1\n"), std::string::npos);
+  ASSERT_EQ(bytes.size(), body + 3 * 27 + 13);
+  EXPECT_EQ(at<float>(bytes, body + 27 + 4), 0.5f);
+  EXPECT_EQ(at<float>(bytes, body + 20), -1) << "nz: towards the camera";
+  EXPECT_EQ(at<std::uint8_t>(bytes, body + 24), 0);
+  EXPECT_EQ(at<std::uint8_t>(bytes, body + 27 + 24), 100) << "half way between the two pixels";
+  EXPECT_EQ(at<std::uint8_t>(bytes, body + 2 * 27 + 25), 100);
+  EXPECT_EQ(at<std::uint8_t>(bytes, body + 81), 3);
+  EXPECT_EQ(at<std::int32_t>(bytes, body + 82), 0);
+  EXPECT_EQ(at<std::int32_t>(bytes, body + 90), 2);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing else left";
+}
+
+TEST(Export, PlyWithoutTextureOrPoints) {
+  const test::TempFolder folder;
+  EXPECT_TRUE(write_ply(folder / "empty.ply", {}, {}).ok());
+  EXPECT_NE(read_file(folder / "empty.ply").find("element vertex 0\n"), std::string::npos);
+  EXPECT_TRUE(write_ply(folder / "grey.ply", test::wavy_grid(5, 5), {}).ok());
+}
+
+TEST(Export, GlbDescribesItsBytes) {
+  const test::TempFolder folder;
+  const Frame3D frame = test::frame(12, 9);
+  ASSERT_TRUE(write_glb(folder / "a.glb", frame).ok());
+  const std::string bytes = read_file(folder / "a.glb");
+  EXPECT_EQ(bytes.substr(0, 4), "glTF");
+  EXPECT_EQ(at<std::uint32_t>(bytes, 4), 2u);
+  EXPECT_EQ(at<std::uint32_t>(bytes, 8), bytes.size());
+  const auto json_size = at<std::uint32_t>(bytes, 12);
+  ASSERT_EQ(json_size % 4, 0u);
+  const auto root = nlohmann::json::parse(bytes.substr(20, json_size));
+  const std::size_t binary = 20 + json_size + 8;
+  ASSERT_EQ(binary + at<std::uint32_t>(bytes, 20 + json_size), bytes.size());
+  EXPECT_EQ(root["scenes"][0]["extras"]["frame"], 42);
+  const auto& primitive = root["meshes"][0]["primitives"][0];
+  const auto& positions = root["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
+  EXPECT_EQ(positions["count"], frame.surface.positions.size());
+  const std::size_t view = positions["bufferView"];
+  const std::size_t start = binary + root["bufferViews"][view]["byteOffset"].get<std::size_t>();
+  EXPECT_EQ(at<float>(bytes, start), frame.surface.positions[0][0]);
+  EXPECT_EQ(at<float>(bytes, start + 4), -frame.surface.positions[0][1]) << "y up";
+  EXPECT_EQ(at<float>(bytes, start + 8), -frame.surface.positions[0][2]) << "z backward";
+  const std::size_t image = root["images"][0]["bufferView"];
+  const auto& image_view = root["bufferViews"][image];
+  const auto* jpeg = reinterpret_cast<const std::uint8_t*>(bytes.data()) + binary +
+                     image_view["byteOffset"].get<std::size_t>();
+  EXPECT_TRUE(decode_jpeg({jpeg, image_view["byteLength"].get<std::size_t>()}, 64, 48).ok());
+}
+
+TEST(Export, GlbOfPointsAndOfNothing) {
+  const test::TempFolder folder;
+  Frame3D frame = test::frame(5, 5);
+  frame.surface.triangles.clear();
+  EXPECT_TRUE(write_glb(folder / "points.glb", frame).ok());
+  EXPECT_TRUE(write_glb(folder / "nothing.glb", Frame3D()).ok());
+  EXPECT_FALSE(write_glb(folder / "bad.glb", frame, 101).ok());
+}
+
+TEST(Export, ObjNamesItsMaterialAndPicture) {
+  const test::TempFolder folder;
+  ASSERT_TRUE(write_obj(folder / "a.obj", test::frame(4, 3)).ok());
+  const std::string text = read_file(folder / "a.obj");
+  EXPECT_NE(text.find("mtllib a.mtl\nusemtl texture\n"), std::string::npos);
+  EXPECT_NE(text.find("\nf 1/1/1 5/5/5 2/2/2\n"), std::string::npos);
+  EXPECT_NE(read_file(folder / "a.mtl").find("map_Kd a.png"), std::string::npos);
+  EXPECT_EQ(read_file(folder / "a.png").substr(1, 3), "PNG");
+}
+
+TEST(Export, BadSurfacesAreRefused) {
+  const test::TempFolder folder;
+  Frame3D frame = test::frame(4, 4);
+  frame.surface.triangles.push_back({0, 1, 99});
+  EXPECT_FALSE(write_ply(folder / "a.ply", frame.surface, {}).ok());
+  EXPECT_FALSE(write_glb(folder / "a.glb", frame).ok());
+  EXPECT_FALSE(write_obj(folder / "a.obj", frame).ok());
+  EXPECT_FALSE(write_png(folder / "a.png", {}).ok());
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(Export, AFileThatCannotBeWrittenLeavesNothingAndKeepsTheOldOne) {
+  const test::TempFolder folder;
+  ASSERT_TRUE(write_ply(folder / "a.ply", test::wavy_grid(2, 2), {}).ok());
+  const std::string old = read_file(folder / "a.ply");
+  const auto status = write_ply(folder / "none/a.ply", {}, {});
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.error().message.find("no such folder"), std::string::npos);
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit size{5000, 5000};
+    setrlimit(RLIMIT_FSIZE, &size);
+    _exit(write_ply(folder / "a.ply", test::wavy_grid(40, 40), {}).ok() ? 1 : 0);
+  }
+  int exit_status = 0;
+  ASSERT_EQ(waitpid(child, &exit_status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(exit_status), 0);
+  EXPECT_EQ(read_file(folder / "a.ply"), old);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(SurfaceNormals, AreUnitAndTowardsTheCamera) {
+  const Surface surface = test::wavy_grid(30, 30, 0, false);
+  const auto normals = surface_normals(surface);
+  ASSERT_EQ(normals.size(), surface.positions.size());
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    const Vec3f& n = normals[i];
+    const Vec3f& p = surface.positions[i];
+    ASSERT_NEAR(std::hypot(n[0], n[1], n[2]), 1, 1e-5);
+    ASSERT_LT(n[0] * p[0] + n[1] * p[1] + n[2] * p[2], 0);
+  }
+  EXPECT_EQ(surface_normals(Surface{.positions = {{0, 0, 2}},
+                                    .normals = {},
+                                    .texture_coordinates = {},
+                                    .grid = {},
+                                    .triangles = {}})[0],
+            (Vec3f{0, 0, -1}))
+      << "a loose point looks to the camera";
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,440 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/recording.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <fstream>
+#include <iterator>
+
+#include "codec/mcap_records.h"
+#include "tests/support/make_surface.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
+constexpr std::int64_t kStep_ns = 33'000'000;
+
+Bytes payload(int i, std::size_t size) {
+  test::Random random(static_cast<std::uint64_t>(i));
+  Bytes bytes(size);
+  for (auto& b : bytes) b = static_cast<std::uint8_t>(random.bits());
+  return bytes;
+}
+
+RecordedMessage message(std::uint16_t channel, int i, std::size_t size) {
+  RecordedMessage m;
+  m.channel = channel;
+  m.sequence = static_cast<std::uint32_t>(i);
+  m.log_time_ns = kStart_ns + i * kStep_ns;
+  m.publish_time_ns = m.log_time_ns - 1000;
+  m.data = payload(i, size);
+  return m;
+}
+
+RecordingSchema schema() {
+  return {"test::Frame", "omgidl", "module test { struct Frame { long x; }; };"};
+}
+RecordingChannel channel(const std::string& topic) {
+  return {topic, "cdr", "test::Frame", {{"stream", "face"}}};
+}
+
+std::unique_ptr<RecordingWriter> create(const std::filesystem::path& file,
+                                        RecordingWriter::Options options = {}) {
+  auto writer = RecordingWriter::create(file, options);
+  EXPECT_TRUE(writer.ok()) << (writer ? "" : writer.error().message);
+  return std::move(*writer);
+}
+
+/// `count` messages on two channels, five a chunk, and two attachments.
+void write_sample(const std::filesystem::path& file, int count, std::size_t size = 40) {
+  auto writer = create(file, {.chunk_ns = 5 * kStep_ns, .chunk_bytes = 1 << 20});
+  ASSERT_EQ(*writer->add_channel(schema(), channel("relievo/frame")), 0);
+  ASSERT_TRUE(writer->add_attachment({"rig.yaml", "application/yaml", kStart_ns, {'a', ':', ' ', '1'}}).ok());
+  ASSERT_EQ(*writer->add_channel(schema(), channel("relievo/status")), 1);
+  for (int i = 0; i < count; ++i) ASSERT_TRUE(writer->write(message(i % 4 == 3 ? 1 : 0, i, size)).ok());
+  ASSERT_TRUE(writer->add_attachment({"pattern.yaml", "application/yaml", kStart_ns, payload(99, 300)}).ok());
+  ASSERT_TRUE(writer->finish().ok());
+}
+
+Bytes read_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return Bytes(std::istreambuf_iterator<char>(in), {});
+}
+void write_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes) {
+  std::filesystem::remove(file);  // ext4 waits for the disk where a file is cut to nothing and written again
+  std::ofstream out(file, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+struct ReadBack {
+  std::vector<RecordedMessage> messages;
+  std::vector<std::string> errors;
+};
+ReadBack read_all(RecordingReader& reader) {
+  ReadBack back;
+  while (back.errors.size() < 100) {
+    auto next = reader.next();
+    if (!next) {
+      back.errors.push_back(next.error().message);
+      continue;
+    }
+    if (!next->has_value()) break;
+    back.messages.push_back(std::move(**next));
+  }
+  return back;
+}
+
+std::unique_ptr<RecordingReader> open(const std::filesystem::path& file) {
+  auto reader = RecordingReader::open(file);
+  EXPECT_TRUE(reader.ok()) << (reader ? "" : reader.error().message);
+  return std::move(*reader);
+}
+
+void expect_equal(const RecordedMessage& a, const RecordedMessage& b) {
+  EXPECT_EQ(a.channel, b.channel);
+  EXPECT_EQ(a.sequence, b.sequence);
+  EXPECT_EQ(a.log_time_ns, b.log_time_ns);
+  EXPECT_EQ(a.publish_time_ns, b.publish_time_ns);
+  EXPECT_EQ(a.data, b.data);
+}
+
+TEST(Recording, EverythingComesBack) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  const auto reader = open(folder / "a.mcap");
+  const RecordingSummary& summary = reader->summary();
+  EXPECT_FALSE(summary.recovered);
+  EXPECT_EQ(summary.lost_bytes, 0u);
+  EXPECT_EQ(summary.messages, 23u);
+  EXPECT_EQ(summary.start_ns, kStart_ns);
+  EXPECT_EQ(summary.end_ns, kStart_ns + 22 * kStep_ns);
+  ASSERT_EQ(summary.channels.size(), 2u);
+  EXPECT_EQ(summary.channels[1].topic, "relievo/status");
+  EXPECT_EQ(summary.channels[1].metadata, channel("").metadata);
+  EXPECT_EQ(summary.channels[1].message_encoding, "cdr");
+  EXPECT_EQ(summary.channel_messages, (std::vector<std::uint64_t>{18, 5}));
+  ASSERT_EQ(summary.schemas.size(), 1u);
+  EXPECT_EQ(summary.schemas[0].text, schema().text);
+  ASSERT_EQ(summary.attachments.size(), 2u);
+  EXPECT_EQ(summary.attachments[0].name, "rig.yaml");
+  EXPECT_EQ(summary.attachments[1].data, payload(99, 300));
+  EXPECT_EQ(summary.attachments[1].time_ns, kStart_ns);
+  const ReadBack back = read_all(*reader);
+  EXPECT_TRUE(back.errors.empty());
+  ASSERT_EQ(back.messages.size(), 23u);
+  for (int i = 0; i < 23; ++i)
+    expect_equal(back.messages[static_cast<std::size_t>(i)], message(i % 4 == 3 ? 1 : 0, i, 40));
+}
+
+TEST(Recording, AnEmptyOneIsWhole) {
+  test::TempFolder folder;
+  create(folder / "a.mcap")->finish().ok();
+  const auto reader = open(folder / "a.mcap");
+  EXPECT_FALSE(reader->summary().recovered);
+  EXPECT_TRUE(read_all(*reader).messages.empty());
+}
+
+TEST(Recording, MessagesComeInTheOrderOfTheirTimes) {
+  test::TempFolder folder;
+  {
+    auto writer = create(folder / "a.mcap", {.chunk_ns = 3 * kStep_ns, .chunk_bytes = 1 << 20});
+    writer->add_channel(schema(), channel("t")).ok();
+    for (const int i : {0, 2, 1, 5, 3, 4, 4, 9, 8, 6, 7}) writer->write(message(0, i, 10)).ok();
+  }
+  std::vector<std::uint32_t> order;
+  for (const auto& m : read_all(*open(folder / "a.mcap")).messages) order.push_back(m.sequence);
+  EXPECT_EQ(order, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 4, 5, 6, 7, 8, 9}));
+}
+
+TEST(Recording, SeekGoesToAnyMessage) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  const auto reader = open(folder / "a.mcap");
+  for (const int i : {20, 0, 7, 22, 13, 14}) {
+    for (const std::int64_t earlier : {std::int64_t{0}, kStep_ns / 2}) {
+      ASSERT_TRUE(reader->seek(kStart_ns + i * kStep_ns - earlier).ok());
+      const auto next = reader->next();
+      ASSERT_TRUE(next.ok());
+      ASSERT_TRUE(next->has_value());
+      EXPECT_EQ((*next)->sequence, static_cast<std::uint32_t>(i));
+    }
+  }
+  ASSERT_TRUE(reader->seek(kStart_ns + 23 * kStep_ns).ok());
+  EXPECT_FALSE(reader->next()->has_value());
+  ASSERT_TRUE(reader->seek(-5).ok());
+  EXPECT_EQ((*reader->next())->sequence, 0u);
+}
+
+TEST(Recording, ChunksAreBoundedInTimeAndSize) {
+  test::TempFolder folder;
+  auto writer = create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns, .chunk_bytes = 500});
+  writer->add_channel(schema(), channel("t")).ok();
+  const auto on_disk = [&] { return read_all(*open(folder / "a.mcap")).messages.size(); };
+  ASSERT_TRUE(writer->write(message(0, 0, 10)).ok());
+  EXPECT_EQ(on_disk(), 0u);
+  ASSERT_TRUE(writer->flush_if_due(kStart_ns + 4 * kStep_ns).ok());
+  EXPECT_EQ(on_disk(), 0u);
+  ASSERT_TRUE(writer->flush_if_due(kStart_ns + 5 * kStep_ns).ok());
+  EXPECT_EQ(on_disk(), 1u) << "old enough";
+  ASSERT_TRUE(writer->write(message(0, 6, 10)).ok());
+  ASSERT_TRUE(writer->write(message(0, 12, 10)).ok());
+  EXPECT_EQ(on_disk(), 2u) << "the next message came later than the chunk may be";
+  ASSERT_TRUE(writer->write(message(0, 13, 600)).ok());
+  EXPECT_EQ(on_disk(), 4u) << "large enough";
+}
+
+TEST(Recording, AnExistingFileIsNotTouched) {
+  test::TempFolder folder;
+  write_file(folder / "a.mcap", Bytes{1, 2, 3});
+  const auto writer = RecordingWriter::create(folder / "a.mcap", {});
+  ASSERT_FALSE(writer.ok());
+  EXPECT_NE(writer.error().message.find("exists already"), std::string::npos);
+  EXPECT_EQ(read_file(folder / "a.mcap"), (Bytes{1, 2, 3}));
+  EXPECT_FALSE(RecordingWriter::create(folder / "none/a.mcap", {}).ok());
+}
+
+TEST(Recording, MisuseIsRefused) {
+  test::TempFolder folder;
+  auto writer = create(folder / "a.mcap");
+  EXPECT_FALSE(writer->write(message(0, 0, 1)).ok()) << "no such channel";
+  EXPECT_FALSE(writer->add_channel(schema(), {"t", "cdr", "other", {}}).ok());
+  EXPECT_TRUE(writer->add_channel(schema(), channel("t")).ok());
+  RecordingSchema other = schema();
+  other.text = "else";
+  EXPECT_FALSE(writer->add_channel(other, channel("u")).ok());
+  RecordedMessage early = message(0, 0, 1);
+  early.log_time_ns = -1;
+  EXPECT_FALSE(writer->write(early).ok());
+  EXPECT_TRUE(writer->finish().ok());
+  EXPECT_TRUE(writer->finish().ok());
+  EXPECT_FALSE(writer->write(message(0, 0, 1)).ok());
+  EXPECT_FALSE(RecordingWriter::create(folder / "b.mcap", {.chunk_bytes = 0}).ok());
+}
+
+TEST(RecordingFault, WhatIsNoRecordingIsRefused) {
+  test::TempFolder folder;
+  EXPECT_FALSE(RecordingReader::open(folder / "none.mcap").ok());
+  EXPECT_FALSE(RecordingReader::open(folder.path()).ok());
+  write_file(folder / "text", Bytes{'h', 'e', 'l', 'l', 'o', ' ', 'w', 'o', 'r', 'l', 'd'});
+  const auto reader = RecordingReader::open(folder / "text");
+  ASSERT_FALSE(reader.ok());
+  EXPECT_NE(reader.error().message.find("not a recording"), std::string::npos);
+}
+
+/// Every byte a crash can cut at.
+TEST(RecordingFault, CutAnywhereGivesEveryWholeChunk) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  const Bytes whole = read_file(folder / "a.mcap");
+  std::size_t before = 0;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    write_file(folder / "cut.mcap", std::span(whole).first(size));
+    const auto reader = open(folder / "cut.mcap");
+    ASSERT_TRUE(reader->summary().recovered) << size;
+    ASSERT_LE(reader->summary().lost_bytes, size);
+    const ReadBack back = read_all(*reader);
+    ASSERT_TRUE(back.errors.empty()) << size << back.errors[0];
+    ASSERT_EQ(back.messages.size(), reader->summary().messages);
+    ASSERT_TRUE(back.messages.size() % 5 == 0 || back.messages.size() == 23)
+        << "a part of a chunk at " << size;
+    ASSERT_GE(back.messages.size(), before);
+    before = back.messages.size();
+    for (std::size_t i = 0; i < back.messages.size(); ++i)
+      ASSERT_EQ(back.messages[i].data, payload(static_cast<int>(i), 40));
+  }
+  EXPECT_EQ(before, 23u) << "a cut within the index loses no message";
+}
+
+TEST(RecordingFault, ZerosThatAPowerLossLeftAreNotRecords) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  Bytes bytes = read_file(folder / "a.mcap");
+  bytes.erase(bytes.end() - 100, bytes.end());
+  bytes.insert(bytes.end(), 4096, 0);
+  write_file(folder / "a.mcap", bytes);
+  const auto reader = open(folder / "a.mcap");
+  EXPECT_TRUE(reader->summary().recovered);
+  EXPECT_GT(reader->summary().lost_bytes, 4000u);  // the first few may complete the record that was cut
+  EXPECT_EQ(read_all(*reader).messages.size(), 23u);
+}
+
+TEST(RecordingFault, AFlippedBitCostsItsChunkAndIsNamed) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  Bytes bytes = read_file(folder / "a.mcap");
+  const Bytes wanted = payload(7, 40);  // in the second chunk
+  const auto at = std::search(bytes.begin(), bytes.end(), wanted.begin(), wanted.end());
+  ASSERT_NE(at, bytes.end());
+  *at ^= 0x10;
+  write_file(folder / "bad.mcap", bytes);
+  const auto reader = open(folder / "bad.mcap");
+  EXPECT_FALSE(reader->summary().recovered);
+  const ReadBack back = read_all(*reader);
+  ASSERT_EQ(back.errors.size(), 1u);
+  EXPECT_NE(back.errors[0].find("CRC"), std::string::npos);
+  EXPECT_NE(back.errors[0].find("at byte"), std::string::npos);
+  ASSERT_EQ(back.messages.size(), 18u);
+  EXPECT_EQ(back.messages[4].sequence, 4u);
+  EXPECT_EQ(back.messages[5].sequence, 10u);
+}
+
+TEST(RecordingFault, ADamagedAttachmentIsLeftOutAndNamed) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 6);
+  Bytes bytes = read_file(folder / "a.mcap");
+  const Bytes wanted = payload(99, 300);
+  const auto at = std::search(bytes.begin(), bytes.end(), wanted.begin(), wanted.end());
+  *(at + 50) ^= 1;
+  write_file(folder / "bad.mcap", bytes);
+  const auto reader = open(folder / "bad.mcap");
+  EXPECT_EQ(reader->summary().attachments.size(), 1u);
+  ASSERT_EQ(reader->summary().damage.size(), 1u);
+  EXPECT_NE(reader->summary().damage[0].find("pattern.yaml"), std::string::npos);
+  EXPECT_EQ(read_all(*reader).messages.size(), 6u);
+}
+
+TEST(RecordingFault, EveryFlippedByteIsWithstood) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 11, 20);
+  const Bytes whole = read_file(folder / "a.mcap");
+  std::size_t wrong = 0;
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    Bytes bytes = whole;
+    bytes[at] ^= at % 2 == 0 ? 0xff : 0x01;
+    write_file(folder / "bad.mcap", bytes);
+    const auto reader = RecordingReader::open(folder / "bad.mcap");
+    if (!reader) continue;
+    const ReadBack back = read_all(**reader);
+    ASSERT_LT(back.errors.size(), 100u) << at;
+    for (const auto& m : back.messages) wrong += m.data != payload(static_cast<int>(m.sequence), 20);
+  }
+  EXPECT_EQ(wrong, 0u) << "messages that were changed but not reported";
+}
+
+/// The same where no CRC catches it first: what the index says must be checked against the file.
+TEST(RecordingFault, AnIndexThatLiesIsWithstood) {
+  const test::TempFolder folder;
+  write_sample(folder / "a.mcap", 11, 20);
+  Bytes whole = read_file(folder / "a.mcap");
+  std::fill(whole.end() - 12, whole.end() - 8, std::uint8_t{0});  // the summary's CRC: none
+  const Bytes data_end{0x0f, 4, 0, 0, 0, 0, 0, 0, 0};
+  const auto summary = std::search(whole.begin(), whole.end(), data_end.begin(), data_end.end());
+  ASSERT_NE(summary, whole.end());
+  test::Random random(11);
+  for (auto at = summary - whole.begin(); at < static_cast<std::ptrdiff_t>(whole.size()); ++at) {
+    for (const int value : {0x00, 0xff, 0x80, static_cast<int>(random.below(256))}) {
+      Bytes bytes = whole;
+      bytes[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(value);
+      write_file(folder / "bad.mcap", bytes);
+      const auto reader = RecordingReader::open(folder / "bad.mcap");
+      if (!reader) continue;
+      ASSERT_LT(read_all(**reader).errors.size(), 100u) << at;
+      ASSERT_TRUE((*reader)->seek(kStart_ns + 5 * kStep_ns).ok());
+      static_cast<void>((*reader)->next().ok());
+    }
+  }
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  EXPECT_LT(usage.ru_maxrss, 500'000) << "kibibytes";
+}
+
+TEST(RecordingFault, ACompressedChunkIsRefusedInWords) {
+  const test::TempFolder folder;
+  Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
+  mcap::append_header(bytes, "another writer");
+  mcap::append_chunk_header(bytes, {.start_time = 1,
+                                    .end_time = 2,
+                                    .uncompressed_size = 100,
+                                    .uncompressed_crc = 0,
+                                    .compression = "zstd",
+                                    .records_size = 8});
+  bytes.insert(bytes.end(), 8, 0x28);
+  write_file(folder / "a.mcap", bytes);
+  const ReadBack back = read_all(*open(folder / "a.mcap"));
+  ASSERT_EQ(back.errors.size(), 1u);
+  EXPECT_NE(back.errors[0].find("compressed with zstd, which is not supported"), std::string::npos);
+}
+
+/// A limit on the file's size stands in for a full disk: both make write() fail in the middle of a chunk.
+TEST(RecordingFault, AFullDiskEndsTheRecordingReadable) {
+  test::TempFolder folder;
+  for (const rlim_t limit : {3000, 3900, 5000}) {
+    const auto file = folder / ("full" + std::to_string(limit) + ".mcap");
+    const pid_t child = fork();
+    if (child == 0) {
+      std::signal(SIGXFSZ, SIG_IGN);
+      const rlimit size{limit, limit};
+      setrlimit(RLIMIT_FSIZE, &size);
+      auto writer = RecordingWriter::create(file, {.chunk_ns = 5 * kStep_ns, .chunk_bytes = 1 << 20});
+      if (!writer || !(*writer)->add_channel(schema(), channel("t"))) _exit(2);
+      for (int i = 0; i < 200; ++i) {
+        const auto status = (*writer)->write(message(0, i, 100));
+        if (status.ok()) continue;
+        const bool named = status.error().message.find(file.string()) != std::string::npos;
+        const bool stays = !(*writer)->write(message(0, i, 100)).ok() && !(*writer)->finish().ok();
+        _exit(named && stays ? 0 : 3);
+      }
+      _exit(4);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    ASSERT_EQ(WEXITSTATUS(status), 0);
+    const auto reader = open(file);
+    const ReadBack back = read_all(*reader);
+    EXPECT_TRUE(back.errors.empty());
+    EXPECT_GE(back.messages.size(), 10u);
+    EXPECT_EQ(back.messages.size() % 5, 0u);
+    EXPECT_EQ(reader->summary().lost_bytes, 0u) << "cut back to whole records";
+    EXPECT_LE(std::filesystem::file_size(file), limit);
+  }
+}
+
+TEST(RecordingFault, NoRoomAtAllLeavesNoFile) {
+  test::TempFolder folder;
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit size{10, 10};
+    setrlimit(RLIMIT_FSIZE, &size);
+    _exit(RecordingWriter::create(folder / "a.mcap", {}).ok() ? 1 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.mcap"));
+}
+
+TEST(RecordingFault, KillLosesOnlyTheOpenChunk) {
+  test::TempFolder folder;
+  int ready[2];
+  ASSERT_EQ(pipe(ready), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    auto writer = RecordingWriter::create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns});
+    (*writer)->add_channel(schema(), channel("t")).ok();
+    for (int i = 0; i < 23; ++i) (*writer)->write(message(0, i, 100)).ok();
+    static_cast<void>(!::write(ready[1], "x", 1));
+    pause();
+    _exit(0);
+  }
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  close(ready[0]);
+  close(ready[1]);
+  const auto reader = open(folder / "a.mcap");
+  EXPECT_TRUE(reader->summary().recovered);
+  EXPECT_EQ(read_all(*reader).messages.size(), 20u);
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+// Real DDS on the loopback interface.
+#include "idl/transport.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "tests/support/process.h"
+#include "tests/support/streams.h"
+
+namespace relievo {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+const DomainOptions kDomain{test::own_domain(), "lo"};
+
+// Everything a subscriber was told, with bounded waits for more.
+class Inbox {
+ public:
+  struct Received {
+    std::vector<StreamInfo> infos;
+    std::vector<std::pair<std::string, FrameMessage>> frames;
+    std::vector<ServerStatus> statuses;
+    std::vector<RawSample> raw;
+    std::vector<std::string> gone;
+    std::vector<std::pair<std::string, std::uint64_t>> lost;
+  };
+
+  Subscriber::Callbacks callbacks(bool raw_too = false) {
+    Subscriber::Callbacks c;
+    c.info = [this](const StreamInfo& i) { add([&] { received_.infos.push_back(i); }); };
+    c.frame = [this](const std::string& s, const FrameMessage& f) {
+      add([&] { received_.frames.emplace_back(s, f); });
+    };
+    c.status = [this](const ServerStatus& s) { add([&] { received_.statuses.push_back(s); }); };
+    c.gone = [this](const std::string& s) { add([&] { received_.gone.push_back(s); }); };
+    c.lost = [this](const std::string& s, std::uint64_t n) {
+      add([&] { received_.lost.emplace_back(s, n); });
+    };
+    if (raw_too) c.raw = [this](const RawSample& s) { add([&] { received_.raw.push_back(s); }); };
+    return c;
+  }
+  /// Until `condition(const Received&)`.
+  template <typename Condition>
+  bool wait(Condition condition, std::chrono::milliseconds timeout = 10s) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, timeout, [&] { return condition(std::as_const(received_)); });
+  }
+  /// A copy: more may come meanwhile.
+  Received now() {
+    std::lock_guard lock(mutex_);
+    return received_;
+  }
+
+ private:
+  template <typename Add>
+  void add(Add add_one) {
+    std::lock_guard lock(mutex_);
+    add_one();
+    changed_.notify_all();
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  Received received_;
+};
+
+template <typename T>
+std::unique_ptr<T> expect_made(Result<std::unique_ptr<T>> result) {
+  if (!result) ADD_FAILURE() << result.error().message;
+  return result ? std::move(result).value() : nullptr;
+}
+
+template <typename AnyPublisher>
+bool wait_for_readers(const AnyPublisher& publisher, int count) {
+  for (int i = 0; i < 1000 && publisher.matched_readers() < count; ++i) std::this_thread::sleep_for(10ms);
+  return publisher.matched_readers() >= count;
+}
+
+TEST(Transport, DescriptionAndStatusReachALateJoiner) {
+  const StreamInfo info = test::example_info("late");
+  auto publisher = expect_made(Publisher::create(kDomain, info));
+  ASSERT_TRUE(publisher);
+  ServerStatus status;
+  status.stream = "late";
+  status.state = StreamState::kStalled;
+  status.message = "no camera";
+  status.drops_encode = 7;
+  status.latency_ms = 12.5;
+  ASSERT_TRUE(publisher->publish(status).ok());
+
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "late", inbox.callbacks()));
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return !r.infos.empty() && !r.statuses.empty(); }));
+  const StreamInfo got = inbox.now().infos[0];
+  EXPECT_EQ(got.stream, "late");
+  EXPECT_EQ(got.source, info.source);
+  EXPECT_EQ(got.started_ns, info.started_ns);
+  EXPECT_EQ(to_yaml(got.rig), to_yaml(info.rig));
+  EXPECT_EQ(to_yaml(got.pattern), to_yaml(info.pattern));
+  EXPECT_EQ(inbox.now().statuses[0].state, StreamState::kStalled);
+  EXPECT_EQ(inbox.now().statuses[0].message, "no camera");
+  EXPECT_EQ(inbox.now().statuses[0].drops_encode, 7u);
+  EXPECT_EQ(inbox.now().statuses[0].latency_ms, 12.5);
+}
+
+void expect_frames_arrive(std::size_t size, int count) {
+  auto publisher = expect_made(Publisher::create(kDomain, test::example_info("frames")));
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "frames", inbox.callbacks()));
+  ASSERT_TRUE(publisher && subscriber && wait_for_readers(*publisher, 1));
+  for (int i = 0; i < count; ++i) {
+    const auto sent = test::example_frame(static_cast<std::uint64_t>(i), size);
+    ASSERT_TRUE(publisher->publish(sent).ok());
+    // One at a time: what is proved is order and bytes, not what the machine can carry.
+    ASSERT_TRUE(inbox.wait([&](auto& r) { return static_cast<int>(r.frames.size()) > i; })) << "frame " << i;
+    const auto [stream, frame] = inbox.now().frames.back();
+    EXPECT_EQ(stream, "frames");
+    EXPECT_EQ(frame.sequence, sent.sequence);
+    EXPECT_EQ(frame.number, sent.number);
+    EXPECT_EQ(frame.capture_time_ns, sent.capture_time_ns);
+    EXPECT_EQ(frame.publish_time_ns, sent.publish_time_ns);
+    EXPECT_EQ(*frame.data, *sent.data);
+  }
+  EXPECT_TRUE(inbox.now().lost.empty());
+}
+
+TEST(Transport, SmallFramesArriveInOrderWithEqualBytes) {
+  expect_frames_arrive(1000, 50);
+}
+
+TEST(Transport, LargeFramesArriveInOrderWithEqualBytes) {
+  expect_frames_arrive(3'000'000, 8);
+}
+
+TEST(Transport, EmptyFrameArrives) {
+  expect_frames_arrive(0, 2);
+}
+
+TEST(Transport, GapInTheSequenceIsReportedOnce) {
+  auto publisher = expect_made(Publisher::create(kDomain, test::example_info("gap")));
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "gap", inbox.callbacks()));
+  ASSERT_TRUE(publisher && subscriber && wait_for_readers(*publisher, 1));
+  for (const std::uint64_t sequence :
+       {5u, 6u, 10u, 11u, 0u, 1u}) {  // joined late; lost 7 to 9; started again
+    ASSERT_TRUE(publisher->publish(test::example_frame(sequence, 100)).ok());
+  }
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 6; }));
+  EXPECT_THAT(inbox.now().lost, testing::ElementsAre(testing::Pair("gap", 3u)));
+}
+
+TEST(Transport, StreamsAreToldApart) {
+  auto one = expect_made(Publisher::create(kDomain, test::example_info("one")));
+  auto two = expect_made(Publisher::create(kDomain, test::example_info("two")));
+  Inbox of_one, of_all;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "one", of_one.callbacks()));
+  auto everything = expect_made(Subscriber::create(kDomain, "", of_all.callbacks()));
+  ASSERT_TRUE(one && two && subscriber && everything);
+  ASSERT_TRUE(wait_for_readers(*one, 2) && wait_for_readers(*two, 1));
+  EXPECT_EQ(two->matched_readers(), 1) << "a reader of one stream must not be sent another's frames";
+  ASSERT_TRUE(two->publish(test::example_frame(0, 10)).ok());
+  ASSERT_TRUE(one->publish(test::example_frame(1, 10)).ok());
+  ASSERT_TRUE(of_one.wait([&](auto& r) { return r.frames.size() == 1; }));
+  ASSERT_TRUE(of_all.wait([&](auto& r) { return r.frames.size() == 2 && r.infos.size() == 2; }));
+  EXPECT_EQ(of_one.now().frames[0].first, "one");
+  EXPECT_EQ(of_one.now().frames[0].second.sequence, 1u);
+  EXPECT_EQ(of_one.now().infos.size(), 1u);
+}
+
+TEST(Transport, NameAlreadyLiveIsRefused) {
+  auto first = expect_made(Publisher::create(kDomain, test::example_info("taken")));
+  ASSERT_TRUE(first);
+  const auto second = Publisher::create(kDomain, test::example_info("taken"));
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(second.error().message, HasSubstr("'taken' is already live"));
+  EXPECT_FALSE(RawPublisher::create(kDomain, "taken").ok());
+  first.reset();
+  EXPECT_TRUE(Publisher::create(kDomain, test::example_info("taken")).ok());
+}
+
+TEST(Transport, BadOptionsAreRefused) {
+  EXPECT_FALSE(Publisher::create(kDomain, test::example_info("no spaces")).ok());
+  EXPECT_FALSE(Publisher::create({-1, "lo"}, test::example_info("a")).ok());
+  EXPECT_FALSE(Subscriber::create({231, "lo"}, "a", {}).ok());
+  EXPECT_FALSE(Subscriber::create({kDomain.domain, "no-such-if0"}, "a", {}).ok());
+}
+
+TEST(Transport, WriterThatLeavesIsGoneAndMayComeBack) {
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "", inbox.callbacks()));
+  auto publisher = expect_made(Publisher::create(kDomain, test::example_info("back")));
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.infos.size() == 1; }));
+  publisher.reset();
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == 1; }));
+  EXPECT_EQ(inbox.now().gone[0], "back");
+  publisher = expect_made(Publisher::create(kDomain, test::example_info("back")));
+  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.infos.size() == 2; }));
+}
+
+TEST(Transport, FramesOfAnotherProcessAllArrive) {
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "other", inbox.callbacks()));
+  test::Process process(
+      {test::program("test_publisher"), "other", std::to_string(kDomain.domain), "500000", "20", "20", "1"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 20; })) << process.err();
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(*inbox.now().frames[i].second.data, *test::example_frame(i, 500'000).data);
+  }
+  EXPECT_TRUE(inbox.now().lost.empty());
+}
+
+TEST(Transport, KilledWriterIsGoneWithinThreeSeconds) {
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "victim", inbox.callbacks()));
+  test::Process process(
+      {test::program("test_publisher"), "victim", std::to_string(kDomain.domain), "1000", "100", "5", "1"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 5; })) << process.err();
+  EXPECT_TRUE(inbox.now().gone.empty());
+  process.signal(SIGKILL);
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == 1; }, 3s));
+  EXPECT_EQ(inbox.now().gone[0], "victim");
+}
+
+TEST(Transport, PausedWriterComesBackWithItsDescription) {
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "paused", inbox.callbacks()));
+  test::Process process(
+      {test::program("test_publisher"), "paused", std::to_string(kDomain.domain), "1000", "20", "2000", "1"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() >= 5; })) << process.err();
+  process.signal(SIGSTOP);
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == 1; }, 3s));
+  process.signal(SIGCONT);
+  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.infos.size() == 2; }));
+}
+
+TEST(Transport, RawSamplesAreReplayedByteForByte) {
+  std::vector<RawSample> recorded;
+  {
+    auto publisher = expect_made(Publisher::create(kDomain, test::example_info("tape")));
+    Inbox inbox;
+    auto subscriber = expect_made(Subscriber::create(kDomain, "tape", inbox.callbacks(true)));
+    ASSERT_TRUE(publisher && subscriber && wait_for_readers(*publisher, 1));
+    ServerStatus status;
+    status.stream = "tape";
+    ASSERT_TRUE(publisher->publish(status).ok());
+    for (std::uint64_t i = 0; i < 3; ++i) {
+      ASSERT_TRUE(publisher->publish(test::example_frame(i, 100'001 + i)).ok());
+    }
+    ASSERT_TRUE(inbox.wait([&](auto& r) { return r.raw.size() == 5; }));
+    recorded = inbox.now().raw;
+    EXPECT_EQ(recorded[0].stream, "tape");
+    EXPECT_GT(recorded[0].source_time_ns, 0);
+  }
+  auto player = expect_made(RawPublisher::create(kDomain, "tape"));
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "tape", inbox.callbacks(true)));
+  ASSERT_TRUE(player && subscriber && wait_for_readers(*player, 1));
+  for (const RawSample& sample : recorded) {
+    const auto status = player->publish(sample);
+    ASSERT_TRUE(status.ok()) << status.error().message;
+  }
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.raw.size() == recorded.size(); }));
+  const std::vector<RawSample> replayed = inbox.now().raw;
+  for (const RawSample& sample : recorded) {
+    EXPECT_TRUE(
+        std::any_of(replayed.begin(), replayed.end(),
+                    [&](const RawSample& got) { return got.topic == sample.topic && got.cdr == sample.cdr; }))
+        << "topic " << static_cast<int>(sample.topic);
+  }
+  // A sample's raw callback comes before its typed one.
+  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 3; }));
+
+  RawSample bad = recorded[0];
+  bad.cdr.resize(bad.cdr.size() / 2);
+  EXPECT_FALSE(player->publish(bad).ok());
+  RawSample other = recorded[0];
+  other.cdr[12] = 'T';  // the key: "Tape"
+  EXPECT_FALSE(player->publish(other).ok());
+}
+
+}  // namespace
+}  // namespace relievo

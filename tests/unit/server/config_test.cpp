@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/config.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+struct Read {
+  Status status;
+  ServeConfig config;
+  std::string file;
+};
+
+Read read(const std::string& text) {
+  const test::TempFolder folder;
+  const auto file = folder / "serve.toml";
+  std::ofstream(file, std::ios::binary) << text;
+  Read out;
+  out.file = file.string();
+  out.status = read_config(file, out.config);
+  return out;
+}
+
+TEST(Config, EverySetting) {
+  const Read r = read(R"(# a comment
+source = "take:shared/bunny"
+stream = "bunny"
+domain = 7
+web = "[::1]:9000"
+record = "out.mcap"
+frames = 900
+loop = true
+fast = true
+threads = 3
+decoder = "paper"
+jpeg_quality = 91
+draco_speed = 4
+)");
+  ASSERT_TRUE(r.status) << r.status.error().message;
+  EXPECT_EQ(r.config.source, "take:shared/bunny");
+  EXPECT_EQ(r.config.stream, "bunny");
+  EXPECT_EQ(r.config.domain, 7);
+  EXPECT_EQ(r.config.web, "[::1]:9000");
+  EXPECT_EQ(r.config.record, "out.mcap");
+  EXPECT_EQ(r.config.frames, 900U);
+  EXPECT_TRUE(r.config.loop);
+  EXPECT_TRUE(r.config.fast);
+  EXPECT_EQ(r.config.threads, 3);
+  EXPECT_EQ(r.config.decoder, Decoder::kPaper);
+  EXPECT_EQ(r.config.jpeg_quality, 91);
+  EXPECT_EQ(r.config.draco_speed, 4);
+}
+
+TEST(Config, WhatIsNotNamedStays) {
+  const test::TempFolder folder;
+  const auto file = folder / "serve.toml";
+  std::ofstream(file) << "threads = 2\n";
+  ServeConfig config;
+  config.source = "sim:torso";
+  config.domain = 3;
+  ASSERT_TRUE(read_config(file, config));
+  EXPECT_EQ(config.threads, 2);
+  EXPECT_EQ(config.source, "sim:torso");
+  EXPECT_EQ(config.domain, 3);
+  EXPECT_EQ(config.web, ServeConfig().web);
+  EXPECT_FALSE(config.frames);
+  EXPECT_FALSE(config.loop);
+  EXPECT_TRUE(read("").status);
+}
+
+struct Wrong {
+  const char* name;
+  const char* line;  // the third of the file
+  const char* says;
+};
+
+class WrongConfig : public ::testing::TestWithParam<Wrong> {};
+
+TEST_P(WrongConfig, NamesFileLineAndWhy) {
+  const Read r = read(std::string("# one\n\n") + GetParam().line + "\n");
+  ASSERT_FALSE(r.status);
+  const std::string& message = r.status.error().message;
+  EXPECT_EQ(message.find(r.file + ":3: "), 0U) << message;
+  EXPECT_NE(message.find(GetParam().says), std::string::npos) << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Values, WrongConfig,
+    ::testing::Values(
+        Wrong{"source_number", "source = 7", "source must be a string"},
+        Wrong{"stream_flag", "stream = true", "stream must be a string"},
+        Wrong{"web_number", "web = 8080", "web must be a string"},
+        Wrong{"record_list", "record = [\"a\"]", "record must be a string"},
+        Wrong{"domain_text", "domain = \"0\"", "domain must be a whole number from 0 to 230"},
+        Wrong{"domain_negative", "domain = -1", "domain must be a whole number from 0 to 230"},
+        Wrong{"domain_large", "domain = 231", "domain must be a whole number from 0 to 230"},
+        Wrong{"domain_fraction", "domain = 1.0", "domain must be a whole number"},
+        Wrong{"frames_none", "frames = 0", "frames must be a whole number from 1"},
+        Wrong{"frames_negative", "frames = -5", "frames must be a whole number from 1"},
+        Wrong{"loop_number", "loop = 1", "loop must be true or false"},
+        Wrong{"loop_text", "loop = \"yes\"", "loop must be true or false"},
+        Wrong{"fast_number", "fast = 0", "fast must be true or false"},
+        Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\" or \"paper\""},
+        Wrong{"threads_none", "threads = 0", "threads must be a whole number from 1 to 64"},
+        Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},
+        Wrong{"quality_none", "jpeg_quality = 0", "jpeg_quality must be a whole number from 1 to 100"},
+        Wrong{"quality_over", "jpeg_quality = 101", "jpeg_quality must be a whole number"},
+        Wrong{"speed_over", "draco_speed = 10", "draco_speed must be a whole number from 0 to 9"},
+        Wrong{"speed_huge", "draco_speed = 4294967297", "draco_speed must be a whole number"},
+        Wrong{"unknown", "quality = 80", "quality is no setting; there are: source stream"},
+        Wrong{"part_of_a_name", "jpeg = 80", "jpeg is no setting"},
+        Wrong{"two_names", "\"loop fast\" = true", "loop fast is no setting"},
+        Wrong{"names_and_gap", "\"loop  fast\" = true", "loop  fast is no setting"},
+        Wrong{"no_name", "\"\" = true", "is no setting"},
+        Wrong{"table", "[source]", "source must be a string"},
+        Wrong{"unknown_table", "[server]", "server is no setting"}),
+    [](const auto& wrong) { return wrong.param.name; });
+
+TEST(Config, WhatIsNoTomlNamesTheLine) {
+  for (const char* text : {"\n\nsource = sim:face\n", "\n\nloop = true fast = true\n", "\n\nthreads\n"}) {
+    const Read r = read(text);
+    ASSERT_FALSE(r.status) << text;
+    EXPECT_EQ(r.status.error().message.find(r.file + ":3: "), 0U) << r.status.error().message;
+    EXPECT_EQ(r.status.error().message.find('\n'), std::string::npos) << r.status.error().message;
+  }
+  const Read twice = read("loop = true\nloop = false\n");
+  ASSERT_FALSE(twice.status);
+  EXPECT_EQ(twice.status.error().message.find(twice.file + ":2: "), 0U) << twice.status.error().message;
+}
+
+TEST(Config, MissingFileAndFolder) {
+  const test::TempFolder folder;
+  ServeConfig config;
+  Status status = read_config(folder / "none.toml", config);
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message.find((folder / "none.toml").string()), std::string::npos);
+  status = read_config(folder.path(), config);  // a folder is no configuration
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message.find(folder.path().string()), std::string::npos);
+}
+
+}  // namespace
+}  // namespace relievo

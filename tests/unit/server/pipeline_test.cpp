@@ -1,0 +1,465 @@
+// SPDX-License-Identifier: Apache-2.0
+// The threaded pipeline between sources and sinks that a test controls.
+#include "server/pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "base/time.h"
+#include "tests/unit/server/fakes.h"
+
+namespace relievo {
+namespace {
+
+using namespace test;
+
+PipelineOptions fast_and_lossless() {
+  PipelineOptions options;
+  options.stream = "test";
+  options.paced = false;
+  options.lossless = true;
+  return options;
+}
+
+std::unique_ptr<Pipeline> make(FieldSource& source, std::vector<FrameSink*> sinks,
+                               const PipelineOptions& options) {
+  auto made = Pipeline::create(source, std::move(sinks), options);
+  EXPECT_TRUE(made) << made.error().message;
+  return *std::move(made);
+}
+
+std::vector<std::uint64_t> numbers(const std::vector<FrameMessage>& frames) {
+  std::vector<std::uint64_t> out;
+  for (const FrameMessage& f : frames) out.push_back(f.number);
+  return out;
+}
+
+std::vector<std::uint64_t> range(std::uint64_t first, std::uint64_t end) {
+  std::vector<std::uint64_t> out(end - first);
+  std::iota(out.begin(), out.end(), first);
+  return out;
+}
+
+void expect_no_gaps(const std::vector<FrameMessage>& frames) {
+  for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].sequence, i);
+}
+
+class PipelineTest : public ::testing::Test {
+ protected:
+  const StripedScene scene_ = striped_scene();
+  const Frames frames_{scene_};
+  CollectingSink sink_;
+};
+
+TEST_F(PipelineTest, LosslessEqualsTheSerialLoopByteForByte) {
+  constexpr std::uint64_t kFrames = 24;
+  PipelineOptions options = fast_and_lossless();
+  options.encode.volume = {{-1, -1, 0}, 2};
+  options.encode.draco_speed = 7;
+
+  std::vector<Bytes> serial;
+  auto reconstructor = Reconstructor::create(scene_.rig, scene_.pattern, {});
+  for (std::uint64_t n = 0; n < kFrames; ++n) {
+    auto frame = reconstructor->add(frames_(n));
+    ASSERT_TRUE(frame);
+    if (!*frame) continue;
+    auto bytes = encode_frame(**frame, options.encode);
+    ASSERT_TRUE(bytes) << bytes.error().message;
+    serial.push_back(*std::move(bytes));
+  }
+  ASSERT_EQ(serial.size(), kFrames - 1);
+
+  for (const int threads : {1, 3}) {
+    options.reconstruct.threads = threads;
+    ScriptedSource source(scene_, count_to(frames_, kFrames));
+    CollectingSink first;
+    CollectingSink second;
+    const auto pipeline = make(source, {&first, &second}, options);
+    const Status done = pipeline->run();
+    EXPECT_TRUE(done) << done.error().message;
+    for (const CollectingSink* sink : {&first, &second}) {
+      const auto got = sink->frames();
+      ASSERT_EQ(numbers(got), range(1, kFrames));
+      expect_no_gaps(got);
+      for (std::size_t i = 0; i < got.size(); ++i) EXPECT_EQ(*got[i].data, serial[i]) << i;
+    }
+    EXPECT_EQ(first.frames()[0].data, second.frames()[0].data);  // shared, not copied
+    const ServerStatus last = first.statuses().back();
+    EXPECT_EQ(last.state, StreamState::kEnded);
+    EXPECT_EQ(last.message, "");
+    EXPECT_EQ(last.stream, "test");
+    EXPECT_EQ(last.frames_captured, kFrames);
+    EXPECT_EQ(last.frames_published, kFrames - 1);
+    EXPECT_EQ(last.drops_capture + last.drops_reconstruct + last.drops_encode + last.drops_publish, 0U);
+    EXPECT_GT(last.reconstruct_ms, 0);
+    EXPECT_GT(last.encode_ms, 0);
+  }
+}
+
+TEST_F(PipelineTest, TheVolumeGrowsSoThatNoVertexIsLost) {
+  StripedScene far = scene_;
+  far.depth_m = 1.6;
+  const Frames far_frames(far);
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 8) return ScriptedSource::end();
+    return std::optional(n < 4 ? frames_(n) : far_frames(n));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  ASSERT_TRUE(pipeline->run());
+  const auto got = sink_.frames();
+  ASSERT_EQ(got.size(), 7U);
+  auto reconstructor = Reconstructor::create(scene_.rig, scene_.pattern, {});
+  std::vector<std::size_t> vertices;
+  for (std::uint64_t n = 0; n < 8; ++n) {
+    auto frame = reconstructor->add(n < 4 ? frames_(n) : far_frames(n));
+    ASSERT_TRUE(frame);
+    if (*frame) vertices.push_back((*frame)->surface.positions.size());
+  }
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    const auto decoded = decode_frame(*got[i].data);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    EXPECT_EQ(decoded->surface.positions.size(), vertices[i]) << i;
+    const double expected = got[i].number < 4 ? 1.0 : 1.6;
+    if (got[i].number == 4) continue;  // the wall jumps between this frame's slides
+    for (const Vec3f& p : decoded->surface.positions)
+      ASSERT_NEAR(p[2], expected + scene_.slope * p[0], 0.01 * expected) << i;
+  }
+}
+
+TEST_F(PipelineTest, SomethingFarAwayDoesNotCoarsenWhatIsNear) {
+  // The lower half of the picture shows a wall at 12 m: the upper half's positions are coded as finely as if
+  // it were not there.
+  StripedScene far = scene_;
+  far.depth_m = 12;
+  const Frames far_frames(far);
+  const auto both = [&](std::uint64_t n) {
+    CapturedFrame frame = frames_(n);
+    const CapturedFrame lower = far_frames(n);
+    for (int y = 60; y < frame.picture.height(); ++y)
+      std::copy_n(lower.picture.row(y), lower.picture.stride(), frame.picture.row(y));
+    return frame;
+  };
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 3) return ScriptedSource::end();
+    return std::optional(both(n));
+  });
+  PipelineOptions options = fast_and_lossless();
+  options.depth_resolution = 1e-4;
+  const auto pipeline = make(source, {&sink_}, options);
+  ASSERT_TRUE(pipeline->run());
+  ASSERT_EQ(sink_.frames().size(), 2U);
+  auto reconstructor = Reconstructor::create(scene_.rig, scene_.pattern, {});
+  for (std::uint64_t n = 0; n < 3; ++n) {
+    auto exact = reconstructor->add(both(n));
+    ASSERT_TRUE(exact);
+    if (!*exact) continue;
+    const auto decoded = decode_frame(*sink_.frames()[n - 1].data);
+    ASSERT_TRUE(decoded);
+    std::size_t near = 0;
+    for (const Vec3f& p : decoded->surface.positions) {
+      if (p[2] > 2) continue;
+      ++near;
+      float closest = 1;
+      for (const Vec3f& q : (*exact)->surface.positions)
+        closest = std::min(closest, std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]));
+      ASSERT_LT(closest, 1e-4 * p[2]);  // half a step along each axis
+    }
+    EXPECT_GT(near, 200U);
+  }
+}
+
+TEST_F(PipelineTest, ASlowSinkCostsTheOldestFramesBeforePublishing) {
+  // Frame 1 waits in the sink and three more in the queue; each further one must throw the oldest out.
+  Gate entered;
+  Gate release;
+  sink_.on_frame = [&](const FrameMessage& f) -> Status {
+    if (f.number == 1) {
+      entered.open();
+      release.wait();
+    }
+    return {};
+  };
+  Pipeline* running = nullptr;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        if (n == 2) {
+          EXPECT_TRUE(entered.wait());
+        }
+        if (n > 2 && n < 6) std::this_thread::sleep_for(150ms);  // the queues are not full yet
+        if (n >= 6) {
+          EXPECT_TRUE(eventually([&] { return running->status().drops_publish >= n - 5; })) << n;
+        }
+        if (n == 15) {
+          release.open();
+          return ScriptedSource::end();
+        }
+        return std::optional(frames_(n));
+      },
+      true);
+  PipelineOptions options;
+  const auto pipeline = make(source, {&sink_}, options);
+  running = pipeline.get();
+  ASSERT_TRUE(pipeline->run());
+  const auto got = sink_.frames();
+  EXPECT_EQ(numbers(got), (std::vector<std::uint64_t>{1, 12, 13, 14}));
+  expect_no_gaps(got);  // sequence counts what is published
+  const ServerStatus s = pipeline->status();
+  EXPECT_EQ(s.frames_captured, 15U);
+  EXPECT_EQ(s.frames_published, 4U);
+  EXPECT_EQ(s.drops_publish, 10U);
+  EXPECT_EQ(s.drops_encode, 0U);
+  EXPECT_EQ(s.drops_reconstruct, 0U);
+  EXPECT_EQ(s.drops_capture, 0U);
+}
+
+TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction) {
+  constexpr std::uint64_t kFrames = 400;
+  ScriptedSource source(scene_, count_to(frames_, kFrames), true);
+  const auto pipeline = make(source, {&sink_}, {});
+  ASSERT_TRUE(pipeline->run());
+  const ServerStatus s = pipeline->status();
+  const auto got = sink_.frames();
+  EXPECT_EQ(s.frames_captured, kFrames);
+  EXPECT_EQ(s.frames_published, got.size());
+  EXPECT_GT(s.drops_reconstruct, 0U);
+  EXPECT_EQ(s.drops_capture, 0U);  // the same slide twice, but because the server dropped what lay between
+  EXPECT_LT(got.size() + s.drops_reconstruct + s.drops_encode + s.drops_publish, kFrames);
+  ASSERT_FALSE(got.empty());
+  EXPECT_GE(got.back().number, kFrames - 3);  // the newest ones stay
+  EXPECT_TRUE(std::is_sorted(got.begin(), got.end(), [](const FrameMessage& a, const FrameMessage& b) {
+    return a.number < b.number;
+  }));
+}
+
+TEST_F(PipelineTest, ASinkThatFailsEndsTheRunWithItsError) {
+  ScriptedSource source(scene_, count_to(frames_, 1'000'000));
+  CollectingSink failing;
+  failing.on_frame = [](const FrameMessage& f) -> Status {
+    if (f.number >= 3) return Error{"disk full at frame " + std::to_string(f.number)};
+    return {};
+  };
+  const auto pipeline = make(source, {&sink_, &failing}, fast_and_lossless());
+  const Status done = pipeline->run();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message, "disk full at frame 3");  // the first, though others followed
+  EXPECT_TRUE(source.stopped());
+  EXPECT_LT(source.calls, 1000);
+  EXPECT_EQ(numbers(failing.frames()), range(1, 3));
+  EXPECT_EQ(numbers(sink_.frames()), range(1, 1 + sink_.frames().size()));
+  const ServerStatus last = sink_.statuses().back();
+  EXPECT_EQ(last.state, StreamState::kEnded);
+  EXPECT_EQ(last.message, "disk full at frame 3");
+}
+
+TEST_F(PipelineTest, ASinkThatRefusesAStatusEndsTheRun) {
+  sink_.on_status = [](const ServerStatus&) -> Status { return Error{"no status, please"}; };
+  ScriptedSource source(scene_, [&](ScriptedSource& self, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 2) return self.block();
+    return std::optional(frames_(n));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  const Status done = pipeline->run();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message, "no status, please");
+}
+
+TEST_F(PipelineTest, AFrameThatCannotBeReadIsCountedAndTheOthersGoOn) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 9) return ScriptedSource::end();
+    if (n == 3 || n == 5 || n == 6) return Error{"frame " + std::to_string(n) + " is torn"};
+    return std::optional(frames_(n));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  const Status done = pipeline->run();
+  EXPECT_TRUE(done) << done.error().message;
+  EXPECT_EQ(numbers(sink_.frames()), (std::vector<std::uint64_t>{1, 2, 4, 7, 8}));
+  const ServerStatus s = pipeline->status();
+  EXPECT_EQ(s.frames_captured, 6U);
+  // Three torn ones; and 4 shows the slide of 2, so a drop was also known from content.
+  EXPECT_EQ(s.drops_capture, 4U);
+  EXPECT_EQ(s.message, "");
+}
+
+TEST_F(PipelineTest, AnErrorBeforeTheEndIsTheRuns) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n == 4) return Error{"the camera was unplugged"};
+    if (n > 4) return ScriptedSource::end();
+    return std::optional(frames_(n));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  const Status done = pipeline->run();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message, "the camera was unplugged");
+  EXPECT_EQ(numbers(sink_.frames()), range(1, 4));  // what was captured before still went out
+  EXPECT_EQ(sink_.statuses().back().state, StreamState::kEnded);
+  EXPECT_EQ(sink_.statuses().back().message, "the camera was unplugged");
+}
+
+TEST_F(PipelineTest, ASourceOfErrorsIsGivenUp) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    return Error{"no signal " + std::to_string(n)};
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  const Status done = pipeline->run();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message, "no signal 29");
+  EXPECT_EQ(source.calls, 30);
+  EXPECT_EQ(pipeline->status().drops_capture, 30U);
+}
+
+TEST_F(PipelineTest, StalledIsSaidWhileErrorsLast) {
+  Gate stalled;
+  sink_.on_status = [&](const ServerStatus& s) -> Status {
+    if (s.state == StreamState::kStalled && s.message == "no signal") stalled.open();
+    return {};
+  };
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n == 2) return Error{"no signal"};
+    if (n == 3) {
+      EXPECT_TRUE(stalled.wait());
+    }
+    if (n > 4) return ScriptedSource::end();
+    return std::optional(frames_(n));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  EXPECT_TRUE(pipeline->run());
+  EXPECT_EQ(sink_.statuses().back().message, "");
+}
+
+TEST_F(PipelineTest, AFrameOfAnotherSizeEndsTheRun) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    CapturedFrame frame = frames_(n);
+    if (n == 5) frame.picture = Image8(8, 8, 3);
+    return std::optional(std::move(frame));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  const Status done = pipeline->run();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message, "frame 5 is 8x8 but rig.yaml says 160x120");
+}
+
+TEST_F(PipelineTest, PatternsThatDoNotFitAreRefusedAtOnce) {
+  StripedScene scene = scene_;
+  scene.pattern = *make_pattern(3, 3, 0, 16);
+  ScriptedSource source(scene, count_to(frames_, 1));
+  EXPECT_FALSE(Pipeline::create(source, {&sink_}, {}));
+}
+
+TEST_F(PipelineTest, EndsAfterAsManyFramesAsAsked) {
+  PipelineOptions options = fast_and_lossless();
+  options.frames = 5;
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n == 2) return Error{"torn"};  // is none of the five
+    return std::optional(frames_(n));
+  });
+  const auto pipeline = make(source, {&sink_}, options);
+  EXPECT_TRUE(pipeline->run());
+  EXPECT_EQ(source.calls, 6);
+  EXPECT_EQ(pipeline->status().frames_captured, 5U);
+  EXPECT_EQ(sink_.frames().back().number, 5U);
+}
+
+TEST_F(PipelineTest, StatusGoesOutWhileNothingComes) {
+  std::atomic<int> statuses{0};
+  sink_.on_status = [&](const ServerStatus&) -> Status {
+    ++statuses;
+    return {};
+  };
+  ScriptedSource source(scene_, [&](ScriptedSource& self, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 3) return self.block();
+    return std::optional(frames_(n));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  Running running(*pipeline);
+  ASSERT_TRUE(eventually([&] { return source.blocked.load(); }));
+  const int before = statuses;
+  EXPECT_TRUE(eventually([&] { return statuses >= before + 2; }));  // one a second
+  pipeline->stop();
+  ASSERT_TRUE(running.ended());
+  EXPECT_TRUE(running.result());
+  EXPECT_EQ(sink_.statuses().back().frames_published, 2U);
+}
+
+TEST_F(PipelineTest, PacedPlaybackKeepsTheTimeStamps) {
+  ScriptedSource source(scene_, count_to(frames_, 12));
+  PipelineOptions options;
+  options.lossless = true;
+  const auto pipeline = make(source, {&sink_}, options);
+  const std::int64_t begin = utc_now_ns();
+  ASSERT_TRUE(pipeline->run());
+  const std::int64_t end = utc_now_ns();
+  const auto got = sink_.frames();
+  ASSERT_EQ(numbers(got), range(1, 12));
+  EXPECT_GE(got.front().capture_time_ns, begin);
+  EXPECT_LE(got.back().publish_time_ns, end);
+  EXPECT_GE(end - begin, 11 * 33'000'000);
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    EXPECT_GE(got[i].publish_time_ns, got[i].capture_time_ns);
+    const auto decoded = read_frame_header(*got[i].data);
+    ASSERT_TRUE(decoded);
+    EXPECT_EQ(decoded->time_ns, frames_(got[i].number).time_ns);  // the take's own time stays in the frame
+    if (i == 0) continue;
+    const std::int64_t between = frames_(got[i].number).time_ns - frames_(got[i - 1].number).time_ns;
+    // Equal but where this machine was so late that the clock was set back.
+    EXPECT_GE(got[i].capture_time_ns - got[i - 1].capture_time_ns, between);
+  }
+}
+
+TEST_F(PipelineTest, ASlowSourceIsNotPlayedInItsOwnPast) {
+  // A frame a millisecond by its stamps, one in 40 ms in truth: latency is from when a frame came.
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 25) return ScriptedSource::end();
+    std::this_thread::sleep_for(40ms);
+    CapturedFrame frame = frames_(n);
+    frame.time_ns = static_cast<std::int64_t>(n) * 1'000'000;
+    return std::optional(std::move(frame));
+  });
+  const auto pipeline = make(source, {&sink_}, {});
+  ASSERT_TRUE(pipeline->run());
+  const auto got = sink_.frames();
+  ASSERT_FALSE(got.empty());
+  // Without setting the clock back the last one would be 24 x 39 ms behind.
+  std::vector<std::int64_t> latency;
+  for (const auto& f : got) latency.push_back(f.publish_time_ns - f.capture_time_ns);
+  EXPECT_LT(
+      *std::min_element(latency.end() - std::min<std::ptrdiff_t>(5, std::ssize(latency)), latency.end()),
+      600'000'000);
+}
+
+TEST_F(PipelineTest, ALiveSourcesTimesAreItsOwn) {
+  const std::int64_t start = utc_now_ns() - 5 * kNanosecondsPerSecond;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        if (n >= 5) return ScriptedSource::end();
+        CapturedFrame frame = frames_(n);
+        frame.time_ns += start;
+        return std::optional(std::move(frame));
+      },
+      true);
+  PipelineOptions options;
+  options.lossless = true;
+  const auto pipeline = make(source, {&sink_}, options);
+  ASSERT_TRUE(pipeline->run());
+  const auto got = sink_.frames();
+  ASSERT_EQ(got.size(), 4U);
+  for (const auto& f : got) EXPECT_EQ(f.capture_time_ns, start + frames_(f.number).time_ns);
+  EXPECT_GT(pipeline->status().latency_ms, 4000);
+}
+
+TEST_F(PipelineTest, ADropInTheTakeIsCountedFromContent) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 8) return ScriptedSource::end();
+    return std::optional(frames_(n < 4 ? n : n + 1));  // 4 is missing
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  ASSERT_TRUE(pipeline->run());
+  EXPECT_EQ(pipeline->status().drops_capture, 1U);
+  EXPECT_EQ(numbers(sink_.frames()), (std::vector<std::uint64_t>{1, 2, 3, 5, 6, 7, 8}));
+}
+
+}  // namespace
+}  // namespace relievo

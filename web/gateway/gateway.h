@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// HTTP and WebSocket server of the viewer: the page itself, /healthz, /metrics, /api/streams and /ws/STREAM
+// (protocol: docs/WEB.md). Fed by a server's pipeline or by a DDS subscriber; knows neither.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "base/result.h"
+#include "base/stream.h"
+
+namespace relievo {
+
+struct GatewayOptions {
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 8080;  // 0: any free one, see Gateway::port()
+  int max_clients = 64;       // WebSocket clients; more are refused with 503
+  std::string empty_hint{};   // what the viewer says while there are no streams
+};
+
+/// Runs on a thread of its own from start() to destruction. Every function may be called from any thread and
+/// returns without waiting for a client: each client has a credit and a latest-frame slot, and frames it has
+/// no credit for are dropped there and counted.
+class Gateway {
+ public:
+  /// Fails where the address cannot be had (port in use), saying which and what to do.
+  static Result<std::unique_ptr<Gateway>> start(const GatewayOptions& options);
+  virtual ~Gateway() = default;  // closes every client with 1001 and joins
+
+  virtual std::uint16_t port() const = 0;
+
+  /// A new stream, or new information on a known one. What is published of a stream before is ignored.
+  virtual void announce(const StreamInfo& info) = 0;
+  virtual void publish(const std::string& stream, const FrameMessage& frame) = 0;
+  virtual void publish(const ServerStatus& status) = 0;
+  /// The stream is gone: clients are told and stay connected, since it may come back.
+  virtual void withdraw(const std::string& stream) = 0;
+};
+
+}  // namespace relievo

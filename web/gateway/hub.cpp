@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "web/gateway/hub.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "web/gateway/protocol.h"
+
+namespace relievo {
+
+struct Hub::Watcher {
+  std::string stream;
+  std::function<void()> wake;
+  bool woken = false;                  // since it last found nothing
+  std::optional<FrameMessage> latest;  // the slot
+  std::uint64_t drops = 0;
+  std::uint64_t seen_info = 0;  // versions it has been sent; 0: none
+  std::uint64_t seen_status = 0;
+  bool told_live = false;
+  bool told_waiting = false;
+};
+
+struct Hub::Entry {
+  StreamSnapshot facts;
+  bool live = false;  // announced and not withdrawn
+  std::shared_ptr<const std::string> info_text, status_text;
+  std::uint64_t info_version = 0, status_version = 0;
+  std::optional<FrameMessage> latest;  // so that a late joiner sees a stalled stream's last picture
+  std::vector<std::shared_ptr<Watcher>> watchers;
+};
+
+Hub::Hub(std::string empty_hint) : empty_hint_(std::move(empty_hint)) {}
+Hub::~Hub() = default;
+
+void Hub::wake_all(Entry& entry) {
+  for (const auto& watcher : entry.watchers) {
+    if (std::exchange(watcher->woken, true)) continue;
+    watcher->wake();
+  }
+}
+
+void Hub::erase_if_unused(const std::string& stream) {
+  const auto it = streams_.find(stream);
+  if (it != streams_.end() && !it->second->live && it->second->watchers.empty()) streams_.erase(it);
+}
+
+void Hub::announce(const StreamInfo& info) {
+  auto text = std::make_shared<const std::string>(info_message(info));
+  const std::lock_guard lock(mutex_);
+  auto& entry = streams_[info.stream];
+  if (!entry) entry = std::make_unique<Entry>();
+  if (entry->live && *entry->info_text == *text) return;  // DDS repeats it to every late joiner
+  entry->facts.info = info;
+  entry->info_text = std::move(text);
+  entry->info_version = next_version_++;
+  entry->live = true;
+  wake_all(*entry);
+}
+
+void Hub::publish(const std::string& stream, const FrameMessage& frame) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it == streams_.end() || !it->second->live || !frame.data) return;
+  Entry& entry = *it->second;
+  ++entry.facts.published;
+  entry.latest = frame;
+  for (const auto& watcher : entry.watchers) {
+    if (watcher->latest) {
+      ++watcher->drops;
+      ++entry.facts.client_drops;
+    }
+    watcher->latest = frame;
+  }
+  wake_all(entry);
+}
+
+void Hub::publish(const ServerStatus& status) {
+  auto text = std::make_shared<const std::string>(status_message(status));
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(status.stream);
+  if (it == streams_.end() || !it->second->live) return;
+  it->second->facts.status = status;
+  it->second->status_text = std::move(text);
+  it->second->status_version = next_version_++;
+  wake_all(*it->second);
+}
+
+void Hub::withdraw(const std::string& stream) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it == streams_.end() || !it->second->live) return;
+  Entry& entry = *it->second;
+  entry.live = false;
+  entry.latest.reset();
+  entry.facts.status.reset();
+  entry.status_version = 0;
+  for (const auto& watcher : entry.watchers) {
+    if (!watcher->latest) continue;
+    watcher->latest.reset();
+    ++watcher->drops;
+    ++entry.facts.client_drops;
+  }
+  wake_all(entry);
+  erase_if_unused(stream);
+}
+
+std::shared_ptr<Hub::Watcher> Hub::watch(const std::string& stream, std::function<void()> wake) {
+  auto watcher = std::make_shared<Watcher>();
+  watcher->stream = stream;
+  watcher->wake = std::move(wake);
+  const std::lock_guard lock(mutex_);
+  auto& entry = streams_[stream];
+  if (!entry) entry = std::make_unique<Entry>();
+  watcher->latest = entry->latest;
+  entry->watchers.push_back(watcher);
+  return watcher;
+}
+
+void Hub::unwatch(const std::shared_ptr<Watcher>& watcher) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(watcher->stream);
+  if (it == streams_.end()) return;
+  std::erase(it->second->watchers, watcher);
+  erase_if_unused(watcher->stream);
+}
+
+std::optional<Hub::Delivery> Hub::take(Watcher& watcher, bool want_frame) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(watcher.stream);
+  if (it == streams_.end()) return std::nullopt;
+  Entry& entry = *it->second;
+  if (!entry.live) {
+    if (std::exchange(watcher.told_live, false)) {
+      watcher.told_waiting = true;
+      return Delivery{.text = std::make_shared<const std::string>(gone_message())};
+    }
+    if (!std::exchange(watcher.told_waiting, true)) {
+      return Delivery{.text = std::make_shared<const std::string>(waiting_message(empty_hint_))};
+    }
+    watcher.woken = false;
+    return std::nullopt;
+  }
+  if (std::exchange(watcher.seen_info, entry.info_version) != entry.info_version) {
+    watcher.told_live = true;
+    watcher.told_waiting = false;
+    return Delivery{.text = entry.info_text};
+  }
+  if (entry.status_version != 0 &&
+      std::exchange(watcher.seen_status, entry.status_version) != entry.status_version) {
+    return Delivery{.text = entry.status_text};
+  }
+  if (want_frame && watcher.latest) {
+    return Delivery{.frame = std::exchange(watcher.latest, std::nullopt), .drops = watcher.drops};
+  }
+  watcher.woken = false;
+  return std::nullopt;
+}
+
+void Hub::count_sent(const Watcher& watcher, std::size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(watcher.stream);
+  if (it == streams_.end()) return;
+  ++it->second->facts.sent;
+  it->second->facts.sent_bytes += bytes;
+}
+
+std::vector<StreamSnapshot> Hub::snapshot() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<StreamSnapshot> out;
+  for (const auto& [name, entry] : streams_) {
+    if (!entry->live) continue;
+    out.push_back(entry->facts);
+    out.back().watchers = entry->watchers.size();
+  }
+  return out;
+}
+
+}  // namespace relievo

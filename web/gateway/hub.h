@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// The gateway's streams and who watches them. Level-triggered: a watcher is woken at most once until it
+// looks, and then finds the latest of everything, so nothing queues up behind a slow client.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/stream.h"
+
+namespace relievo {
+
+/// What one stream has been doing, for /api/streams and /metrics.
+struct StreamSnapshot {
+  StreamInfo info;
+  std::optional<ServerStatus> status;
+  std::uint64_t published = 0;     // frames handed to the gateway
+  std::uint64_t sent = 0;          // frames written to clients, all of them together
+  std::uint64_t sent_bytes = 0;    // of those frames
+  std::uint64_t client_drops = 0;  // frames replaced in a client's slot before it had credit
+  std::size_t watchers = 0;
+};
+
+/// Every function may be called from any thread and returns without waiting for a client.
+class Hub {
+ public:
+  struct Watcher;
+
+  /// One thing for a watcher to send.
+  struct Delivery {
+    std::shared_ptr<const std::string> text{};  // JSON, or
+    std::optional<FrameMessage> frame{};        // a frame
+    std::uint64_t drops = 0;                    // with a frame: this watcher's so far
+  };
+
+  explicit Hub(std::string empty_hint);
+  Hub(const Hub&) = delete;
+  Hub& operator=(const Hub&) = delete;
+  ~Hub();
+
+  void announce(const StreamInfo& info);
+  /// Frames and status of a stream that is not announced are ignored.
+  void publish(const std::string& stream, const FrameMessage& frame);
+  void publish(const ServerStatus& status);
+  void withdraw(const std::string& stream);
+
+  /// `wake` is called, from any thread and with the hub locked, when take() has something; it must not call
+  /// back.
+  std::shared_ptr<Watcher> watch(const std::string& stream, std::function<void()> wake);
+  void unwatch(const std::shared_ptr<Watcher>& watcher);
+
+  /// The next thing to send, `want_frame` saying whether a frame may be among it; nothing where there is
+  /// none, and then the watcher will be woken.
+  std::optional<Delivery> take(Watcher& watcher, bool want_frame);
+  void count_sent(const Watcher& watcher, std::size_t bytes);
+
+  std::vector<StreamSnapshot> snapshot() const;  // announced streams, by name
+  const std::string& empty_hint() const { return empty_hint_; }
+
+ private:
+  struct Entry;
+  void wake_all(Entry& entry);
+  void erase_if_unused(const std::string& stream);
+
+  const std::string empty_hint_;
+  mutable std::mutex mutex_;
+  std::map<std::string, std::unique_ptr<Entry>> streams_;
+  std::uint64_t next_version_ = 1;
+};
+
+}  // namespace relievo

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each HTTP request is answered, sockets apart. Pure but for the hub's snapshot.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "web/gateway/hub.h"
+#include "web/gateway/protocol.h"
+
+namespace relievo {
+
+struct HttpRequest {
+  std::string_view method;  // "GET"
+  std::string_view target;  // "/api/streams?x"
+  std::string_view host;    // header values, empty where absent
+  std::string_view origin;
+  std::string_view if_none_match;
+  bool upgrade = false;  // asks for a WebSocket
+};
+
+struct HttpReply {
+  int status = 200;
+  std::string content_type = "text/plain; charset=utf-8";
+  std::string body;
+  std::string_view fixed_body;  // instead of `body`: bytes that live as long as the program
+  std::vector<std::pair<std::string, std::string>> headers;  // beside the ones every reply carries
+  std::string websocket_stream;  // not empty: no reply, upgrade and serve this stream
+
+  std::string_view bytes() const { return fixed_body.empty() ? std::string_view(body) : fixed_body; }
+};
+
+struct RouteContext {
+  const Hub& hub;
+  GatewayCounts counts;
+  int max_clients = 0;
+  bool loopback = true;  // bound to a loopback address only
+};
+
+HttpReply answer(const HttpRequest& request, const RouteContext& context);
+
+/// Headers of every reply (FACTS: a policy that lets the page load only from here, wasm included).
+const std::vector<std::pair<std::string, std::string>>& security_headers();
+
+/// A page may open a WebSocket only where it came from; a program that sends no Origin is not a page.
+bool same_origin(std::string_view origin, std::string_view host);
+
+/// True where `host` (a Host header) cannot be a foreign name that was pointed at this machine's loopback
+/// address (DNS rebinding): an IP address, localhost, or absent.
+bool loopback_host(std::string_view host);
+
+}  // namespace relievo

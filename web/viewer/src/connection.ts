@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// One WebSocket to one stream, kept up: credit, clock exchange, silence as loss, retries with backoff.
+import { parseFramePrefix, parseServerMessage, type FramePrefix, type ServerMessage } from './protocol';
+import { backoffS } from './state';
+
+const kCredit = 2; // frames under way: one being decoded while the next travels (FACTS: 1 or 2 bound the latency)
+const kClockEveryMs = 4000;
+const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
+
+export interface ConnectionEvents {
+  open(): void;
+  lost(): void;
+  message(message: ServerMessage): void;
+  frame(prefix: FramePrefix, message: ArrayBuffer): void;
+  clock(t0: number, serverMs: number, t1: number): void;
+  /** Something the server sent makes no sense; the frame's credit is given back. */
+  nonsense(message: string): void;
+}
+
+export const utcNow = (): number => performance.timeOrigin + performance.now();
+
+export class Connection {
+  private socket: WebSocket | null = null;
+  private attempt = 0;
+  private retryAt: number | null = null; // performance.now()
+  private lastHeard = 0;
+  private lastClock = -Infinity;
+  private stopped = false;
+  private readonly timer: number;
+
+  constructor(
+    private readonly stream: string,
+    private readonly events: ConnectionEvents,
+  ) {
+    this.connect();
+    this.timer = window.setInterval(() => this.tick(), 250);
+  }
+
+  get connected(): boolean {
+    return this.socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Whole seconds until the next attempt; null while connected or connecting for the first time. */
+  get retryInS(): number | null {
+    if (this.retryAt === null) return this.attempt > 0 && !this.connected ? 0 : null;
+    return Math.max(0, Math.ceil((this.retryAt - performance.now()) / 1000));
+  }
+
+  /** This many frames more may come. */
+  credit(n = 1): void {
+    this.send({ type: 'credit', n });
+  }
+
+  retryNow(): void {
+    if (this.retryAt !== null) this.connect();
+  }
+
+  stop(): void {
+    this.stopped = true;
+    window.clearInterval(this.timer);
+    this.detach(1000);
+  }
+
+  private connect(): void {
+    this.detach();
+    this.retryAt = null;
+    const url = new URL(`ws/${encodeURIComponent(this.stream)}`, document.baseURI);
+    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+    url.search = url.hash = '';
+    const socket = new WebSocket(url);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    this.lastHeard = performance.now();
+    socket.onopen = () => {
+      this.attempt = 0;
+      this.lastHeard = performance.now();
+      this.lastClock = -Infinity;
+      this.events.open();
+      this.credit(kCredit);
+      this.tick();
+    };
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
+    socket.onclose = () => this.onLost();
+  }
+
+  private receive(data: string | ArrayBuffer): void {
+    this.lastHeard = performance.now();
+    try {
+      if (typeof data !== 'string') {
+        this.events.frame(parseFramePrefix(data), data);
+        return;
+      }
+      const message = parseServerMessage(data);
+      if (message?.type === 'time') this.events.clock(message.t0, message.server_ms, utcNow());
+      else if (message !== null) this.events.message(message);
+    } catch (error) {
+      if (typeof data !== 'string') this.credit();
+      this.events.nonsense(error instanceof Error ? error.message : String(error));
+    }
+  }
+
+  private onLost(): void {
+    this.detach();
+    if (this.stopped) return;
+    this.retryAt = performance.now() + backoffS(this.attempt++) * 1000;
+    this.events.lost();
+  }
+
+  private tick(): void {
+    const now = performance.now();
+    if (this.retryAt !== null) {
+      if (now >= this.retryAt) this.connect();
+      return;
+    }
+    if (now - this.lastHeard > kSilenceMs) return this.onLost();
+    if (this.connected && now - this.lastClock > kClockEveryMs) {
+      this.lastClock = now;
+      this.send({ type: 'time', t0: utcNow() });
+    }
+  }
+
+  private send(message: object): void {
+    if (this.connected) this.socket?.send(JSON.stringify(message));
+  }
+
+  private detach(code?: number): void {
+    const socket = this.socket;
+    this.socket = null;
+    if (socket === null) return;
+    socket.onopen = socket.onmessage = socket.onclose = null;
+    socket.close(code);
+  }
+}

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page's side of the decoding worker. A decoder that hangs is replaced.
+import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
+
+const kPatienceMs = 10_000;
+
+export interface DecoderEvents {
+  decoded(frame: DecodedFrame): void;
+  failed(id: number, message: string): void;
+  /** No frame will ever be decoded. */
+  unusable(message: string): void;
+}
+
+export class Decoder {
+  want = { normals: false, edges: false };
+  private worker: Worker;
+  private nextId = 1;
+  private readonly pending = new Map<number, number>(); // id -> when it was handed over
+  private ready = false;
+
+  constructor(private readonly events: DecoderEvents) {
+    this.worker = this.start();
+    window.setInterval(() => this.watch(), 1000);
+  }
+
+  /** Takes the message's bytes; the answer carries the id returned. */
+  decode(bytes: ArrayBuffer, offset: number): number {
+    const id = this.nextId++;
+    this.pending.set(id, performance.now());
+    const request: DecodeRequest = { type: 'decode', id, bytes, offset, want: { ...this.want } };
+    this.worker.postMessage(request, [bytes]);
+    return id;
+  }
+
+  private start(): Worker {
+    const worker = new Worker(new URL('./decoder.worker.ts', import.meta.url), { type: 'module' });
+    this.ready = false;
+    worker.onmessage = (event: MessageEvent<DecodeReply>) => {
+      const reply = event.data;
+      if (reply.type === 'ready') this.ready = true;
+      if (reply.type === 'unusable') this.events.unusable(reply.message);
+      if (reply.type === 'frame' && this.pending.delete(reply.id)) this.events.decoded(reply);
+      if (reply.type === 'failed' && this.pending.delete(reply.id)) this.events.failed(reply.id, reply.message);
+    };
+    worker.onerror = (event) => {
+      event.preventDefault();
+      if (!this.ready) this.events.unusable(event.message || 'the decoder cannot be loaded');
+    };
+    return worker;
+  }
+
+  private watch(): void {
+    const oldest = Math.min(...this.pending.values());
+    if (!this.ready || performance.now() - oldest < kPatienceMs) return;
+    this.worker.terminate();
+    const lost = [...this.pending.keys()];
+    this.pending.clear();
+    this.worker = this.start();
+    for (const id of lost) this.events.failed(id, 'decoding took longer than 10 s');
+  }
+}

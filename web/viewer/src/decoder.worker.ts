@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Decodes frames off the main thread, one after the other.
+import wasmUrl from 'draco3d/draco_decoder.wasm?url';
+import { DracoDecoder } from './draco';
+import { kTextureJpeg, parseFrame, type Frame } from './frame';
+import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
+import { robustExtent, triangleEdges, vertexNormals } from './surface';
+
+const post = (reply: DecodeReply, transfer: Transferable[] = []): void => {
+  self.postMessage(reply, { transfer });
+};
+
+const decoder = load();
+let queue: Promise<void> = decoder.then(
+  () => post({ type: 'ready' }),
+  (error: unknown) => post({ type: 'unusable', message: String(error) }),
+);
+
+self.onmessage = (event: MessageEvent<DecodeRequest>) => {
+  const request = event.data;
+  queue = queue.then(async () => {
+    try {
+      const frame = await decode(request);
+      const arrays = [frame.positions, frame.coordinates, frame.normals, frame.triangles, frame.edges];
+      const transfer: Transferable[] = arrays.flatMap((a) => (a === null ? [] : [a.buffer]));
+      if (frame.texture !== null) transfer.push(frame.texture);
+      post(frame, transfer);
+    } catch (error) {
+      post({ type: 'failed', id: request.id, message: error instanceof Error ? error.message : String(error) });
+    }
+  });
+};
+
+async function load(): Promise<DracoDecoder> {
+  const response = await fetch(wasmUrl);
+  if (!response.ok) throw new Error(`the geometry decoder cannot be loaded (HTTP ${response.status})`);
+  return DracoDecoder.create(await response.arrayBuffer());
+}
+
+async function decode(request: DecodeRequest): Promise<DecodedFrame> {
+  const draco = await decoder;
+  const start = performance.now();
+  const frame = parseFrame(new Uint8Array(request.bytes, request.offset));
+  const picture = decodeTexture(frame); // the browser decodes it meanwhile, on a thread of its own
+  picture.catch(() => undefined); // awaited below, unless the geometry fails first
+  const geometry = draco.decode(frame);
+  const { positions } = geometry;
+  const normals =
+    geometry.normals ?? (request.want.normals ? vertexNormals(positions, geometry.triangles) : null);
+  return {
+    type: 'frame',
+    id: request.id,
+    number: Number(frame.header.number),
+    positions,
+    coordinates: geometry.coordinates,
+    normals,
+    triangles: geometry.triangles,
+    edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
+    texture: await picture,
+    extent: robustExtent(positions),
+    decodeMs: performance.now() - start,
+  };
+}
+
+async function decodeTexture(frame: Frame): Promise<ImageBitmap | null> {
+  if (frame.texture.length === 0) return null;
+  if (frame.textureCodec !== kTextureJpeg) throw new Error(`texture codec ${frame.textureCodec} is not known here`);
+  // Copied into the Blob by the browser; nothing here keeps the bytes.
+  const blob = new Blob([frame.texture as Uint8Array<ArrayBuffer>], { type: 'image/jpeg' });
+  const bitmap = await createImageBitmap(blob, { colorSpaceConversion: 'none', premultiplyAlpha: 'none' });
+  const { textureWidth, textureHeight } = frame.header;
+  if (bitmap.width !== textureWidth || bitmap.height !== textureHeight) {
+    bitmap.close();
+    throw new Error('the texture is not of the size that the frame declares');
+  }
+  return bitmap;
+}

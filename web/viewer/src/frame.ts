@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// One frame of 3D video as bytes: codec/FORMAT.md. Checks everything it says before anything is decoded.
+
+export interface FrameHeader {
+  version: number;
+  number: bigint;
+  timeNs: bigint;
+  volumeMin: [number, number, number];
+  volumeSize: number;
+  vertices: number;
+  triangles: number;
+  textureWidth: number;
+  textureHeight: number;
+}
+
+export interface Frame {
+  header: FrameHeader;
+  geometryCodec: number;
+  geometry: Uint8Array; // views into the bytes given
+  textureCodec: number; // 0: none
+  texture: Uint8Array;
+}
+
+export const kGeometryDraco = 1;
+export const kTextureJpeg = 1;
+
+const kFixedBytes = 64;
+const kEntryBytes = 8;
+const kMaxSections = 16;
+const kLimits = { vertices: 4_000_000, triangles: 8_000_000, pixels: 64_000_000 };
+
+/** Throws an Error that says what is wrong; any input. */
+export function parseFrame(bytes: Uint8Array): Frame {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const isFrame =
+    bytes.length >= 4 && bytes[0] === 0x52 && bytes[1] === 0x4c && bytes[2] === 0x56 && bytes[3] === 0x46;
+  if (!isFrame) throw new Error('not a Relievo frame: it does not start with RLVF');
+  if (bytes.length < kFixedBytes) throw new Error(`frame is cut short: ${bytes.length} bytes`);
+  const version = view.getUint8(4);
+  if (version !== 1) throw new Error(`frame is of format version ${version}, this viewer knows version 1`);
+  const flags = view.getUint8(5);
+  if (flags !== 1) throw new Error(`frame has flags that this viewer does not know (${flags})`);
+  const headerBytes = view.getUint16(6, true);
+  if (headerBytes > bytes.length) throw new Error(`frame is cut short: ${bytes.length} bytes`);
+  const header: FrameHeader = {
+    version,
+    number: view.getBigUint64(8, true),
+    timeNs: view.getBigInt64(16, true),
+    volumeMin: [view.getFloat32(24, true), view.getFloat32(28, true), view.getFloat32(32, true)],
+    volumeSize: view.getFloat32(36, true),
+    vertices: view.getUint32(40, true),
+    triangles: view.getUint32(44, true),
+    textureWidth: view.getUint32(48, true),
+    textureHeight: view.getUint32(52, true),
+  };
+  const volumeOk = [...header.volumeMin, header.volumeSize].every(Number.isFinite) && header.volumeSize >= 0;
+  if (!volumeOk) throw new Error('frame has a volume that is not finite');
+  const sections = readSections(bytes, view, headerBytes);
+  checkCounts(header, sections.geometry.length, sections.texture.length);
+  return { header, ...sections };
+}
+
+function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): Omit<Frame, 'header'> {
+  const count = view.getUint8(56);
+  const entryBytes = view.getUint8(57);
+  const tableAt = view.getUint16(58, true);
+  const broken =
+    count > kMaxSections ||
+    entryBytes < kEntryBytes ||
+    tableAt < kFixedBytes ||
+    tableAt + count * entryBytes > headerBytes;
+  if (broken) throw new Error('frame has a broken table of sections');
+  const nothing = bytes.subarray(0, 0);
+  let geometry: Uint8Array | null = null;
+  let texture: Uint8Array | null = null;
+  let geometryCodec = 0;
+  let textureCodec = 0;
+  let at = headerBytes;
+  for (let i = 0; i < count; ++i) {
+    const entry = tableAt + i * entryBytes;
+    const kind = view.getUint8(entry);
+    const codec = view.getUint8(entry + 1);
+    const required = (view.getUint16(entry + 2, true) & 1) !== 0;
+    const size = view.getUint32(entry + 4, true);
+    if (size > bytes.length - at) throw new Error('frame is cut short: a section ends behind its end');
+    const section = bytes.subarray(at, at + size);
+    at += size;
+    if (kind === 1 && geometry === null) {
+      geometry = section;
+      geometryCodec = codec;
+    } else if (kind === 2 && texture === null) {
+      texture = section;
+      textureCodec = codec;
+      if (codec === 0) throw new Error('frame has a texture section without a codec');
+    } else if (kind === 1 || kind === 2) {
+      throw new Error(`frame has two sections of kind ${kind}`);
+    } else if (required) {
+      throw new Error(`frame needs a section of kind ${kind} that this viewer does not know`);
+    }
+  }
+  if (at !== bytes.length) throw new Error(`frame has ${bytes.length - at} bytes behind its end`);
+  if (geometry === null) throw new Error('frame has no geometry section');
+  return { geometry, geometryCodec, texture: texture ?? nothing, textureCodec };
+}
+
+/** FORMAT.md, "Sizes": what a frame may ask for is bounded by the bytes it brings. */
+function checkCounts(header: FrameHeader, geometryBytes: number, textureBytes: number): void {
+  const { vertices, triangles } = header;
+  const pixels = header.textureWidth * header.textureHeight;
+  if (vertices > kLimits.vertices) throw new Error(`frame has ${vertices} vertices, more than the limit`);
+  if (triangles > kLimits.triangles) throw new Error(`frame has ${triangles} triangles, more than the limit`);
+  if (pixels > kLimits.pixels) throw new Error(`frame has ${pixels} texture pixels, more than the limit`);
+  const items = triangles > 0 ? triangles : vertices;
+  if ((vertices === 0) !== (geometryBytes === 0) || vertices > 3 * items || items > 8 * geometryBytes) {
+    throw new Error(`frame declares ${vertices} vertices and ${triangles} triangles in ${geometryBytes} bytes`);
+  }
+  if ((pixels === 0) !== (textureBytes === 0) || pixels > 256 * textureBytes) {
+    throw new Error(
+      `frame declares a texture of ${header.textureWidth}x${header.textureHeight} in ${textureBytes} bytes`,
+    );
+  }
+}

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What page and worker say to each other. Arrays and pictures are transferred, never copied.
+import type { Extent } from './surface';
+
+export interface DecodeRequest {
+  type: 'decode';
+  id: number;
+  bytes: ArrayBuffer;
+  offset: number; // of the frame in `bytes`
+  want: { normals: boolean; edges: boolean };
+}
+
+export interface DecodedFrame {
+  type: 'frame';
+  id: number;
+  number: number; // of the camera frame
+  positions: Float32Array<ArrayBuffer>;
+  coordinates: Float32Array<ArrayBuffer> | null;
+  normals: Float32Array<ArrayBuffer> | null;
+  triangles: Uint32Array<ArrayBuffer>;
+  edges: Uint32Array<ArrayBuffer> | null;
+  texture: ImageBitmap | null;
+  extent: Extent | null;
+  decodeMs: number;
+}
+
+export type DecodeReply =
+  | { type: 'ready' }
+  | { type: 'unusable'; message: string } // the decoder cannot be loaded at all
+  | { type: 'failed'; id: number; message: string }
+  | DecodedFrame;

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gathers what the statistics line says.
+import type { DecodedFrame } from './messages';
+import type { FramePrefix, StreamStatus } from './protocol';
+import { ClockOffset, DropCounter, Rate, RollingMedian } from './statistics';
+import type { Statistic } from './ui';
+
+// Older than this, a frame is from a recording and its age is no latency.
+const kLiveMs = 60_000;
+
+export class Meter {
+  readonly clock = new ClockOffset();
+  skipped = 0; // decoded here, replaced before they were drawn
+  private readonly drops = new DropCounter();
+  private readonly frames = new Rate();
+  private readonly bytes = new Rate();
+  private readonly latency = new RollingMedian();
+  private readonly decode = new RollingMedian();
+  private received = 0;
+  private shownFrames = 0;
+  private errors = 0;
+  private lastError = '';
+  private number = 0;
+  private sequence = 0;
+  private vertices = 0;
+  private triangles = 0;
+
+  /** A new connection or stream. */
+  restart(): void {
+    this.drops.restart();
+    this.frames.clear();
+    this.bytes.clear();
+    this.latency.clear();
+  }
+
+  /** The page was hidden or shown again: frames it did not ask for meanwhile are no losses. */
+  pause(): void {
+    this.restart();
+  }
+
+  arrived(prefix: FramePrefix, bytes: number, now: number): void {
+    ++this.received;
+    this.drops.add(prefix.sequence, prefix.drops);
+    this.bytes.add(now, bytes);
+  }
+
+  shown(frame: DecodedFrame, prefix: FramePrefix, utcMs: number, now: number): void {
+    ++this.shownFrames;
+    this.number = frame.number;
+    this.sequence = prefix.sequence;
+    this.vertices = frame.positions.length / 3;
+    this.triangles = frame.triangles.length / 3;
+    this.decode.add(frame.decodeMs);
+    this.frames.add(now);
+    const offset = this.clock.get();
+    if (offset === null) return;
+    const age = utcMs + offset - prefix.captureMs;
+    if (age > -1000 && age < kLiveMs) this.latency.add(age);
+    else this.latency.clear();
+  }
+
+  failed(message: string): void {
+    ++this.errors;
+    this.lastError = message;
+  }
+
+  report(): Record<string, unknown> {
+    return {
+      frame: this.number,
+      sequence: this.sequence,
+      received: this.received,
+      shown: this.shownFrames,
+      errors: this.errors,
+      lastError: this.lastError,
+      drops: { link: this.drops.link, gaps: this.drops.gaps, viewer: this.skipped },
+      vertices: this.vertices,
+      triangles: this.triangles,
+      latencyMs: this.latency.get(),
+      decodeMs: this.decode.get(),
+    };
+  }
+
+  statistics(now: number, status: StreamStatus | null): Statistic[] {
+    const server = status
+      ? status.drops_capture + status.drops_reconstruct + status.drops_encode + status.drops_publish
+      : 0;
+    const { link, gaps } = this.drops;
+    const total = server + link + gaps + this.skipped;
+    const places = [
+      [server, 'server'],
+      [link, 'link'],
+      [this.skipped, 'viewer'],
+      [gaps, 'gaps'],
+    ].flatMap(([count, place]) => (count === 0 ? [] : [`${count} ${place}`]));
+    const latency = this.latency.get();
+    const statistics: Statistic[] = [
+      { label: 'frame', value: String(this.number), title: 'Number of the camera frame that completed this surface' },
+      {
+        label: 'rate',
+        value: `${this.frames.perSecond(now).toFixed(1)} /s`,
+        title: 'Surfaces drawn a second',
+      },
+      {
+        label: 'latency',
+        value: latency === null ? '–' : `${Math.round(latency)} ms`,
+        title:
+          latency === null
+            ? 'Not known: the frames carry no time of a live camera, or the clocks are not compared yet'
+            : 'From the start of the exposure to the drawing, clocks compared with the server',
+      },
+      {
+        label: 'decode',
+        value: `${(this.decode.get() ?? 0).toFixed(1)} ms`,
+        title: 'Median time to decode a frame in this browser',
+        minor: true,
+      },
+      {
+        label: 'vertices',
+        value: grouped(this.vertices),
+        title: `${grouped(this.triangles)} triangles`,
+        minor: true,
+      },
+      {
+        label: 'network',
+        value: bitrate(this.bytes.perSecond(now) * 8),
+        title: 'Received from the server',
+        minor: true,
+      },
+      {
+        label: 'drops',
+        value: total === 0 ? '0' : `${grouped(total)} (${places.join(', ')})`,
+        title:
+          'server: between the camera and the network. link: this page was not ready for them. ' +
+          'viewer: decoded but not drawn. gaps: lost before they reached the web server.',
+        kind: total === 0 ? 'plain' : 'warn',
+      },
+    ];
+    if (this.errors > 0) {
+      statistics.push({ label: 'errors', value: String(this.errors), title: this.lastError, kind: 'bad' });
+    }
+    return statistics;
+  }
+}
+
+function grouped(n: number): string {
+  return String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
+}
+
+function bitrate(bits: number): string {
+  return bits >= 1e6 ? `${(bits / 1e6).toFixed(1)} Mbit/s` : `${Math.round(bits / 1e3)} kbit/s`;
+}

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// The gateway's WebSocket messages (docs/WEB.md). Pure.
+
+export interface Pinhole {
+  width: number;
+  height: number;
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+}
+
+export interface StreamInfo {
+  stream: string;
+  source: string;
+  frame_rate: number;
+  scan: string;
+  stripes: number;
+  camera: Pinhole;
+}
+
+export interface StreamStatus {
+  state: 'starting' | 'running' | 'stalled' | 'ended';
+  message: string;
+  drops_capture: number;
+  drops_reconstruct: number;
+  drops_encode: number;
+  drops_publish: number;
+}
+
+export type ServerMessage =
+  | ({ type: 'info' } & StreamInfo)
+  | ({ type: 'status' } & StreamStatus)
+  | { type: 'waiting'; hint: string }
+  | { type: 'gone' }
+  | { type: 'time'; t0: number; server_ms: number };
+
+const kTypes = ['info', 'status', 'waiting', 'gone', 'time'];
+
+/** Null for a type of a later version. Throws on what is no message at all. */
+export function parseServerMessage(text: string): ServerMessage | null {
+  const message = JSON.parse(text) as { type?: unknown };
+  if (typeof message !== 'object' || message === null || typeof message.type !== 'string') {
+    throw new Error('the server sent a message without a type');
+  }
+  return kTypes.includes(message.type) ? (message as ServerMessage) : null;
+}
+
+export interface FramePrefix {
+  bytes: number; // of the prefix: where the frame starts
+  sequence: number;
+  captureMs: number; // UTC
+  publishMs: number;
+  sentMs: number;
+  drops: number; // of this client so far
+}
+
+/** Throws where the message is too short to be a frame. */
+export function parseFramePrefix(message: ArrayBuffer): FramePrefix {
+  const view = new DataView(message);
+  const bytes = message.byteLength >= 48 ? view.getUint32(0, true) : 0;
+  if (bytes < 48 || bytes > message.byteLength) throw new Error('the server sent a frame without its prefix');
+  const ms = (at: number): number => Number(view.getBigInt64(at, true) / 1000n) / 1000;
+  return {
+    bytes,
+    sequence: Number(view.getBigUint64(8, true)),
+    captureMs: ms(16),
+    publishMs: ms(24),
+    sentMs: ms(32),
+    drops: Number(view.getBigUint64(40, true)),
+  };
+}
+
+export interface ListedStream {
+  name: string;
+  source: string;
+  state: string;
+}
+
+export interface StreamList {
+  version: string;
+  hint: string;
+  streams: ListedStream[];
+}

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the worker derives from a decoded mesh: normals for shading, edges for the wireframe, and a box for the
+// first view. Pure.
+
+/**
+ * Vertex normals for shading, unit, of triangles counter-clockwise seen from outside: area-weighted, then averaged
+ * with their neighbours `rings` times. Lines of the camera are measured one by one and lie much closer than stripes, so
+ * without averaging their noise hides the relief. Positions stay as they are.
+ */
+export function vertexNormals(
+  positions: Float32Array,
+  triangles: Uint32Array,
+  rings = 3,
+): Float32Array<ArrayBuffer> {
+  let normals = faceSums(positions, triangles);
+  normalise(normals);
+  for (let ring = 0; ring < rings; ++ring) {
+    const sums = new Float32Array(normals); // each counts itself once, and each neighbour once a triangle
+    for (let t = 0; t < triangles.length; t += 3) {
+      const a = triangles[t]! * 3;
+      const b = triangles[t + 1]! * 3;
+      const c = triangles[t + 2]! * 3;
+      for (let i = 0; i < 3; ++i) {
+        const sum = normals[a + i]! + normals[b + i]! + normals[c + i]!;
+        sums[a + i] = sums[a + i]! + sum;
+        sums[b + i] = sums[b + i]! + sum;
+        sums[c + i] = sums[c + i]! + sum;
+      }
+    }
+    normalise(sums);
+    normals = sums;
+  }
+  return normals;
+}
+
+function faceSums(positions: Float32Array, triangles: Uint32Array): Float32Array<ArrayBuffer> {
+  const p = positions;
+  const normals = new Float32Array(p.length);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const a = triangles[t]! * 3;
+    const b = triangles[t + 1]! * 3;
+    const c = triangles[t + 2]! * 3;
+    const ux = p[b]! - p[a]!;
+    const uy = p[b + 1]! - p[a + 1]!;
+    const uz = p[b + 2]! - p[a + 2]!;
+    const vx = p[c]! - p[a]!;
+    const vy = p[c + 1]! - p[a + 1]!;
+    const vz = p[c + 2]! - p[a + 2]!;
+    const nx = uy * vz - uz * vy;
+    const ny = uz * vx - ux * vz;
+    const nz = ux * vy - uy * vx;
+    for (const v of [a, b, c]) {
+      normals[v] = normals[v]! + nx;
+      normals[v + 1] = normals[v + 1]! + ny;
+      normals[v + 2] = normals[v + 2]! + nz;
+    }
+  }
+  return normals;
+}
+
+function normalise(normals: Float32Array): void {
+  for (let v = 0; v < normals.length; v += 3) {
+    const length = Math.hypot(normals[v]!, normals[v + 1]!, normals[v + 2]!);
+    const scale = length > 0 ? 1 / length : 0;
+    normals[v] = normals[v]! * scale;
+    normals[v + 1] = normals[v + 1]! * scale;
+    normals[v + 2] = length > 0 ? normals[v + 2]! * scale : -1; // towards the camera
+  }
+}
+
+/** Two vertex indices an edge; an edge of two triangles comes twice, which a line drawing does not show. */
+export function triangleEdges(triangles: Uint32Array): Uint32Array<ArrayBuffer> {
+  const edges = new Uint32Array(triangles.length * 2);
+  for (let t = 0, e = 0; t < triangles.length; t += 3, e += 6) {
+    const a = triangles[t]!;
+    const b = triangles[t + 1]!;
+    const c = triangles[t + 2]!;
+    edges[e] = a;
+    edges[e + 1] = b;
+    edges[e + 2] = b;
+    edges[e + 3] = c;
+    edges[e + 4] = c;
+    edges[e + 5] = a;
+  }
+  return edges;
+}
+
+export interface Extent {
+  min: [number, number, number];
+  max: [number, number, number];
+  centre: [number, number, number]; // medians
+}
+
+/** Robust box: what lies outside 2 % on either side does not move the first view. Nothing below 50 vertices. */
+export function robustExtent(positions: Float32Array): Extent | null {
+  const vertices = positions.length / 3;
+  if (vertices < 50) return null;
+  const step = Math.max(1, Math.floor(vertices / 2000));
+  const axes = [0, 1, 2].map((axis) => {
+    const values: number[] = [];
+    for (let v = 0; v < vertices; v += step) values.push(positions[v * 3 + axis]!);
+    values.sort((x, y) => x - y);
+    const at = (fraction: number): number => values[Math.floor(fraction * (values.length - 1))]!;
+    return [at(0.02), at(0.98), at(0.5)] as const;
+  }) as [readonly [number, number, number], readonly [number, number, number], readonly [number, number, number]];
+  return {
+    min: [axes[0][0], axes[1][0], axes[2][0]],
+    max: [axes[0][1], axes[1][1], axes[2][1]],
+    centre: [axes[0][2], axes[1][2], axes[2][2]],
+  };
+}

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: what the page says follows from what it knows, and an old picture is never called live.
+import { describe, expect, it } from 'vitest';
+import { backoffS, patienceMs, present, type Facts } from '../src/state';
+
+const live: Facts = {
+  problem: null,
+  everConnected: true,
+  connected: true,
+  retryInS: null,
+  stream: 'face',
+  announced: true,
+  seen: true,
+  serverState: 'running',
+  serverMessage: '',
+  quietMs: 30,
+  frameRate: 30,
+  hint: 'relievo-server serve --source sim:face',
+};
+
+describe('present', () => {
+  it.each<[string, Partial<Facts>, string]>([
+    ['a running stream', {}, 'live'],
+    ['no WebGL', { problem: 'no WebGL 2' }, 'unsupported'],
+    ['the first attempt', { everConnected: false, connected: false }, 'connecting'],
+    ['a server that is not there', { everConnected: false, connected: false, retryInS: 2 }, 'lost'],
+    ['a lost connection', { connected: false, retryInS: 3 }, 'lost'],
+    ['nothing to watch', { stream: null, announced: false, seen: false }, 'empty'],
+    ['a stream that is not there yet', { announced: false, seen: false }, 'waiting'],
+    ['a stream that left', { announced: false }, 'ended'],
+    ['a stream whose source is at its end', { serverState: 'ended' }, 'ended'],
+    ['no frame yet', { seen: false }, 'starting'],
+    ['a stall the server knows', { serverState: 'stalled' }, 'stalled'],
+    ['a silence the server does not know', { quietMs: 2500 }, 'stalled'],
+    ['a silence with no status at all', { serverState: null, quietMs: 2500 }, 'stalled'],
+  ])('%s', (_, facts, state) => {
+    const shown = present({ ...live, ...facts });
+    expect(shown.state).toBe(state);
+    expect(shown.title === '').toBe(state === 'live');
+    if (['lost', 'stalled', 'ended', 'unsupported'].includes(state)) expect(shown.dim).toBe(true);
+  });
+
+  it('says how to start a stream and when it tries again', () => {
+    expect(present({ ...live, stream: null }).hint).toBe(live.hint);
+    expect(present({ ...live, connected: false, retryInS: 3 }).text).toContain('in 3 s');
+    expect(present({ ...live, serverState: 'stalled', serverMessage: 'No signal.' }).text).toContain('No signal.');
+  });
+
+  it('is patient with slow streams', () => {
+    expect(patienceMs(30)).toBe(2000);
+    expect(patienceMs(1)).toBe(10_000);
+    expect(patienceMs(0)).toBe(2000);
+  });
+
+  it('waits longer each time, ten seconds at most', () => {
+    expect([0, 1, 2, 3, 4, 50].map(backoffS)).toEqual([1, 2, 4, 8, 10, 10]);
+  });
+});
