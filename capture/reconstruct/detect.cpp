@@ -88,7 +88,7 @@ void Detector::detect(const CapturedFrame& frame, WorkerPool& pool, Detection& o
     return;
   }
   differencer_.difference(frame, pool, image_);
-  const float scale = 255.F / std::max(image_.largest, 1.F);
+  const float scale = 255.F / std::max(differencer_.largest(frame, pool), 1.F);
 
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   for (LineScratch& scratch : scratch_) {  // a worker without a line leaves its own as it was

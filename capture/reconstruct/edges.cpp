@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/rows.h"
+
 namespace relievo {
 namespace {
 
-constexpr int kSlopeReach_px = 2;  // slope is looked at over twice this, as delta of Eq. 4
-constexpr float kNoiseFactor = 4;  // a rise over 4 px must exceed this many standard deviations of a value
+constexpr float kNoiseFactor = 4;  // a rise over 3 px must exceed this many standard deviations of a value
 constexpr float kLeastRise = 2;    // grey levels, where a picture has no noise
 constexpr float kMerge_px = 2;     // crossings of different channels closer than this are one edge
 constexpr float kMaxReach_px = 6;  // evidence is gathered up to here
@@ -48,18 +49,23 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
   const float threshold = std::max(kLeastRise, kNoiseFactor * image.noise);
   auto& crossings = scratch.crossings;
   crossings.clear();
-  for (int channel = 0; channel < 3; ++channel) {
-    const float* d = image.line(line) + channel * width;
-    for (int x = kSlopeReach_px; x + kSlopeReach_px < width; ++x) {
-      if ((d[x] > 0) == (d[x + 1] > 0)) continue;
-      const float rise = d[std::min(x + kSlopeReach_px, width - 1)] - d[x - kSlopeReach_px + 1];
+  scratch.flags.resize(static_cast<std::size_t>(width));
+  row_kernels().crossings(image.line(line), width, threshold, scratch.flags.data());
+  for (int x = 0; x < width; ++x) {
+    if (scratch.flags[static_cast<std::size_t>(x)] == 0) continue;
+    const std::size_t first_here = crossings.size();
+    for (int channel = 0; channel < 3; ++channel) {
+      if (!(scratch.flags[static_cast<std::size_t>(x)] >> channel & 1)) continue;
+      const float* d = image.line(line) + channel * width;
       const float step = d[x + 1] - d[x];
-      if (std::fabs(rise) < threshold || (rise > 0) != (step > 0)) continue;
-      crossings.push_back({static_cast<float>(x) - d[x] / step, std::fabs(step)});
+      const Crossing found{static_cast<float>(x) - d[x] / step, std::fabs(step)};
+      std::size_t place = crossings.size();
+      crossings.push_back(found);
+      for (; place > first_here && found.column_px < crossings[place - 1].column_px; --place)
+        crossings[place] = crossings[place - 1];
+      crossings[place] = found;
     }
   }
-  std::sort(crossings.begin(), crossings.end(),
-            [](const Crossing& a, const Crossing& b) { return a.column_px < b.column_px; });
 
   const std::size_t begin = scratch.edges.size();
   for (std::size_t i = 0; i < crossings.size();) {

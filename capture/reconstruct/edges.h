@@ -55,6 +55,7 @@ class EdgeFinder {
     float slope;
   };
   struct Scratch {
+    std::vector<std::uint8_t> flags;
     std::vector<Crossing> crossings;
     std::vector<Edge> edges;
     std::vector<std::uint32_t> counts;

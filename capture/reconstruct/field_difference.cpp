@@ -3,35 +3,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace relievo {
 namespace {
 
-/// Low-pass along the line ([1 2 1] / 4) and the colour matrix (Eq. 3) on one RGB row, into three planes of
-/// `width`, and the luma (Rec. 601) of the captured colours into a fourth. Returns the largest calibrated
-/// value (5.2: the normalisation range).
-float calibrate_row(const std::uint8_t* rgb, int width, const std::array<float, 9>& m, float* out) {
-  float* red = out;
-  float* green = out + width;
-  float* blue = out + 2 * width;
-  float* luma = out + 3 * width;
-  const auto store = [&](int x, float r, float g, float b) {
-    luma[x] = 0.299F * r + 0.587F * g + 0.114F * b;
-    red[x] = m[0] * r + m[1] * g + m[2] * b;
-    green[x] = m[3] * r + m[4] * g + m[5] * b;
-    blue[x] = m[6] * r + m[7] * g + m[8] * b;
+/// Largest value of one RGB row after the low-pass along the line ([1 2 1] / 4) and the colour matrix (Eq.
+/// 3).
+float largest_of_row(const std::uint8_t* rgb, int width, const std::array<float, 9>& m) {
+  float largest = 0;
+  const auto take = [&](float r, float g, float b) {
+    largest = std::max({largest, m[0] * r + m[1] * g + m[2] * b, m[3] * r + m[4] * g + m[5] * b,
+                        m[6] * r + m[7] * g + m[8] * b});
   };
   for (int x = 1; x + 1 < width; ++x) {
     const std::uint8_t* p = rgb + 3 * x;
     const auto low_pass = [&](int c) { return 0.25F * static_cast<float>(p[c - 3] + 2 * p[c] + p[c + 3]); };
-    store(x, low_pass(0), low_pass(1), low_pass(2));
+    take(low_pass(0), low_pass(1), low_pass(2));
   }
-  const auto copy = [&](int x) { store(x, rgb[3 * x], rgb[3 * x + 1], rgb[3 * x + 2]); };
-  copy(0);
-  copy(width - 1);
-  float largest = 0;
-  for (int i = 0; i < 3 * width; ++i) largest = std::max(largest, out[i]);
+  for (const int x : {0, width - 1}) take(rgb[3 * x], rgb[3 * x + 1], rgb[3 * x + 2]);
   return largest;
 }
 
@@ -68,78 +57,83 @@ float estimate_noise(const DifferenceImage& image) {
 }  // namespace
 
 Differencer::Differencer(const std::array<double, 9>& colour_matrix) {
-  for (std::size_t i = 0; i < 9; ++i) matrix_[i] = static_cast<float>(colour_matrix[i]);
+  // FieldRows are twice, and after the low-pass 32 times, what the fields hold.
+  constexpr float kScale = 1.F / 32;
+  for (std::size_t i = 0; i < 9; ++i) {
+    matrix_[i] = static_cast<float>(colour_matrix[i]);
+    weights_.colour[i] = matrix_[i] * kScale;
+  }
+  weights_.luma = {0.299F * kScale, 0.587F * kScale, 0.114F * kScale};  // Rec. 601, of the captured colours
 }
 
-void Differencer::raw_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& image) {
+void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int end, Scratch& scratch,
+                                      DifferenceImage& out) const {
+  const RowKernels& kernels = row_kernels();
   const View8 slide = frame.slide_field();
   const View8 complement = frame.complement_field();
-  const int width = image.width;
-  const std::size_t colours = static_cast<std::size_t>(width) * 3;
-  const std::size_t plane = static_cast<std::size_t>(width) * 4;
-  raw_.resize(plane * static_cast<std::size_t>(image.lines));
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
-  for (Scratch& s : scratch_) s.largest = 0;
-  pool.for_ranges(image.lines, [&](int begin, int end, int worker) {
-    Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-    scratch.rows.resize(plane * 3);
-    float* slide_row = scratch.rows.data();
-    float* above = slide_row + plane;  // complement's row above the slide's
-    float* below = slide_row + 2 * plane;
-    const auto calibrate = [&](const View8& view, int line, float* out) {
-      const std::uint8_t* row = view.row(std::clamp(line, 0, view.height - 1));
-      scratch.largest = std::max(scratch.largest, calibrate_row(row, width, matrix_, out));
-    };
-    const bool interlaced = frame.scan == Scan::kInterlaced;
-    if (interlaced) calibrate(complement, std::max(0, begin - 1), above);
-    for (int line = begin; line < end; ++line) {
-      calibrate(slide, line, slide_row);
-      calibrate(complement, line, below);
-      float* out = raw_.data() + plane * static_cast<std::size_t>(line);
-      if (interlaced) {
-        // The complement's rows lie half a line off the slide's: their mean is what it shows at the slide's
-        // row.
-        for (std::size_t i = 0; i < colours; ++i) out[i] = slide_row[i] - 0.5F * (above[i] + below[i]);
-        for (std::size_t i = colours; i < plane; ++i) out[i] = slide_row[i] + 0.5F * (above[i] + below[i]);
-        std::swap(above, below);
-      } else {
-        for (std::size_t i = 0; i < colours; ++i) out[i] = slide_row[i] - below[i];
-        for (std::size_t i = colours; i < plane; ++i) out[i] = slide_row[i] + below[i];
-      }
-    }
-  });
+  const int samples = 3 * out.width;
+  const auto row = static_cast<std::size_t>(samples);
+  scratch.rows.resize(9 * row);
+  const auto scratch_row = [&](int i) { return scratch.rows.data() + row * static_cast<std::size_t>(i); };
+  // The three lines about the current one, each in the place that the one three lines above it had.
+  const auto fields_at = [&](int line) {
+    const int place = std::clamp(line, 0, out.lines - 1) % 3;
+    return FieldRows{scratch_row(2 * place), scratch_row(2 * place + 1)};
+  };
+  const auto read = [&](int line) {
+    if (line < 0 || line >= out.lines) return;
+    // An interlaced complement's rows lie half a line off the slide's: their mean is what it shows at the
+    // slide's row.
+    const int before = frame.scan == Scan::kInterlaced ? line - 1 : line;
+    kernels.combine_fields(slide.row(line), complement.row(std::clamp(before, 0, complement.height - 1)),
+                           complement.row(std::min(line, complement.height - 1)), samples, fields_at(line));
+  };
+  std::int16_t* across = scratch_row(6);
+  const FieldRows smooth{scratch_row(7), scratch_row(8)};
+  read(begin - 1);
+  read(begin);
+  for (int line = begin; line < end; ++line) {
+    read(line + 1);
+    const FieldRows above = fields_at(line - 1);
+    const FieldRows here = fields_at(line);
+    const FieldRows below = fields_at(line + 1);
+    // A boundary that leans keeps its place, since the kernel is symmetric.
+    kernels.low_pass(above.difference, here.difference, below.difference, samples, across, smooth.difference);
+    kernels.low_pass(above.sum, here.sum, below.sum, samples, across, smooth.sum);
+    const auto at = static_cast<std::size_t>(line);
+    kernels.to_planes(
+        smooth, out.width, weights_,
+        {out.values.data() + row * at, out.white.data() + static_cast<std::size_t>(out.width) * at});
+  }
 }
 
 void Differencer::difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
   const View8 slide = frame.slide_field();
   out.width = slide.width;
   out.lines = slide.height;
-  raw_difference(frame, pool, out);
-  const std::size_t colours = static_cast<std::size_t>(out.width) * 3;
-  const std::size_t white = static_cast<std::size_t>(out.width);
-  const std::size_t plane = colours + white;
-  out.values.resize(colours * static_cast<std::size_t>(out.lines));
-  out.white.resize(white * static_cast<std::size_t>(out.lines));
-  pool.for_ranges(out.lines, [&](int begin, int end, int) {
-    for (int line = begin; line < end; ++line) {
-      const auto row = [&](int l) {
-        return raw_.data() + plane * static_cast<std::size_t>(std::clamp(l, 0, out.lines - 1));
-      };
-      // The low-pass across lines; a boundary that leans keeps its place, since the kernel is symmetric.
-      const float* above = row(line - 1);
-      const float* here = row(line);
-      const float* below = row(line + 1);
-      const auto smooth = [&](float* to, std::size_t from, std::size_t count) {
-        for (std::size_t i = 0; i < count; ++i)
-          to[i] = 0.25F * (above[from + i] + below[from + i]) + 0.5F * here[from + i];
-      };
-      smooth(out.values.data() + colours * static_cast<std::size_t>(line), 0, colours);
-      smooth(out.white.data() + white * static_cast<std::size_t>(line), colours, white);
-    }
+  const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
+  out.values.resize(3 * pixels);
+  out.white.resize(pixels);
+  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
+    difference_of_lines(frame, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
   });
-  out.largest = 0;
-  for (const Scratch& s : scratch_) out.largest = std::max(out.largest, s.largest);
   out.noise = estimate_noise(out);
+}
+
+float Differencer::largest(const CapturedFrame& frame, WorkerPool& pool) {
+  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  for (Scratch& s : scratch_) s.largest = 0;
+  for (const View8& field : {frame.slide_field(), frame.complement_field()}) {
+    pool.for_ranges(field.height, [&](int begin, int end, int worker) {
+      float& largest = scratch_[static_cast<std::size_t>(worker)].largest;
+      for (int line = begin; line < end; ++line)
+        largest = std::max(largest, largest_of_row(field.row(line), field.width, matrix_));
+    });
+  }
+  float largest = 0;
+  for (const Scratch& s : scratch_) largest = std::max(largest, s.largest);
+  return largest;
 }
 
 }  // namespace relievo

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/rows.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -18,7 +19,6 @@ struct DifferenceImage {
   int lines = 0;
   std::vector<float> values;  // [line][channel][width]
   std::vector<float> white;   // [line][width]: luma of the fields' sum, what the scene shows in white light
-  float largest = 0;          // of the calibrated fields, all channels: 255 of the paper's normalised scale
   float noise = 0;            // standard deviation of a value, from the picture itself
 
   const float* white_line(int l) const {
@@ -37,15 +37,19 @@ class Differencer {
   /// Low-pass, colour matrix (Eq. 3) and difference. `out` is overwritten; its memory is reused.
   void difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
 
+  /// Of the calibrated fields, low-passed along the line, all channels: 255 of the paper's normalised scale.
+  float largest(const CapturedFrame& frame, WorkerPool& pool);
+
  private:
   struct Scratch {
-    std::vector<float> rows;  // calibrated rows of both fields, each with its luma as a fourth plane
+    std::vector<std::int16_t> rows;
     float largest = 0;
   };
-  void raw_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+  void difference_of_lines(const CapturedFrame& frame, int begin, int end, Scratch& scratch,
+                           DifferenceImage& out) const;
 
   std::array<float, 9> matrix_;
-  std::vector<float> raw_;  // [line][3 channels, white][width], before the low-pass across lines
+  PlaneWeights weights_;
   std::vector<Scratch> scratch_;
 };
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "capture/reconstruct/rows.h"
+
 namespace relievo {
 
 void add_fields(const CapturedFrame& frame, WorkerPool& pool, Image8& out) {
@@ -11,25 +13,19 @@ void add_fields(const CapturedFrame& frame, WorkerPool& pool, Image8& out) {
   const int samples = picture.width * 3;
   if (out.width() != picture.width || out.height() != height || out.channels() != 3)
     out = Image8(picture.width, height, 3);
+  const RowKernels& kernels = row_kernels();
   pool.for_ranges(height, [&](int begin, int end, int) {
     for (int y = begin; y < end; ++y) {
-      const std::uint8_t* own = picture.row(y);
-      std::uint8_t* to = out.row(y);
       if (frame.scan == Scan::kProgressive) {
         const std::uint8_t* other = frame.complement.row(y);
-        for (int i = 0; i < samples; ++i) to[i] = static_cast<std::uint8_t>(std::min(255, own[i] + other[i]));
+        kernels.add_rows(picture.row(y), other, other, samples, out.row(y));
+      } else if (height == 1) {  // there is no other field
+        std::copy_n(picture.row(y), samples, out.row(y));
       } else {
-        if (height == 1) {  // there is no other field
-          std::copy_n(own, samples, to);
-          continue;
-        }
         // Rows above and below are of the other field; at the picture's edge the one there is serves for
         // both.
-        const std::uint8_t* above = picture.row(y > 0 ? y - 1 : y + 1);
-        const std::uint8_t* below = picture.row(y + 1 < height ? y + 1 : y - 1);
-        for (int i = 0; i < samples; ++i) {
-          to[i] = static_cast<std::uint8_t>(std::min(255, own[i] + (above[i] + below[i] + 1) / 2));
-        }
+        kernels.add_rows(picture.row(y), picture.row(y > 0 ? y - 1 : y + 1),
+                         picture.row(y + 1 < height ? y + 1 : y - 1), samples, out.row(y));
       }
     }
   });

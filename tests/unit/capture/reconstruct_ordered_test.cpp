@@ -79,7 +79,6 @@ DifferenceImage picture_of(const Pattern& pattern, int slide, const std::vector<
   out.width = kWidth;
   out.lines = kLines;
   out.noise = 0.5F;
-  out.largest = 200;
   out.values.assign(static_cast<std::size_t>(kLines * 3 * kWidth), 0);
   out.white.assign(static_cast<std::size_t>(kLines * kWidth), 100);
   for (int x = 0; x < kWidth; ++x) {

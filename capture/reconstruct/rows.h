@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is done to every sample of a picture, a row at a time: the loops that decide how fast a frame is read.
+// One portable implementation, which is the reference, and others for what a processor can do beyond it; all
+// give the same results, and the best that runs here is chosen once.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace relievo {
+
+/// A frame's two fields at one line, before any low-pass: whole numbers, interleaved RGB.
+struct FieldRows {
+  std::int16_t* difference;  // 2 slide - (above + below): twice the difference, -510..510
+  std::int16_t* sum;         // 2 slide + (above + below): twice the sum, 0..1020
+};
+
+/// Weights that turn a low-passed row of FieldRows into planes: of the difference's channels by captured RGB,
+/// row-major, and of the sum's luma.
+struct PlaneWeights {
+  std::array<float, 9> colour;
+  std::array<float, 3> luma;
+};
+
+/// `planes` is [3][width], `white` [width].
+struct PlaneRows {
+  float* planes;
+  float* white;
+};
+
+/// Every pointer is to a row of its own; none overlap but where said. `samples` is 3 * width.
+struct RowKernels {
+  const char* name;
+
+  /// out = own + (above + below) / 2, rounded up, 255 at most. `above` and `below` may be the same.
+  void (*add_rows)(const std::uint8_t* own, const std::uint8_t* above, const std::uint8_t* below, int samples,
+                   std::uint8_t* out);
+
+  /// Difference and sum of a slide's row and the complement's two rows about it, which may be the same.
+  void (*combine_fields)(const std::uint8_t* slide, const std::uint8_t* above, const std::uint8_t* below,
+                         int samples, FieldRows out);
+
+  /// Low-pass [1 2 1] across three lines of either of FieldRows and then along the line, whose ends stay:
+  /// 16 times as large as it came. `across` is scratch memory.
+  void (*low_pass)(const std::int16_t* above, const std::int16_t* here, const std::int16_t* below,
+                   int samples, std::int16_t* across, std::int16_t* out);
+
+  /// Planes from interleaved rows.
+  void (*to_planes)(FieldRows rows, int width, const PlaneWeights& weights, PlaneRows out);
+
+  /// Bit c of flags[x] is set where channel c of `planes` ([3][width]) crosses zero between columns x and
+  /// x + 1 and rises or falls the same way by `least_rise` or more from x - 1 to x + 2. `flags` is [width].
+  void (*crossings)(const float* planes, int width, float least_rise, std::uint8_t* flags);
+};
+
+/// Those that run on this machine, the reference first and the best last.
+const std::vector<RowKernels>& all_row_kernels();
+
+/// The best that runs on this machine.
+const RowKernels& row_kernels();
+
+}  // namespace relievo
