@@ -14,8 +14,7 @@ struct WorkerPool::State {
   std::mutex mutex;
   std::condition_variable start;
   std::condition_variable done;
-  const std::function<void(int, int, int)>* work = nullptr;
-  int count = 0;
+  Task task;
   int pending = 0;
   std::uint64_t round = 0;
   bool stop = false;
@@ -24,11 +23,11 @@ struct WorkerPool::State {
 
   void run_range(int worker) const {
     const auto bound = [&](int i) {
-      return static_cast<int>(static_cast<std::int64_t>(count) * i / threads);
+      return static_cast<int>(static_cast<std::int64_t>(task.count) * i / threads);
     };
     const int begin = bound(worker);
     const int end = bound(worker + 1);
-    if (begin < end) (*work)(begin, end, worker);
+    if (begin < end) task.call(task.work, begin, end, worker);
   }
 
   void helper(int worker) {
@@ -64,16 +63,15 @@ int WorkerPool::threads() const {
   return state_->threads;
 }
 
-void WorkerPool::for_ranges(int count, const std::function<void(int, int, int)>& work) {
+void WorkerPool::run(const Task& task) {
   State& s = *state_;
   if (s.threads == 1) {
-    if (count > 0) work(0, count, 0);
+    if (task.count > 0) task.call(task.work, 0, task.count, 0);
     return;
   }
   {
     std::lock_guard lock(s.mutex);
-    s.work = &work;
-    s.count = count;
+    s.task = task;
     s.pending = s.threads - 1;
     ++s.round;
   }

@@ -3,7 +3,6 @@
 // out.
 #pragma once
 
-#include <functional>
 #include <memory>
 
 namespace relievo {
@@ -20,11 +19,23 @@ class WorkerPool {
 
   /// Calls work(begin, end, worker) over disjoint ranges that cover [0, count); returns when all are done.
   /// `worker` in [0, threads()) tells which scratch memory a call may use: range i always goes to worker i,
-  /// so a run repeats exactly.
-  void for_ranges(int count, const std::function<void(int begin, int end, int worker)>& work);
+  /// so a run repeats exactly. Allocates nothing.
+  template <typename Work>
+  void for_ranges(int count, const Work& work) {
+    run({count, &work, [](const void* w, int begin, int end, int worker) {
+           (*static_cast<const Work*>(w))(begin, end, worker);
+         }});
+  }
 
  private:
   struct State;
+  struct Task {
+    int count = 0;
+    const void* work = nullptr;
+    void (*call)(const void* work, int begin, int end, int worker) = nullptr;
+  };
+  void run(const Task& task);
+
   std::unique_ptr<State> state_;
 };
 

@@ -79,11 +79,12 @@ Status run(const Options& options, StopSignal& stop) {
     if (stop.stopped()) return {};
     const std::int64_t cpu_begin = process_cpu_ns();
     const std::int64_t begin = steady_now_ns();
-    const auto frame = reconstructor->add(frames.at(n));
+    auto frame = reconstructor->add(frames.at(n));
     const double ms = milliseconds(steady_now_ns() - begin);
     const double cpu_ms = milliseconds(process_cpu_ns() - cpu_begin);
     if (!frame) return frame.error();
     if (n >= kWarmUp && *frame) samples.add(ms, cpu_ms, reconstructor->report(), (*frame)->surface);
+    if (*frame) reconstructor->recycle(*std::move(*frame));
   }
   if (samples.frame.empty()) return Error{"no frame of " + *uri + " could be reconstructed"};
 

@@ -189,6 +189,7 @@ class ThreadedPipeline final : public Pipeline {
       stats_.encoded(milliseconds(steady_now_ns() - begin));
       FrameMessage message;
       message.number = item->frame.number;
+      reconstructor_.recycle(std::move(item->frame));
       message.capture_time_ns = item->capture_time_ns;
       message.data = std::make_shared<const Bytes>(*std::move(bytes));
       push(to_publish_, std::move(message));

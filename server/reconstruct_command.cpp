@@ -117,6 +117,7 @@ Status run(const Options& options, StopSignal& stop) {
             write_ply(fs::path(options.out) / name, (*frame)->surface, (*frame)->texture.view());
         !written)
       return written.error();
+    reconstructor->recycle(*std::move(*frame));
   }
   progress.finish();
   if (made && totals.reconstructed == 0) fs::remove(options.out, failed);

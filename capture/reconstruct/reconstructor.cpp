@@ -2,6 +2,7 @@
 #include "capture/reconstruct/reconstructor.h"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "base/parallel.h"
@@ -19,6 +20,8 @@
 
 namespace relievo {
 namespace {
+
+constexpr std::size_t kSpareFrames = 4;  // a stage's queue and what its neighbours hold
 
 int line_step(const Rig& rig) {
   return rig.scan == Scan::kInterlaced ? 2 : 1;
@@ -84,7 +87,9 @@ struct Reconstructor::State {
         differencer(r.colour_matrix),
         sequence(p),
         refiner(r.colour_matrix),
-        triangulator(r, p, line_count(r), line_step(r)) {}
+        triangulator(r, p, line_count(r), line_step(r)) {
+    spare.reserve(kSpareFrames);
+  }
 
   Rig rig;
   Pattern pattern;
@@ -116,6 +121,9 @@ struct Reconstructor::State {
   SurfaceScratch surface_scratch;
   ReconstructReport report;
 
+  std::mutex spare_mutex;
+  std::vector<Frame3D> spare;  // handed back; guarded by spare_mutex
+
   bool paper() const { return options.decoder == Decoder::kPaper; }
   void observe(const CapturedFrame& frame);
   bool shows_same_slide() const;
@@ -124,6 +132,7 @@ struct Reconstructor::State {
   void match_in_order(SlideOrder predicted);
   void add_vertex(int boundary, int line, float column_px, float slope);
   void triangulate();
+  Frame3D blank_frame();
 };
 
 void Reconstructor::State::observe(const CapturedFrame& frame) {
@@ -210,6 +219,15 @@ void Reconstructor::State::triangulate() {
   }
 }
 
+/// Whatever it holds is overwritten.
+Frame3D Reconstructor::State::blank_frame() {
+  std::lock_guard lock(spare_mutex);
+  if (spare.empty()) return {};
+  Frame3D out = std::move(spare.back());
+  spare.pop_back();
+  return out;
+}
+
 Reconstructor::Reconstructor(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Reconstructor::Reconstructor(Reconstructor&&) noexcept = default;
 Reconstructor& Reconstructor::operator=(Reconstructor&&) noexcept = default;
@@ -223,6 +241,11 @@ Result<Reconstructor> Reconstructor::create(const Rig& rig, const Pattern& patte
   }
   if (pattern.stripes() < 2) return Error{"the pattern has no boundary: it needs two stripes or more"};
   return Reconstructor(std::make_unique<State>(rig, pattern, options));
+}
+
+void Reconstructor::recycle(Frame3D&& used) {
+  std::lock_guard lock(state_->spare_mutex);
+  if (state_->spare.size() < kSpareFrames) state_->spare.push_back(std::move(used));
 }
 
 const ReconstructReport& Reconstructor::report() const {
@@ -252,7 +275,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
   s.match_in_order(s.report.same_slide ? s.order : other(s.order));
   s.report.match_ms = clock.lap_ms();
 
-  Frame3D out;
+  Frame3D out = s.blank_frame();
   out.number = frame.number;
   out.time_ns = frame.time_ns;
   s.triangulate();
@@ -263,13 +286,18 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
   const float width = static_cast<float>(s.rig.camera.width);
   const float height = static_cast<float>(s.rig.camera.height);
   const int step = line_step(s.rig);
+  out.surface.texture_coordinates.clear();
   out.surface.texture_coordinates.reserve(out.surface.grid.size());
   for (const GridPoint& p : out.surface.grid) {
     out.surface.texture_coordinates.push_back(
         {(p.column_px + 0.5F) / width, (static_cast<float>(p.line * step) + 0.5F) / height});
   }
   s.report.surface_ms = clock.lap_ms();
-  if (s.options.texture) add_fields(frame, s.pool, out.texture);
+  if (s.options.texture) {
+    add_fields(frame, s.pool, out.texture);
+  } else {
+    out.texture = {};  // of a frame that came back
+  }
   s.report.texture_ms = clock.lap_ms();
   return std::optional<Frame3D>(std::move(out));
 }

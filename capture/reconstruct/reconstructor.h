@@ -48,6 +48,10 @@ class Reconstructor {
   /// the rig's.
   Result<std::optional<Frame3D>> add(const CapturedFrame& frame);
 
+  /// Takes back a surface that nobody needs any more, so that a later one is made in its memory. A stream
+  /// whose frames all come back allocates nothing once it is warm. Any thread.
+  void recycle(Frame3D&& used);
+
   /// Of the last add().
   const ReconstructReport& report() const;
 
