@@ -90,6 +90,7 @@ class Viewer {
       stream: this.stream,
       mode: this.view?.mode,
       drawn: this.view?.drawn,
+      scale: this.view?.movingScale,
       problem: this.problem,
       ...this.meter.report(),
     };

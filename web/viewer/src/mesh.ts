@@ -83,13 +83,12 @@ export class SurfaceMesh {
   private hasNormals = false;
   private hasEdges = false;
 
-  constructor(pixelRatio: number) {
+  constructor() {
     this.object.rotation.x = Math.PI;
     for (const part of [this.mesh, this.wires, this.points]) {
       part.frustumCulled = false; // bounds of a surface that changes all the time cost more than they save
       this.object.add(part);
     }
-    this.materials.points.size = this.materials.plainPoints.size = 1.75 * pixelRatio;
     // Texture row 0 is the picture's top and v = 0 means top (FORMAT.md): nothing is to be flipped.
     this.texture.flipY = false;
     this.texture.colorSpace = THREE.SRGBColorSpace;
@@ -97,6 +96,11 @@ export class SurfaceMesh {
     this.texture.minFilter = this.texture.magFilter = THREE.LinearFilter;
     this.attach();
     this.apply();
+  }
+
+  /** Drawn pixels to one of the page's. */
+  setPixelRatio(ratio: number): void {
+    this.materials.points.size = this.materials.plainPoints.size = 1.75 * ratio;
   }
 
   get mode(): Mode {

@@ -5,6 +5,7 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { SurfaceMesh, type Mode } from './mesh';
 import type { DecodedFrame } from './messages';
 import type { Pinhole } from './protocol';
+import { Resolution, drawnInSoftware } from './resolution';
 import type { Extent } from './surface';
 
 // From where the surface is first seen: the rig's own camera, moved aside and up far enough that relief reads.
@@ -12,6 +13,8 @@ const kAzimuth = THREE.MathUtils.degToRad(16);
 const kElevation = THREE.MathUtils.degToRad(13);
 const kMargin = 1.2;
 const kDefaultFov = 40;
+const kStill_ms = 1000; // without a drawing: the picture stands still and can be as fine as the screen
+const kPoll_ms = 2;
 
 export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
@@ -35,6 +38,10 @@ export class View {
   private readonly controls: OrbitControls;
   private readonly surface: SurfaceMesh;
   private scheduled = false;
+  private readonly resolution = new Resolution();
+  private scale = 0; // drawn at
+  private fence: WebGLSync | null = null; // of a drawing that is being timed
+  private stillTimer = 0;
   private extent: Extent | null = null;
   private placed = false; // the first view is set
   private moved = false; // by a person, since
@@ -46,11 +53,11 @@ export class View {
     private readonly canvas: HTMLCanvasElement,
     private readonly events: ViewEvents,
   ) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
-    const pixelRatio = Math.min(window.devicePixelRatio, 2);
-    this.renderer.setPixelRatio(pixelRatio);
+    // Four samples a pixel cost a processor that draws more than all the rest.
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
     this.renderer.setClearAlpha(0);
-    this.surface = new SurfaceMesh(pixelRatio);
+    this.surface = new SurfaceMesh();
+    this.setScale(1);
     this.scene.add(this.surface.object, this.camera);
     this.light();
 
@@ -158,9 +165,15 @@ export class View {
       this.scheduled = false;
       this.events.beforeDraw();
       this.controls.update(); // schedules the next drawing while the motion dies away
-      this.renderer.render(this.scene, this.camera);
-      ++this.drawn;
+      this.setScale(this.resolution.scale);
+      this.render();
+      this.time();
     });
+  }
+
+  /** Of the screen's pixels that are drawn while the picture moves. */
+  get movingScale(): number {
+    return this.resolution.scale;
   }
 
   /** What is on the screen, for tests and for reports of people whose picture is wrong. */
@@ -182,6 +195,47 @@ export class View {
     const mean = count > 0 ? sum / count : 0;
     const deviation = count > 0 ? Math.sqrt(Math.max(0, squares / count - mean * mean)) : 0;
     return { width, height, covered: count / (width * height), mean, deviation, hash };
+  }
+
+  private render(): void {
+    this.renderer.render(this.scene, this.camera);
+    ++this.drawn;
+    window.clearTimeout(this.stillTimer);
+    if (this.scale === 1) return;
+    this.stillTimer = window.setTimeout(() => {
+      this.setScale(1);
+      this.render();
+    }, kStill_ms);
+  }
+
+  private setScale(scale: number): void {
+    if (scale === this.scale) return;
+    this.scale = scale;
+    const pixelRatio = Math.min(window.devicePixelRatio, 2) * scale;
+    this.renderer.setPixelRatio(pixelRatio);
+    this.surface.setPixelRatio(pixelRatio);
+  }
+
+  // How long the graphics card, or the processor in its place, takes for what was just asked of it.
+  private time(): void {
+    if (this.fence !== null || document.hidden) return;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (this.fence === null) return; // the context is lost
+    gl.flush();
+    const start = performance.now();
+    const poll = (): void => {
+      if (this.fence === null) return;
+      const status = gl.getSyncParameter(this.fence, gl.SYNC_STATUS) as number | null;
+      if (status === gl.UNSIGNALED) {
+        window.setTimeout(poll, kPoll_ms);
+        return;
+      }
+      gl.deleteSync(this.fence);
+      this.fence = null;
+      if (status === gl.SIGNALED) this.resolution.took(performance.now() - start);
+    };
+    window.setTimeout(poll, kPoll_ms);
   }
 
   // What is left of a drag's momentum would carry the new view away.

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many of the screen's pixels are drawn. Where the graphics are weak, or there are none and the processor
+// draws, a coarser picture at the stream's rate serves better than a fine one that stutters.
+
+const kSlow_ms = 22; // a frame of 30 a second, less what the rest of the page needs
+const kFast_ms = 9; // one step up costs 1.6 times as much and stays below kSlow_ms
+const kStep = 0.8;
+const kLeast = 0.5;
+const kIgnored = 4; // drawings after a change, which makes new buffers, and at the start, which compiles shaders
+const kEnough = 6; // more of them to judge by
+const kWeight = 0.2; // of the newest drawing in the mean
+
+export class Resolution {
+  /** Of the screen's own resolution, kLeast..1. */
+  scale = 1;
+  private mean_ms = 0;
+  private count = 0;
+
+  /** One drawing of a moving picture took `ms`. True where the scale has changed. */
+  took(ms: number): boolean {
+    if (++this.count <= kIgnored) return false;
+    this.mean_ms = this.count === kIgnored + 1 ? ms : this.mean_ms + kWeight * (ms - this.mean_ms);
+    if (this.count < kIgnored + kEnough) return false;
+    const scale =
+      this.mean_ms > kSlow_ms
+        ? Math.max(kLeast, this.scale * kStep)
+        : this.mean_ms < kFast_ms
+          ? Math.min(1, this.scale / kStep)
+          : this.scale;
+    if (scale === this.scale) return false;
+    this.scale = scale;
+    this.count = 0;
+    return true;
+  }
+}
+
+/** True where the processor draws, as far as the browser tells. */
+export function drawnInSoftware(): boolean {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  if (gl === null) return false;
+  const names = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = String(gl.getParameter(names?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
