@@ -40,6 +40,21 @@ float agreement(Primary colour, const SideEvidence& e) {
          (1.F / 3);
 }
 
+/// Of every primary.
+using ColourAgreement = std::array<float, 8>;
+
+ColourAgreement agreements(const SideEvidence& e) {
+  ColourAgreement out;
+  for (std::size_t c = 0; c < 8; ++c) out[c] = agreement(static_cast<Primary>(c), e);
+  return out;
+}
+
+std::size_t best_colour(const ColourAgreement& of) {
+  std::size_t best = 1;
+  for (std::size_t c = 2; c < 7; ++c) best = of[c] > of[best] ? c : best;
+  return best;
+}
+
 /// Where the edge stood two frames ago, under the same slide, from where it is now: the nearest place with
 /// the same colours on both sides. `found` is false where there is none.
 struct Displacement {
@@ -91,42 +106,49 @@ void SequenceDecoder::find_candidates(const Edge& edge, const Beside& beside, co
                                       Scratch& scratch) const {
   const Slide& shown = shown_slide(context);
   const Slide& other = other_slide(context);
-  std::array<float, 8> left{};
-  std::array<float, 8> right{};
-  std::array<float, 8> theirs_left{};
-  std::array<float, 8> theirs_right{};
-  for (Primary c = 1; c < 7; ++c) {
-    left[c] = agreement(c, edge.left);
-    right[c] = agreement(c, edge.right);
-    theirs_left[c] = agreement(c, beside.left);
-    theirs_right[c] = agreement(c, beside.right);
-  }
-  float best_pair = -10;
-  for (std::size_t l = 1; l < 7; ++l) {
-    for (std::size_t r = 1; r < 7; ++r) {
-      if (!shown.by_transition[l * 8 + r].empty()) best_pair = std::max(best_pair, left[l] + right[r]);
-    }
-  }
-  const std::size_t begin = scratch.candidates.size();
-  for (std::size_t l = 1; l < 7; ++l) {
-    for (std::size_t r = 1; r < 7; ++r) {
-      const float own = left[l] + right[r];
-      if (own < best_pair - kTransitionSlack || own < 0) continue;
-      for (const std::int16_t b : shown.by_transition[l * 8 + r]) {
-        const auto [ocl, ocr] = other.colours[static_cast<std::size_t>(b)];
-        const float theirs = other_gain(theirs_left[ocl], theirs_right[ocr], beside.tracked);
-        scratch.candidates.push_back({b, own + theirs - kThreshold, 0, -1, -1});
+  const ColourAgreement left = agreements(edge.left);
+  const ColourAgreement right = agreements(edge.right);
+  const ColourAgreement theirs_left = agreements(beside.left);
+  const ColourAgreement theirs_right = agreements(beside.right);
+  const std::size_t best_left = best_colour(left);
+  const std::size_t best_right = best_colour(right);
+  float best_pair = left[best_left] + right[best_right];
+  if (shown.by_transition[best_left * 8 + best_right].empty()) {
+    best_pair = -10;
+    for (std::size_t l = 1; l < 7; ++l) {
+      for (std::size_t r = 1; r < 7; ++r) {
+        if (!shown.by_transition[l * 8 + r].empty()) best_pair = std::max(best_pair, left[l] + right[r]);
       }
     }
   }
-  const auto first = scratch.candidates.begin() + static_cast<std::ptrdiff_t>(begin);
-  if (scratch.candidates.size() - begin > kCandidates) {
-    std::partial_sort(first, first + kCandidates, scratch.candidates.end(),
-                      [](const Candidate& a, const Candidate& b) {
-                        return a.gain != b.gain ? a.gain > b.gain : a.boundary < b.boundary;
-                      });
-    scratch.candidates.resize(begin + kCandidates);
+  const float least = std::max(0.F, best_pair - kTransitionSlack);
+  // The best of them, best first, in as many places as there are at most.
+  std::array<Candidate, kCandidates> best;
+  std::size_t count = 0;
+  for (std::size_t l = 1; l < 7; ++l) {
+    if (left[l] + right[best_right] < least) continue;
+    for (std::size_t r = 1; r < 7; ++r) {
+      const float own = left[l] + right[r];
+      if (own < least) continue;
+      for (const std::int16_t b : shown.by_transition[l * 8 + r]) {
+        const auto [ocl, ocr] = other.colours[static_cast<std::size_t>(b)];
+        const float gain = own + other_gain(theirs_left[ocl], theirs_right[ocr], beside.tracked) - kThreshold;
+        const auto better = [&](const Candidate& than) {
+          return gain != than.gain ? gain > than.gain : b < than.boundary;
+        };
+        std::size_t place = count;
+        if (count < kCandidates) {
+          ++count;
+        } else if (!better(best[--place])) {
+          continue;
+        }
+        for (; place > 0 && better(best[place - 1]); --place) best[place] = best[place - 1];
+        best[place] = {b, gain, 0, -1, -1};
+      }
+    }
   }
+  scratch.candidates.insert(scratch.candidates.end(), best.begin(),
+                            best.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
