@@ -3,6 +3,7 @@
 
 #include <time.h>
 
+#include <chrono>
 #include <thread>
 #include <utility>
 
@@ -15,7 +16,7 @@ namespace relievo::bench {
 namespace {
 
 constexpr int kCredit = 2;
-constexpr int kWait_ms = 100;  // until a client without frames looks whether it should end
+constexpr std::chrono::milliseconds kWait{100};  // until a client without frames looks whether it should end
 
 std::int64_t thread_cpu_ns() {
   timespec now{};
@@ -25,11 +26,11 @@ std::int64_t thread_cpu_ns() {
 
 class DdsClient final : public ChainClient {
  public:
-  Status start(int domain, const std::string& stream) {
+  Status start(const DomainOptions& domain, const std::string& stream) {
     Subscriber::Callbacks callbacks;
     callbacks.frame = [this](const std::string&, const FrameMessage& frame) { decode(frame); };
     callbacks.lost = [this](const std::string&, std::uint64_t count) { lost_ += count; };
-    auto subscriber = Subscriber::create({.domain = domain}, stream, std::move(callbacks));
+    auto subscriber = Subscriber::create(domain, stream, std::move(callbacks));
     if (!subscriber) return subscriber.error();
     subscriber_ = *std::move(subscriber);
     return {};
@@ -89,7 +90,7 @@ class WebClient final : public ChainClient {
  private:
   void work() {
     while (!ending_) {
-      const auto message = socket_.next_of("frame", kWait_ms);
+      const auto message = socket_.next_of("frame", kWait);
       cpu_ns_ = thread_cpu_ns();
       if (!message) {
         if (!socket_.at_end()) continue;
@@ -117,7 +118,7 @@ class WebClient final : public ChainClient {
 
 }  // namespace
 
-Result<std::unique_ptr<ChainClient>> make_dds_client(int domain, const std::string& stream) {
+Result<std::unique_ptr<ChainClient>> make_dds_client(const DomainOptions& domain, const std::string& stream) {
   auto client = std::make_unique<DdsClient>();
   if (const Status started = client->start(domain, stream); !started) return started.error();
   return std::unique_ptr<ChainClient>(std::move(client));

@@ -10,6 +10,7 @@
 
 #include "base/result.h"
 #include "base/stream.h"
+#include "idl/transport.h"
 
 namespace relievo::bench {
 
@@ -38,7 +39,7 @@ class ChainClient {
 };
 
 /// A DDS subscriber that decodes every frame.
-Result<std::unique_ptr<ChainClient>> make_dds_client(int domain, const std::string& stream);
+Result<std::unique_ptr<ChainClient>> make_dds_client(const DomainOptions& domain, const std::string& stream);
 
 /// A WebSocket client of the gateway on 127.0.0.1 that keeps two frames of credit, as the viewer, and does
 /// not decode.

@@ -38,7 +38,7 @@ struct Options {
   int web_clients = 1;
   double seconds = 10;
   std::uint64_t frames = 0;  // 0: as many as `seconds` take
-  int domain = 1 + static_cast<int>(getpid() % 200);
+  DomainOptions domain{.domain = 1 + static_cast<int>(getpid() % 200), .interface = ""};
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
   bool json = false;
@@ -151,7 +151,7 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
                         .pattern = frames.info().pattern};
   auto gateway = Gateway::start({.port = 0});
   if (!gateway) return gateway.error();
-  auto publisher = Publisher::create({.domain = options.domain}, info);
+  auto publisher = Publisher::create(options.domain, info);
   if (!publisher) return publisher.error();
   (*gateway)->announce(info);
 
@@ -229,7 +229,7 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
                    {"web_clients", count(options.web_clients)},
                    {"threads", count(options.threads)},
                    {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")},
-                   {"domain", count(options.domain)},
+                   {"domain", count(options.domain.domain)},
                    {"distinct_frames", count(frames.size())},
                    {"warm_up_frames", count(o.warm_up)}},
       .figures = {{"frames.captured", count(o.status.frames_captured)},
@@ -302,8 +302,11 @@ Command chain_suite() {
                 ->capture_default_str();
             app.add_option("--frames", options->frames, "Camera frames, instead of --seconds")
                 ->check(CLI::PositiveNumber);
-            app.add_option("--domain", options->domain, "DDS domain (default: one of its own)")
+            app.add_option("--domain", options->domain.domain, "DDS domain (default: one of its own)")
                 ->check(CLI::Range(0, 230));
+            app.add_option("--interface", options->domain.interface,
+                           "Network interface, by name or address (default: the first that reaches others)")
+                ->type_name("NAME");
             app.add_option("--threads", options->threads, "That reconstruct")
                 ->check(CLI::Range(1, 64))
                 ->capture_default_str();

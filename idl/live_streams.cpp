@@ -3,6 +3,8 @@
 
 #include <dds/dds.h>
 
+#include <algorithm>
+
 #include "base/time.h"
 #include "idl/topics.h"
 #include "relievo.h"
@@ -40,9 +42,11 @@ Status check_name_is_free(const Domain& domain, const std::string& stream, std::
 
   const std::int64_t end_ns =
       steady_now_ns() + std::chrono::duration_cast<std::chrono::nanoseconds>(wait).count();
-  for (std::int64_t left_ns = end_ns - steady_now_ns(); left_ns > 0; left_ns = end_ns - steady_now_ns()) {
+  for (bool last = false; !last;) {  // once at least, however long it took to come here
+    const std::int64_t left_ns = end_ns - steady_now_ns();
+    last = left_ns <= 0;
     dds_attach_t triggered = 0;
-    dds_waitset_wait(waitset->get(), &triggered, 1, left_ns);
+    dds_waitset_wait(waitset->get(), &triggered, 1, std::max<std::int64_t>(0, left_ns));
     auto live = take_live_info(reader->get(), stream);
     if (!live) return live.error();
     if (*live) {

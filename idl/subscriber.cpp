@@ -2,6 +2,8 @@
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <thread>
@@ -40,10 +42,16 @@ class LentBytes {
   ddsrt_iovec_t bytes_{};
 };
 
-// What is remembered of a stream.
+// What is remembered of a stream. It is there while it writes to any topic: DDS marks a topic's instance as
+// not alive when its writer leaves, dies or is silent for its lease, and as alive again only with the topic's
+// next sample. A writer that was silent (a machine that stood still) and goes on does not send its
+// description again: ours still holds.
 struct Known {
   std::optional<StreamInfo> info;
-  bool live = false;
+  std::array<bool, kTopics.size()> alive{};
+  bool told = false;  // the info callback was called, and the gone callback not since
+
+  bool live() const { return std::find(alive.begin(), alive.end(), true) != alive.end(); }
   std::uint64_t frame_writer = 0;  // DDS handle of the writer of the last frame; 0 before the first
   std::uint64_t last_sequence = 0;
 };
@@ -112,7 +120,7 @@ class DdsSubscriber final : public Subscriber {
         if (readers_[static_cast<std::size_t>(topic)].get() != 0) take(topic);
       }
       // Only now, so that a stream's last frames come before its end.
-      for (const std::string& stream : ended_) tell_gone(stream);
+      for (const std::string& stream : ended_) tell_if_gone(stream);
     }
   }
 
@@ -133,10 +141,7 @@ class DdsSubscriber final : public Subscriber {
         const LentBytes bytes(samples[i]);
         if (auto status = deliver(topic, bytes.span(), infos[i]); !status) refuse(topic, status.error());
       }
-      if (topic == Topic::kInfo && infos[i].instance_state != DDS_IST_ALIVE) {
-        const auto ended = stream_of_.find(infos[i].instance_handle);
-        if (ended != stream_of_.end()) ended_.insert(ended->second);
-      }
+      if (infos[i].instance_state != DDS_IST_ALIVE) end(topic, infos[i].instance_handle);
       ddsi_serdata_unref(samples[i]);
     }
     return count;
@@ -148,12 +153,11 @@ class DdsSubscriber final : public Subscriber {
         auto info = read_info_cdr(cdr);
         if (!info) return info.error();
         if (!wanted(info->stream)) return {};
-        Known* known = remember(info->stream);
+        Known* known = remember(info->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
         raw(topic, info->stream, cdr, sample);
-        stream_of_[sample.instance_handle] = info->stream;
         known->info = std::move(*info);
-        known->live = true;
+        known->told = true;
         if (callbacks_.info) callbacks_.info(*known->info);
         return {};
       }
@@ -161,9 +165,9 @@ class DdsSubscriber final : public Subscriber {
         auto frame = read_frame_cdr(cdr);
         if (!frame) return frame.error();
         if (!wanted(frame->stream)) return {};
-        Known* known = remember(frame->stream);
+        Known* known = remember(frame->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
-        revive(*known);
+        tell_there(*known);
         count_lost(*known, *frame, sample.publication_handle);
         raw(topic, frame->stream, cdr, sample);
         if (!callbacks_.frame) return {};
@@ -180,8 +184,9 @@ class DdsSubscriber final : public Subscriber {
         auto status = read_status_cdr(cdr);
         if (!status) return status.error();
         if (!wanted(status->stream)) return {};
-        Known* known = remember(status->stream);
+        Known* known = remember(status->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
+        tell_there(*known);
         raw(topic, status->stream, cdr, sample);
         if (callbacks_.status) callbacks_.status(*status);
         return {};
@@ -193,22 +198,24 @@ class DdsSubscriber final : public Subscriber {
   bool wants_frames() const { return callbacks_.frame || callbacks_.raw || callbacks_.lost; }
   bool wanted(const std::string& stream) const { return stream_.empty() || stream == stream_; }
 
-  Known* remember(const std::string& stream) {
-    const auto found = known_.find(stream);
-    if (found != known_.end()) return &found->second;
-    if (known_.size() >= kMaxStreams) {
-      std::erase_if(known_, [](const auto& entry) { return !entry.second.live; });
-      std::erase_if(stream_of_, [&](const auto& entry) { return known_.count(entry.second) == 0; });
+  // The stream of a sample, which shows whether it is there.
+  Known* remember(const std::string& stream, Topic topic, const dds_sample_info_t& sample) {
+    if (known_.count(stream) == 0) {
+      if (known_.size() >= kMaxStreams) {
+        std::erase_if(known_, [](const auto& entry) { return !entry.second.live(); });
+        std::erase_if(stream_of_, [&](const auto& entry) { return known_.count(entry.second) == 0; });
+      }
+      if (known_.size() >= kMaxStreams) return nullptr;
     }
-    if (known_.size() >= kMaxStreams) return nullptr;
-    return &known_[stream];
+    Known& known = known_[stream];
+    known.alive[static_cast<std::size_t>(topic)] = sample.instance_state == DDS_IST_ALIVE;
+    stream_of_[{topic, sample.instance_handle}] = stream;
+    return &known;
   }
 
-  // A writer that was silent for its lease (a machine that stood still) and goes on does not send its
-  // description again: ours still holds.
-  void revive(Known& known) {
-    if (known.live || !known.info) return;
-    known.live = true;
+  void tell_there(Known& known) {
+    if (known.told || !known.info || !known.live()) return;
+    known.told = true;
     if (callbacks_.info) callbacks_.info(*known.info);
   }
 
@@ -226,10 +233,18 @@ class DdsSubscriber final : public Subscriber {
     callbacks_.raw({topic, stream, sample.source_timestamp, utc_now_ns(), Bytes(cdr.begin(), cdr.end())});
   }
 
-  void tell_gone(const std::string& stream) {
+  void end(Topic topic, std::uint64_t instance) {
+    const auto stream = stream_of_.find({topic, instance});
+    if (stream == stream_of_.end()) return;
+    ended_.insert(stream->second);
+    const auto known = known_.find(stream->second);
+    if (known != known_.end()) known->second.alive[static_cast<std::size_t>(topic)] = false;
+  }
+
+  void tell_if_gone(const std::string& stream) {
     const auto found = known_.find(stream);
-    if (found == known_.end() || !found->second.live) return;
-    found->second.live = false;
+    if (found == known_.end() || found->second.live() || !found->second.told) return;
+    found->second.told = false;
     if (callbacks_.gone) callbacks_.gone(stream);
   }
 
@@ -254,7 +269,7 @@ class DdsSubscriber final : public Subscriber {
   std::thread thread_;
   // Of the thread alone:
   std::map<std::string, Known> known_;
-  std::map<std::uint64_t, std::string> stream_of_;  // by the info topic's instance
+  std::map<std::pair<Topic, std::uint64_t>, std::string> stream_of_;  // by a topic's instance
   std::set<std::string> ended_;
   std::uint64_t refused_ = 0;
 };

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -30,6 +31,7 @@ std::string read_file(const std::filesystem::path& path) {
 }
 
 [[noreturn]] void become(const std::filesystem::path& folder, char* const* argv, char* const* environment) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that is killed for its time leaves nothing running
   const int in = open("/dev/null", O_RDONLY);
   const int out = open((folder / "out").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   const int err = open((folder / "err").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
@@ -65,7 +67,7 @@ Process::Process(const std::vector<std::string>& command, const std::vector<std:
 Process::~Process() {
   if (!status_) {
     signal(SIGKILL);
-    wait(std::chrono::seconds(10));
+    wait();
   }
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
@@ -97,13 +99,10 @@ std::string Process::err() const {
   return read_file(folder_ / "err");
 }
 
-bool Process::wait_for_text(const std::string& text, std::chrono::milliseconds timeout) const {
-  const auto end = std::chrono::steady_clock::now() + timeout;
-  for (;;) {
-    if ((err() + out()).find(text) != std::string::npos) return true;
-    if (std::chrono::steady_clock::now() >= end) return false;
-    std::this_thread::sleep_for(kPoll);
-  }
+bool Process::wait_for_text(const std::string& text) {
+  const auto said = [&] { return (err() + out()).find(text) != std::string::npos; };
+  eventually([&] { return said() || wait(0ms); });
+  return said();
 }
 
 Finished run(const std::vector<std::string>& command, std::chrono::milliseconds timeout,

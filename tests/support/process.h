@@ -10,10 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/patience.h"
+
 namespace relievo::test {
 
-/// A running child; killed and reaped in the destructor, so that none is left behind. Its output goes to
-/// files.
+/// A running child; killed and reaped in the destructor, and killed with the thread that made it, so that
+/// none is left behind. Its output goes to files.
 class Process {
  public:
   /// `program` is a path; throws where it cannot be started.
@@ -26,12 +28,12 @@ class Process {
   pid_t pid() const { return pid_; }
   void signal(int number) const;
   /// The exit status (128 + n for signal n); nothing where it still runs after `timeout`.
-  std::optional<int> wait(std::chrono::milliseconds timeout);
+  std::optional<int> wait(std::chrono::milliseconds timeout = kPatience);
   /// What it has written so far.
   std::string out() const;
   std::string err() const;
-  /// Waits until its standard error or output contains `text`.
-  bool wait_for_text(const std::string& text, std::chrono::milliseconds timeout) const;
+  /// Waits until its standard error or output contains `text`; false where it ends without.
+  bool wait_for_text(const std::string& text);
 
  private:
   pid_t pid_ = -1;
@@ -44,7 +46,7 @@ struct Finished {
   std::string out;
   std::string err;
 };
-Finished run(const std::vector<std::string>& command, std::chrono::milliseconds timeout,
+Finished run(const std::vector<std::string>& command, std::chrono::milliseconds timeout = kPatience,
              const std::vector<std::string>& environment = {});
 
 /// The folder of the built programs.

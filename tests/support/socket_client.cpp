@@ -11,9 +11,14 @@
 #include <cctype>
 #include <utility>
 
-#include "base/time.h"
-
 namespace relievo::test {
+namespace {
+
+std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadline) {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+}
+
+}  // namespace
 
 TcpClient::TcpClient(std::uint16_t port, int receive_buffer_bytes) {
   fd_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -47,10 +52,10 @@ bool TcpClient::send(const std::string& bytes) {
   return true;
 }
 
-bool TcpClient::receive(int timeout_ms) {
+bool TcpClient::receive(std::chrono::milliseconds timeout) {
   if (fd_ < 0 || at_end_) return false;
   pollfd waiting{fd_, POLLIN, 0};
-  if (poll(&waiting, 1, timeout_ms) <= 0) return false;
+  if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) return false;
   std::string chunk(65536, '\0');
   const auto n = recv(fd_, chunk.data(), chunk.size(), 0);
   if (n <= 0) {
@@ -128,13 +133,13 @@ bool WsClient::send(const std::string& text, int opcode) {
   return tcp_.send(frame);
 }
 
-std::optional<WsMessage> WsClient::next(int timeout_ms) {
-  const std::int64_t deadline = steady_now_ns() + timeout_ms * 1'000'000LL;
+std::optional<WsMessage> WsClient::next(std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
   std::string& buffer = tcp_.buffer();
   const auto need = [&](std::size_t bytes) {
     while (buffer.size() < bytes) {
-      const auto left = static_cast<int>((deadline - steady_now_ns()) / 1'000'000);
-      if (left < 0 || !tcp_.receive(left)) return false;
+      const auto left = left_until(deadline);
+      if (left < 0ms || !tcp_.receive(left)) return false;
     }
     return true;
   };
@@ -157,11 +162,11 @@ std::optional<WsMessage> WsClient::next(int timeout_ms) {
   }
 }
 
-std::optional<WsMessage> WsClient::next_of(const std::string& kind, int timeout_ms) {
-  const std::int64_t deadline = steady_now_ns() + timeout_ms * 1'000'000LL;
+std::optional<WsMessage> WsClient::next_of(const std::string& kind, std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
   for (;;) {
-    const auto left = static_cast<int>((deadline - steady_now_ns()) / 1'000'000);
-    if (left < 0) return std::nullopt;
+    const auto left = left_until(deadline);
+    if (left < 0ms) return std::nullopt;
     auto message = next(left);
     if (!message) return std::nullopt;
     if (kind == "frame" && message->opcode == 2) return message;

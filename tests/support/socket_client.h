@@ -3,11 +3,14 @@
 // server it checks. Every wait is bounded.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "tests/support/patience.h"
 
 namespace relievo::test {
 
@@ -21,7 +24,7 @@ class TcpClient {
   bool connected() const { return fd_ >= 0; }
   bool send(const std::string& bytes);
   /// Waits until at least one byte more is there; false at the end of the stream or after the time.
-  bool receive(int timeout_ms = 3000);
+  bool receive(std::chrono::milliseconds timeout = kPatience);
   bool at_end() const { return at_end_; }  // the server closed
   std::string& buffer() { return buffer_; }
 
@@ -61,9 +64,9 @@ class WsClient {
   bool send(const std::string& text, int opcode = 1);
   bool credit(int n) { return send(R"({"type":"credit","n":)" + std::to_string(n) + "}"); }
   /// The next message that is no ping; nothing after the time or at the end.
-  std::optional<WsMessage> next(int timeout_ms = 3000);
+  std::optional<WsMessage> next(std::chrono::milliseconds timeout = kPatience);
   /// Skips to the next message of a kind: "info", "status", "gone", "waiting", "time" or "frame".
-  std::optional<WsMessage> next_of(const std::string& kind, int timeout_ms = 3000);
+  std::optional<WsMessage> next_of(const std::string& kind, std::chrono::milliseconds timeout = kPatience);
   bool at_end() const { return tcp_.at_end(); }
 
  private:

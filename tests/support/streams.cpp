@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/streams.h"
 
-#include <unistd.h>
-
 #include "base/time.h"
 
 namespace relievo::test {
@@ -37,10 +35,6 @@ FrameMessage example_frame(std::uint64_t sequence, std::size_t size) {
   }
   frame.data = std::make_shared<const Bytes>(std::move(data));
   return frame;
-}
-
-int own_domain() {
-  return 1 + static_cast<int>(getpid() % 100);
 }
 
 }  // namespace relievo::test

@@ -15,7 +15,4 @@ StreamInfo example_info(const std::string& stream);
 /// `size` bytes that differ in every frame.
 FrameMessage example_frame(std::uint64_t sequence, std::size_t size);
 
-/// A DDS domain of this process's own, so that tests can run side by side.
-int own_domain();
-
 }  // namespace relievo::test

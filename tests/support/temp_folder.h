@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A folder of its own for one test, removed with it.
+// A folder of its own for one test, removed with it; files that grow.
 #pragma once
 
 #include <stdlib.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
+
+#include "tests/support/patience.h"
 
 namespace relievo::test {
 
@@ -28,5 +31,14 @@ class TempFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// Waits until another process has written that much of it.
+inline bool wait_for_size(const std::filesystem::path& file, std::uintmax_t bytes) {
+  return eventually([&] {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(file, error);
+    return !error && size >= bytes;
+  });
+}
 
 }  // namespace relievo::test

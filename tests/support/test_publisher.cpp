@@ -34,7 +34,7 @@ relievo::FrameMessage real_frame(std::uint64_t sequence) {
 int main(int argc, char** argv) {
   using namespace relievo;
   if (argc < 6) return 2;
-  alarm(120);  // whatever happens to the test, this process ends
+  alarm(600);  // whatever happens to the test, this process ends
   const std::string stream = argv[1];
   const std::size_t bytes = std::strtoul(argv[3], nullptr, 10);
   const auto period =

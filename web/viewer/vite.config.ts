@@ -20,5 +20,6 @@ export default defineConfig({
       '/ws': { target: gateway, ws: true, rewriteWsOrigin: true },
     },
   },
-  test: { include: ['test/**/*.test.ts'] },
+  // Far more than a test needs: a loaded machine may take its time.
+  test: { include: ['test/**/*.test.ts'], testTimeout: 60_000, hookTimeout: 60_000, teardownTimeout: 60_000 },
 });

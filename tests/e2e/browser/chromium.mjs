@@ -20,5 +20,17 @@ const kFlags = [
   '--disable-sync',
 ];
 
+/** For anything that happens by itself, however slow or loaded the machine. */
+export const kPatienceMs = 60_000;
+
 /** A browser of its own; who starts it closes it. */
-export const launchChromium = () => chromium.launch({ executablePath, headless: true, args: kFlags });
+export const launchChromium = () =>
+  chromium.launch({ executablePath, headless: true, args: kFlags, timeout: kPatienceMs });
+
+/** Waits until `condition()`, which may be asynchronous, is true; fails with `what` where it does not come true. */
+export async function eventually(what, condition) {
+  for (const end = Date.now() + kPatienceMs; !(await condition()); ) {
+    if (Date.now() > end) throw new Error(typeof what === 'function' ? what() : what);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+}

@@ -14,13 +14,12 @@ namespace relievo::test {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace std::chrono_literals;
 using nlohmann::json;
 using testing::HasSubstr;
 
 Finished server(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), program("relievo-server").string());
-  return run(arguments, 150s);
+  return run(arguments, kLongPatience);
 }
 
 json report(const std::vector<std::string>& arguments) {

@@ -5,9 +5,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <thread>
-
 #include "tests/e2e/server/server_process.h"
 
 namespace relievo::test {
@@ -44,18 +41,17 @@ TEST_F(ServerFault, PortInUse) {
   const TakenPort taken;
   ASSERT_GT(taken.port(), 0);
   const std::string address = "127.0.0.1:" + std::to_string(taken.port());
-  const Finished done = run(serve(source_, {"--web", address}), kPatience);
+  const Finished done = run(serve(source_, {"--web", address}));
   expect_one_error(done, std::to_string(taken.port()));
   EXPECT_EQ(done.out, "");
 }
 
 TEST_F(ServerFault, UnknownSources) {
-  expect_one_error(run(serve("webcam:0", {}), kPatience), "webcam:0");
-  expect_one_error(run(serve("take:" + (folder_.path() / "none").string(), {}), kPatience), "none");
-  expect_one_error(run(serve("sim:nowhere", {}), kPatience), "nowhere");
-  expect_one_error(
-      run(server({"reconstruct", (folder_.path() / "none").string(), "--out", out_.string()}), kPatience),
-      "none");
+  expect_one_error(run(serve("webcam:0", {})), "webcam:0");
+  expect_one_error(run(serve("take:" + (folder_.path() / "none").string(), {})), "none");
+  expect_one_error(run(serve("sim:nowhere", {})), "nowhere");
+  expect_one_error(run(server({"reconstruct", (folder_.path() / "none").string(), "--out", out_.string()})),
+                   "none");
   EXPECT_FALSE(fs::exists(out_));
 }
 
@@ -65,7 +61,7 @@ TEST_F(ServerFault, ARigWithoutAKey) {
     for (const auto& command :
          {serve(source_, {}), server({"reconstruct", take_.string(), "--out", out_.string()}),
           server({"evaluate", take_.string()})}) {
-      const Finished done = run(command, kPatience);
+      const Finished done = run(command);
       expect_one_error(done, key);
       EXPECT_NE(done.err.find("rig.yaml"), std::string::npos) << done.err;
       EXPECT_EQ(done.out, "");
@@ -79,7 +75,7 @@ TEST_F(ServerFault, APatternThatRepeatsACode) {
   StripedScene scene = striped_scene();
   scene.pattern.sequence = {0, 7, 14, 0, 7};
   ASSERT_TRUE(write_striped_take(scene, take_, 2));
-  const Finished done = run(serve(source_, {}), kPatience);
+  const Finished done = run(serve(source_, {}));
   expect_one_error(done, "pattern.yaml");
   EXPECT_NE(done.err.find("repeats"), std::string::npos) << done.err;
 }
@@ -87,13 +83,13 @@ TEST_F(ServerFault, APatternThatRepeatsACode) {
 TEST_F(ServerFault, SettingsThatAreWrong) {
   const fs::path file = folder_.path() / "serve.toml";
   std::ofstream(file) << "# settings\nthreads = 99\n";
-  const Finished done = run(serve(source_, {"--config", file.string()}), kPatience);
+  const Finished done = run(serve(source_, {"--config", file.string()}));
   expect_one_error(done, file.string() + ":2: threads");
 }
 
 TEST_F(ServerFault, ACorruptPictureIsNamedAndTheOthersAreServed) {
   fs::resize_file(take_ / "frames" / "000003.png", 200);
-  const Finished done = run(serve(source_, {"--fast"}), kPatience);
+  const Finished done = run(serve(source_, {"--fast"}));
   EXPECT_EQ(done.status, 0) << done.err;
   EXPECT_TRUE(errors(done.err).empty()) << done.err;
   int named = 0;
@@ -104,7 +100,7 @@ TEST_F(ServerFault, ACorruptPictureIsNamedAndTheOthersAreServed) {
 
 TEST_F(ServerFault, ACorruptPictureIsNamedAndTheOthersAreReconstructed) {
   fs::resize_file(take_ / "frames" / "000003.png", 200);
-  const Finished done = run(server({"reconstruct", take_.string(), "--out", out_.string()}), kPatience);
+  const Finished done = run(server({"reconstruct", take_.string(), "--out", out_.string()}));
   EXPECT_EQ(done.status, 1);
   ASSERT_EQ(errors(done.err).size(), 1U) << done.err;
   EXPECT_NE(errors(done.err)[0].find("1 of 12 frames could not be read"), std::string::npos) << done.err;
@@ -112,16 +108,15 @@ TEST_F(ServerFault, ACorruptPictureIsNamedAndTheOthersAreReconstructed) {
   EXPECT_EQ(names_in(out_).size(), 10U);  // not the first, not the torn one
   EXPECT_FALSE(names_in(out_).contains("000003.ply"));
   // A score over part of a take would not be comparable.
-  expect_one_error(run(server({"evaluate", take_.string()}), kPatience), "000003.png");
+  expect_one_error(run(server({"evaluate", take_.string()})), "000003.png");
 }
 
 TEST_F(ServerFault, ATakeRemovedMidRun) {
   Process process(serve(source_, {"--loop"}));
-  ASSERT_TRUE(process.wait_for_text("stream take", kPatience)) << process.err();
-  std::this_thread::sleep_for(500ms);
-  ASSERT_EQ(process.wait(0ms), std::nullopt) << process.err();
+  ASSERT_TRUE(process.wait_for_text("stream take")) << process.err();
+  ASSERT_EQ(process.wait(500ms), std::nullopt) << process.err();
   fs::remove_all(take_);
-  ASSERT_EQ(process.wait(kPatience), 1) << process.err();
+  ASSERT_EQ(process.wait(), 1) << process.err();
   ASSERT_EQ(errors(process.err()).size(), 1U) << process.err();
   EXPECT_NE(errors(process.err())[0].find("was removed"), std::string::npos) << process.err();
   int said = 0;
@@ -132,13 +127,12 @@ TEST_F(ServerFault, ATakeRemovedMidRun) {
 
 TEST_F(ServerFault, NoTruthToScoreAgainst) {
   fs::remove_all(take_ / "truth");
-  expect_one_error(run(server({"evaluate", take_.string()}), kPatience), "truth");
+  expect_one_error(run(server({"evaluate", take_.string()})), "truth");
 }
 
 TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   std::ofstream(out_) << "mine\n";
-  expect_one_error(run(server({"reconstruct", take_.string(), "--out", out_.string()}), kPatience),
-                   out_.string());
+  expect_one_error(run(server({"reconstruct", take_.string(), "--out", out_.string()})), out_.string());
   EXPECT_EQ(read_text(out_), "mine\n");
 }
 
@@ -147,7 +141,7 @@ TEST_F(ServerFault, NoRoomForTheReconstruction) {
   std::string script = "trap '' XFSZ; ulimit -f 8; exec";
   for (const std::string& word : server({"reconstruct", take_.string(), "--out", out_.string()}))
     script += " '" + word + "'";
-  const Finished done = run({"/bin/bash", "-c", script}, kPatience);
+  const Finished done = run({"/bin/bash", "-c", script});
   expect_one_error(done, out_.string());
   EXPECT_EQ(names_in(out_), std::set<std::string>{}) << "a half-written file was left";
 }
@@ -156,21 +150,19 @@ class ServerSignal : public TakeTest, public ::testing::WithParamInterface<int> 
 
 TEST_P(ServerSignal, EndsServeCleanly) {
   Process process(serve(source_, {"--loop"}));
-  ASSERT_TRUE(process.wait_for_text("stream take", kPatience)) << process.err();
-  std::this_thread::sleep_for(200ms);
+  ASSERT_TRUE(process.wait_for_text("stream take")) << process.err();
+  EXPECT_EQ(process.wait(200ms), std::nullopt) << process.err();
   process.signal(GetParam());
-  EXPECT_EQ(process.wait(20s), 0) << process.err();
+  EXPECT_EQ(process.wait(), 0) << process.err();
   EXPECT_TRUE(errors(process.err()).empty()) << process.err();
 }
 
 TEST_P(ServerSignal, EndsSimulateWithNothingHalfWritten) {
   Process process(server({"simulate", "--scene", "walk", "--frames", "2000", "--out", out_.string()}));
-  const auto end = std::chrono::steady_clock::now() + kPatience;
-  while (names_in(folder_.path()).size() < 2 && std::chrono::steady_clock::now() < end)  // beside the take
-    std::this_thread::sleep_for(20ms);
-  ASSERT_EQ(names_in(folder_.path()).size(), 2U) << process.err();
+  ASSERT_TRUE(eventually([&] { return names_in(folder_.path()).size() == 2; }))
+      << process.err();  // with the take
   process.signal(GetParam());
-  EXPECT_EQ(process.wait(kPatience), 0) << process.err();
+  EXPECT_EQ(process.wait(), 0) << process.err();
   EXPECT_TRUE(errors(process.err()).empty()) << process.err();
   EXPECT_EQ(names_in(folder_.path()), std::set<std::string>{"take"});
 }

@@ -16,7 +16,6 @@ namespace relievo::test {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace std::chrono_literals;
 using nlohmann::json;
 
 constexpr const char* kPython = "/usr/bin/python3";
@@ -27,7 +26,7 @@ fs::path shared() {
 }
 
 json run_json(const std::vector<std::string>& command) {
-  const Finished done = run(command, 120s);
+  const Finished done = run(command, kLongPatience);
   EXPECT_EQ(done.status, 0) << done.err;
   const json parsed = json::parse(done.out, nullptr, false);
   EXPECT_FALSE(parsed.is_discarded()) << done.out;
@@ -40,7 +39,7 @@ class Scores : public ::testing::TestWithParam<const char*> {
     if (!fs::exists(shared() / "takes"))
       GTEST_SKIP() << "no takes at " << shared() / "takes"
                    << ": set RELIEVO_SHARED";
-    if (run({kPython, "-c", "import numpy, cv2"}, 60s).status != 0)
+    if (run({kPython, "-c", "import numpy, cv2"}).status != 0)
       GTEST_SKIP() << "the scoring scripts need apt-get install python3-numpy python3-opencv";
   }
 

@@ -11,17 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/own_domain.h"
+#include "tests/support/patience.h"
 #include "tests/support/process.h"
-#include "tests/support/streams.h"
 #include "tests/support/striped_scene.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo::test {
-
-using namespace std::chrono_literals;
-
-/// For anything that ends by itself; far more than a loaded machine needs.
-constexpr auto kPatience = 60s;
 
 inline std::vector<std::string> server(const std::vector<std::string>& arguments) {
   std::vector<std::string> command{program("relievo-server").string()};
@@ -32,7 +28,7 @@ inline std::vector<std::string> server(const std::vector<std::string>& arguments
 /// `serve` of `source` on this test's own domain, without a gateway unless `more` says so.
 inline std::vector<std::string> serve(const std::string& source, const std::vector<std::string>& more) {
   std::vector<std::string> command =
-      server({"serve", "--source", source, "--domain", std::to_string(own_domain())});
+      server({"serve", "--source", source, "--domain", std::to_string(own_domain()), "--interface", "lo"});
   command.insert(command.end(), more.begin(), more.end());
   if (std::find(more.begin(), more.end(), "--web") == more.end()) {
     command.push_back("--web");

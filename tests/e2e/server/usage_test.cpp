@@ -35,7 +35,7 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
   for (const auto& arguments : wrong) {
     std::string shown;
     for (const std::string& a : arguments) shown += " " + a;
-    const Finished done = run(server(arguments), kPatience);
+    const Finished done = run(server(arguments));
     EXPECT_EQ(done.status, 2) << shown << "\n" << done.out << done.err;
     EXPECT_EQ(done.out, "") << shown;
     EXPECT_EQ(lines(done.err).size(), 1U) << shown << "\n" << done.err;
@@ -49,7 +49,7 @@ TEST(ServerUsage, HelpAndVersion) {
     for (const std::string flag : {"--help", "--version"}) {
       std::vector<std::string> arguments = command;
       arguments.push_back(flag);
-      const Finished done = run(server(arguments), kPatience);
+      const Finished done = run(server(arguments));
       EXPECT_EQ(done.status, 0) << done.err;
       EXPECT_EQ(done.err, "");
       EXPECT_NE(done.out, "");

@@ -116,15 +116,13 @@ TEST_P(SourceCompliance, StopFromAnotherThreadEndsTheRun) {
   auto stopper = std::async(std::launch::async, [&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(30));
     source->request_stop();
-    return std::chrono::steady_clock::now();
   });
   for (;;) {
     auto frame = source->next();
     ASSERT_TRUE(frame);
     if (!*frame) break;
   }
-  const auto ended = std::chrono::steady_clock::now();
-  EXPECT_LT(ended - stopper.get(), std::chrono::seconds(5));
+  stopper.get();
   EXPECT_FALSE(*source->next());
 }
 

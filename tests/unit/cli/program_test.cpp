@@ -108,8 +108,8 @@ TEST(Program, SignalStopsTheCommandCleanly) {
   const auto o = run(one_command([&](int, StopSignal& stop) {
                        stop.on_stop([&] { ++called; });
                        kill(getpid(), SIGTERM);
-                       if (!stop.wait_for(std::chrono::seconds(10))) return Status(Error{"never stopped"});
-                       for (int i = 0; i < 1000 && called == 0; ++i) usleep(1000);
+                       if (!stop.wait_for(std::chrono::seconds(60))) return Status(Error{"never stopped"});
+                       for (int i = 0; i < 60000 && called == 0; ++i) usleep(1000);
                        stop.clear_on_stop();
                        return Status();
                      }),

@@ -8,15 +8,15 @@
 
 #include <condition_variable>
 #include <mutex>
-#include <thread>
 
+#include "tests/support/own_domain.h"
+#include "tests/support/patience.h"
 #include "tests/support/process.h"
 #include "tests/support/streams.h"
 
 namespace relievo {
 namespace {
 
-using namespace std::chrono_literals;
 using testing::HasSubstr;
 
 const DomainOptions kDomain{test::own_domain(), "lo"};
@@ -24,23 +24,47 @@ const DomainOptions kDomain{test::own_domain(), "lo"};
 // Everything a subscriber was told, with bounded waits for more.
 class Inbox {
  public:
+  enum class Presence { kThere, kGone };
   struct Received {
     std::vector<StreamInfo> infos;
     std::vector<std::pair<std::string, FrameMessage>> frames;
     std::vector<ServerStatus> statuses;
     std::vector<RawSample> raw;
     std::vector<std::string> gone;
+    std::vector<Presence> presence;  // info and gone callbacks, in their order
+
+    bool there() const { return !presence.empty() && presence.back() == Presence::kThere; }
+    bool was_there_and_is_gone() const { return !presence.empty() && presence.back() == Presence::kGone; }
+    // However often a starved machine lets a stream lapse: it is gone only after it was there.
+    bool plausible() const {
+      Presence last = Presence::kGone;
+      for (const Presence p : presence) {
+        if (p == Presence::kGone && last == Presence::kGone) return false;
+        last = p;
+      }
+      return true;
+    }
     std::vector<std::pair<std::string, std::uint64_t>> lost;
   };
 
   Subscriber::Callbacks callbacks(bool raw_too = false) {
     Subscriber::Callbacks c;
-    c.info = [this](const StreamInfo& i) { add([&] { received_.infos.push_back(i); }); };
+    c.info = [this](const StreamInfo& i) {
+      add([&] {
+        received_.infos.push_back(i);
+        received_.presence.push_back(Presence::kThere);
+      });
+    };
     c.frame = [this](const std::string& s, const FrameMessage& f) {
       add([&] { received_.frames.emplace_back(s, f); });
     };
     c.status = [this](const ServerStatus& s) { add([&] { received_.statuses.push_back(s); }); };
-    c.gone = [this](const std::string& s) { add([&] { received_.gone.push_back(s); }); };
+    c.gone = [this](const std::string& s) {
+      add([&] {
+        received_.gone.push_back(s);
+        received_.presence.push_back(Presence::kGone);
+      });
+    };
     c.lost = [this](const std::string& s, std::uint64_t n) {
       add([&] { received_.lost.emplace_back(s, n); });
     };
@@ -49,9 +73,9 @@ class Inbox {
   }
   /// Until `condition(const Received&)`.
   template <typename Condition>
-  bool wait(Condition condition, std::chrono::milliseconds timeout = 10s) {
+  bool wait(Condition condition) {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, timeout, [&] { return condition(std::as_const(received_)); });
+    return changed_.wait_for(lock, test::kPatience, [&] { return condition(std::as_const(received_)); });
   }
   /// A copy: more may come meanwhile.
   Received now() {
@@ -79,8 +103,7 @@ std::unique_ptr<T> expect_made(Result<std::unique_ptr<T>> result) {
 
 template <typename AnyPublisher>
 bool wait_for_readers(const AnyPublisher& publisher, int count) {
-  for (int i = 0; i < 1000 && publisher.matched_readers() < count; ++i) std::this_thread::sleep_for(10ms);
-  return publisher.matched_readers() >= count;
+  return test::eventually([&] { return publisher.matched_readers() >= count; });
 }
 
 TEST(Transport, DescriptionAndStatusReachALateJoiner) {
@@ -196,48 +219,78 @@ TEST(Transport, WriterThatLeavesIsGoneAndMayComeBack) {
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "", inbox.callbacks()));
   auto publisher = expect_made(Publisher::create(kDomain, test::example_info("back")));
-  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.infos.size() == 1; }));
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.there(); }));
   publisher.reset();
-  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == 1; }));
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.was_there_and_is_gone(); }));
   EXPECT_EQ(inbox.now().gone[0], "back");
   publisher = expect_made(Publisher::create(kDomain, test::example_info("back")));
-  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.infos.size() == 2; }));
+  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.there(); }));
+  EXPECT_TRUE(inbox.now().plausible());
+}
+
+test::Process start_publisher(const std::string& stream, const std::vector<std::string>& more) {
+  std::vector<std::string> command = {test::program("test_publisher"), stream,
+                                      std::to_string(kDomain.domain)};
+  command.insert(command.end(), more.begin(), more.end());
+  return test::Process(command);
 }
 
 TEST(Transport, FramesOfAnotherProcessAllArrive) {
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "other", inbox.callbacks()));
-  test::Process process(
-      {test::program("test_publisher"), "other", std::to_string(kDomain.domain), "500000", "20", "20", "1"});
-  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 20; })) << process.err();
-  for (std::uint64_t i = 0; i < 20; ++i) {
+  // As many as a writer keeps for readers that lag: fewer than that are never lost.
+  constexpr std::uint64_t kFrames = 8;
+  const auto process = start_publisher("other", {"500000", "20", std::to_string(kFrames), "1"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == kFrames; })) << process.err();
+  for (std::uint64_t i = 0; i < kFrames; ++i) {
     EXPECT_EQ(*inbox.now().frames[i].second.data, *test::example_frame(i, 500'000).data);
   }
   EXPECT_TRUE(inbox.now().lost.empty());
 }
 
-TEST(Transport, KilledWriterIsGoneWithinThreeSeconds) {
+TEST(Transport, KilledWriterIsGone) {
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "victim", inbox.callbacks()));
-  test::Process process(
-      {test::program("test_publisher"), "victim", std::to_string(kDomain.domain), "1000", "100", "5", "1"});
-  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 5; })) << process.err();
-  EXPECT_TRUE(inbox.now().gone.empty());
+  auto process = start_publisher("victim", {"1000", "100", "5", "1"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 5 && r.there(); })) << process.err();
   process.signal(SIGKILL);
-  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == 1; }, 3s));
+  ASSERT_TRUE(process.wait());
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.was_there_and_is_gone(); }));
   EXPECT_EQ(inbox.now().gone[0], "victim");
+  EXPECT_TRUE(inbox.now().plausible());
 }
 
-TEST(Transport, PausedWriterComesBackWithItsDescription) {
+// A writer that stood still for longer than its lease, and then died for good.
+void expect_lapse_return_and_end(test::Process& process, Inbox& inbox) {
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.there(); })) << process.err();
+  process.signal(SIGSTOP);
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.was_there_and_is_gone(); }));
+  process.signal(SIGCONT);
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.there(); }));
+  EXPECT_EQ(to_yaml(inbox.now().infos.back().pattern), to_yaml(inbox.now().infos[0].pattern));
+  process.signal(SIGKILL);
+  ASSERT_TRUE(process.wait());
+  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.was_there_and_is_gone(); })) << "dead, and still there";
+  EXPECT_TRUE(inbox.now().plausible());
+}
+
+TEST(Transport, PausedWriterComesBackWithItsDescriptionAndIsGoneAgainWhenKilled) {
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "paused", inbox.callbacks()));
-  test::Process process(
-      {test::program("test_publisher"), "paused", std::to_string(kDomain.domain), "1000", "20", "2000", "1"});
+  auto process = start_publisher("paused", {"1000", "20", "100000", "1"});
   ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() >= 5; })) << process.err();
-  process.signal(SIGSTOP);
-  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == 1; }, 3s));
-  process.signal(SIGCONT);
-  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.infos.size() == 2; }));
+  expect_lapse_return_and_end(process, inbox);
+}
+
+TEST(Transport, PausedWriterComesBackForAReaderOfNoFrames) {
+  Inbox inbox;
+  Subscriber::Callbacks callbacks = inbox.callbacks();
+  callbacks.frame = nullptr;
+  callbacks.lost = nullptr;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "listed", callbacks));
+  auto process = start_publisher("listed", {"1000", "20", "100000"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return !r.statuses.empty(); })) << process.err();
+  expect_lapse_return_and_end(process, inbox);
 }
 
 TEST(Transport, RawSamplesAreReplayedByteForByte) {

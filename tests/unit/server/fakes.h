@@ -2,10 +2,14 @@
 // Sources and sinks that do what a test says, for the pipeline.
 #pragma once
 
+#include <unistd.h>
+
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -14,11 +18,10 @@
 
 #include "capture/source/field_source.h"
 #include "server/pipeline.h"
+#include "tests/support/patience.h"
 #include "tests/support/striped_scene.h"
 
 namespace relievo::test {
-
-using namespace std::chrono_literals;
 
 /// Calls `script` with 0, 1, 2, ... for each frame. Blocks there, as a camera does, where the script calls
 /// block().
@@ -149,7 +152,7 @@ class Gate {
     }
     wake_.notify_all();
   }
-  bool wait(std::chrono::milliseconds timeout = 20s) {
+  bool wait(std::chrono::milliseconds timeout = kPatience) {
     std::unique_lock lock(mutex_);
     return wake_.wait_for(lock, timeout, [&] { return open_; });
   }
@@ -160,14 +163,25 @@ class Gate {
   bool open_ = false;
 };
 
-template <typename Condition>
-bool eventually(const Condition& condition, std::chrono::milliseconds timeout = 20s) {
-  const auto end = std::chrono::steady_clock::now() + timeout;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(2ms);
-  }
-  return true;
+/// Every other thread of this process sleeps: what was under way is done, or waits for this one. How often a
+/// thread has run is counted, so that one which woke and slept again between two looks is seen too.
+inline bool at_rest() {
+  const auto self = std::to_string(gettid());
+  const auto look = [&] {
+    std::string seen;
+    for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task")) {
+      if (thread.path().filename() == self) continue;
+      std::ifstream file(thread.path() / "status");
+      for (std::string line; std::getline(file, line);) {
+        if (line.starts_with("State:") && line.find("S (sleeping)") == std::string::npos)
+          return std::string();
+        if (line.starts_with("Pid:") || line.find("ctxt_switches:") != std::string::npos) seen += line + '\n';
+      }
+    }
+    return seen;
+  };
+  const std::string first = look();
+  return !first.empty() && look() == first;
 }
 
 /// run() on a thread of its own; stopped and joined at the end whatever happens.
@@ -183,7 +197,7 @@ class Running {
     pipeline_.stop();
     thread_.join();
   }
-  bool ended(std::chrono::milliseconds timeout = 20s) { return done_.wait(timeout); }
+  bool ended(std::chrono::milliseconds timeout = kPatience) { return done_.wait(timeout); }
   Status result() {
     thread_.join();
     return result_;

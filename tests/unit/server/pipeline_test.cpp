@@ -188,7 +188,9 @@ TEST_F(PipelineTest, ASlowSinkCostsTheOldestFramesBeforePublishing) {
         if (n == 2) {
           EXPECT_TRUE(entered.wait());
         }
-        if (n > 2 && n < 6) std::this_thread::sleep_for(150ms);  // the queues are not full yet
+        if (n > 2 && n < 6) {  // the queues are not full yet: each frame is to wait in the last one
+          EXPECT_TRUE(eventually(at_rest)) << n;
+        }
         if (n >= 6) {
           EXPECT_TRUE(eventually([&] { return running->status().drops_publish >= n - 5; })) << n;
         }
@@ -216,19 +218,31 @@ TEST_F(PipelineTest, ASlowSinkCostsTheOldestFramesBeforePublishing) {
 }
 
 TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction) {
-  constexpr std::uint64_t kFrames = 400;
-  ScriptedSource source(scene_, count_to(frames_, kFrames), true);
+  constexpr std::uint64_t kLeast = 400;
+  Pipeline* running = nullptr;
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  std::uint64_t given = 0;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        const bool late = std::chrono::steady_clock::now() > end;
+        if (n >= kLeast && (late || running->status().drops_reconstruct > 0)) return ScriptedSource::end();
+        given = n + 1;
+        return std::optional(frames_(n));
+      },
+      true);
   const auto pipeline = make(source, {&sink_}, {});
+  running = pipeline.get();
   ASSERT_TRUE(pipeline->run());
   const ServerStatus s = pipeline->status();
   const auto got = sink_.frames();
-  EXPECT_EQ(s.frames_captured, kFrames);
+  EXPECT_EQ(s.frames_captured, given);
   EXPECT_EQ(s.frames_published, got.size());
   EXPECT_GT(s.drops_reconstruct, 0U);
   EXPECT_EQ(s.drops_capture, 0U);  // the same slide twice, but because the server dropped what lay between
-  EXPECT_LT(got.size() + s.drops_reconstruct + s.drops_encode + s.drops_publish, kFrames);
+  EXPECT_LT(got.size() + s.drops_reconstruct + s.drops_encode + s.drops_publish, given);
   ASSERT_FALSE(got.empty());
-  EXPECT_GE(got.back().number, kFrames - 3);  // the newest ones stay
+  EXPECT_GE(got.back().number, given - 3);  // the newest ones stay
   EXPECT_TRUE(std::is_sorted(got.begin(), got.end(), [](const FrameMessage& a, const FrameMessage& b) {
     return a.number < b.number;
   }));
@@ -410,11 +424,13 @@ TEST_F(PipelineTest, PacedPlaybackKeepsTheTimeStamps) {
 
 TEST_F(PipelineTest, ASlowSourceIsNotPlayedInItsOwnPast) {
   // A frame a millisecond by its stamps, one in 40 ms in truth: latency is from when a frame came.
+  std::vector<std::int64_t> came;
   ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
     if (n >= 25) return ScriptedSource::end();
     std::this_thread::sleep_for(40ms);
     CapturedFrame frame = frames_(n);
     frame.time_ns = static_cast<std::int64_t>(n) * 1'000'000;
+    came.push_back(utc_now_ns());
     return std::optional(std::move(frame));
   });
   const auto pipeline = make(source, {&sink_}, {});
@@ -422,11 +438,7 @@ TEST_F(PipelineTest, ASlowSourceIsNotPlayedInItsOwnPast) {
   const auto got = sink_.frames();
   ASSERT_FALSE(got.empty());
   // Without setting the clock back the last one would be 24 x 39 ms behind.
-  std::vector<std::int64_t> latency;
-  for (const auto& f : got) latency.push_back(f.publish_time_ns - f.capture_time_ns);
-  EXPECT_LT(
-      *std::min_element(latency.end() - std::min<std::ptrdiff_t>(5, std::ssize(latency)), latency.end()),
-      600'000'000);
+  for (const auto& f : got) EXPECT_GE(f.capture_time_ns, came[f.number] - 100'000'000) << f.number;
 }
 
 TEST_F(PipelineTest, ALiveSourcesTimesAreItsOwn) {

@@ -4,12 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 
+#include "tests/support/patience.h"
 #include "tests/support/socket_client.h"
 #include "web/gateway/gateway.h"
 
@@ -35,15 +33,6 @@ inline FrameMessage make_frame(std::uint64_t sequence, std::size_t bytes = 1000)
   frame.publish_time_ns = 2000 + static_cast<std::int64_t>(sequence);
   frame.data = std::make_shared<const Bytes>(bytes, static_cast<std::uint8_t>(sequence));
   return frame;
-}
-
-/// Waits until `done`, 5 s at most.
-inline bool wait_until(const std::function<bool()>& done) {
-  for (int i = 0; i < 500; ++i) {
-    if (done()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
 }
 
 class GatewayTest : public testing::Test {
