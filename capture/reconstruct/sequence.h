@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "base/pattern.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/line_path.h"
 #include "capture/reconstruct/match.h"
 
 namespace relievo {
@@ -51,27 +52,14 @@ class SequenceDecoder {
   }
 
  private:
-  static constexpr int kCandidates = 8;
-  struct Candidate {
-    std::int16_t boundary;
-    float gain;         // of calling the edge this boundary, evidence alone
-    float best;         // of the best path that ends here
-    std::int32_t from;  // index of the candidate before it on that path, -1 where the path starts
-    std::int32_t same;  // index of the candidate before it for the same boundary, -1 where there is none
-  };
   struct Scratch {
-    std::vector<Candidate> candidates;  // of one line
-    std::vector<std::int32_t>
-        edge_begin;                     // candidates of the line's edge e: [edge_begin[e], edge_begin[e + 1])
-    std::vector<std::int32_t> edge_of;  // of a candidate
-    std::vector<std::int32_t> last;     // of each boundary: its last candidate on the line so far, or -1
+    PathCandidates candidates;  // of one line
     double score = 0;
     std::size_t in_order = 0;
   };
   struct Slide {
-    std::array<std::vector<std::int16_t>, 64>
-        by_transition;                            // boundaries with these colours left * 8 + right
     std::vector<std::array<Primary, 2>> colours;  // of each boundary
+    BoundaryColours table;                        // the same, with those under the other slide
   };
 
   /// What the other slide's frame shows on an edge's sides.
@@ -81,8 +69,7 @@ class SequenceDecoder {
   };
 
   static Beside look_beside(const Edge& edge, int line, const SequenceContext& context);
-  void find_candidates(const Edge& edge, const Beside& beside, const SequenceContext& context,
-                       Scratch& scratch) const;
+  static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out) const;
   void check_and_complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
