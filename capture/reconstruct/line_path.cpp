@@ -15,8 +15,8 @@ namespace {
 constexpr std::size_t kPlaces = kPathCandidates;
 constexpr float kNever = -std::numeric_limits<float>::infinity();
 
-void choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
-                     std::int32_t* boundary, float* gain) {
+int choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
+                    std::int32_t* boundary, float* gain) {
   const auto count = static_cast<std::size_t>(colours.count);
   const auto own = [&](std::size_t b) {
     return edge.left[static_cast<std::size_t>(colours.left[b])] +
@@ -50,10 +50,9 @@ void choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, 
     kept[size] = static_cast<std::int32_t>(b);
     kept_gain[size++] = g;
   }
-  for (std::size_t i = 0; i < kPlaces; ++i) {
-    boundary[i] = i < size ? kept[i] : PathCandidates::kNoCandidate;
-    gain[i] = i < size ? kept_gain[i] : kNever;
-  }
+  std::copy_n(kept.begin(), size, boundary);
+  std::copy_n(kept_gain.begin(), size, gain);
+  return static_cast<int>(size);
 }
 
 // Eight numbers at once; a processor with narrower registers takes several for them.
@@ -64,24 +63,29 @@ using EightInts = std::int32_t __attribute__((vector_size(32), aligned(4), may_a
                                                PathCandidates& candidates) {
   const std::int32_t* boundary = candidates.boundary.data();
   const float* best = candidates.best.data();
+  const int own = step.edge * kPathCandidates;
   // The boundary before each candidate's own, as a path in order comes from it.
-  const EightInts before = *reinterpret_cast<const EightInts*>(boundary + step.end) - 1;
+  const EightInts before = *reinterpret_cast<const EightInts*>(boundary + own) - 1;
   Eight value{};
   EightInts from = EightInts{} - 1;
-  for (int p = step.first; p < step.end; ++p) {
-    const EightInts missing = before - boundary[p];
-    const Eight by_way =
-        (best[p] + rules.in_order) - rules.per_missing * __builtin_convertvector(missing, Eight);
-    const EightInts better = (missing >= 0) & (missing <= rules.max_missing) & (by_way > value);
-    value = better ? by_way : value;
-    from = better ? EightInts{} + p : from;
+  for (int edge = step.first; edge < step.edge; ++edge) {
+    const int begin = edge * kPathCandidates;
+    const int end = begin + candidates.used[static_cast<std::size_t>(edge)];
+    for (int p = begin; p < end; ++p) {
+      const EightInts missing = before - boundary[p];
+      const Eight by_way =
+          (best[p] + rules.in_order) - rules.per_missing * __builtin_convertvector(missing, Eight);
+      const EightInts better = (missing >= 0) & (missing <= rules.max_missing) & (by_way > value);
+      value = better ? by_way : value;
+      from = better ? EightInts{} + p : from;
+    }
   }
   const EightInts start = !(value > step.start);
   value = start ? Eight{} + step.start : value;
   from = start ? EightInts{} + step.start_from : from;
-  *reinterpret_cast<Eight*>(candidates.best.data() + step.end) =
-      value + *reinterpret_cast<const Eight*>(candidates.gain.data() + step.end);
-  *reinterpret_cast<EightInts*>(candidates.from.data() + step.end) = from;
+  *reinterpret_cast<Eight*>(candidates.best.data() + own) =
+      value + *reinterpret_cast<const Eight*>(candidates.gain.data() + own);
+  *reinterpret_cast<EightInts*>(candidates.from.data() + own) = from;
 }
 
 void extend_portable(const PathStep& step, const OrderRules& rules, PathCandidates& candidates) {
@@ -124,13 +128,12 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> kPack = [] {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from.data() + at));
 }
 
-[[gnu::target("avx2")]] void choose_avx2(const BoundaryColours& colours, const EdgeAgreement& edge,
-                                         const GainRules& rules, std::int32_t* boundary, float* gain) {
+[[gnu::target("avx2")]] int choose_avx2(const BoundaryColours& colours, const EdgeAgreement& edge,
+                                        const GainRules& rules, std::int32_t* boundary, float* gain) {
   constexpr std::size_t kBlock = 1024;  // boundaries looked at at once; a longer pattern is the reference's
   const auto count = static_cast<std::size_t>(colours.count);
   if (count > kBlock) {
-    choose_portable(colours, edge, rules, boundary, gain);
-    return;
+    return choose_portable(colours, edge, rules, boundary, gain);
   }
   const __m256 left = _mm256_loadu_ps(edge.left.data());
   const __m256 right = _mm256_loadu_ps(edge.right.data());
@@ -219,12 +222,10 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> kPack = [] {
                     gain_of.data(), boundary_of.data(), size);
     }
   }
-  const __m256i used = _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(size)), lanes);
-  const __m256 g = _mm256_loadu_ps(gain_of.data());
-  const __m256i b = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(boundary_of.data()));
-  _mm256_storeu_ps(gain, _mm256_blendv_ps(never, g, _mm256_castsi256_ps(used)));
+  _mm256_storeu_ps(gain, _mm256_loadu_ps(gain_of.data()));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(boundary),
-                      _mm256_blendv_epi8(_mm256_set1_epi32(PathCandidates::kNoCandidate), b, used));
+                      _mm256_loadu_si256(reinterpret_cast<const __m256i*>(boundary_of.data())));
+  return static_cast<int>(size);
 }
 
 #endif
@@ -244,6 +245,7 @@ void BoundaryColours::fill_up() {
 }
 
 void PathCandidates::resize(std::size_t edges) {
+  used.resize(edges);
   boundary.resize(edges * kPlaces);
   gain.resize(edges * kPlaces);
   best.resize(edges * kPlaces);

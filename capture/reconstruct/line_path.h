@@ -52,9 +52,9 @@ struct OrderRules {
   int max_missing;
 };
 
-/// The candidates of a line's edges, kPathCandidates places an edge. Empty places have boundary kNoCandidate.
+/// The candidates of a line's edges, kPathCandidates places an edge, of which the first `used` are taken.
 struct PathCandidates {
-  static constexpr std::int32_t kNoCandidate = -1000;
+  std::vector<std::int32_t> used;  // one an edge
   std::vector<std::int32_t> boundary;
   std::vector<float> gain;         // of calling the edge this boundary, evidence alone
   std::vector<float> best;         // of the best path that ends here
@@ -63,24 +63,23 @@ struct PathCandidates {
   void resize(std::size_t edges);
 };
 
-/// Places [first, end) are those of the edges from which a path may go on in order to the edge whose places
-/// begin at `end`.
+/// A path goes on in order to `edge` from the edges [first, edge), or starts there.
 struct PathStep {
-  int first, end;
-  float start;  // gain of starting anew or of jumping here, from `start_from` (or -1)
-  std::int32_t start_from;
+  int first, edge;
+  float start;              // gain of starting anew or of jumping here, from `start_from` (or -1)
+  std::int32_t start_from;  // a place
 };
 
 struct PathKernels {
   const char* name;
 
   /// Writes the best boundaries for an edge, by gain and of equal ones the first, in the sequence's order, to
-  /// `boundary` and `gain`, and fills what is left of their kPathCandidates places. Own agreement is not
-  /// below 0.
-  void (*choose)(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
-                 std::int32_t* boundary, float* gain);
+  /// the front of `boundary` and `gain`, each of kPathCandidates places; returns how many. Own agreement is
+  /// not below 0.
+  int (*choose)(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
+                std::int32_t* boundary, float* gain);
 
-  /// Fills best and from of the edge's places. Of equal ways the first in place is taken.
+  /// Fills best and from of the edge's places in use. Of equal ways the first in place is taken.
   void (*extend)(const PathStep& step, const OrderRules& rules, PathCandidates& candidates);
 };
 

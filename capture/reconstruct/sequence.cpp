@@ -23,6 +23,7 @@ constexpr OrderRules kOrder{
 };
 constexpr float kJump = -1.6F;     // a depth step: anything may follow
 constexpr int kMaxSkipped = 3;     // false edges between two that follow each other
+constexpr float kClear = 0.5F;     // of a channel's evidence: leaves no doubt about its sign
 constexpr float kNoStripe = -100;  // agreement with what no stripe is
 
 // How far an edge may have moved in two frames: 1 m/s in depth is 10 px where a stripe is 8 wide.
@@ -96,6 +97,15 @@ SequenceDecoder::SequenceDecoder(const Pattern& pattern) : boundaries_(pattern.b
       slide.table.add(left, right, pattern.colour(b, other), pattern.colour(b + 1, other));
     }
     slide.table.fill_up();
+    slide.by_code.assign(8 * 8 * 8 * 8, -1);
+    std::vector<int> uses(slide.by_code.size());
+    for (int b = 0; b < boundaries_; ++b) {
+      const auto i = static_cast<std::size_t>(b);
+      const auto code = static_cast<std::size_t>(
+          ((slide.table.left[i] * 8 + slide.table.right[i]) * 8 + slide.table.other_left[i]) * 8 +
+          slide.table.other_right[i]);
+      slide.by_code[code] = static_cast<std::int16_t>(++uses[code] == 1 ? b : -1);
+    }
   }
 }
 
@@ -109,11 +119,24 @@ EdgeAgreement SequenceDecoder::agreement_of(const Edge& edge, const Beside& besi
   return out;
 }
 
+/// The boundary that an edge is beyond doubt, or -1: every channel on both sides in both frames is clear.
+int SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown) {
+  if (!beside.tracked) return -1;
+  std::size_t code = 0;
+  float least = kClear;
+  for (const SideEvidence* side : {&edge.left, &edge.right, &beside.left, &beside.right}) {
+    const SideEvidence& e = *side;
+    code = code * 8 + static_cast<std::size_t>((e[0] > 0 ? 1 : 0) | (e[1] > 0 ? 2 : 0) | (e[2] > 0 ? 4 : 0));
+    least = std::min({least, std::fabs(e[0]), std::fabs(e[1]), std::fabs(e[2])});
+  }
+  return least >= kClear ? shown.by_code[code] : -1;
+}
+
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
                                   Scratch& scratch, SequenceResult& out) const {
   constexpr int kPlaces = kPathCandidates;
   const PathKernels& kernels = path_kernels();
-  const BoundaryColours& table = shown_slide(context).table;
+  const Slide& shown = shown_slide(context);
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
   const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
   const int count = static_cast<int>(end - begin);
@@ -124,16 +147,25 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
   for (int e = 0; e < count; ++e) {
     const auto index = begin + static_cast<std::uint32_t>(e);
     const int own = e * kPlaces;
-    kernels.choose(table, agreement_of(edges.edges[index], beside_[index]), kGains,
-                   candidates.boundary.data() + own, candidates.gain.data() + own);
+    const Edge& edge = edges.edges[index];
+    std::int32_t* boundary = candidates.boundary.data() + own;
+    float* gains = candidates.gain.data() + own;
+    int& used = candidates.used[static_cast<std::size_t>(e)];
+    if (const int clear = clear_boundary(edge, beside_[index], shown); clear >= 0) {
+      used = 1;
+      *boundary = clear;
+      *gains = gain(edge, beside_[index], context, clear) - kGains.threshold;
+    } else {
+      used = kernels.choose(shown.table, agreement_of(edge, beside_[index]), kGains, boundary, gains);
+    }
     const float jump_from = best_so_far + kJump;
     const bool jump = jump_from > 0;  // a path may start anywhere
-    kernels.extend({.first = std::max(0, e - 1 - kMaxSkipped) * kPlaces,
-                    .end = own,
+    kernels.extend({.first = std::max(0, e - 1 - kMaxSkipped),
+                    .edge = e,
                     .start = jump ? jump_from : 0,
                     .start_from = jump ? best_end : -1},
                    kOrder, candidates);
-    for (std::int32_t a = own; a < own + kPlaces; ++a) {
+    for (std::int32_t a = own; a < own + used; ++a) {
       const float best = candidates.best[static_cast<std::size_t>(a)];
       best_end = best > best_so_far ? a : best_end;
       best_so_far = std::max(best, best_so_far);

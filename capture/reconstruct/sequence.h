@@ -60,6 +60,9 @@ class SequenceDecoder {
   struct Slide {
     std::vector<std::array<Primary, 2>> colours;  // of each boundary
     BoundaryColours table;                        // the same, with those under the other slide
+    // Of each code, ((left * 8 + right) * 8 + other_left) * 8 + other_right: its boundary, -1 where it has
+    // none or several.
+    std::vector<std::int16_t> by_code;
   };
 
   /// What the other slide's frame shows on an edge's sides.
@@ -70,6 +73,7 @@ class SequenceDecoder {
 
   static Beside look_beside(const Edge& edge, int line, const SequenceContext& context);
   static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
+  static int clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out) const;
   void check_and_complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
