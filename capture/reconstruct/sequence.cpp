@@ -133,7 +133,7 @@ int SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, cons
 }
 
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
-                                  Scratch& scratch, SequenceResult& out) const {
+                                  Scratch& scratch, SequenceResult& out) {
   constexpr int kPlaces = kPathCandidates;
   const PathKernels& kernels = path_kernels();
   const Slide& shown = shown_slide(context);
@@ -172,8 +172,10 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     }
   }
   for (std::int32_t a = best_end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
-    out.boundary[begin + static_cast<std::uint32_t>(a / kPlaces)] =
-        static_cast<std::int16_t>(candidates.boundary[static_cast<std::size_t>(a)]);
+    const std::uint32_t index = begin + static_cast<std::uint32_t>(a / kPlaces);
+    const std::int32_t boundary = candidates.boundary[static_cast<std::size_t>(a)];
+    out.boundary[index] = static_cast<std::int16_t>(boundary);
+    convincing_[index] = convincing(edges.edges[index], beside_[index], context, boundary);
     ++scratch.in_order;
   }
   scratch.score += best_so_far;
@@ -260,7 +262,7 @@ void SequenceDecoder::check_and_complete(const EdgeImage& edges, const SequenceC
       int support = near_above_or_below(line, b, x) ? 2 : 0;
       if (e > begin && b > 0 && out.boundary[e - 1] == b - 1) ++support;
       if (e + 1 < end && b + 1 < boundaries_ && out.boundary[e + 1] == b + 1) ++support;
-      if (support >= 2 && convincing(edges.edges[e], beside_[e], context, b)) continue;
+      if (support >= 2 && convincing_[e] != 0) continue;
       cell(line, b) = -1;
       out.boundary[e] = -1;
       ++out.counts.unsupported;
@@ -308,6 +310,7 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
     s.in_order = 0;
   }
   beside_.resize(edges.edges.size());
+  convincing_.resize(edges.edges.size());
   pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) {
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
@@ -325,18 +328,23 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
 }
 
 bool same_slide(const DifferenceImage& a, const DifferenceImage& b) {
+  constexpr int kEveryLine = 7;
   if (a.values.size() != b.values.size()) return false;
   const float threshold_a = 4 * a.noise + 1;
   const float threshold_b = 4 * b.noise + 1;
-  std::size_t both = 0;
-  std::size_t equal = 0;
-  for (std::size_t i = 0; i < a.values.size(); i += 7) {
-    if (std::fabs(a.values[i]) < threshold_a || std::fabs(b.values[i]) < threshold_b) continue;
-    ++both;
-    equal += (a.values[i] > 0) == (b.values[i] > 0);
+  std::uint32_t both = 0;
+  std::uint32_t equal = 0;
+  for (int line = 0; line < a.lines; line += kEveryLine) {
+    const float* va = a.line(line);
+    const float* vb = b.line(line);
+    for (int i = 0; i < 3 * a.width; ++i) {
+      const bool stand_out = (std::fabs(va[i]) >= threshold_a) & (std::fabs(vb[i]) >= threshold_b);
+      both += stand_out;
+      equal += stand_out & ((va[i] > 0) == (vb[i] > 0));
+    }
   }
   // Channels of two slides agree about every second time; of the same slide, but for what moved, always.
-  return both > 0 && equal * 10 > both * 8;
+  return both > 0 && std::uint64_t{equal} * 10 > std::uint64_t{both} * 8;
 }
 
 }  // namespace relievo

@@ -75,7 +75,7 @@ class SequenceDecoder {
   static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
   static int clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
-                   SequenceResult& out) const;
+                   SequenceResult& out);
   void check_and_complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
   bool convincing(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
   float gain(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
@@ -90,8 +90,9 @@ class SequenceDecoder {
   std::array<Slide, 2> slides_;
   int boundaries_;
   std::vector<Scratch> scratch_;
-  std::vector<Beside> beside_;      // one an edge
-  std::vector<std::int32_t> grid_;  // [line][boundary]: edge or -1
+  std::vector<Beside> beside_;            // one an edge
+  std::vector<std::uint8_t> convincing_;  // one an edge: what it was decoded as by its line is
+  std::vector<std::int32_t> grid_;        // [line][boundary]: edge or -1
 };
 
 /// True where both pictures were taken under the same slide (5.2.3): the signs of what stands out agree.
