@@ -83,9 +83,18 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
   const float threshold = std::max(kLeastRise, kNoiseFactor * image.noise);
   auto& crossings = scratch.crossings;
   crossings.clear();
-  scratch.flags.resize(static_cast<std::size_t>(width));
+  scratch.flags.assign(static_cast<std::size_t>(width + 8),
+                       0);  // so that the last ones are read at once, too
   row_kernels().crossings(image.line(line), width, threshold, scratch.flags.data());
   for (int x = 0; x < width; ++x) {
+    if (x % 8 == 0) {  // most columns have none
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, scratch.flags.data() + x, sizeof eight);
+      if (eight == 0) {
+        x += 7;
+        continue;
+      }
+    }
     if (scratch.flags[static_cast<std::size_t>(x)] == 0) continue;
     const std::size_t first_here = crossings.size();
     for (int channel = 0; channel < 3; ++channel) {

@@ -3,24 +3,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace relievo {
 namespace {
 
 // Gains of the path search. Evidence of one side is a colour's agreement with three channels, -1..1; a clear
 // edge of a still scene has 2 from its own frame and 2 from the other slide's.
-constexpr float kTransitionSlack = 0.9F;  // of the best pair of colours: further off is no candidate
-constexpr float kOtherSlideFloor =
-    -0.6F;  // what the other slide's frame can take away: the scene may have moved
-constexpr float kContradiction = 0.0F;  // but where it held still, a side that disagrees
-constexpr float kContradicted = 1.5F;   // costs this much more
-constexpr float kThreshold = 1.3F;      // an edge that gains less is better left out
-constexpr float kInOrder = 1.0F;        // bonus for the boundary that follows in the sequence
-constexpr float kPerMissing = 0.5F;     // less for each boundary missed in between
-constexpr int kMaxMissing = 3;
-constexpr float kJump = -1.6F;  // a depth step: anything may follow
-constexpr int kMaxSkipped = 3;  // false edges between two that follow each other
+constexpr GainRules kGains{
+    .transition_slack = 0.9F,  // of the best pair of colours: further off is no candidate
+    .other_floor = -0.6F,      // what the other slide's frame can take away: the scene may have moved
+    .contradiction = 0.0F,     // but where it held still, a side that disagrees
+    .contradicted = 1.5F,      // costs this much more
+    .threshold = 1.3F,         // an edge that gains less is better left out
+};
+constexpr OrderRules kOrder{
+    .in_order = 1.0F,     // bonus for the boundary that follows in the sequence
+    .per_missing = 0.5F,  // less for each boundary missed in between
+    .max_missing = 3,
+};
+constexpr float kJump = -1.6F;     // a depth step: anything may follow
+constexpr int kMaxSkipped = 3;     // false edges between two that follow each other
+constexpr float kClear = 0.5F;     // of a channel's evidence: leaves no doubt about its sign
+constexpr float kNoStripe = -100;  // agreement with what no stripe is
 
 // How far an edge may have moved in two frames: 1 m/s in depth is 10 px where a stripe is 8 wide.
 constexpr float kSearch_px = 14;
@@ -41,18 +45,10 @@ float agreement(Primary colour, const SideEvidence& e) {
 }
 
 /// Of every primary.
-using ColourAgreement = std::array<float, 8>;
-
-ColourAgreement agreements(const SideEvidence& e) {
-  ColourAgreement out;
+PerPrimary agreements(const SideEvidence& e) {
+  PerPrimary out;
   for (std::size_t c = 0; c < 8; ++c) out[c] = agreement(static_cast<Primary>(c), e);
   return out;
-}
-
-std::size_t best_colour(const ColourAgreement& of) {
-  std::size_t best = 1;
-  for (std::size_t c = 2; c < 7; ++c) best = of[c] > of[best] ? c : best;
-  return best;
 }
 
 /// Where the edge stood two frames ago, under the same slide, from where it is now: the nearest place with
@@ -83,8 +79,8 @@ Displacement displacement(const DifferenceImage& same, int line, const Edge& edg
 
 /// Gain from the other slide's frame, where the colours on the two sides agree with it by `left` and `right`.
 float other_gain(float left, float right, bool tracked) {
-  if (!tracked) return std::max(kOtherSlideFloor, left + right);
-  return left + right - (std::min(left, right) < kContradiction ? kContradicted : 0);
+  if (!tracked) return std::max(kGains.other_floor, left + right);
+  return left + right - (std::min(left, right) < kGains.contradiction ? kGains.contradicted : 0);
 }
 
 }  // namespace
@@ -92,127 +88,94 @@ float other_gain(float left, float right, bool tracked) {
 SequenceDecoder::SequenceDecoder(const Pattern& pattern) : boundaries_(pattern.boundaries()) {
   for (int s = 0; s < 2; ++s) {
     Slide& slide = slides_[static_cast<std::size_t>(s)];
+    const int shown = std::min(s, pattern.slides - 1);
+    const int other = std::min(1 - s, pattern.slides - 1);
     for (int b = 0; b < boundaries_; ++b) {
-      const int shown = std::min(s, pattern.slides - 1);
       const Primary left = pattern.colour(b, shown);
       const Primary right = pattern.colour(b + 1, shown);
       slide.colours.push_back({left, right});
-      slide.by_transition[static_cast<std::size_t>(left * 8 + right)].push_back(static_cast<std::int16_t>(b));
+      slide.table.add(left, right, pattern.colour(b, other), pattern.colour(b + 1, other));
+    }
+    slide.table.fill_up();
+    slide.by_code.assign(8 * 8 * 8 * 8, -1);
+    std::vector<int> uses(slide.by_code.size());
+    for (int b = 0; b < boundaries_; ++b) {
+      const auto i = static_cast<std::size_t>(b);
+      const auto code = static_cast<std::size_t>(
+          ((slide.table.left[i] * 8 + slide.table.right[i]) * 8 + slide.table.other_left[i]) * 8 +
+          slide.table.other_right[i]);
+      slide.by_code[code] = static_cast<std::int16_t>(++uses[code] == 1 ? b : -1);
     }
   }
 }
 
-void SequenceDecoder::find_candidates(const Edge& edge, const Beside& beside, const SequenceContext& context,
-                                      Scratch& scratch) const {
-  const Slide& shown = shown_slide(context);
-  const Slide& other = other_slide(context);
-  const ColourAgreement left = agreements(edge.left);
-  const ColourAgreement right = agreements(edge.right);
-  const ColourAgreement theirs_left = agreements(beside.left);
-  const ColourAgreement theirs_right = agreements(beside.right);
-  const std::size_t best_left = best_colour(left);
-  const std::size_t best_right = best_colour(right);
-  float best_pair = left[best_left] + right[best_right];
-  if (shown.by_transition[best_left * 8 + best_right].empty()) {
-    best_pair = -10;
-    for (std::size_t l = 1; l < 7; ++l) {
-      for (std::size_t r = 1; r < 7; ++r) {
-        if (!shown.by_transition[l * 8 + r].empty()) best_pair = std::max(best_pair, left[l] + right[r]);
-      }
-    }
+EdgeAgreement SequenceDecoder::agreement_of(const Edge& edge, const Beside& beside) {
+  EdgeAgreement out{agreements(edge.left), agreements(edge.right), agreements(beside.left),
+                    agreements(beside.right), beside.tracked};
+  for (PerPrimary* side : {&out.left, &out.right}) {  // no stripe is black or white
+    side->front() = kNoStripe;
+    side->back() = kNoStripe;
   }
-  const float least = std::max(0.F, best_pair - kTransitionSlack);
-  // The best of them, best first, in as many places as there are at most.
-  std::array<Candidate, kCandidates> best;
-  std::size_t count = 0;
-  for (std::size_t l = 1; l < 7; ++l) {
-    if (left[l] + right[best_right] < least) continue;
-    for (std::size_t r = 1; r < 7; ++r) {
-      const float own = left[l] + right[r];
-      if (own < least) continue;
-      for (const std::int16_t b : shown.by_transition[l * 8 + r]) {
-        const auto [ocl, ocr] = other.colours[static_cast<std::size_t>(b)];
-        const float gain = own + other_gain(theirs_left[ocl], theirs_right[ocr], beside.tracked) - kThreshold;
-        const auto better = [&](const Candidate& than) {
-          return gain != than.gain ? gain > than.gain : b < than.boundary;
-        };
-        std::size_t place = count;
-        if (count < kCandidates) {
-          ++count;
-        } else if (!better(best[--place])) {
-          continue;
-        }
-        for (; place > 0 && better(best[place - 1]); --place) best[place] = best[place - 1];
-        best[place] = {b, gain, 0, -1, -1};
-      }
-    }
+  return out;
+}
+
+/// The boundary that an edge is beyond doubt, or -1: every channel on both sides in both frames is clear.
+int SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown) {
+  if (!beside.tracked) return -1;
+  std::size_t code = 0;
+  float least = kClear;
+  for (const SideEvidence* side : {&edge.left, &edge.right, &beside.left, &beside.right}) {
+    const SideEvidence& e = *side;
+    code = code * 8 + static_cast<std::size_t>((e[0] > 0 ? 1 : 0) | (e[1] > 0 ? 2 : 0) | (e[2] > 0 ? 4 : 0));
+    least = std::min({least, std::fabs(e[0]), std::fabs(e[1]), std::fabs(e[2])});
   }
-  scratch.candidates.insert(scratch.candidates.end(), best.begin(),
-                            best.begin() + static_cast<std::ptrdiff_t>(count));
+  return least >= kClear ? shown.by_code[code] : -1;
 }
 
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
-                                  Scratch& scratch, SequenceResult& out) const {
+                                  Scratch& scratch, SequenceResult& out) {
+  constexpr int kPlaces = kPathCandidates;
+  const PathKernels& kernels = path_kernels();
+  const Slide& shown = shown_slide(context);
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
   const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
   const int count = static_cast<int>(end - begin);
-  auto& candidates = scratch.candidates;
-  candidates.clear();
-  scratch.edge_begin.assign(1, 0);
-  scratch.edge_of.clear();
-  scratch.last.assign(static_cast<std::size_t>(boundaries_), -1);
+  PathCandidates& candidates = scratch.candidates;
+  candidates.resize(static_cast<std::size_t>(count));
   float best_so_far = 0;
-  std::int32_t best_end = -1;  // candidate at which the best path so far ends
+  std::int32_t best_end = -1;  // place at which the best path so far ends
   for (int e = 0; e < count; ++e) {
     const auto index = begin + static_cast<std::uint32_t>(e);
-    find_candidates(edges.edges[index], beside_[index], context, scratch);
-    scratch.edge_begin.push_back(static_cast<std::int32_t>(candidates.size()));
-    scratch.edge_of.resize(candidates.size(), e);
-    const float jump_from = best_so_far + kJump;
-    const std::int32_t jump_end = best_end;
-    const std::int32_t own = scratch.edge_begin[static_cast<std::size_t>(e)];
-    const std::int32_t reach = scratch.edge_begin[static_cast<std::size_t>(std::max(0, e - 1 - kMaxSkipped))];
-    for (std::int32_t a = own; a < static_cast<std::int32_t>(candidates.size()); ++a) {
-      Candidate& here = candidates[static_cast<std::size_t>(a)];
-      float in_order = 0;
-      std::int32_t in_order_from = -1;
-      for (int missing = 0; missing <= kMaxMissing && here.boundary - 1 - missing >= 0; ++missing) {
-        const auto before_boundary = static_cast<std::size_t>(here.boundary - 1 - missing);
-        for (std::int32_t b = scratch.last[before_boundary]; b >= reach;
-             b = candidates[static_cast<std::size_t>(b)].same) {
-          const float value = candidates[static_cast<std::size_t>(b)].best + kInOrder -
-                              kPerMissing * static_cast<float>(missing);
-          // Of two that are as good the one further left, whatever the order of looking.
-          if (value > in_order || (value == in_order && b < in_order_from)) {
-            in_order = value;
-            in_order_from = b;
-          }
-        }
-      }
-      float from = 0;  // a path may start anywhere
-      here.from = -1;
-      if (jump_from > from) {
-        from = jump_from;
-        here.from = jump_end;
-      }
-      if (in_order > from) {
-        from = in_order;
-        here.from = in_order_from;
-      }
-      here.best = from + here.gain;
+    const int own = e * kPlaces;
+    const Edge& edge = edges.edges[index];
+    std::int32_t* boundary = candidates.boundary.data() + own;
+    float* gains = candidates.gain.data() + own;
+    int& used = candidates.used[static_cast<std::size_t>(e)];
+    if (const int clear = clear_boundary(edge, beside_[index], shown); clear >= 0) {
+      used = 1;
+      *boundary = clear;
+      *gains = gain(edge, beside_[index], context, clear) - kGains.threshold;
+    } else {
+      used = kernels.choose(shown.table, agreement_of(edge, beside_[index]), kGains, boundary, gains);
     }
-    for (std::int32_t a = own; a < static_cast<std::int32_t>(candidates.size()); ++a) {
-      Candidate& here = candidates[static_cast<std::size_t>(a)];
-      here.same = std::exchange(scratch.last[static_cast<std::size_t>(here.boundary)], a);
-      if (here.best > best_so_far) {
-        best_so_far = here.best;
-        best_end = a;
-      }
+    const float jump_from = best_so_far + kJump;
+    const bool jump = jump_from > 0;  // a path may start anywhere
+    kernels.extend({.first = std::max(0, e - 1 - kMaxSkipped),
+                    .edge = e,
+                    .start = jump ? jump_from : 0,
+                    .start_from = jump ? best_end : -1},
+                   kOrder, candidates);
+    for (std::int32_t a = own; a < own + used; ++a) {
+      const float best = candidates.best[static_cast<std::size_t>(a)];
+      best_end = best > best_so_far ? a : best_end;
+      best_so_far = std::max(best, best_so_far);
     }
   }
-  for (std::int32_t a = best_end; a >= 0; a = candidates[static_cast<std::size_t>(a)].from) {
-    out.boundary[begin + static_cast<std::uint32_t>(scratch.edge_of[static_cast<std::size_t>(a)])] =
-        candidates[static_cast<std::size_t>(a)].boundary;
+  for (std::int32_t a = best_end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
+    const std::uint32_t index = begin + static_cast<std::uint32_t>(a / kPlaces);
+    const std::int32_t boundary = candidates.boundary[static_cast<std::size_t>(a)];
+    out.boundary[index] = static_cast<std::int16_t>(boundary);
+    convincing_[index] = convincing(edges.edges[index], beside_[index], context, boundary);
     ++scratch.in_order;
   }
   scratch.score += best_so_far;
@@ -299,7 +262,7 @@ void SequenceDecoder::check_and_complete(const EdgeImage& edges, const SequenceC
       int support = near_above_or_below(line, b, x) ? 2 : 0;
       if (e > begin && b > 0 && out.boundary[e - 1] == b - 1) ++support;
       if (e + 1 < end && b + 1 < boundaries_ && out.boundary[e + 1] == b + 1) ++support;
-      if (support >= 2 && convincing(edges.edges[e], beside_[e], context, b)) continue;
+      if (support >= 2 && convincing_[e] != 0) continue;
       cell(line, b) = -1;
       out.boundary[e] = -1;
       ++out.counts.unsupported;
@@ -347,6 +310,7 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
     s.in_order = 0;
   }
   beside_.resize(edges.edges.size());
+  convincing_.resize(edges.edges.size());
   pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) {
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
@@ -364,18 +328,23 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
 }
 
 bool same_slide(const DifferenceImage& a, const DifferenceImage& b) {
+  constexpr int kEveryLine = 7;
   if (a.values.size() != b.values.size()) return false;
   const float threshold_a = 4 * a.noise + 1;
   const float threshold_b = 4 * b.noise + 1;
-  std::size_t both = 0;
-  std::size_t equal = 0;
-  for (std::size_t i = 0; i < a.values.size(); i += 7) {
-    if (std::fabs(a.values[i]) < threshold_a || std::fabs(b.values[i]) < threshold_b) continue;
-    ++both;
-    equal += (a.values[i] > 0) == (b.values[i] > 0);
+  std::uint32_t both = 0;
+  std::uint32_t equal = 0;
+  for (int line = 0; line < a.lines; line += kEveryLine) {
+    const float* va = a.line(line);
+    const float* vb = b.line(line);
+    for (int i = 0; i < 3 * a.width; ++i) {
+      const bool stand_out = (std::fabs(va[i]) >= threshold_a) & (std::fabs(vb[i]) >= threshold_b);
+      both += stand_out;
+      equal += stand_out & ((va[i] > 0) == (vb[i] > 0));
+    }
   }
   // Channels of two slides agree about every second time; of the same slide, but for what moved, always.
-  return both > 0 && equal * 10 > both * 8;
+  return both > 0 && std::uint64_t{equal} * 10 > std::uint64_t{both} * 8;
 }
 
 }  // namespace relievo

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "base/pattern.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/line_path.h"
 #include "capture/reconstruct/match.h"
 
 namespace relievo {
@@ -51,27 +52,17 @@ class SequenceDecoder {
   }
 
  private:
-  static constexpr int kCandidates = 8;
-  struct Candidate {
-    std::int16_t boundary;
-    float gain;         // of calling the edge this boundary, evidence alone
-    float best;         // of the best path that ends here
-    std::int32_t from;  // index of the candidate before it on that path, -1 where the path starts
-    std::int32_t same;  // index of the candidate before it for the same boundary, -1 where there is none
-  };
   struct Scratch {
-    std::vector<Candidate> candidates;  // of one line
-    std::vector<std::int32_t>
-        edge_begin;                     // candidates of the line's edge e: [edge_begin[e], edge_begin[e + 1])
-    std::vector<std::int32_t> edge_of;  // of a candidate
-    std::vector<std::int32_t> last;     // of each boundary: its last candidate on the line so far, or -1
+    PathCandidates candidates;  // of one line
     double score = 0;
     std::size_t in_order = 0;
   };
   struct Slide {
-    std::array<std::vector<std::int16_t>, 64>
-        by_transition;                            // boundaries with these colours left * 8 + right
     std::vector<std::array<Primary, 2>> colours;  // of each boundary
+    BoundaryColours table;                        // the same, with those under the other slide
+    // Of each code, ((left * 8 + right) * 8 + other_left) * 8 + other_right: its boundary, -1 where it has
+    // none or several.
+    std::vector<std::int16_t> by_code;
   };
 
   /// What the other slide's frame shows on an edge's sides.
@@ -81,10 +72,10 @@ class SequenceDecoder {
   };
 
   static Beside look_beside(const Edge& edge, int line, const SequenceContext& context);
-  void find_candidates(const Edge& edge, const Beside& beside, const SequenceContext& context,
-                       Scratch& scratch) const;
+  static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
+  static int clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
-                   SequenceResult& out) const;
+                   SequenceResult& out);
   void check_and_complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
   bool convincing(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
   float gain(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
@@ -99,8 +90,9 @@ class SequenceDecoder {
   std::array<Slide, 2> slides_;
   int boundaries_;
   std::vector<Scratch> scratch_;
-  std::vector<Beside> beside_;      // one an edge
-  std::vector<std::int32_t> grid_;  // [line][boundary]: edge or -1
+  std::vector<Beside> beside_;            // one an edge
+  std::vector<std::uint8_t> convincing_;  // one an edge: what it was decoded as by its line is
+  std::vector<std::int32_t> grid_;        // [line][boundary]: edge or -1
 };
 
 /// True where both pictures were taken under the same slide (5.2.3): the signs of what stands out agree.
