@@ -19,6 +19,8 @@ struct GridPoint {
   std::uint16_t boundary = 0;  // of the pattern: between stripes `boundary` and `boundary` + 1
   std::uint16_t line = 0;      // detection line, top first: camera row `line * line_step_px`
   float column_px = 0;         // sub-pixel camera column, distorted image coordinates
+  float sigma_px = 0;          // standard deviation of column_px; 0: not known
+  bool interpolated = false;   // not measured there, but between measured points of one surface
 };
 
 /// Camera frame: x right, y down, z forward, metres. Vectors beside `positions` are empty or as long as it.
@@ -28,6 +30,8 @@ struct Surface {
   std::vector<Vec2f>
       texture_coordinates;      // glTF: (0, 0) the texture's upper left corner, (1, 1) the lower right
   std::vector<GridPoint> grid;  // empty where the surface did not come from stripes
+  std::vector<float> sigmas_m;  // standard deviation of the depth (along z); 0: not known
+  std::vector<std::uint8_t> interpolated;  // 1: not measured, but between measured points of one surface
   std::vector<Triangle> triangles;
 };
 

@@ -116,6 +116,8 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.flag("fast", config.fast);
   reader.integer("threads", 1, 64, config.threads);
   reader.decoder("decoder", config.decoder);
+  reader.flag("dense", config.surface.dense);
+  reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.integer("jpeg_quality", 1, 100, config.jpeg_quality);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
   return reader.finish();

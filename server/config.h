@@ -24,6 +24,7 @@ struct ServeConfig {
   bool fast = false;
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
+  SurfaceBuilderOptions surface;
   int jpeg_quality = 80;
   int draco_speed = 4;
 };

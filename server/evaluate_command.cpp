@@ -28,6 +28,7 @@ struct Options {
   std::uint64_t skip = 1;
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
+  SurfaceBuilderOptions surface;
   bool json = false;
 };
 
@@ -37,8 +38,10 @@ fs::path truth_of(const fs::path& take, std::uint64_t number) {
   return take / "truth" / name;
 }
 
-void print(const Score& s, bool json) {
+void print(const Score& s, const FilterCounts& filters, bool json) {
   if (json) {
+    nlohmann::json counts;
+    for (const Filter& filter : kFilters) counts[std::string(filter.name)] = filters.*filter.count;
     const nlohmann::json out = {{"frames", s.frames},
                                 {"of", s.of},
                                 {"vertices_per_frame", s.vertices_per_frame},
@@ -46,7 +49,8 @@ void print(const Score& s, bool json) {
                                 {"outliers", s.outliers},
                                 {"median_um_per_m", s.median_um_per_m},
                                 {"rms_um_per_m", s.rms_um_per_m},
-                                {"p95_um_per_m", s.p95_um_per_m}};
+                                {"p95_um_per_m", s.p95_um_per_m},
+                                {"filters", counts}};
     std::printf("%s\n", out.dump(2).c_str());
     return;
   }
@@ -56,6 +60,7 @@ void print(const Score& s, bool json) {
   std::printf("outliers      %.3f %%\n", 100 * s.outliers);
   std::printf("depth error   median %.1f, RMS %.1f, 95 %% under %.1f um a metre\n", s.median_um_per_m,
               s.rms_um_per_m, s.p95_um_per_m);
+  print_filters(filters, s.frames);
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -67,11 +72,13 @@ Status run(const Options& options, StopSignal& stop) {
                  " has no truth/ folder to score against; relievo-server simulate writes takes with truth"};
   }
   auto reconstructor = Reconstructor::create(
-      info.rig, info.pattern, {.decoder = options.decoder, .threads = options.threads, .texture = false});
+      info.rig, info.pattern,
+      {.decoder = options.decoder, .threads = options.threads, .texture = false, .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
 
   Scorer scorer(info.rig, info.pattern);
   Progress progress("evaluate", "frames", info.frames.value_or(0));
+  FilterCounts filters;  // of the frames scored
   std::optional<long> previous_slide;
   std::uint64_t done = 0;
   while (!stop.stopped()) {
@@ -95,13 +102,14 @@ Status run(const Options& options, StopSignal& stop) {
       return Error{file.string() + " is not of the camera's size"};
     }
     scorer.add(*truth, *result ? &(*result)->surface : nullptr);
+    filters += reconstructor->report().filters;
   }
   progress.finish();
   if (stop.stopped()) return {};  // nor would what was scored until now
   const Score score = scorer.score();
   if (score.frames == 0)
     return Error{"no frame of " + options.take + " could be scored: none with truth was reconstructed"};
-  print(score, options.json);
+  print(score, filters, options.json);
   return {};
 }
 
@@ -118,6 +126,7 @@ Command evaluate_command() {
                 ->check(CLI::Range(1, 64))
                 ->capture_default_str();
             add_decoder_option(app, options->decoder);
+            add_surface_options(app, options->surface);
             app.add_flag("--json", options->json, "Print the score as JSON");
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};

@@ -25,18 +25,21 @@ struct Options {
   std::string out;
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
+  SurfaceBuilderOptions surface;
   bool json = false;
 };
 
 struct Totals {
   std::uint64_t frames = 0, unreadable = 0, reconstructed = 0, same_slide = 0, vertices = 0, boundaries = 0,
                 matched = 0;
+  FilterCounts filters;
   RollingMedian detect_ms, match_ms, triangulate_ms, surface_ms, texture_ms, total_ms;
 };
 
 void count(const ReconstructReport& report, double total_ms, Totals& totals) {
   totals.boundaries += report.boundaries;
   totals.matched += report.matched;
+  totals.filters += report.filters;
   totals.detect_ms.add(report.detect_ms);
   totals.match_ms.add(report.match_ms);
   totals.triangulate_ms.add(report.triangulate_ms);
@@ -49,6 +52,8 @@ void print(const Totals& t, const Options& options) {
   const double per_frame =
       t.reconstructed > 0 ? static_cast<double>(t.vertices) / static_cast<double>(t.reconstructed) : 0;
   if (options.json) {
+    nlohmann::json counts;
+    for (const Filter& filter : kFilters) counts[std::string(filter.name)] = t.filters.*filter.count;
     const nlohmann::json out = {{"frames", t.frames},
                                 {"reconstructed", t.reconstructed},
                                 {"unreadable", t.unreadable},
@@ -56,6 +61,7 @@ void print(const Totals& t, const Options& options) {
                                 {"vertices_per_frame", per_frame},
                                 {"boundaries", t.boundaries},
                                 {"decoded", t.matched},
+                                {"filters", counts},
                                 {"median_ms",
                                  {{"detect", t.detect_ms.median()},
                                   {"match", t.match_ms.median()},
@@ -73,6 +79,7 @@ void print(const Totals& t, const Options& options) {
     std::printf("%llu frames showed the slide of the frame before: dropped frames in capture\n",
                 static_cast<unsigned long long>(t.same_slide));
   }
+  if (t.reconstructed > 0) print_filters(t.filters, t.reconstructed);
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -80,8 +87,9 @@ Status run(const Options& options, StopSignal& stop) {
   const bool is_uri = options.take.starts_with("take:") || options.take.starts_with("sim:");
   auto source = open_source(is_uri ? options.take : "take:" + options.take, {});
   if (!source) return source.error();
-  auto reconstructor = Reconstructor::create((*source)->info().rig, (*source)->info().pattern,
-                                             {.decoder = options.decoder, .threads = options.threads});
+  auto reconstructor = Reconstructor::create(
+      (*source)->info().rig, (*source)->info().pattern,
+      {.decoder = options.decoder, .threads = options.threads, .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
   std::error_code failed;
   const bool made = fs::create_directories(options.out, failed);
@@ -147,6 +155,7 @@ Command reconstruct_command() {
                 ->check(CLI::Range(1, 64))
                 ->capture_default_str();
             add_decoder_option(app, options->decoder);
+            add_surface_options(app, options->surface);
             app.add_flag("--json", options->json, "Print the summary as JSON");
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};

@@ -139,6 +139,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   options.frames = config.frames;
   options.reconstruct.threads = config.threads;
   options.reconstruct.decoder = config.decoder;
+  options.reconstruct.surface = config.surface;
   options.encode.jpeg_quality = config.jpeg_quality;
   options.encode.draco_speed = config.draco_speed;
   auto pipeline = Pipeline::create(**source, sinks, options);
@@ -173,9 +174,9 @@ std::string stream_name(const std::string& name) {
 struct Flags {
   std::optional<std::string> config, source, stream, interface, web, record;
   std::optional<std::string> decoder;
-  std::optional<int> domain, threads, jpeg_quality, draco_speed;
+  std::optional<int> domain, threads, jpeg_quality, draco_speed, fill_holes;
   std::optional<std::uint64_t> frames;
-  bool loop = false, fast = false;
+  bool loop = false, fast = false, dense = false;
 };
 
 Status run(const Flags& flags, StopSignal& stop) {
@@ -196,6 +197,8 @@ Status run(const Flags& flags, StopSignal& stop) {
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
   set(flags.jpeg_quality, config.jpeg_quality);
   set(flags.draco_speed, config.draco_speed);
+  set(flags.fill_holes, config.surface.fill_holes);
+  config.surface.dense = config.surface.dense || flags.dense;
   if (flags.frames) config.frames = flags.frames;
   config.loop = config.loop || flags.loop;
   config.fast = config.fast || flags.fast;
@@ -232,6 +235,12 @@ Command serve_command() {
                        "ordered (default: more exact) or paper (as published: three times as fast)")
             ->check(CLI::IsMember({"ordered", "paper"}))
             ->type_name("NAME");
+        app.add_flag("--dense", f->dense,
+                     "A vertex at each pixel of a line, interpolated between boundaries of one surface");
+        app.add_option("--fill-holes", f->fill_holes,
+                       "Bridge so many missing boundaries or lines of one surface (default 0: none)")
+            ->check(CLI::Range(0, kMostFilled))
+            ->type_name("N");
         app.add_option("--threads", f->threads, "Threads that reconstruct (default 1)")
             ->check(CLI::Range(1, 64));
         app.add_option("--jpeg-quality", f->jpeg_quality, "Quality of the texture (default 80)")

@@ -14,7 +14,7 @@
 #include "capture/reconstruct/match.h"
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/sequence.h"
-#include "capture/reconstruct/surface.h"
+#include "capture/reconstruct/surface_builder.h"
 #include "capture/reconstruct/texture.h"
 #include "capture/reconstruct/triangulate.h"
 
@@ -87,7 +87,8 @@ struct Reconstructor::State {
         differencer(r.colour_matrix),
         sequence(p),
         refiner(r.colour_matrix),
-        triangulator(r, p, line_count(r), line_step(r)) {
+        triangulator(r, p, line_count(r), line_step(r)),
+        surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
   }
 
@@ -103,6 +104,7 @@ struct Reconstructor::State {
   Refiner refiner;
   ConsistencyCheck consistency;
   Triangulator triangulator;
+  SurfaceBuilder surface_builder;
 
   Observation newer;
   Observation previous;  // the frame before
@@ -118,7 +120,6 @@ struct Reconstructor::State {
   EdgeImage edges;
   SequenceResult result, other_result;
   std::vector<GridVertex> vertices;
-  SurfaceScratch surface_scratch;
   ReconstructReport report;
 
   std::mutex spare_mutex;
@@ -130,7 +131,7 @@ struct Reconstructor::State {
   bool match_paper(SlideOrder tried, Match& out);
   bool match_ordered(SlideOrder tried, SequenceResult& out);
   void match_in_order(SlideOrder predicted);
-  void add_vertex(int boundary, int line, float column_px, float slope);
+  void add_vertex(int boundary, int line, float column_px, float sigma_px, float slope);
   void triangulate();
   Frame3D blank_frame();
 };
@@ -188,16 +189,26 @@ void Reconstructor::State::match_in_order(SlideOrder predicted) {
     report.matched = match.valid;
   } else {
     refiner.refine(newer.difference, result, sequence.shown_colours(order), pool, edges);
-    consistency.check(pattern.boundaries(), pool, result, edges);
+    const ConsistencyCounts checked = consistency.check(pattern.boundaries(), pool, result, edges);
+    report.filters.unsupported = result.counts.unsupported;
+    report.filters.completed = result.counts.completed;
+    report.filters.rejected = checked.rejected;
+    report.filters.moved = checked.moved;
     report.matched = result.counts.in_order - result.counts.unsupported + result.counts.completed;
   }
 }
 
-void Reconstructor::State::add_vertex(int boundary, int line, float column_px, float slope) {
+void Reconstructor::State::add_vertex(int boundary, int line, float column_px, float sigma_px, float slope) {
   if (boundary < 0) return;
   const auto position = triangulator.point(boundary, line, column_px);
-  if (!position) return;
-  vertices.push_back({{static_cast<std::uint16_t>(boundary), static_cast<std::uint16_t>(line), column_px},
+  if (!position) {
+    ++report.filters.no_point;
+    return;
+  }
+  vertices.push_back({{.boundary = static_cast<std::uint16_t>(boundary),
+                       .line = static_cast<std::uint16_t>(line),
+                       .column_px = column_px,
+                       .sigma_px = sigma_px},
                       *position,
                       slope});
 }
@@ -210,10 +221,10 @@ void Reconstructor::State::triangulate() {
     for (std::uint32_t i = starts[l]; i < starts[l + 1]; ++i) {
       if (paper()) {
         const Boundary& b = newer.detection.boundaries[i];
-        add_vertex(match.boundary[i], line, b.column_px, b.slope);
+        add_vertex(match.boundary[i], line, b.column_px, 0, b.slope);
       } else {
         const Edge& e = edges.edges[i];
-        add_vertex(result.boundary[i], line, e.column_px, e.slope);
+        add_vertex(result.boundary[i], line, e.column_px, e.sigma_px, e.slope);
       }
     }
   }
@@ -281,17 +292,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
   s.triangulate();
   s.report.triangulate_ms = clock.lap_ms();
 
-  build_surface(s.vertices, s.pattern.boundaries(), line_count(s.rig), SurfaceOptions{}, s.surface_scratch,
-                out.surface);
-  const float width = static_cast<float>(s.rig.camera.width);
-  const float height = static_cast<float>(s.rig.camera.height);
-  const int step = line_step(s.rig);
-  out.surface.texture_coordinates.clear();
-  out.surface.texture_coordinates.reserve(out.surface.grid.size());
-  for (const GridPoint& p : out.surface.grid) {
-    out.surface.texture_coordinates.push_back(
-        {(p.column_px + 0.5F) / width, (static_cast<float>(p.line * step) + 0.5F) / height});
-  }
+  s.surface_builder.build(s.vertices, s.triangulator, s.pool, out.surface, s.report.filters);
   s.report.surface_ms = clock.lap_ms();
   if (s.options.texture) {
     add_fields(frame, s.pool, out.texture);

@@ -6,10 +6,12 @@
 #include <memory>
 #include <optional>
 
+#include "base/filter_counts.h"
 #include "base/frame3d.h"
 #include "base/pattern.h"
 #include "base/result.h"
 #include "base/rig.h"
+#include "capture/reconstruct/surface_builder.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -23,6 +25,7 @@ struct ReconstructOptions {
   Decoder decoder = Decoder::kOrdered;
   int threads = 1;  // 1 is the serial reference; more give the same result
   bool texture = true;
+  SurfaceBuilderOptions surface;
 };
 
 /// Milliseconds of each stage of the last frame, and what each decided.
@@ -30,6 +33,7 @@ struct ReconstructReport {
   double detect_ms = 0, match_ms = 0, triangulate_ms = 0, surface_ms = 0, texture_ms = 0;
   std::size_t boundaries = 0;  // detected in this frame
   std::size_t matched = 0;     // of which decoded with the frame before
+  FilterCounts filters;        // what each filter did
   bool same_slide = false;     // this frame shows the slide of the one before: a frame was dropped (5.2.3)
 };
 

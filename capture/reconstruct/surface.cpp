@@ -16,11 +16,6 @@ Vec3f cross(const Vec3f& a, const Vec3f& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// Of two at one place. The column settles a tie, so that the order of detection never does.
-bool better(const GridVertex& a, const GridVertex& b) {
-  return a.slope != b.slope ? a.slope > b.slope : a.at.column_px < b.at.column_px;
-}
-
 float dot(const Vec3f& a, const Vec3f& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -39,9 +34,12 @@ void find_components(std::size_t vertices, const std::vector<Triangle>& triangle
     }
     return root;
   };
-  for (const Triangle& t : triangles) {
-    const std::int32_t first = root_of(t[0]);
-    for (const std::uint32_t v : {t[1], t[2]}) parent[static_cast<std::size_t>(root_of(v))] = first;
+  for (const std::vector<Triangle>* list :
+       {&triangles, static_cast<const std::vector<Triangle>*>(&scratch.cut)}) {
+    for (const Triangle& t : *list) {
+      const std::int32_t first = root_of(t[0]);
+      for (const std::uint32_t v : {t[1], t[2]}) parent[static_cast<std::size_t>(root_of(v))] = first;
+    }
   }
   scratch.size.assign(vertices, 0);
   for (std::size_t v = 0; v < vertices; ++v) {
@@ -72,7 +70,8 @@ SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundar
   auto& grid = scratch.grid;
   grid.assign(static_cast<std::size_t>(boundaries) * static_cast<std::size_t>(lines), -1);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    std::int32_t& slot = grid[cell(vertices[i].at.line, vertices[i].at.boundary)];
+    const GridPoint& at = vertices[i].at;
+    std::int32_t& slot = grid[cell(at.line, options.by_pixel ? static_cast<int>(at.column_px) : at.boundary)];
     counts.duplicate += slot >= 0;
     if (slot < 0 || better(vertices[i], vertices[static_cast<std::size_t>(slot)]))
       slot = static_cast<std::int32_t>(i);
@@ -85,10 +84,12 @@ SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundar
   const auto position = [&](std::int32_t i) -> const Vec3f& {
     return vertices[static_cast<std::size_t>(i)].position;
   };
-  const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c) {
+  scratch.cut.clear();
+  const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c, bool linked) {
     const float r = options.depth_step_ratio;
     if (!connected(position(a), position(b), r) || !connected(position(b), position(c), r) ||
         !connected(position(c), position(a), r)) {
+      ++counts.step;
       return;
     }
     // Order may be reversed where the surface is seen through a fold; the normal must face the camera.
@@ -96,9 +97,14 @@ SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundar
     const Vec3f& p = position(a);
     const float facing = -dot(n, p);
     const float least = options.least_facing;
-    if (!(facing > 0) || facing * facing < least * least * dot(n, n) * dot(p, p)) return;
-    out.triangles.push_back(
-        {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(c)});
+    if (!(facing > 0) || facing * facing < least * least * dot(n, n) * dot(p, p)) {
+      ++counts.edge_on;
+      return;
+    }
+    counts.step += !linked;
+    (linked ? out.triangles : scratch.cut)
+        .push_back(
+            {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(c)});
   };
   for (int line = 0; line + 1 < lines; ++line) {
     for (int b = 0; b + 1 < boundaries; ++b) {
@@ -106,19 +112,30 @@ SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundar
                                           grid[cell(line + 1, b + 1)], grid[cell(line, b + 1)]};
       const int present = (q[0] >= 0) + (q[1] >= 0) + (q[2] >= 0) + (q[3] >= 0);
       if (present < 3) continue;
+      // Sides from each corner to the next; a triangle has the two that do not touch the corner it leaves
+      // out.
+      std::array<bool, 4> on{true, true, true, true};
+      if (const GridLinks* links = options.links) {
+        on = {links->along[cell(line, b)] != 0, links->across[cell(line + 1, b)] != 0,
+              links->along[cell(line, b + 1)] != 0, links->across[cell(line, b)] != 0};
+      }
+      const auto add_without = [&](std::size_t corner) {
+        const std::size_t i = (corner + 1) % 4;
+        const std::size_t j = (corner + 2) % 4;
+        add(q[i], q[j], q[(corner + 3) % 4], on[i] && on[j]);
+      };
       if (present == 3) {
-        const std::size_t missing = q[0] < 0 ? 0 : q[1] < 0 ? 1 : q[2] < 0 ? 2 : 3;
-        add(q[(missing + 1) % 4], q[(missing + 2) % 4], q[(missing + 3) % 4]);
+        add_without(q[0] < 0 ? 0 : q[1] < 0 ? 1 : q[2] < 0 ? 2 : 3);
         continue;
       }
       // The diagonal with the smaller depth step follows the surface.
       if (std::fabs(position(q[0])[2] - position(q[2])[2]) <=
           std::fabs(position(q[1])[2] - position(q[3])[2])) {
-        add(q[0], q[1], q[2]);
-        add(q[0], q[2], q[3]);
+        add_without(3);
+        add_without(1);
       } else {
-        add(q[0], q[1], q[3]);
-        add(q[1], q[2], q[3]);
+        add_without(2);
+        add_without(0);
       }
     }
   }

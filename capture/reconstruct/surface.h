@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/frame3d.h"
+#include "capture/reconstruct/column_grid.h"
 
 namespace relievo {
 
@@ -17,6 +18,11 @@ struct GridVertex {
   float slope = 0;   // of the boundary it came from: the better of two at one place is kept
 };
 
+/// Of two at one place. The column settles a tie, so that the order of detection never does.
+inline bool better(const GridVertex& a, const GridVertex& b) {
+  return a.slope != b.slope ? a.slope > b.slope : a.at.column_px < b.at.column_px;
+}
+
 struct SurfaceOptions {
   // A cell's edge is cut where its depth step exceeds this many times its extent across the view.
   float depth_step_ratio = 4;
@@ -25,12 +31,18 @@ struct SurfaceOptions {
   float least_facing = 0.2F;
   // Connected pieces with fewer vertices are most often wrong codes; 0 keeps vertices in no triangle, too.
   int least_component = 10;
+  // Where the surface goes on from one grid place to the next: triangles keep to it. Null: depth alone tells.
+  const GridLinks* links = nullptr;
+  // The grid is [line][whole column_px] instead of [line][boundary], and `boundaries` its width.
+  bool by_pixel = false;
 };
 
-/// What a surface lost to its filters, in vertices.
+/// What a surface lost to its filters.
 struct SurfaceCounts {
-  std::size_t duplicate = 0;        // at a grid place that a better vertex has
-  std::size_t small_component = 0;  // in pieces below least_component
+  std::size_t duplicate = 0;        // vertices at a grid place that a better one has
+  std::size_t small_component = 0;  // vertices in pieces below least_component
+  std::size_t step = 0;             // triangles that would bridge a depth step
+  std::size_t edge_on = 0;          // triangles seen more edge-on than least_facing
 };
 
 /// Grows with use and is kept from frame to frame.
@@ -39,6 +51,7 @@ struct SurfaceScratch {
   std::vector<std::int32_t> kept;
   std::vector<std::int32_t> parent;  // union-find over vertices
   std::vector<std::int32_t> size;    // of a root's component
+  std::vector<Triangle> cut;         // not made, but what they join is no small component
 };
 
 /// `vertices` in any order. Fills positions, normals, grid and triangles of `out`, in order of line and

@@ -138,7 +138,7 @@ double Triangulator::sheet(int boundary, double y) const {
   return samples[i] + (at - i) * (samples[i + 1] - samples[i]);
 }
 
-std::optional<Vec3f> Triangulator::point(int boundary, int line, float column_px) const {
+std::optional<Vec3f> Triangulator::point(int boundary, float beyond, int line, float column_px) const {
   const auto [rx, ry] = ray(line, column_px);
   const auto& r = rotation_;
   // Direction of the ray in the projector's frame; the point is z * d + translation.
@@ -148,7 +148,8 @@ std::optional<Vec3f> Triangulator::point(int boundary, int line, float column_px
   double y = 0;
   double z = 0;
   for (int round = 0; round < (straight_sheets_ ? 1 : kSheetRounds); ++round) {
-    const double x = sheet(boundary, y);
+    double x = sheet(boundary, y);
+    if (beyond != 0) x += beyond * (sheet(boundary + 1, y) - x);
     // On the sheet: X = x Z in the projector's frame.
     const double denominator = dx - x * dz;
     if (std::fabs(denominator) < 1e-9) return std::nullopt;

@@ -27,7 +27,13 @@ class Triangulator {
 
   /// The point, in metres in the camera's frame, of pattern boundary `boundary` seen at `column_px` on
   /// `line`. Nothing where ray and sheet do not meet in front of both camera and projector.
-  std::optional<Vec3f> point(int boundary, int line, float column_px) const;
+  std::optional<Vec3f> point(int boundary, int line, float column_px) const {
+    return point(boundary, 0, line, column_px);
+  }
+
+  /// The same for a projector column between two boundaries: `beyond` stripes to the right of `boundary`.
+  /// `boundary` + 1 must be one too unless `beyond` is 0.
+  std::optional<Vec3f> point(int boundary, float beyond, int line, float column_px) const;
 
  private:
   std::array<float, 2> ray(int line, float column_px) const;

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// From decoded boundaries with their points to the surface that is sent: holes, depth steps, the dense
+// option, connectivity, normals, texture coordinates and standard deviations.
+#pragma once
+
+#include <vector>
+
+#include "base/filter_counts.h"
+#include "base/frame3d.h"
+#include "base/parallel.h"
+#include "base/rig.h"
+#include "capture/reconstruct/column_grid.h"
+#include "capture/reconstruct/dense.h"
+#include "capture/reconstruct/depth_sigma.h"
+#include "capture/reconstruct/surface.h"
+#include "capture/reconstruct/triangulate.h"
+
+namespace relievo {
+
+inline constexpr int kMostFilled = 16;
+
+struct SurfaceBuilderOptions {
+  bool dense = false;  // a vertex at each pixel of a line, instead of one at each boundary
+  int fill_holes = 0;  // missing boundaries or lines that are bridged on one surface, 0..kMostFilled
+};
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class SurfaceBuilder {
+ public:
+  SurfaceBuilder(const Rig& rig, int boundaries, int lines, int line_step_px,
+                 const SurfaceBuilderOptions& options);
+
+  /// `vertices` in any order; overwritten. Fills `out` but for what it holds of old, and adds what the
+  /// filters did to `counts`. `triangulator` must be of the same rig, pattern and lines.
+  void build(std::vector<GridVertex>& vertices, const Triangulator& triangulator, WorkerPool& pool,
+             Surface& out, FilterCounts& counts);
+
+ private:
+  void fill_columns(const std::vector<GridVertex>& vertices);
+  float usual_sigma_px(const std::vector<GridVertex>& vertices);
+  void finish(Surface& out) const;
+
+  Rig rig_;
+  int boundaries_, lines_, line_step_px_;
+  SurfaceBuilderOptions options_;
+  DepthSlope depth_slope_;
+  ColumnGrid columns_;
+  std::vector<std::int32_t> vertex_;  // [line][boundary]: the better vertex there, or -1
+  std::vector<float> sigmas_px_;
+  std::vector<Hole> holes_;
+  GridLinks links_;
+  DenseSampler dense_;
+  std::vector<GridVertex> pixels_;
+  SurfaceScratch scratch_;
+};
+
+}  // namespace relievo
