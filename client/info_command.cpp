@@ -166,16 +166,18 @@ void print_json(const nlohmann::json& j) {
 Status describe_file(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.what, options.stream);
   if (!recorded) return recorded.error();
+  auto described = recorded->find_info();
+  if (!described) return described.error();
   FrameTotals totals;
   std::optional<StreamInfo> info;
+  if (*described) {
+    if (auto read = read_info_cdr((*described)->cdr)) info = std::move(*read);
+  }
   Progress progress("read", "frames", recorded->frames());
   while (!stop.stopped()) {
     auto sample = recorded->next();
     if (!sample) return sample.error();
     if (!*sample) break;
-    if ((*sample)->topic == Topic::kInfo && !info) {
-      if (auto read = read_info_cdr((*sample)->cdr)) info = std::move(*read);
-    }
     if ((*sample)->topic != Topic::kFrame) continue;
     const auto frame = read_frame_cdr((*sample)->cdr);
     if (!frame) {

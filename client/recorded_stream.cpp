@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "base/log.h"
+#include "idl/cdr.h"
+#include "idl/recorder.h"
 
 namespace relievo {
 namespace {
@@ -95,12 +97,21 @@ Status RecordedStream::rewind() {
 
 Result<std::optional<RawSample>> RecordedStream::find_info() {
   std::optional<RawSample> info;
+  for (const RecordingAttachment& attachment : summary().attachments) {
+    if (attachment.name != kInfoAttachment) continue;
+    const auto read = read_info_cdr(attachment.data);
+    if (read && read->stream == stream_)
+      return std::optional(
+          RawSample{Topic::kInfo, stream_, attachment.time_ns, attachment.time_ns, attachment.data});
+  }
+  const std::uint64_t damaged = damaged_;
   for (int i = 0; i < kInfoWithinSamples && !info; ++i) {
     auto sample = next();
     if (!sample) return sample.error();
     if (!*sample) break;
     if ((*sample)->topic == Topic::kInfo) info = std::move(*sample);
   }
+  damaged_ = damaged;  // they are met again
   if (auto status = rewind(); !status) return status.error();
   return info;
 }

@@ -35,7 +35,8 @@ class RecordedStream {
   /// Damaged parts skipped since opening.
   std::uint64_t damaged() const { return damaged_; }
 
-  /// The first description in the file, wherever it lies; rewinds. Nothing where there is none.
+  /// The first description in the file, attached or among the first samples; rewinds. Nothing where there is
+  /// none.
   Result<std::optional<RawSample>> find_info();
 
  private:

@@ -10,7 +10,7 @@
 namespace relievo {
 namespace {
 
-RecordingAttachment attachment(const char* name, const std::string& text) {
+RecordingAttachment yaml_attachment(const char* name, const std::string& text) {
   return {name, "application/yaml", utc_now_ns(), Bytes(text.begin(), text.end())};
 }
 
@@ -91,6 +91,7 @@ void Recorder::add(const RawSample& sample) {
   }
   if (!writer_) fail(open_file());
   if (!error_) fail(write(sample));
+  if (sample.topic == Topic::kInfo) info_cdr_ = sample.cdr;
   if (error_) return;
   counts_.bytes += sample.cdr.size();
   counts_.live = true;
@@ -106,11 +107,15 @@ void Recorder::add_attachments(const StreamInfo& info) {
   // A server that came back with the same calibration does not make the file longer.
   if (const std::string yaml = to_yaml(info.rig); yaml != rig_yaml_) {
     rig_yaml_ = yaml;
-    fail(writer_->add_attachment(attachment("rig.yaml", yaml)));
+    fail(writer_->add_attachment(yaml_attachment("rig.yaml", yaml)));
   }
   if (const std::string yaml = to_yaml(info.pattern); !error_ && yaml != pattern_yaml_) {
     pattern_yaml_ = yaml;
-    fail(writer_->add_attachment(attachment("pattern.yaml", yaml)));
+    fail(writer_->add_attachment(yaml_attachment("pattern.yaml", yaml)));
+  }
+  if (!error_ && info_cdr_ != attached_info_cdr_) {
+    attached_info_cdr_ = info_cdr_;
+    fail(writer_->add_attachment({kInfoAttachment, "application/octet-stream", utc_now_ns(), info_cdr_}));
   }
 }
 

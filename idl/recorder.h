@@ -15,6 +15,10 @@
 
 namespace relievo {
 
+/// Name of the attachment that repeats the stream's description, a StreamInfo as CDR: it is in one chunk
+/// only, and frames cannot be shown without it.
+constexpr const char* kInfoAttachment = "stream_info.cdr";
+
 /// Fed by a Subscriber's thread, watched by another: every function may be called from any thread. It writes
 /// on the feeding thread; while the disk is slow, samples wait in DDS's own bounded queue, and what that
 /// loses is counted.
@@ -62,6 +66,7 @@ class Recorder {
   std::unique_ptr<RecordingWriter> writer_;  // made with the first sample, so that no empty file is left
   std::uint16_t channels_[3] = {};
   std::string rig_yaml_, pattern_yaml_;  // as attached last
+  Bytes info_cdr_, attached_info_cdr_;   // as received last, as attached last
   std::optional<Error> error_;
   Counts counts_;
   std::int64_t first_frame_ns_ = 0;

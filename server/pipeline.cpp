@@ -23,6 +23,9 @@ constexpr std::int64_t kStatusInterval_ns = kNanosecondsPerSecond;
 constexpr std::int64_t kMaxLate_ns =
     100'000'000;                      // behind its own time stamps before a source's clock is set back
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
+constexpr double kSilentFrames = 10;  // times a frame's without one: the source has stalled
+constexpr std::int64_t kSilentAtLeast_ns = kNanosecondsPerSecond;
+constexpr std::uint64_t kFramesForASurface = 30;  // far more than any schedule needs
 
 struct Captured {
   CapturedFrame frame;
@@ -79,6 +82,10 @@ class ThreadedPipeline final : public Pipeline {
     std::lock_guard lock(mutex_);
     s.state = state_;
     s.message = message_;
+    if (state_ == StreamState::kRunning && asked_ns_ && steady_now_ns() - *asked_ns_ > silence_ns()) {
+      s.state = StreamState::kStalled;
+      s.message = "The source gives no frames.";
+    }
     return s;
   }
 
@@ -103,6 +110,24 @@ class ThreadedPipeline final : public Pipeline {
     return stopping_;
   }
 
+  /// The source's next frame; while it is waited for, status() can say so.
+  Result<std::optional<CapturedFrame>> next_frame() {
+    const auto asked = [this](std::optional<std::int64_t> since_ns) {
+      std::lock_guard lock(mutex_);
+      asked_ns_ = since_ns;
+    };
+    asked(steady_now_ns());
+    auto next = source_.next();
+    asked(std::nullopt);
+    return next;
+  }
+
+  /// How long a source may be silent.
+  std::int64_t silence_ns() const {
+    const double rate = source_.info().rig.frame_rate;
+    return std::max(kSilentAtLeast_ns, static_cast<std::int64_t>(kSilentFrames * 1e9 / rate));
+  }
+
   /// False once stopping.
   bool sleep_until(std::int64_t utc_ns) {
     std::unique_lock lock(mutex_);
@@ -118,7 +143,7 @@ class ThreadedPipeline final : public Pipeline {
     int errors_in_a_row = 0;
     Error last_error;
     while (!options_.frames || delivered < *options_.frames) {
-      auto next = source_.next();
+      auto next = next_frame();
       if (!next) {
         // An error is logged once the source goes on behind it, or returned where it does not.
         if (errors_in_a_row > 0 && last_error.message != next.error().message)
@@ -155,6 +180,8 @@ class ThreadedPipeline final : public Pipeline {
 
   void reconstruct_stage() {
     std::optional<std::uint64_t> previous;
+    std::uint64_t without_surface = 0;  // frames, before the first surface
+    bool any_surface = false;
     while (auto item = to_reconstruct_.pop()) {
       const std::int64_t begin = steady_now_ns();
       auto result = reconstructor_.add(item->frame);
@@ -169,7 +196,14 @@ class ThreadedPipeline final : public Pipeline {
       const bool consecutive = previous && item->ordinal == *previous + 1 && !starts_again;
       if (reconstructor_.report().same_slide && consecutive) stats_.lost_in_capture(1);
       previous = item->ordinal;
-      if (!*result) continue;
+      if (!*result) {
+        // A take that is looped would go on so for ever.
+        if (!any_surface && ++without_surface == std::max(kFramesForASurface, 2 * pass.value_or(0)))
+          fail(Error{source_.info().name + " gave no surface in " + std::to_string(without_surface) +
+                     " frames: a surface needs two frames under different slides"});
+        continue;
+      }
+      any_surface = true;
       stats_.reconstructed(milliseconds(steady_now_ns() - begin));
       push(to_encode_, Reconstructed{*std::move(*result), item->capture_time_ns});
     }
@@ -250,6 +284,7 @@ class ThreadedPipeline final : public Pipeline {
   bool stopping_ = false;
   StreamState state_ = StreamState::kStarting;
   std::string message_;
+  std::optional<std::int64_t> asked_ns_;  // the source for a frame that has not come yet
   std::optional<Error> failure_;
 };
 

@@ -7,6 +7,7 @@
 
 #include <condition_variable>
 #include <fstream>
+#include <future>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -210,7 +211,8 @@ TEST(RecordPlay, InterruptedRecorderCompletesItsFile) {
   const auto description = info(file);
   EXPECT_EQ(description["recovered"], false);
   EXPECT_EQ(description["frames"], result["frames"]);
-  EXPECT_THAT(description["attachments"].dump(), HasSubstr(R"(["rig.yaml","pattern.yaml"])"));
+  EXPECT_THAT(description["attachments"].dump(),
+              HasSubstr(R"(["rig.yaml","pattern.yaml","stream_info.cdr"])"));
   const Arrived there = arrived(recorded_frames(file));
   EXPECT_EQ(result["lost"], there.lost);
   EXPECT_EQ(description["lost"], there.lost);
@@ -294,6 +296,65 @@ TEST(RecordPlay, FramesAreDescribedAndExported) {
   const auto late = test::run({program("relievo"), "export", file, "--out", folder / "x", "--from", "99"});
   EXPECT_EQ(late.status, 1);
   EXPECT_THAT(late.err, HasSubstr("no frame in that range"));
+}
+
+// Damages the description among the recorded samples, and with it the chunk that holds it.
+void damage_description(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  std::string description;
+  {
+    auto reader = RecordingReader::open(file);
+    ASSERT_TRUE(reader.ok());
+    for (const auto& attachment : (*reader)->summary().attachments)
+      if (attachment.name == "stream_info.cdr") description = text_of(attachment.data);
+  }
+  ASSERT_FALSE(description.empty());
+  for (auto at = bytes.find(description); at != std::string::npos; at = bytes.find(description, at + 1)) {
+    std::string damaged = bytes;
+    damaged[at + description.size() / 2] ^= 0x55;
+    std::ofstream(file, std::ios::binary) << damaged;
+    auto reader = RecordingReader::open(file);
+    ASSERT_TRUE(reader.ok());
+    if ((*reader)->summary().damage.empty()) return;  // not the attachment, which is the other place
+  }
+  FAIL() << "no description among the samples";
+}
+
+TEST(RecordPlay, DescriptionSurvivesADamagedFirstChunk) {
+  const test::TempFolder folder;
+  const auto file = folder / "damaged.mcap";
+  {
+    test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    test::Process recorder(on_loopback({"record", "face", "--out", file}));
+    ASSERT_TRUE(wait_for_size(file, 2'000'000)) << recorder.err();
+    recorder.signal(SIGINT);
+    ASSERT_EQ(recorder.wait(), 0) << recorder.err();
+  }
+  damage_description(file);
+  const auto description = info(file);
+  EXPECT_EQ(description["damaged_parts"], 1);
+  EXPECT_EQ(description["info"]["pattern"]["stripes"], 7);
+  EXPECT_GT(description["frames"], 0);
+
+  std::promise<StreamInfo> told;
+  std::once_flag once;
+  Subscriber::Callbacks callbacks;
+  callbacks.info = [&](const StreamInfo& i) { std::call_once(once, [&] { told.set_value(i); }); };
+  const auto subscriber = Subscriber::create({kDomainNumber, "lo"}, "face", callbacks);
+  ASSERT_TRUE(subscriber.ok());
+  test::Process player(on_loopback({"play", file, "--loop"}));
+  auto played = told.get_future();
+  ASSERT_EQ(played.wait_for(test::kPatience), std::future_status::ready) << player.err();
+  EXPECT_EQ(played.get().pattern.stripes(), 7);
+  player.signal(SIGINT);
+  EXPECT_EQ(player.wait(), 0) << player.err();
+
+  test::Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  ASSERT_TRUE(web.wait_for_text("viewer http://127.0.0.1:")) << web.err();
+  const std::string out = web.out();
+  const auto port = static_cast<std::uint16_t>(std::stoi(out.substr(out.rfind(':') + 1)));
+  EXPECT_THAT(test::request(port, "GET", "/api/streams").body, HasSubstr("\"stripes\":7"));
 }
 
 TEST(RecordPlay, WebServesARecordingInALoop) {

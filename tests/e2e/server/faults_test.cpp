@@ -125,6 +125,15 @@ TEST_F(ServerFault, ATakeRemovedMidRun) {
   EXPECT_EQ(names_in(folder_.path()), std::set<std::string>{});
 }
 
+TEST_F(ServerFault, ATakeOfOneFrameInALoop) {
+  fs::remove_all(take_);
+  ASSERT_TRUE(write_striped_take(striped_scene(), take_, 1));
+  const Finished done = run(serve(source_, {"--loop"}));
+  EXPECT_EQ(done.status, 1) << done.err;
+  ASSERT_EQ(errors(done.err).size(), 1U) << done.err;
+  EXPECT_NE(errors(done.err)[0].find("a surface needs two frames"), std::string::npos) << done.err;
+}
+
 TEST_F(ServerFault, NoTruthToScoreAgainst) {
   fs::remove_all(take_ / "truth");
   expect_one_error(run(server({"evaluate", take_.string()})), "truth");

@@ -343,6 +343,47 @@ TEST_F(PipelineTest, StalledIsSaidWhileErrorsLast) {
   EXPECT_EQ(sink_.statuses().back().message, "");
 }
 
+TEST_F(PipelineTest, StalledIsSaidWhileTheSourceIsSilent) {
+  Gate stalled;
+  sink_.on_status = [&](const ServerStatus& s) -> Status {
+    if (s.state == StreamState::kStalled && s.message == "The source gives no frames.") stalled.open();
+    return {};
+  };
+  Pipeline* running = nullptr;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        if (n == 3) {
+          EXPECT_TRUE(stalled.wait());
+          EXPECT_EQ(running->status().state, StreamState::kStalled);
+        }
+        if (n == 4) {
+          EXPECT_TRUE(eventually([&] { return running->status().message.empty(); }));
+        }
+        if (n > 5) return ScriptedSource::end();
+        return std::optional(frames_(n));
+      },
+      true);
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  running = pipeline.get();
+  EXPECT_TRUE(pipeline->run());
+  EXPECT_EQ(numbers(sink_.frames()), range(1, 6));
+  EXPECT_EQ(sink_.statuses().back().state, StreamState::kEnded);
+  EXPECT_EQ(sink_.statuses().back().message, "");
+}
+
+TEST_F(PipelineTest, ASourceThatNeverGivesASurfaceEndsTheRun) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t) -> ScriptedSource::Next {
+    return std::optional(frames_(0));  // one frame, looped
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  const Status done = pipeline->run();
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().message,
+            "scripted gave no surface in 30 frames: a surface needs two frames under different slides");
+  EXPECT_TRUE(sink_.frames().empty());
+}
+
 TEST_F(PipelineTest, AFrameOfAnotherSizeEndsTheRun) {
   ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
     CapturedFrame frame = frames_(n);
