@@ -16,66 +16,25 @@ constexpr float kMerge_px = 2;     // crossings of different channels closer tha
 constexpr float kMaxReach_px = 6;  // evidence is gathered up to here
 constexpr float kNoiseOfSign = 2;  // standard deviations at which a sign counts half
 
-// Four numbers that are added, multiplied and compared at once wherever the processor can.
-using Four = float __attribute__((vector_size(16)));
-using FourInts = std::int32_t __attribute__((vector_size(16)));
-
-Four four_at(const float* p) {
-  Four out;
-  std::memcpy(&out, p, sizeof out);
-  return out;
-}
-
-/// Sums of the three channels over columns [first, last], the fourth 0.
-Four sums(const DifferenceImage& image, int line, int first, int last) {
-  const float* red = image.line(line);
-  const float* green = red + image.width;
-  const float* blue = green + image.width;
-  Four r{}, g{}, b{};
-  int x = first;
-  for (; x + 4 <= image.width && x <= last; x += 4) {
-    const int left = last - x + 1;
-    const Four none{};
-    const FourInts wanted = FourInts{0, 1, 2, 3} < left;
-    r += wanted ? four_at(red + x) : none;
-    g += wanted ? four_at(green + x) : none;
-    b += wanted ? four_at(blue + x) : none;
-  }
-  for (; x <= last; ++x) {
-    r[0] += red[x];
-    g[0] += green[x];
-    b[0] += blue[x];
-  }
-  const Four rg = __builtin_shufflevector(r, g, 0, 4, 1, 5) + __builtin_shufflevector(r, g, 2, 6, 3, 7);
-  const Four b0 = b + __builtin_shufflevector(b, b, 2, 3, 0, 1);
-  const Four b00 = __builtin_shufflevector(b0, Four{}, 0, 4, 1, 5);
-  return __builtin_shufflevector(rg, b00, 0, 1, 4, 5) + __builtin_shufflevector(rg, b00, 2, 3, 6, 7);
-}
-
-/// Mean of the channels over columns [from, to], scaled so that the strongest channel is about 1 where it
-/// stands out.
-SideEvidence evidence(const DifferenceImage& image, int line, float from, float to) {
+/// Columns [from, to] of a row, at least one.
+std::array<int, 2> columns(int width, float from, float to) {
   // Rounds as std::lround does but for what the clamp takes away, at a tenth of its time.
-  const int first = std::clamp(static_cast<int>(from + 0.5F), 0, image.width - 1);
-  const int last = std::clamp(static_cast<int>(to + 0.5F), first, image.width - 1);
-  const Four mean = sums(image, line, first, last) * (1.F / static_cast<float>(last - first + 1));
-  const Four size = mean < 0 ? -mean : mean;
-  const float strongest = std::max({size[0], size[1], size[2]});
-  Four out = mean * (1.F / (0.4F * strongest + kNoiseOfSign * image.noise + 0.5F));
-  const Four one{1, 1, 1, 1};
-  out = out > one ? one : out;
-  out = out < -one ? -one : out;
-  return {out[0], out[1], out[2]};
+  const int first = std::clamp(static_cast<int>(from + 0.5F), 0, width - 1);
+  return {first, std::clamp(static_cast<int>(to + 0.5F), first, width - 1)};
 }
 
 }  // namespace
 
-SideEvidence evidence_left(const DifferenceImage& image, int line, float column_px, float reach_px) {
-  return evidence(image, line, column_px - reach_px, column_px - 0.5F * reach_px);
-}
-
-SideEvidence evidence_right(const DifferenceImage& image, int line, float column_px, float reach_px) {
-  return evidence(image, line, column_px + 0.5F * reach_px, column_px + reach_px);
+EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edge& edge, float column_px) {
+  const float l = edge.left_reach_px;
+  const float r = edge.right_reach_px;
+  const auto [left_first, left_last] = columns(image.width, column_px - l, column_px - 0.5F * l);
+  const auto [right_first, right_last] = columns(image.width, column_px + 0.5F * r, column_px + r);
+  const float doubt = kNoiseOfSign * image.noise + 0.5F;
+  Sides out;
+  row_kernels().side_evidence(image.line(line), image.width,
+                              {left_first, left_last, right_first, right_last, doubt, doubt}, out);
+  return {{out.left[0], out.left[1], out.left[2]}, {out.right[0], out.right[1], out.right[2]}};
 }
 
 void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& scratch) {
@@ -135,8 +94,9 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
     const float right_gap = i + 1 < end ? scratch.edges[i + 1].column_px - e.column_px : 2 * kMaxReach_px;
     e.left_reach_px = std::clamp(0.55F * left_gap, 1.F, kMaxReach_px);
     e.right_reach_px = std::clamp(0.55F * right_gap, 1.F, kMaxReach_px);
-    e.left = evidence_left(image, line, e.column_px, e.left_reach_px);
-    e.right = evidence_right(image, line, e.column_px, e.right_reach_px);
+    const EvidenceBeside beside = evidence_beside(image, line, e, e.column_px);
+    e.left = beside.left;
+    e.right = beside.right;
   }
   scratch.counts.push_back(static_cast<std::uint32_t>(end - begin));
 }

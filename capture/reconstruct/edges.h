@@ -37,10 +37,13 @@ struct EdgeImage {
   std::vector<Edge> edges;  // by line, then left to right
 };
 
-/// Evidence of colours at `column_px` - reach (left) or + reach (right) on a line of any frame's difference
-/// image.
-SideEvidence evidence_left(const DifferenceImage& image, int line, float column_px, float reach_px);
-SideEvidence evidence_right(const DifferenceImage& image, int line, float column_px, float reach_px);
+struct EvidenceBeside {
+  SideEvidence left, right;
+};
+
+/// Evidence of colours beside `column_px`, half a reach of `edge` to a whole one away, on a line of any
+/// frame's difference image.
+EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edge& edge, float column_px);
 
 /// Keeps its scratch memory from frame to frame. One thread.
 class EdgeFinder {

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/rows.h"
 
+#include <algorithm>
+#include <cstring>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
 namespace relievo {
 namespace {
 
@@ -79,8 +86,103 @@ RELIEVO_BODY void crossings_body(const float* __restrict planes, int width, floa
     flags[x] = static_cast<std::uint8_t>(crosses(red, x) | crosses(green, x) << 1 | crosses(blue, x) << 2);
 }
 
+// Four numbers that are added, multiplied and compared at once wherever the processor can.
+using Four = float __attribute__((vector_size(16)));
+using FourInts = std::int32_t __attribute__((vector_size(16)));
+
+Four four_at(const float* p) {
+  Four out;
+  std::memcpy(&out, p, sizeof out);
+  return out;
+}
+
+/// Sums of the three channels over columns [first, last], the fourth 0.
+Four sums(const float* planes, int width, int first, int last) {
+  const float* red = planes;
+  const float* green = planes + width;
+  const float* blue = planes + 2 * width;
+  Four r{}, g{}, b{};
+  int x = first;
+  for (; x + 4 <= width && x <= last; x += 4) {
+    const int left = last - x + 1;
+    const Four none{};
+    const FourInts wanted = FourInts{0, 1, 2, 3} < left;
+    r += wanted ? four_at(red + x) : none;
+    g += wanted ? four_at(green + x) : none;
+    b += wanted ? four_at(blue + x) : none;
+  }
+  for (; x <= last; ++x) {
+    r[0] += red[x];
+    g[0] += green[x];
+    b[0] += blue[x];
+  }
+  const Four rg = __builtin_shufflevector(r, g, 0, 4, 1, 5) + __builtin_shufflevector(r, g, 2, 6, 3, 7);
+  const Four b0 = b + __builtin_shufflevector(b, b, 2, 3, 0, 1);
+  const Four b00 = __builtin_shufflevector(b0, Four{}, 0, 4, 1, 5);
+  return __builtin_shufflevector(rg, b00, 0, 1, 4, 5) + __builtin_shufflevector(rg, b00, 2, 3, 6, 7);
+}
+
+std::array<float, 4> evidence(const float* planes, int width, int first, int last, float doubt) {
+  const Four sum = sums(planes, width, first, last);
+  const Four size = sum < 0 ? -sum : sum;
+  const float strongest = std::max({size[0], size[1], size[2]});
+  const auto count = static_cast<float>(last - first + 1);
+  Four out = sum * (1.F / (RowKernels::kClearShare * strongest + count * doubt));
+  const Four one{1, 1, 1, 1};
+  out = out > one ? one : out;
+  out = out < -one ? -one : out;
+  return {out[0], out[1], out[2], 0};
+}
+
+void side_evidence_portable(const float* planes, int width, const SideWindows& w, Sides& out) {
+  out.left = evidence(planes, width, w.left_first, w.left_last, w.left_doubt);
+  out.right = evidence(planes, width, w.right_first, w.right_last, w.right_doubt);
+}
+
+#if defined(__x86_64__)
+
+/// Both sides at once, the left in the lower half of each register.
+[[gnu::target("avx2")]] void side_evidence_avx2(const float* planes, int width, const SideWindows& w,
+                                                Sides& out) {
+  const int left_count = w.left_last - w.left_first + 1;
+  const int right_count = w.right_last - w.right_first + 1;
+  if (left_count > 4 || right_count > 4 || w.left_first + 4 > width || w.right_first + 4 > width) {
+    side_evidence_portable(planes, width, w, out);
+    return;
+  }
+  const __m256i count = _mm256_set_m128i(_mm_set1_epi32(right_count), _mm_set1_epi32(left_count));
+  const __m256 wanted =
+      _mm256_castsi256_ps(_mm256_cmpgt_epi32(count, _mm256_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3)));
+  const auto channel = [&](int c) __attribute__((target("avx2"), always_inline)) {
+    const float* row = planes + c * width;
+    return _mm256_and_ps(wanted,
+                         _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(row + w.left_first)),
+                                              _mm_loadu_ps(row + w.right_first), 1));
+  };
+  const __m256 red = channel(0);
+  const __m256 green = channel(1);
+  const __m256 blue = channel(2);
+  // Lanes 0 and 2, and 1 and 3, are added first, as in sums().
+  const __m256 rg = _mm256_add_ps(_mm256_unpacklo_ps(red, green), _mm256_unpackhi_ps(red, green));
+  const __m256 b0 = _mm256_add_ps(_mm256_unpacklo_ps(blue, _mm256_setzero_ps()),
+                                  _mm256_unpackhi_ps(blue, _mm256_setzero_ps()));
+  const __m256 sum = _mm256_add_ps(_mm256_shuffle_ps(rg, b0, 0x44), _mm256_shuffle_ps(rg, b0, 0xee));
+  const __m256 size = _mm256_andnot_ps(_mm256_set1_ps(-0.F), sum);
+  __m256 strongest = _mm256_max_ps(size, _mm256_shuffle_ps(size, size, 0x4e));
+  strongest = _mm256_max_ps(strongest, _mm256_shuffle_ps(strongest, strongest, 0xb1));
+  const __m256 doubt = _mm256_set_m128(_mm_set1_ps(w.right_doubt), _mm_set1_ps(w.left_doubt));
+  const __m256 unit = _mm256_div_ps(
+      _mm256_set1_ps(1), _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(RowKernels::kClearShare), strongest),
+                                       _mm256_mul_ps(_mm256_cvtepi32_ps(count), doubt)));
+  const __m256 evidence =
+      _mm256_max_ps(_mm256_set1_ps(-1), _mm256_min_ps(_mm256_set1_ps(1), _mm256_mul_ps(sum, unit)));
+  _mm256_storeu_ps(out.left.data(), evidence);  // and the right behind it
+}
+
+#endif
+
 /// All kernels for one set of instructions, as static functions of a struct.
-#define RELIEVO_KERNELS(set, attributes)                                                           \
+#define RELIEVO_KERNELS(set, attributes, side_evidence)                                            \
   struct set {                                                                                     \
     attributes static void add_rows(const std::uint8_t* own, const std::uint8_t* above,            \
                                     const std::uint8_t* below, int samples, std::uint8_t* out) {   \
@@ -104,17 +206,19 @@ RELIEVO_BODY void crossings_body(const float* __restrict planes, int width, floa
       crossings_body(planes, width, least_rise, flags);                                            \
     }                                                                                              \
     static RowKernels table(const char* name) {                                                    \
-      return {name, add_rows, combine_fields, low_pass, to_planes, crossings};                     \
+      return {name, add_rows, combine_fields, low_pass, to_planes, crossings, side_evidence};      \
     }                                                                                              \
   }
 
-RELIEVO_KERNELS(Portable, );
+RELIEVO_KERNELS(Portable, , side_evidence_portable);
 #if defined(__x86_64__)
 // Without fused multiply-add, whose results differ in the last bit from the reference's.
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], side_evidence_avx2);
 #endif
 
 }  // namespace
+
+static_assert(sizeof(Sides) == 8 * sizeof(float));
 
 const std::vector<RowKernels>& all_row_kernels() {
   static const std::vector<RowKernels> kernels = [] {

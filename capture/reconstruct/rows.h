@@ -29,8 +29,22 @@ struct PlaneRows {
   float* white;
 };
 
+/// Columns [first, last] on both sides of an edge, and what is added to the colours' size in each. Columns
+/// are of the row.
+struct SideWindows {
+  int left_first, left_last, right_first, right_last;
+  float left_doubt, right_doubt;
+};
+
+/// Of red, green and blue; the fourth is 0.
+struct Sides {
+  std::array<float, 4> left, right;
+};
+
 /// Every pointer is to a row of its own; none overlap but where said. `samples` is 3 * width.
 struct RowKernels {
+  static constexpr float kClearShare = 0.4F;
+
   const char* name;
 
   /// out = own + (above + below) / 2, rounded up, 255 at most. `above` and `below` may be the same.
@@ -52,6 +66,10 @@ struct RowKernels {
   /// Bit c of flags[x] is set where channel c of `planes` ([3][width]) crosses zero between columns x and
   /// x + 1 and rises or falls the same way by `least_rise` or more from x - 1 to x + 2. `flags` is [width].
   void (*crossings)(const float* planes, int width, float least_rise, std::uint8_t* flags);
+
+  /// Mean m of `planes` ([3][width]) in each window over kClearShare * (largest |m| of the channels) + doubt,
+  /// clamped to -1..1.
+  void (*side_evidence)(const float* planes, int width, const SideWindows& windows, Sides& out);
 };
 
 /// Those that run on this machine, the reference first and the best last.

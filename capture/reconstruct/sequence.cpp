@@ -66,8 +66,8 @@ bool alike(const SideEvidence& a, const SideEvidence& b) {
 
 Displacement displacement(const DifferenceImage& same, int line, const Edge& edge) {
   const auto matches = [&](float px) {
-    return alike(edge.left, evidence_left(same, line, edge.column_px + px, edge.left_reach_px)) &&
-           alike(edge.right, evidence_right(same, line, edge.column_px + px, edge.right_reach_px));
+    const EvidenceBeside there = evidence_beside(same, line, edge, edge.column_px + px);
+    return alike(edge.left, there.left) && alike(edge.right, there.right);
   };
   if (matches(0)) return {true, 0};
   for (float px = kSearchStep_px; px <= kSearch_px; px += kSearchStep_px) {
@@ -212,8 +212,9 @@ SequenceDecoder::Beside SequenceDecoder::look_beside(const Edge& edge, int line,
     px = 0.5F * moved.px;
   }
   if (context.other == nullptr) return out;
-  out.left = evidence_left(*context.other, line, edge.column_px + px, edge.left_reach_px);
-  out.right = evidence_right(*context.other, line, edge.column_px + px, edge.right_reach_px);
+  const EvidenceBeside there = evidence_beside(*context.other, line, edge, edge.column_px + px);
+  out.left = there.left;
+  out.right = there.right;
   return out;
 }
 

@@ -133,6 +133,43 @@ TEST_P(Rows, Crossings) {
   }
 }
 
+TEST_P(Rows, SideEvidence) {
+  std::mt19937 random(11);
+  for (const int width : kWidths) {
+    const auto whole = make.row<std::int16_t>(3 * width, -90, 90);
+    const std::vector<float> planes(whole.begin(), whole.end());
+    std::uniform_int_distribution<int> first(0, width - 1), count(1, 9);
+    for (int round = 0; round < 50; ++round) {
+      const int left = first(random);
+      const int right = first(random);
+      const SideWindows windows{left,  std::min(width, left + count(random)) - 1,
+                                right, std::min(width, right + count(random)) - 1,
+                                0.5F,  2.5F};
+      Sides got, reference;
+      kernels().side_evidence(planes.data(), width, windows, got);
+      all_row_kernels().front().side_evidence(planes.data(), width, windows, reference);
+      ASSERT_EQ(got.left, reference.left);
+      ASSERT_EQ(got.right, reference.right);
+      for (const bool is_left : {true, false}) {
+        const int begin = is_left ? windows.left_first : windows.right_first;
+        const int end = (is_left ? windows.left_last : windows.right_last) + 1;
+        std::array<double, 3> mean{};
+        for (std::size_t c = 0; c < 3; ++c)
+          for (int x = begin; x < end; ++x)
+            mean[c] += static_cast<double>(
+                           planes[c * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]) /
+                       (end - begin);
+        const double strongest = std::max({std::fabs(mean[0]), std::fabs(mean[1]), std::fabs(mean[2])});
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double expected = std::clamp(mean[c] / (0.4 * strongest + (is_left ? 0.5 : 2.5)), -1.0, 1.0);
+          ASSERT_NEAR((is_left ? got.left : got.right)[c], expected, 1e-5)
+              << begin << ".." << end << " of " << width;
+        }
+      }
+    }
+  }
+}
+
 /// Whatever the processor, a frame's results are the same.
 TEST_P(Rows, EqualsTheReferenceToTheLastBit) {
   const RowKernels& reference = all_row_kernels().front();
