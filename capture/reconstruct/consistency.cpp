@@ -36,9 +36,10 @@ constexpr float kDoubtAcross_px = 0.05F;  // where boundaries beside it are
 constexpr float kSuspect_px = 0.1F;       // worse than this, a boundary is weighed against its neighbours
 constexpr float kAgree = 3.F;             // standard deviations between a boundary and a prediction of it
 constexpr float kAlone_px = 0.08F;        // beside a step, without a prediction that agrees
-constexpr float kAtStep_px = 0.36F;       // beside a step, after weighing
+constexpr float kAtStep_px = 0.25F;       // beside a step, after weighing
 constexpr float kNoisy = 1.2F;            // or, where noise is strong, this many times its part
-constexpr float kAtMost_px = 0.5F;        // elsewhere, for instance where texture spoils it
+constexpr float kGoesOn_px = 0.5F;        // off a line above or below, or the straight through two of them
+constexpr float kAtMost_px = 0.3F;        // elsewhere, for instance where texture spoils it
 constexpr float kLean_px = 2.5F;          // a boundary hangs together over lines that differ by less
 constexpr float kWidest_px = 40.F;        // and with the next one over less
 constexpr std::int32_t kLeastPiece = 25;  // boundaries; smaller pieces of surface are wrong codes
@@ -220,33 +221,41 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
   predict(here[boundary - 1], here[boundary - 2], here[boundary - 3], kTwoAcross_px);
   predict(here[boundary + 1], here[boundary + 2], here[boundary + 3], kTwoAcross_px);
   const auto at = [&](int l) { return row(trusted_, line + l)[boundary]; };
-  predict(at(-1), at(-2), at(-3), kTwoAlong_px);
-  predict(at(1), at(2), at(3), kTwoAlong_px);
+  if (!edge.above_differs) predict(at(-1), at(-2), at(-3), kTwoAlong_px);
+  if (!edge.below_differs) predict(at(1), at(2), at(3), kTwoAlong_px);
   float own_variance = sigma_px * sigma_px + kOwn_px * kOwn_px;
   if (state & (kOpenAlong | kBentAlong)) own_variance += kDoubtAlong_px * kDoubtAlong_px;
   if (state & (kOpenAcross | kBentAcross)) own_variance += kDoubtAcross_px * kDoubtAcross_px;
   out = {own, sigma_px};
-  const bool along = (state & (kOpenAlong | kBentAlong)) != 0;
+  // Where lines above and below are other surfaces, the line itself may be a mixture of both.
+  const auto goes_on = [&](int direction) {
+    const float next = row(smooth_, line + direction)[boundary];
+    const float second = row(smooth_, line + 2 * direction)[boundary];
+    return std::fabs(next - own) < kGoesOn_px || std::fabs(2 * next - second - own) < kGoesOn_px;
+  };
+  const bool above = !edge.above_differs && goes_on(-1);
+  const bool below = !edge.below_differs && goes_on(1);
+  if ((state & (kOpenAlong | kBentAlong)) && !above && !below) return false;
   const bool step = beside_step(state);
   const float alone_px = std::max(kAlone_px, kNoisy * edge.noise_px);
   const float at_step_px = std::max(kAtStep_px, kNoisy * edge.noise_px);
   if (count == 0) return sigma_px < (step ? alone_px : kAtMost_px);
-  // The nearest prediction is on the boundary's side of the step.
-  const Estimate* best = nullptr;
-  float least = 0;
+  // Predictions that agree are on the boundary's side of the step.
+  float weights = 1 / own_variance;
+  float sum = weights * own;
+  bool agrees = false;
   for (std::size_t i = 0; i < count; ++i) {
-    const float off = predictions[i].column_px - own;
-    const float chi = off * off / (predictions[i].sigma_px * predictions[i].sigma_px + own_variance);
-    if (best == nullptr || chi < least) {
-      best = &predictions[i];
-      least = chi;
-    }
+    const Estimate& p = predictions[i];
+    const float off = p.column_px - own;
+    if (off * off > kAgree * kAgree * (p.sigma_px * p.sigma_px + own_variance)) continue;
+    const float weight = 1 / (p.sigma_px * p.sigma_px);
+    weights += weight;
+    sum += weight * p.column_px;
+    agrees = true;
   }
-  if (least > kAgree * kAgree) return step ? sigma_px < alone_px && !along : sigma_px < kAtMost_px;
-  const float own_weight = 1 / own_variance;
-  const float weight = 1 / (best->sigma_px * best->sigma_px);
-  out.column_px = (own_weight * own + weight * best->column_px) / (own_weight + weight);
-  out.sigma_px = 1 / std::sqrt(own_weight + weight);
+  if (!agrees) return sigma_px < (step ? alone_px : kAtMost_px);
+  out.column_px = sum / weights;
+  out.sigma_px = 1 / std::sqrt(weights);
   return out.sigma_px <= (step ? at_step_px : kAtMost_px);
 }
 
@@ -289,7 +298,8 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
         Estimate settled{row(smooth_, line)[b], edge.sigma_px};
         const bool replaced = row(measured_, line)[b] != edge.column_px;
         const bool is_step = edge.at_step && beside_step(s);
-        const bool suspect = s != 0 || edge.sigma_px > kSuspect_px;
+        const bool suspect =
+            s != 0 || edge.above_differs || edge.below_differs || edge.sigma_px > kSuspect_px;
         if (replaced || is_step || size_[cell] < kLeastPiece ||
             (suspect && !settle(line, b, edge, settled))) {
           result.boundary[e] = -1;

@@ -23,7 +23,9 @@ struct Edge {
   float noise_px = 0;  // the part of sigma_px that is noise; the rest is what the scene around it does
   float slope = 0;     // root of the sum of the channels' squared slopes, difference units a pixel
   float contrast = 0;  // 0..1, of the scene in white light around the edge: what draws an edge off its place
-  bool at_step = false;     // the scene itself has a step just here: perhaps it is what was found
+  bool at_step = false;        // the scene itself has a step just here: perhaps it is what was found
+  bool above_differs = false;  // the scene has a step between this line and the one above,
+  bool below_differs = false;  // or below: another surface, or its edge
   float left_reach_px = 0;  // how far to the left evidence was gathered, less than half way to the next edge
   float right_reach_px = 0;
   SideEvidence left{};  // of the frame the edge was found in

@@ -130,7 +130,7 @@ struct Reconstructor::State {
   bool shows_same_slide() const;
   bool match_paper(SlideOrder tried, Match& out);
   bool match_ordered(SlideOrder tried, SequenceResult& out);
-  void match_in_order(SlideOrder predicted);
+  void match_in_order(SlideOrder predicted, View8 slide);
   void add_vertex(int boundary, int line, float column_px, float sigma_px, float slope);
   void triangulate();
   Frame3D blank_frame();
@@ -172,7 +172,7 @@ bool Reconstructor::State::match_ordered(SlideOrder tried, SequenceResult& out) 
 
 /// `predicted` is the order if slides alternate. Where it explains little, both are tried: "each frame is
 /// decoded using the tuple which gives more valid stripe positions" (5.3).
-void Reconstructor::State::match_in_order(SlideOrder predicted) {
+void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
   order = predicted;
   const bool good = paper() ? match_paper(order, match) : match_ordered(order, result);
   if (pattern.slides == 2 && !(good && order_known)) {
@@ -188,7 +188,7 @@ void Reconstructor::State::match_in_order(SlideOrder predicted) {
   if (paper()) {
     report.matched = match.valid;
   } else {
-    refiner.refine(newer.difference, result, sequence.shown_colours(order), pool, edges);
+    refiner.refine(newer.difference, slide, result, sequence.shown_colours(order), pool, edges);
     const ConsistencyCounts checked = consistency.check(pattern.boundaries(), pool, result, edges);
     report.filters.unsupported = result.counts.unsupported;
     report.filters.completed = result.counts.completed;
@@ -283,7 +283,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
     s.have_same = std::exchange(s.have_older, true);
   }
   if (!s.have_older && s.pattern.slides == 2) return std::optional<Frame3D>();
-  s.match_in_order(s.report.same_slide ? s.order : other(s.order));
+  s.match_in_order(s.report.same_slide ? s.order : other(s.order), frame.slide_field());
   s.report.match_ms = clock.lap_ms();
 
   Frame3D out = s.blank_frame();

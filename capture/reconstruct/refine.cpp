@@ -10,20 +10,33 @@ namespace {
 
 constexpr int kReach_px = 7;  // samples looked at on each side
 
-constexpr int kContrastReach_px = 4;  // how far a step in the scene draws an edge
-constexpr int kContrastLines = 1;     // the low-pass across lines reaches as far
-constexpr float kDark = 3;            // grey levels of the fields' sum, below which ratios are noise
-// Standard deviation in pixels that the scene's contrast, 0..1, adds. Zero crossings keep their place on
-// texture but are blurred as colour is; luma is sharp but takes the texture for light.
-constexpr float kColourBias_px = 0.9F;
-constexpr float kLumaBias_px = 1.F;
-constexpr float kApartShare = 0.6F;     // of the distance between luma's and colour's place
-constexpr float kApartNoise = 2.5F;     // beyond so many standard deviations of it
-constexpr float kNoLuma_px = 0.1F;      // where luma shows no step
-constexpr float kLumaFactor = 1.3F;     // the middle level is itself measured
-constexpr float kLevelSlack = 0.1F;     // of a side's luma ratio about what the code tells
-constexpr float kStepContrast = 0.12F;  // a step of the scene that is one
-constexpr float kStepNear_px = 0.7F;
+constexpr int kPlateau_px = 5;        // of these, where a side's level is measured: from 2 px on
+constexpr float kBreak = 0.12F;       // change of luma over two columns, of its sum, at which a surface ends
+constexpr float kFarthest_px = 2.5F;  // between colour's place and luma's
+constexpr float kVarianceOfMedian = 2.198F;  // variance over median of the squares, of normal deviates
+constexpr int kContrastReach_px = 4;         // how far a step in the scene draws an edge
+constexpr int kContrastLines = 1;            // the low-pass across lines reaches as far
+constexpr float kDark = 3;                   // grey levels of the fields' sum, below which ratios are noise
+// What the scene's contrast, 0..1, adds to a standard deviation. Zero crossings keep their place on texture
+// but are blurred as colour is, which the frame itself tells; luma is sharp but its levels are uncertain.
+constexpr float kLevelShare = 0.16F;         // of the luma ratio
+constexpr float kLeastColourBias_px = 0.4F;  // of a zero crossing
+constexpr float kMostColourBias_px = 2.F;
+constexpr float kDrawnTogether = 1.6F;      // what draws colour draws luma too, the same way
+constexpr float kPlain = 0.05F;             // contrast that is none,
+constexpr float kContrasty = 0.1F;          // and one by which the bias is measured
+constexpr float kSteep = 0.15F;             // slope of the luma ratio that places a boundary well, a pixel
+constexpr float kApartShare = 0.35F;        // of the distance between luma's and colour's place
+constexpr float kApartNoise = 2.5F;         // beyond so many standard deviations of it
+constexpr float kNoLuma_px = 0.1F;          // where luma shows no step, and
+constexpr float kNoLumaContrast_px = 0.6F;  // times contrast more
+constexpr float kLumaFactor = 1.3F;         // the middle level is itself measured
+constexpr float kLevelSlack = 0.1F;         // of a side's luma ratio about what the code tells
+constexpr float kStepContrast = 0.12F;      // a step of the scene that is one
+constexpr int kRowReach_px = 4;             // columns compared with the lines above and below
+constexpr float kRowStep = 0.12F;           // difference, of the sum, that is another surface's
+constexpr float kRowNoise = 3.F;            // grey levels more: noise
+constexpr float kStepNear_px = 1.2F;
 
 /// True where the steepest place of a step of `white` around `column_px` is there.
 bool steepest_at(const float* white, int centre, float column_px) {
@@ -64,10 +77,131 @@ Refiner::Refiner(const std::array<double, 9>& colour_matrix) {
   }
 }
 
-void Refiner::refine_edge(const DifferenceImage& image, int line, const Sides& sides, Edge& edge) const {
+/// Luma of the difference over that of the sum: the projected light's own, whatever the surface.
+float Refiner::ratio(const float* d, const float* white, int width, int x) const {
+  return (luma_[0] * d[x] + luma_[1] * d[width + x] + luma_[2] * d[2 * width + x]) / (white[x] + kDark);
+}
+
+/// Columns from `centre` on in the direction of `step` that show the same surface in the same light, as far
+/// as luma tells, `reach` at most.
+int Refiner::clear_run(const float* white, int width, int centre, int step, int reach) {
+  int run = 1;
+  for (; run < reach; ++run) {
+    const int x = centre + step * run;
+    if (x < 1 || x + 1 >= width) break;
+    if (std::fabs(white[x + 1] - white[x - 1]) > kBreak * (white[x + 1] + white[x - 1] + kDark)) break;
+  }
+  return run;
+}
+
+Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, const Sides& sides,
+                                       float share, float own) const {
+  const int width = image.width;
+  const int centre = static_cast<int>(std::lround(own));
+  const float* d = image.line(line);
+  const float* white = image.white_line(line);
+  std::array<float, 2 * kReach_px + 1> y{};
+  for (int i = 0; i <= 2 * kReach_px; ++i)
+    y[static_cast<std::size_t>(i)] = ratio(d, white, width, centre - kReach_px + i);
+  const auto at = [&](int x) { return y[static_cast<std::size_t>(x - centre + kReach_px)]; };
+
+  LumaPlace out{own, 0, false};
+  float place = own;
+  for (int round = 0; round < 2; ++round) {
+    // Plateaus of both sides, and how strong each channel comes back from this surface.
+    std::array<float, 2> measured{};
+    std::array<int, 2> samples{};
+    std::array<float, 3> amplitude{};
+    for (int s = 0; s < 2; ++s) {
+      const int direction = s == 0 ? -1 : 1;
+      const float free = s == 0 ? sides.free_left_px + (place - own) : sides.free_right_px - (place - own);
+      const int middle = static_cast<int>(std::lround(place));
+      const int reach = std::clamp(static_cast<int>(free - 1.F), 2, kPlateau_px);
+      const int run = clear_run(white, width, middle, direction, reach + 1);
+      std::array<float, 3> sum{};
+      float level = 0;
+      int n = 0;
+      for (int i = 2; i <= reach; ++i) {
+        const int x = middle + direction * i;
+        if (i >= run || x < centre - kReach_px || x > centre + kReach_px) break;
+        const float unit = 1.F / (white[x] + kDark);
+        for (int c = 0; c < 3; ++c) sum[static_cast<std::size_t>(c)] += d[c * width + x] * unit;
+        level += at(x);
+        ++n;
+      }
+      samples[static_cast<std::size_t>(s)] = n;
+      if (n == 0) continue;
+      measured[static_cast<std::size_t>(s)] = level / static_cast<float>(n);
+      for (std::size_t c = 0; c < 3; ++c)
+        amplitude[c] = std::max(amplitude[c], std::fabs(sum[c]) / static_cast<float>(n));
+    }
+    // Expected levels: this surface's channels under the code's colours. A surface in the projector's white
+    // light alone would have `share`.
+    float total = 0;
+    for (std::size_t c = 0; c < 3; ++c) total += luma_[c] * amplitude[c];
+    if (!(total > 0)) return out;
+    std::array<float, 2> expected{};
+    for (std::size_t s = 0; s < 2; ++s) {
+      const Primary colour = sides.colours[s];
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float part = luma_[c] * amplitude[c] * share / total;
+        expected[s] += (colour >> c & 1) ? part : -part;
+      }
+    }
+    std::array<float, 2> levels{};
+    for (std::size_t s = 0; s < 2; ++s) {
+      const float off = measured[1 - s] - expected[1 - s];
+      if (samples[s] > 0) {
+        levels[s] = std::clamp(measured[s], expected[s] - kLevelSlack, expected[s] + kLevelSlack);
+      } else {
+        levels[s] = expected[s] + (samples[1 - s] > 0 ? std::clamp(off, -kLevelSlack, kLevelSlack) : 0);
+      }
+    }
+    const float middle = 0.5F * (levels[0] + levels[1]);
+    float nearest = kFarthest_px;
+    bool found = false;
+    for (int x = centre - 4; x < centre + 4; ++x) {
+      const float a = at(x) - middle;
+      const float b = at(x + 1) - middle;
+      if ((a > 0) == (b > 0) || (b > a) != (levels[1] > levels[0])) continue;
+      const float column = static_cast<float>(x) - a / (b - a);
+      if (std::fabs(column - place) >= nearest) continue;
+      nearest = std::fabs(column - place);
+      out.column_px = column;
+      out.slope = std::fabs(b - a);
+      found = true;
+    }
+    if (!found) return {own, 0, false};
+    out.found = true;
+    place = out.column_px;
+  }
+  return out;
+}
+
+/// Whether the lines above and below show what this line does: under one slide the same surface looks the
+/// same, but for the boundary, which leans little.
+void Refiner::look_up_and_down(View8 slide, int line, Edge& edge) {
+  const int centre = static_cast<int>(std::lround(edge.column_px));
+  const std::uint8_t* here = slide.row(line);
+  const auto differs = [&](int other) {
+    if (other < 0 || other >= slide.height) return false;
+    const std::uint8_t* there = slide.row(other);
+    int difference = 0;
+    int sum = 0;
+    for (int i = 3 * (centre - kRowReach_px); i < 3 * (centre + kRowReach_px + 1); ++i) {
+      difference += std::abs(here[i] - there[i]);
+      sum += here[i] + there[i];
+    }
+    return static_cast<float>(difference) >
+           kRowStep * static_cast<float>(sum) + kRowNoise * static_cast<float>(6 * kRowReach_px + 3);
+  };
+  edge.above_differs = differs(line - 1);
+  edge.below_differs = differs(line + 1);
+}
+
+void Refiner::look_around(const DifferenceImage& image, int line, Edge& edge) {
   const int centre = static_cast<int>(std::lround(edge.column_px));
   if (centre < kReach_px || centre + kReach_px >= image.width) return;
-  const float* d = image.line(line);
   const float* white = image.white_line(line);
   float brightest = 0;
   float darkest = 1e9F;
@@ -81,64 +215,40 @@ void Refiner::refine_edge(const DifferenceImage& image, int line, const Sides& s
   }
   edge.at_step = steepest_at(white, centre, edge.column_px);
   edge.contrast = (brightest - darkest) / (brightest + darkest + kDark);
-  // The ratio of difference and sum is that of the projected light alone, whatever the surface.
-  std::array<float, 2 * kReach_px + 1> y{};
-  for (int i = 0; i <= 2 * kReach_px; ++i) {
-    const int x = centre - kReach_px + i;
-    y[static_cast<std::size_t>(i)] =
-        (luma_[0] * d[x] + luma_[1] * d[image.width + x] + luma_[2] * d[2 * image.width + x]) /
-        (white[x] + kDark);
-  }
-  const auto at = [&](int x) { return y[static_cast<std::size_t>(x - centre + kReach_px)]; };
-  const auto level = [&](float from, float to, float expected) {
-    const int first = std::clamp(static_cast<int>(std::lround(from)), centre - kReach_px, centre + kReach_px);
-    const int last = std::clamp(static_cast<int>(std::lround(to)), first, centre + kReach_px);
-    float sum = 0;
-    for (int x = first; x <= last; ++x) sum += at(x);
-    return std::clamp(sum / static_cast<float>(last - first + 1), expected - kLevelSlack,
-                      expected + kLevelSlack);
-  };
+}
+
+void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
+                          Edge& edge) const {
   const float own = edge.column_px;
-  const float l = level(own - std::clamp(sides.free_left_px - 2.F, 2.F, 5.F), own - 2.F, sides.ratio_left);
-  const float r = level(own + 2.F, own + std::clamp(sides.free_right_px - 2.F, 2.F, 5.F), sides.ratio_right);
-  const float middle = 0.5F * (l + r);
-  // Nearest crossing of the middle level, in the direction of the step.
-  float best = 1e9F;
-  float slope = 0;
-  float column = 0;
-  for (int x = centre - 3; x < centre + 3; ++x) {
-    const float a = at(x) - middle;
-    const float b = at(x + 1) - middle;
-    if ((a > 0) == (b > 0) || (b > a) != (r > l)) continue;
-    const float place = static_cast<float>(x) - a / (b - a);
-    if (std::fabs(place - own) < best) {
-      best = std::fabs(place - own);
-      slope = std::fabs(b - a);
-      column = place;
-    }
-  }
-  const float colour_bias = kColourBias_px * edge.contrast;
-  const float w_colour = 1 / (edge.sigma_px * edge.sigma_px + colour_bias * colour_bias);
+  const float colour_noise = edge.sigma_px * edge.sigma_px + drawn.always_px * drawn.always_px;
+  const float colour_bias = drawn.by_contrast_px * edge.contrast;
+  const float w_colour = 1 / (colour_noise + colour_bias * colour_bias);
   float w_luma = 0;
-  float luma_noise_px = 0;
-  float pure_weight = 1 / (edge.sigma_px * edge.sigma_px);
-  if (best <= 2.5F) {
-    const float noise = image.noise *
-                        std::sqrt(luma_[0] * luma_[0] + luma_[1] * luma_[1] + luma_[2] * luma_[2]) /
-                        (white[centre] + kDark);
-    const float sigma = kLumaFactor * noise / slope;
-    const float luma_bias = kLumaBias_px * edge.contrast;
+  float noise = colour_noise;
+  float pure_weight = 1 / colour_noise;
+  if (luma.found) {
+    const float sigma = luma_sigma(image, line, luma);
+    const float luma_bias = kLevelShare * edge.contrast / luma.slope;
     pure_weight += 1 / (sigma * sigma);
-    luma_noise_px = std::sqrt(sigma * sigma + edge.sigma_px * edge.sigma_px);
+    noise += sigma * sigma;
     w_luma = 1 / (sigma * sigma + luma_bias * luma_bias);
-    edge.column_px = (w_luma * column + w_colour * own) / (w_luma + w_colour);
+    edge.column_px = (w_luma * luma.column_px + w_colour * own) / (w_luma + w_colour);
   }
   // Where the two disagree by more than they should, neither is as good as it looks.
-  const float apart = w_luma > 0
-                          ? kApartShare * std::max(0.F, std::fabs(column - own) - kApartNoise * luma_noise_px)
-                          : kNoLuma_px;
+  const float apart =
+      luma.found
+          ? kApartShare * std::max(0.F, std::fabs(luma.column_px - own) - kApartNoise * std::sqrt(noise))
+          : kNoLuma_px + kNoLumaContrast_px * edge.contrast;
   edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + apart * apart);
   edge.noise_px = 1 / std::sqrt(pure_weight);
+}
+
+float Refiner::luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const {
+  const int x = std::clamp(static_cast<int>(std::lround(luma.column_px)), 0, image.width - 1);
+  const float noise = image.noise *
+                      std::sqrt(luma_[0] * luma_[0] + luma_[1] * luma_[1] + luma_[2] * luma_[2]) /
+                      (image.white_line(line)[x] + kDark);
+  return kLumaFactor * noise / luma.slope;
 }
 
 /// Share of the projector's light in what the frame shows: the rest is ambient. The median of the luma steps
@@ -178,29 +288,69 @@ float Refiner::projected_share(const DifferenceImage& image, const SequenceResul
   return 1;
 }
 
-void Refiner::refine(const DifferenceImage& image, const SequenceResult& result,
-                     const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool,
-                     EdgeImage& edges) const {
+/// How far blurred chroma draws colour's place from luma's, in the frame at hand.
+Refiner::Drawn Refiner::colour_drawn(const DifferenceImage& image, const EdgeImage& edges) {
+  const auto median = [](std::vector<float>& values) {
+    if (values.empty()) return 0.F;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  always_.clear();
+  by_contrast_.clear();
+  for (int line = 0; line < edges.lines; ++line) {
+    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+      const LumaPlace& luma = places_[e];
+      if (!luma.found) continue;
+      const Edge& edge = edges.edges[e];
+      const float sigma = luma_sigma(image, line, luma);
+      const float apart = luma.column_px - edge.column_px;
+      const float excess = apart * apart - sigma * sigma - edge.sigma_px * edge.sigma_px;
+      if (edge.contrast < kPlain) {
+        always_.push_back(excess);
+      } else if (edge.contrast > kContrasty && luma.slope > kSteep) {
+        const float level = kLevelShare * edge.contrast / luma.slope;
+        by_contrast_.push_back((excess - level * level) / (edge.contrast * edge.contrast));
+      }
+    }
+  }
+  return {std::sqrt(std::max(0.F, median(always_)) * kVarianceOfMedian),
+          std::clamp(kDrawnTogether * std::sqrt(std::max(0.F, median(by_contrast_)) * kVarianceOfMedian),
+                     kLeastColourBias_px, kMostColourBias_px)};
+}
+
+void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
+                     const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges) {
   const float share = projected_share(image, result, colours, edges);
+  places_.assign(edges.edges.size(), {});
   pool.for_ranges(edges.lines, [&](int begin_line, int end_line, int) {
     for (int line = begin_line; line < end_line; ++line) {
       const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
       const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
-      float left_neighbour = -100;
       for (std::uint32_t e = begin; e < end; ++e) {
-        Edge& edge = edges.edges[e];
-        const float own = edge.column_px;
-        const float right_neighbour = e + 1 < end ? edges.edges[e + 1].column_px : own + 100;
-        if (result.boundary[e] >= 0) {
-          const auto [left, right] = colours[static_cast<std::size_t>(result.boundary[e])];
-          refine_edge(
-              image, line,
-              {own - left_neighbour, right_neighbour - own, share * ratio_[left], share * ratio_[right]},
-              edge);
-        }
-        left_neighbour = own;
+        if (result.boundary[e] < 0) continue;
+        const float own = edges.edges[e].column_px;
+        if (own < kReach_px || own + kReach_px + 1 > static_cast<float>(image.width)) continue;
+        const float left = e > begin ? edges.edges[e - 1].column_px : own - 100;
+        const float right = e + 1 < end ? edges.edges[e + 1].column_px : own + 100;
+        look_around(image, line, edges.edges[e]);
+        places_[e] = luma_place(
+            image, line, {own - left, right - own, colours[static_cast<std::size_t>(result.boundary[e])]},
+            share, own);
       }
     }
+  });
+  const Drawn drawn = colour_drawn(image, edges);
+  pool.for_ranges(edges.lines, [&](int begin_line, int end_line, int) {
+    for (int line = begin_line; line < end_line; ++line)
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+        if (result.boundary[e] >= 0) {
+          Edge& edge = edges.edges[e];
+          refine_edge(image, line, places_[e], drawn, edge);
+          if (edge.contrast > kStepContrast) look_up_and_down(slide, line, edge);
+        }
   });
 }
 

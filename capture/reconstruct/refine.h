@@ -6,6 +6,7 @@
 
 #include <array>
 
+#include "base/image.h"
 #include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
@@ -19,21 +20,43 @@ class Refiner {
   explicit Refiner(const std::array<double, 9>& colour_matrix);
 
   /// Moves the columns of the decoded edges and sets their standard deviations and contrasts. `colours` are
-  /// those on both sides of each boundary, under the slide that `image` shows.
-  void refine(const DifferenceImage& image, const SequenceResult& result,
-              const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges) const;
+  /// those on both sides of each boundary, under the slide that `image` shows; `slide` is the field under
+  /// that slide itself, a row a line.
+  void refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
+              const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges);
 
  private:
   struct Sides {
     float free_left_px, free_right_px;  // to the next edges
-    float ratio_left, ratio_right;      // luma of the difference over that of the sum, in clean white light
+    std::array<Primary, 2> colours;
+  };
+  /// Where luma has the boundary.
+  struct LumaPlace {
+    float column_px;
+    float slope;  // of the ratio, a pixel
+    bool found;
+  };
+  /// Standard deviations of what blurred chroma does to zero crossings.
+  struct Drawn {
+    float always_px, by_contrast_px;
   };
   float projected_share(const DifferenceImage& image, const SequenceResult& result,
                         const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) const;
-  void refine_edge(const DifferenceImage& image, int line, const Sides& sides, Edge& edge) const;
+  float ratio(const float* d, const float* white, int width, int x) const;
+  static int clear_run(const float* white, int width, int centre, int step, int reach);
+  LumaPlace luma_place(const DifferenceImage& image, int line, const Sides& sides, float share,
+                       float own) const;
+  float luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const;
+  Drawn colour_drawn(const DifferenceImage& image, const EdgeImage& edges);
+  static void look_around(const DifferenceImage& image, int line, Edge& edge);
+  static void look_up_and_down(View8 slide, int line, Edge& edge);
+  void refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
+                   Edge& edge) const;
 
-  std::array<float, 3> luma_;   // of the difference image's channels
-  std::array<float, 8> ratio_;  // of each primary
+  std::array<float, 3> luma_;      // of the difference image's channels
+  std::array<float, 8> ratio_;     // of each primary
+  std::vector<LumaPlace> places_;  // one an edge
+  std::vector<float> always_, by_contrast_;
 };
 
 }  // namespace relievo

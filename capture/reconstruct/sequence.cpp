@@ -208,7 +208,7 @@ SequenceDecoder::Beside SequenceDecoder::look_beside(const Edge& edge, int line,
   float px = 0;
   if (context.same != nullptr) {
     const Displacement moved = displacement(*context.same, line, edge);
-    out.tracked = moved.found;
+    out.tracked = moved.found && moved.px == 0;
     px = 0.5F * moved.px;
   }
   if (context.other == nullptr) return out;
