@@ -10,16 +10,20 @@ Command calibrate_command() {
   return {"calibrate", "Calibrate the rig from captures: writes rig.yaml", [](CLI::App& app) {
             app.require_subcommand(1);
             CLI::App* geometry = app.add_subcommand(
-                "geometry", "Lenses and poses of camera and projector, from views of a chessboard");
+                "geometry",
+                "Lenses and poses of camera and projector, from views of a chessboard or ChArUco board");
             CLI::App* colour =
                 app.add_subcommand("colour", "The colour matrix, from captures of a white target");
             CLI::App* example = app.add_subcommand(
                 "example", "Write simulated captures to try the other two on, with the truth");
-            for (CLI::App* verb : {geometry, colour, example}) verb->fallthrough();
+            CLI::App* board = app.add_subcommand("board", "Write a board to print, as a picture");
+            for (CLI::App* verb : {geometry, colour, example, board}) verb->fallthrough();
             auto run_geometry = define_calibrate_geometry(*geometry);
             auto run_colour = define_calibrate_colour(*colour);
             auto run_example = define_calibrate_example(*example);
+            auto run_board = define_calibrate_board(*board);
             return [=](StopSignal& stop) {
+              if (board->parsed()) return run_board(stop);
               if (example->parsed()) return run_example(stop);
               return geometry->parsed() ? run_geometry(stop) : run_colour(stop);
             };

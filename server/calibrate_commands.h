@@ -17,5 +17,6 @@ namespace relievo {
 std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app);
 std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app);
 std::function<Status(StopSignal&)> define_calibrate_example(CLI::App& app);
+std::function<Status(StopSignal&)> define_calibrate_board(CLI::App& app);
 
 }  // namespace relievo

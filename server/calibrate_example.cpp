@@ -4,10 +4,13 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/pictures.h"
+#include "capture/calibrate/stripe_stack.h"
+#include "capture/pattern/bcsl.h"
 #include "capture/source/sim/renderer.h"
 #include "cli/progress.h"
 #include "server/calibrate_commands.h"
@@ -22,13 +25,13 @@ struct Options {
   std::string out;
   std::string spec = "object,distortion=1";
   std::string board = "chessboard:9x7:25mm";
+  std::string code = "stripes";
   int views = 8;
   std::uint32_t seed = 1;
   bool json = false;
 };
 
-Status write_view(const fs::path& folder, const std::vector<Image8>& pictures) {
-  if (const Status made = make_folder(folder); !made) return made;
+Status write_gray_view(const fs::path& folder, const std::vector<Image8>& pictures) {
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     char name[32];
     std::snprintf(name, sizeof name, "gray_%02zu.png", i);
@@ -51,15 +54,34 @@ Status run(const Options& options, StopSignal& stop) {
     return Error{"the board does not fit before the rig at " + std::to_string(options.views) +
                  " poses: use a smaller one, with --board"};
   }
+  std::optional<Pattern> stripes;
+  if (options.code == "stripes") {
+    auto made = make_pattern(spec->base, spec->slides, spec->first, spec->stripes);
+    if (!made) return made.error();
+    if (made->slides > 2) return Error{"stripes on 1 or 2 slides calibrate: give slides=1 or slides=2"};
+    stripes = *std::move(made);
+  }
   const fs::path out = options.out;
+  if (const Status made = make_folder(out / "views"); !made) return made;
+  if (stripes) {
+    const Status written = write_atomically(out / "views" / "pattern.yaml", to_yaml(*stripes));
+    if (!written) return written;
+  }
   Progress progress("example", "views", static_cast<std::uint64_t>(options.views));
   for (int i = 0; i < options.views && !stop.stopped(); ++i) {
-    const BoardSceneOptions how{
-        .noise = spec->noise, .ambient = spec->ambient, .seed = options.seed + static_cast<std::uint32_t>(i)};
+    const BoardSceneOptions how{.noise = spec->noise,
+                                .ambient = spec->ambient,
+                                .chroma = spec->chroma,
+                                .seed = options.seed + static_cast<std::uint32_t>(i)};
+    const Pose& pose = poses[static_cast<std::size_t>(i)];
     char name[32];
     std::snprintf(name, sizeof name, "view_%02d", i);
-    const Status written = write_view(out / "views" / name,
-                                      render_gray_view(rig, *board, poses[static_cast<std::size_t>(i)], how));
+    const fs::path folder = out / "views" / name;
+    if (const Status made = make_folder(folder); !made) return made;
+    const Status written =
+        stripes
+            ? write_stripe_view(folder, render_stripe_view(rig, *board, pose, *stripes, spec->defocus, how))
+            : write_gray_view(folder, render_gray_view(rig, *board, pose, how));
     if (!written) return written;
     progress.update(static_cast<std::uint64_t>(i) + 1);
   }
@@ -84,7 +106,7 @@ Status run(const Options& options, StopSignal& stop) {
     std::printf("%s\n", json.dump(2).c_str());
     return {};
   }
-  std::printf("%d views of a chessboard and 8 captures of a white sheet, in %s. Next:\n", options.views,
+  std::printf("%d views of a board and 8 captures of a white sheet, in %s. Next:\n", options.views,
               options.out.c_str());
   std::printf("  relievo-server calibrate colour %s/colours --out rig.yaml\n", options.out.c_str());
   std::printf(
@@ -101,7 +123,10 @@ std::function<Status(StopSignal&)> define_calibrate_example(CLI::App& app) {
   app.add_option("-o,--out", o->out, "Folder for views/, colours/ and truth.yaml")->required();
   app.add_option("--rig", o->spec, "Whose rig, as for sim: sources: SCENE[,key=value...]")
       ->capture_default_str();
-  app.add_option("--board", o->board, "The chessboard")->capture_default_str();
+  app.add_option("--board", o->board, "The board, as calibrate geometry has it")->capture_default_str();
+  app.add_option("--code", o->code, "What is projected on the board")
+      ->check(CLI::IsMember({"stripes", "gray"}))
+      ->capture_default_str();
   app.add_option("--views", o->views, "Poses of the board")->check(CLI::Range(3, 100))->capture_default_str();
   app.add_option("--seed", o->seed, "Of poses and noise")->capture_default_str();
   app.add_flag("--json", o->json, "Print what was written as JSON");

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -9,15 +8,13 @@
 #include <numbers>
 #include <optional>
 
-#include "base/log.h"
 #include "capture/calibrate/compare_rigs.h"
 #include "capture/calibrate/geometry.h"
-#include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
 #include "capture/rig_file.h"
-#include "cli/progress.h"
 #include "server/calibrate_commands.h"
+#include "server/calibrate_views.h"
 #include "server/size_option.h"
 
 namespace relievo {
@@ -28,6 +25,7 @@ namespace fs = std::filesystem;
 struct Options {
   std::string views;
   std::string board;
+  std::string pattern;
   Size projector;
   std::string out;
   std::string update;
@@ -38,59 +36,6 @@ struct Options {
   int threads = 2;
   bool json = false;
 };
-
-/// The folders of VIEWS, in the order of their names; VIEWS itself where it holds pictures is a usual
-/// mistake.
-Result<std::vector<fs::path>> views_in(const std::string& folder) {
-  std::error_code code;
-  if (!fs::is_directory(folder, code)) return Error{folder + " is no folder"};
-  std::vector<fs::path> out;
-  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    std::error_code ignored;
-    if (it->is_directory(ignored)) out.push_back(it->path());
-  }
-  if (code) return Error{"cannot read the folder " + folder + ": " + code.message()};
-  std::sort(out.begin(), out.end());
-  if (out.empty())
-    return Error{folder + " has no folders: a calibration needs several views, a folder of pictures each"};
-  return out;
-}
-
-struct Measured {
-  std::vector<MeasuredView> views;
-  PinholeModel camera;  // its size
-};
-
-Result<Measured> measure(const Options& options, const Board& board, StopSignal& stop) {
-  auto folders = views_in(options.views);
-  if (!folders) return folders.error();
-  Measured out;
-  WorkerPool pool(options.threads);
-  Progress progress("calibrate", "views", folders->size());
-  for (const fs::path& folder : *folders) {
-    const std::string name = folder.filename().string();
-    auto stack = read_gray_stack(folder, options.projector.width, options.projector.height,
-                                 [&](std::size_t, std::size_t) { return !stop.stopped(); });
-    if (stop.stopped()) return Error{"stopped"};
-    if (!stack) {
-      // A folder of something else, or a capture cut short: the others may do.
-      out.views.push_back({.name = name, .refused = stack.error().message});
-    } else if (out.camera.width != 0 &&
-               (out.camera.width != stack->width() || out.camera.height != stack->height())) {
-      return Error{folder.string() + " has pictures of another size than the views before it"};
-    } else {
-      out.camera.width = stack->width();
-      out.camera.height = stack->height();
-      out.views.push_back(measure_view(name, *stack, board, {}, pool));
-    }
-    if (!out.views.back().refused.empty())
-      log_warning("view " + name + " is left out: " + out.views.back().refused);
-    progress.update(out.views.size());
-  }
-  if (out.camera.width == 0)
-    return Error{"no view of " + options.views + " can be used: " + out.views.front().refused};
-  return out;
-}
 
 nlohmann::json lens_json(const PinholeModel& lens, const double* sigma) {
   return {{"focal_px", {lens.fx(), lens.fy()}},
@@ -202,7 +147,11 @@ Status run(const Options& options, StopSignal& stop) {
     reference = *read;
   }
   const std::string out = options.out.empty() ? options.update : options.out;
-  auto measured = measure(options, *board, stop);
+  auto stripes = stripes_of(options.views, options.pattern);
+  if (!stripes) return stripes.error();
+  ViewCode code{.stripes = *std::move(stripes), .projector = options.projector};
+  if (before.colour_matrix) code.colour_matrix = *before.colour_matrix;
+  auto measured = measure_views(options.views, code, *board, options.threads, stop);
   if (stop.stopped()) return {};
   if (!measured) return measured.error();
   PinholeModel projector;
@@ -243,11 +192,18 @@ Status run(const Options& options, StopSignal& stop) {
 
 std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("views", o->views, "Folder of views, each a folder of Gray-code pictures of the board")
+  app.add_option("views", o->views,
+                 "Folder of views, each a folder of pictures of the board under the pattern")
       ->required();
-  app.add_option("--board", o->board,
-                 "chessboard:COLUMNSxROWS:SIDE, inner corners and a square's side, e.g. chessboard:9x7:75mm")
+  app.add_option(
+         "--board", o->board,
+         "chessboard:COLUMNSxROWS:SIDE, inner corners and a square's side, e.g. chessboard:9x7:75mm; or "
+         "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY], squares, e.g. charuco:10x8:30mm:22mm:5X5_100")
       ->required();
+  app.add_option(
+      "--pattern", o->pattern,
+      "What was projected: gray, or the pattern.yaml of stripes (default: the one in the folder of "
+      "views, else gray)");
   add_size_option(app, "--projector", o->projector, "The projector's size in pixels")->required();
   auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
   auto* update =

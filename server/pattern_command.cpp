@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "capture/calibrate/gray_stack.h"
+#include "capture/calibrate/pictures.h"
+#include "capture/calibrate/stripe_stack.h"
 #include "capture/pattern/bcsl.h"
 #include "capture/pattern/gray_code.h"
 #include "capture/pattern/slides.h"
@@ -33,6 +35,7 @@ struct Options {
   Size size{1024, 768};
   bool interlaced = false;
   bool gray = false;
+  bool both_axes = false;
   bool json = false;
 };
 
@@ -52,6 +55,28 @@ Status write_gray(const Options& options) {
   return {};
 }
 
+/// For calibration: the slides along columns, then along rows.
+Status write_both_axes(const Options& options, const Pattern& pattern) {
+  const Scan scan = options.interlaced ? Scan::kInterlaced : Scan::kProgressive;
+  if (auto s = write_stripe_slides(options.out, pattern, options.size.width, options.size.height, scan); !s)
+    return s;
+  if (auto s = write_atomically(fs::path(options.out) / "pattern.yaml", to_yaml(pattern)); !s) return s;
+  const std::size_t count = stripe_view_names(pattern.slides, scan).size();
+  const int rows = row_pattern(pattern, options.size.width, options.size.height).stripes();
+  if (options.json) {
+    const nlohmann::json json = {
+        {"folder", options.out}, {"slides", count}, {"stripes", pattern.stripes()}, {"row_stripes", rows}};
+    std::printf("%s\n", json.dump(2).c_str());
+  } else {
+    std::printf(
+        "%zu slides, %dx%d, of %d stripes along columns and %d along rows, in %s: project them in the order "
+        "of "
+        "their names, one picture each\n",
+        count, options.size.width, options.size.height, pattern.stripes(), rows, options.out.c_str());
+  }
+  return {};
+}
+
 Status run(const Options& options) {
   if (options.gray) return write_gray(options);
   auto pattern = options.pattern.empty()
@@ -63,6 +88,7 @@ Status run(const Options& options) {
                  std::to_string(options.size.width) + " projector columns: ask for fewer with --stripes"};
   }
   if (const Status made = make_folder(options.out); !made) return made;
+  if (options.both_axes) return write_both_axes(options, *pattern);
   std::vector<std::string> files;
   const auto write = [&](const std::string& name, const Image8& picture) {
     files.push_back(name);
@@ -118,11 +144,16 @@ Command pattern_command() {
         auto* interlaced = app.add_flag(
             "--interlaced", o->interlaced,
             "A frame a slide, for interlaced video: the slide on even rows, its complement on odd ones");
+        auto* both = app.add_flag(
+            "--both-axes", o->both_axes,
+            "Stripes along columns, then along rows, for calibrate geometry: give --stripes a divisor of the "
+            "width");
         app.add_flag("--gray", o->gray,
                      "Gray code instead of stripes: columns, rows, white and black, for calibration and "
                      "still scenes")
             ->excludes(file)
-            ->excludes(interlaced);
+            ->excludes(interlaced)
+            ->excludes(both);
         app.add_flag("--json", o->json, "Print the result as JSON");
         return [o](StopSignal&) { return run(*o); };
       }};

@@ -7,7 +7,6 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
-#include "capture/calibrate/local_homography.h"
 #include "capture/calibrate/plane_check.h"
 
 namespace relievo {
@@ -30,38 +29,6 @@ double squared(Vec2d v) {
 
 Vec2d minus(Vec2d a, Vec2d b) {
   return {a[0] - b[0], a[1] - b[1]};
-}
-
-/// The smallest distance from corner i to a neighbour, camera pixels.
-double spacing(const std::vector<Vec2d>& corners, const Board& board, int i) {
-  double least = std::numeric_limits<double>::infinity();
-  const int column = i % board.columns, row = i / board.columns;
-  const auto look = [&](int c, int r) {
-    if (c < 0 || r < 0 || c >= board.columns || r >= board.rows) return;
-    const auto& here = corners[static_cast<std::size_t>(i)];
-    least = std::min(least, squared(minus(corners[static_cast<std::size_t>(r * board.columns + c)], here)));
-  };
-  look(column - 1, row);
-  look(column + 1, row);
-  look(column, row - 1);
-  look(column, row + 1);
-  return std::sqrt(least);
-}
-
-/// The mean of all pictures: a bit and its inverse together light everything once, so the code vanishes, and
-/// most of the noise.
-ImageF even_light(const GrayStack& stack) {
-  ImageF out(stack.width(), stack.height(), 1);
-  for (const auto* pairs : {&stack.columns, &stack.rows}) {
-    for (const GrayPair& pair : *pairs) {
-      for (std::size_t i = 0; i < out.size(); ++i) {
-        out.data()[i] += static_cast<float>(int{pair.lit.data()[i]} + int{pair.inverse.data()[i]});
-      }
-    }
-  }
-  const auto pictures = static_cast<float>(2 * (stack.columns.size() + stack.rows.size()));
-  for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] /= pictures;
-  return out;
 }
 
 /// A view on its way through the calibration.
@@ -364,34 +331,6 @@ class Calibration {
 };
 
 }  // namespace
-
-MeasuredView measure_view(const std::string& name, const GrayStack& stack, const Board& board,
-                          const GrayDecodeOptions& options, WorkerPool& pool) {
-  MeasuredView view{.name = name};
-  const auto corners = find_board(even_light(stack), board);
-  if (!corners) {
-    view.refused = "the whole board is not seen in the pictures";
-    return view;
-  }
-  GrayDecodeOptions whole = options;
-  whole.window_px = 0;  // the edges are what is needed
-  const auto maps = decode_gray(stack, whole, pool);
-  if (!maps) {
-    view.refused = maps.error().message;
-    return view;
-  }
-  for (int i = 0; i < board.corners(); ++i) {
-    const Vec2d at = (*corners)[static_cast<std::size_t>(i)];
-    if (const auto projected = project_corner(*maps, at, spacing(*corners, board, i))) {
-      view.corners.push_back({board.corner_m(i), at, projected->projector_px});
-    }
-  }
-  if (4 * static_cast<int>(view.corners.size()) < 3 * board.corners()) {
-    view.refused = "only " + std::to_string(view.corners.size()) + " of " + std::to_string(board.corners()) +
-                   " corners could be decoded; is the projector's light on the whole board?";
-  }
-  return view;
-}
 
 Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, const PinholeModel& camera_size,
                                     const PinholeModel& projector_size, const GeometryOptions& options) {

@@ -1,34 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Geometric calibration of a rig from views of a chessboard under Gray code: intrinsics and distortion of the
-// camera and of the projector, which is treated as a camera that looks backwards, and the pose between them.
-//
-// Corners are found in the camera's picture; where the projector sees them follows from the code around them
-// (local_homography.h). OpenCV's calibrateCamera starts both lenses; a bundle adjustment (bundle.h) finishes.
+// Geometric calibration of a rig from measured views of a board (measure_view.h): intrinsics and distortion
+// of the camera and of the projector, which is treated as a camera that looks backwards, and the pose between
+// them. OpenCV's calibrateCamera starts both lenses; a bundle adjustment (bundle.h) finishes.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "base/parallel.h"
+#include "base/image.h"
 #include "base/result.h"
 #include "base/rig.h"
-#include "capture/calibrate/board.h"
 #include "capture/calibrate/bundle.h"
-#include "capture/pattern/gray_decode.h"
+#include "capture/calibrate/measure_view.h"
 
 namespace relievo {
-
-/// What one view shows of the board.
-struct MeasuredView {
-  std::string name;
-  std::vector<CornerSight> corners;  // seen by both devices
-  std::string refused;               // why the view cannot be used; empty where it can
-};
-
-/// Finds the board in the stack's picture and each corner in the projector. A view is refused where the whole
-/// board is not seen, or fewer than three quarters of its corners have a place in the projector.
-MeasuredView measure_view(const std::string& name, const GrayStack& stack, const Board& board,
-                          const GrayDecodeOptions& options, WorkerPool& pool);
 
 struct GeometryOptions {
   BundlePriors priors;

@@ -58,6 +58,18 @@ double median_value(const std::vector<Sample>& samples, bool column) {
   return median(std::move(values));
 }
 
+/// A plane through edges of two columns alone would say nothing of how they bend.
+bool enough_values(const std::vector<Sample>& samples, bool column) {
+  std::vector<double> values;
+  for (const Sample& s : samples) {
+    if (s.column == column && std::find(values.begin(), values.end(), s.value) == values.end()) {
+      values.push_back(s.value);
+      if (values.size() == 3) return true;
+    }
+  }
+  return false;
+}
+
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 
 /// h: u = (h0 x + h1 y + h2) / (1 + h6 x + h7 y), v likewise with h3..h5; values are relative to the frame.
@@ -92,14 +104,15 @@ std::optional<Vector8> solve(const std::vector<Sample>& samples, const std::vect
 
 }  // namespace
 
-std::optional<ProjectedCorner> project_corner(const GrayMaps& maps, Vec2d camera_px, double radius_px) {
-  const int width = maps.columns.width(), height = maps.columns.height();
+std::optional<ProjectedCorner> project_corner(const ProjectorEdges& edges, Vec2d camera_px,
+                                              double radius_px) {
   std::vector<Sample> samples;
-  gather(maps.column_edges, width, height, camera_px, radius_px, true, radius_px, samples);
+  gather(edges.columns, edges.width, edges.height, camera_px, radius_px, true, radius_px, samples);
   const auto columns = static_cast<int>(samples.size());
-  gather(maps.row_edges, width, height, camera_px, radius_px, false, radius_px, samples);
+  gather(edges.rows, edges.width, edges.height, camera_px, radius_px, false, radius_px, samples);
   const int rows = static_cast<int>(samples.size()) - columns;
   if (columns < kMinEdges || rows < kMinEdges) return std::nullopt;
+  if (!enough_values(samples, true) || !enough_values(samples, false)) return std::nullopt;
   const Frame frame{radius_px, median_value(samples, true), median_value(samples, false)};
   for (Sample& s : samples) s.value -= s.column ? frame.column0 : frame.row0;
 

@@ -27,6 +27,16 @@ Image8 draw_slide(const Pattern& pattern, int slide, bool complement, int width,
   return out;
 }
 
+Image8 draw_row_slide(const Pattern& pattern, int slide, bool complement, int width, int height) {
+  Image8 line(height, 1, 3);
+  draw_row(pattern, slide, complement, height, line.row(0));
+  Image8 out(width, height, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) std::copy_n(line.row(0) + 3 * y, 3, out.row(y) + 3 * x);
+  }
+  return out;
+}
+
 Image8 draw_interlaced(const Pattern& pattern, int slide, int width, int height) {
   Image8 out(width, height, 3);
   for (int y = 0; y < height; ++y) draw_row(pattern, slide, y % 2 != 0, width, out.row(y));

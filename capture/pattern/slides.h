@@ -11,6 +11,9 @@ namespace relievo {
 /// centre is in, so boundaries lie where Pattern::boundary_column_px says to half a pixel.
 Image8 draw_slide(const Pattern& pattern, int slide, bool complement, int width, int height);
 
+/// The same with the stripes along rows, from top to bottom: they divide the height.
+Image8 draw_row_slide(const Pattern& pattern, int slide, bool complement, int width, int height);
+
 /// One interlaced frame: the slide on the even rows, its complement on the odd ones.
 Image8 draw_interlaced(const Pattern& pattern, int slide, int width, int height);
 

@@ -12,35 +12,14 @@
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/compare_rigs.h"
 #include "capture/pattern/gray_code.h"
+#include "tests/unit/calibrate/true_rig.h"
 
 namespace relievo {
 namespace {
 
 using testing::HasSubstr;
 
-Rig truth() {
-  Rig rig;
-  rig.scan = Scan::kInterlaced;
-  rig.frame_rate = 29.97;
-  rig.camera = {640, 480, {1050, 0, 325, 0, 1052, 236, 0, 0, 1}, {-0.18, 0.1, 0.0006, -0.0008, 0}};
-  // A projector that throws upwards: its principal point lies below its picture.
-  rig.projector = {800, 600, {1250, 0, 398, 0, 1251, 660, 0, 0, 1}, {-0.04, 0.05, 0.0008, 0.0005, 0}};
-  const double a = 0.2, b = 0.28;  // towards the camera's axis, and down by the lens shift
-  const std::array<double, 9> y = {std::cos(a), 0, std::sin(a), 0, 1, 0, -std::sin(a), 0, std::cos(a)};
-  const std::array<double, 9> x = {1, 0, 0, 0, std::cos(b), -std::sin(b), 0, std::sin(b), std::cos(b)};
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      double sum = 0;
-      for (std::size_t k = 0; k < 3; ++k) sum += x[3 * i + k] * y[3 * k + j];
-      rig.projector_from_camera_rotation[3 * i + j] = sum;
-    }
-  }
-  rig.projector_from_camera_translation = {-0.2, 0.01, 0.05};
-  rig.colour_matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  return rig;
-}
-
-constexpr Board kBoard{9, 7, 0.025};
+const Board kBoard{9, 7, 0.025};
 
 GrayStack stack_of(const Rig& rig, const std::vector<Image8>& pictures) {
   GrayStack stack;
@@ -83,26 +62,6 @@ std::vector<MeasuredView> ideal_views(const Rig& rig, int count, double noise_px
     }
   }
   return views;
-}
-
-PinholeModel size_of(const PinholeModel& lens) {
-  PinholeModel out;
-  out.width = lens.width;
-  out.height = lens.height;
-  return out;
-}
-
-Result<Geometry> calibrate(const Rig& rig, const std::vector<MeasuredView>& views) {
-  return calibrate_geometry(views, size_of(rig.camera), size_of(rig.projector), {});
-}
-
-Rig rig_of(const Geometry& geometry) {
-  Rig rig = truth();
-  rig.camera = geometry.camera;
-  rig.projector = geometry.projector;
-  rig.projector_from_camera_rotation = geometry.projector_from_camera_rotation;
-  rig.projector_from_camera_translation = geometry.projector_from_camera_translation;
-  return rig;
 }
 
 TEST(Geometry, RenderedViewsGiveTheRigBack) {
@@ -250,11 +209,20 @@ TEST(Board, ParsesAndRefuses) {
   EXPECT_EQ(board->rows, 7);
   EXPECT_NEAR(board->square_m, 0.075, 1e-12);
   EXPECT_NEAR(parse_board("chessboard:4x3:2.5cm")->square_m, 0.025, 1e-12);
-  for (const char* wrong : {"", "chessboard", "chessboard:9x7", "chessboard:9x7:75", "chessboard:2x7:75mm",
-                            "chessboard:9x7:0mm"}) {
+  for (const char* wrong :
+       {"", "chessboard", "chessboard:9x7", "chessboard:9x7:75", "chessboard:2x7:75mm", "chessboard:9x7:0mm",
+        "charuco:9x7:30mm", "charuco:9x7:30mm:30mm", "charuco:2x7:30mm:20mm", "charuco:9x7:30mm:20mm:8X8_50",
+        "charuco:20x20:30mm:20mm"}) {
     EXPECT_FALSE(parse_board(wrong).ok()) << wrong;
   }
-  EXPECT_THAT(parse_board("charuco:5x7:30mm").error().message, HasSubstr("use a chessboard"));
+  const auto charuco = parse_board("charuco:10x8:30mm:2.2cm:DICT_5X5_100");
+  ASSERT_TRUE(charuco.ok());
+  EXPECT_TRUE(charuco->charuco());
+  EXPECT_EQ(charuco->corners(), 63);  // of 10 x 8 squares
+  EXPECT_NEAR(charuco->marker_m, 0.022, 1e-12);
+  EXPECT_EQ(parse_board("charuco:10x8:30mm:22mm:5X5_100")->dictionary, charuco->dictionary);
+  EXPECT_EQ(parse_board("charuco:10x8:30mm:22mm")->dictionary, "DICT_4X4_50");
+  EXPECT_THAT(parse_board("charuco:20x20:30mm:20mm").error().message, HasSubstr("use a larger dictionary"));
 }
 
 }  // namespace

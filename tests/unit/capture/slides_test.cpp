@@ -28,6 +28,14 @@ TEST(Slides, StripesDivideTheWidthAsTheContractSays) {
   }
 }
 
+TEST(Slides, RowSlidesAreColumnSlidesTurned) {
+  const auto pattern = make_pattern(6, 2, 0, 30);
+  ASSERT_TRUE(pattern);
+  const Image8 columns = draw_slide(*pattern, 1, true, 100, 2),
+               rows = draw_row_slide(*pattern, 1, true, 3, 100);
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(lit(rows.row(i) + 6), lit(columns.row(1) + 3 * i)) << i;
+}
+
 TEST(Slides, SlideAndComplementMakeWhite) {
   const auto pattern = make_pattern(3, 2, 0, 20);
   ASSERT_TRUE(pattern);

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/calibrate/stripe_decode.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/refine.h"
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::size_t kLeastEdges = 200;
+constexpr float kMaxSigma_px = 0.5F;
+
+Image8 turned(const Image8& picture) {
+  Image8 out(picture.height(), picture.width(), 3);
+  for (int y = 0; y < picture.height(); ++y) {
+    const std::uint8_t* from = picture.row(y);
+    for (int x = 0; x < picture.width(); ++x) std::copy_n(from + 3 * x, 3, out.row(x) + 3 * y);
+  }
+  return out;
+}
+
+/// A boundary on the picture that was decoded.
+struct Found {
+  float column_px;
+  int line;
+  int boundary;
+};
+
+/// One axis, as columns.
+class AxisDecoder {
+ public:
+  AxisDecoder(const Pattern& pattern, const std::array<double, 9>& colour_matrix, WorkerPool& pool)
+      : pattern_(pattern),
+        differencer_(colour_matrix),
+        refiner_(colour_matrix),
+        sequence_(pattern),
+        pool_(pool) {}
+
+  void add(Image8 lit, Image8 complement) {
+    CapturedFrame frame;
+    frame.scan = Scan::kProgressive;
+    frame.picture = std::move(lit);
+    frame.complement = std::move(complement);
+    differencer_.difference(frame, pool_, images_.emplace_back());
+    edge_finder_.find(images_.back(), pool_, edges_.emplace_back());
+  }
+
+  std::vector<Found> decode() {
+    std::vector<Found> out;
+    if (images_.size() == 1) {
+      take(0, SlideOrder::kNewerIsFirst, run(0, nullptr, SlideOrder::kNewerIsFirst), out);
+      return out;
+    }
+    // The order that explains the pictures better is the one in which they were taken.
+    const auto both = [&](SlideOrder order, SlideOrder turned_order) {
+      return std::array{run(0, &images_[1], order), run(1, &images_[0], turned_order)};
+    };
+    auto best = both(SlideOrder::kNewerIsFirst, SlideOrder::kNewerIsSecond);
+    auto other = both(SlideOrder::kNewerIsSecond, SlideOrder::kNewerIsFirst);
+    const bool swapped = best[0].score + best[1].score < other[0].score + other[1].score;
+    if (swapped) std::swap(best, other);
+    take(0, swapped ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst, best[0], out);
+    take(1, swapped ? SlideOrder::kNewerIsFirst : SlideOrder::kNewerIsSecond, best[1], out);
+    return out;
+  }
+
+ private:
+  SequenceResult run(std::size_t frame, const DifferenceImage* other, SlideOrder order) {
+    SequenceResult out;
+    sequence_.decode(edges_[frame], {.order = order, .other = other}, pool_, out);
+    return out;
+  }
+
+  void take(std::size_t frame, SlideOrder order, const SequenceResult& result, std::vector<Found>& out) {
+    EdgeImage& edges = edges_[frame];
+    refiner_.refine(images_[frame], result, sequence_.shown_colours(order), pool_, edges);
+    for (int line = 0; line < edges.lines; ++line) {
+      const auto l = static_cast<std::size_t>(line);
+      for (std::uint32_t e = edges.line_start[l]; e < edges.line_start[l + 1]; ++e) {
+        const Edge& edge = edges.edges[e];
+        if (result.boundary[e] < 0 || edge.at_step || edge.sigma_px > kMaxSigma_px) continue;
+        out.push_back({edge.column_px, line, result.boundary[e]});
+      }
+    }
+  }
+
+  const Pattern& pattern_;
+  Differencer differencer_;
+  EdgeFinder edge_finder_;
+  Refiner refiner_;
+  SequenceDecoder sequence_;
+  WorkerPool& pool_;
+  std::vector<DifferenceImage> images_;
+  std::vector<EdgeImage> edges_;
+};
+
+/// By pixel, as GrayEdges are.
+GrayEdges sorted(std::vector<GrayEdge> edges, int width, int height) {
+  const auto pixel = [&](const GrayEdge& e) {
+    const int x = std::clamp(static_cast<int>(e.x), 0, width - 1);
+    const int y = std::clamp(static_cast<int>(e.y), 0, height - 1);
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+  };
+  std::stable_sort(edges.begin(), edges.end(),
+                   [&](const GrayEdge& a, const GrayEdge& b) { return pixel(a) < pixel(b); });
+  GrayEdges out;
+  out.first.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) + 1, 0);
+  for (const GrayEdge& e : edges) ++out.first[pixel(e) + 1];
+  for (std::size_t i = 1; i < out.first.size(); ++i) out.first[i] += out.first[i - 1];
+  out.edges = std::move(edges);
+  return out;
+}
+
+Status check(const StripeStack& stack) {
+  const auto slides = static_cast<std::size_t>(stack.pattern.slides);
+  if (slides < 1 || slides > 2)
+    return Error{"stripes on 1 or 2 slides can be decoded, not on " + std::to_string(slides)};
+  if (stack.columns.size() != slides || stack.rows.size() != slides) {
+    return Error{"there must be " + std::to_string(slides) + " slides along columns and as many along rows"};
+  }
+  for (const auto* pairs : {&stack.columns, &stack.rows}) {
+    for (const StripePair& pair : *pairs) {
+      for (const Image8* picture : {&pair.lit, &pair.complement}) {
+        if (picture->width() != stack.width() || picture->height() != stack.height() ||
+            picture->channels() != 3)
+          return Error{"the pictures differ in size"};
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Pattern row_pattern(const Pattern& pattern, int projector_width, int projector_height) {
+  Pattern out = pattern;
+  const auto stripes = static_cast<int>(
+      std::lround(static_cast<double>(pattern.stripes()) * projector_height / projector_width));
+  out.sequence.resize(static_cast<std::size_t>(std::clamp(stripes, 2, pattern.stripes())));
+  return out;
+}
+
+Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const std::array<double, 9>& colour_matrix,
+                                      WorkerPool& pool) {
+  if (const Status checked = check(stack); !checked) return checked.error();
+  const int width = stack.width(), height = stack.height();
+  ProjectorEdges out{.width = width, .height = height, .columns = {}, .rows = {}};
+  const Pattern rows = row_pattern(stack.pattern, stack.projector_width, stack.projector_height);
+  AxisDecoder along_columns(stack.pattern, colour_matrix, pool), along_rows(rows, colour_matrix, pool);
+  for (const StripePair& pair : stack.columns) along_columns.add(pair.lit.clone(), pair.complement.clone());
+  for (const StripePair& pair : stack.rows) along_rows.add(turned(pair.lit), turned(pair.complement));
+  std::vector<GrayEdge> edges;
+  for (const Found& f : along_columns.decode()) {
+    edges.push_back(
+        {f.column_px, static_cast<float>(f.line),
+         static_cast<float>(stack.pattern.boundary_column_px(f.boundary, stack.projector_width))});
+  }
+  const std::size_t column_edges = edges.size();
+  out.columns = sorted(std::exchange(edges, {}), width, height);
+  for (const Found& f : along_rows.decode()) {
+    edges.push_back({static_cast<float>(f.line), f.column_px,
+                     static_cast<float>(rows.boundary_column_px(f.boundary, stack.projector_height))});
+  }
+  const std::size_t row_edges = edges.size();
+  out.rows = sorted(std::move(edges), width, height);
+  if (column_edges < kLeastEdges || row_edges < kLeastEdges) {
+    return Error{"hardly any stripe along " + std::string(column_edges < kLeastEdges ? "columns" : "rows") +
+                 " could be decoded; are pattern and exposure right?"};
+  }
+  return out;
+}
+
+}  // namespace relievo

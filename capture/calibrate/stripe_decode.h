@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// The system's own stripes on a scene that holds still, along columns and along rows of the projector: where
+// their boundaries cross the camera's picture. For calibration.
+//
+// Stripes along rows are the same code turned: a picture of them is decoded by the ordinary decoder
+// (capture/reconstruct) after exchanging its columns and rows.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "base/image.h"
+#include "base/parallel.h"
+#include "base/pattern.h"
+#include "base/result.h"
+#include "capture/calibrate/local_homography.h"
+
+namespace relievo {
+
+/// Pictures under one slide and under its complement: RGB, whole frames, of one size.
+struct StripePair {
+  Image8 lit;
+  Image8 complement;
+};
+
+struct StripeStack {
+  int projector_width = 0, projector_height = 0;
+  Pattern pattern;                  // along columns; along rows it is row_pattern() of it
+  std::vector<StripePair> columns;  // [slide]
+  std::vector<StripePair> rows;     // [slide]
+
+  int width() const { return columns.empty() ? 0 : columns.front().lit.width(); }
+  int height() const { return columns.empty() ? 0 : columns.front().lit.height(); }
+};
+
+/// The pattern along rows: as many first stripes of `pattern` as make stripes of its width fit the height.
+/// N stripes divide the height as the contract has them divide the width.
+Pattern row_pattern(const Pattern& pattern, int projector_width, int projector_height);
+
+/// The boundaries of both axes. The slides may come in any order: the code tells them apart. Fails where the
+/// stack is not one or two slides of each axis in pictures of one size, or hardly a boundary is decoded.
+Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const std::array<double, 9>& colour_matrix,
+                                      WorkerPool& pool);
+
+}  // namespace relievo

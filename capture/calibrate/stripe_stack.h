@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Views under our own stripes as folders of pictures, and the slides to project for them. The pictures are in
+// the order of their names: the slides along columns, slide 1 first, each before its complement; then those
+// along rows. An interlaced camera's frames, where even rows show a slide and odd ones its complement, are
+// one picture a slide.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/rig.h"
+#include "capture/calibrate/stripe_decode.h"
+
+namespace relievo {
+
+/// "columns_slide1", "columns_slide1_complement", ..., "rows_slide2_complement": names that sort into the
+/// order of projection. Interlaced: "columns_frame1", ...
+std::vector<std::string> stripe_view_names(int slides, Scan scan);
+
+/// 4 * slides or 2 * slides pictures of any common format, in natural order of names. Pictures of the latter
+/// are de-interlaced. Errors name the folder or the file. `on_picture` as in read_gray_stack().
+Result<StripeStack> read_stripe_stack(const std::filesystem::path& folder, const Pattern& pattern,
+                                      int projector_width, int projector_height,
+                                      const std::function<bool(std::size_t, std::size_t)>& on_picture = {});
+
+/// Writes the stack's pictures, whole frames, named as above, to an existing folder.
+Status write_stripe_view(const std::filesystem::path& folder, const StripeStack& stack);
+
+/// Each picture of the pair from the rows of an interlaced frame that show it, the rows between interpolated.
+StripePair deinterlaced(const Image8& frame);
+
+/// Writes the slides to project, named as above, to an existing folder. Fails where stripes are narrower than
+/// a pixel.
+Status write_stripe_slides(const std::filesystem::path& folder, const Pattern& pattern, int projector_width,
+                           int projector_height, Scan scan);
+
+}  // namespace relievo

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/calibrate_views.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "base/log.h"
+#include "capture/calibrate/gray_stack.h"
+#include "capture/calibrate/stripe_stack.h"
+#include "capture/rig_file.h"
+#include "cli/progress.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The folders of VIEWS, in the order of their names; VIEWS itself where it holds pictures is a usual
+/// mistake.
+Result<std::vector<fs::path>> views_in(const std::string& folder) {
+  std::error_code code;
+  if (!fs::is_directory(folder, code)) return Error{folder + " is no folder"};
+  std::vector<fs::path> out;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    std::error_code ignored;
+    if (it->is_directory(ignored)) out.push_back(it->path());
+  }
+  if (code) return Error{"cannot read the folder " + folder + ": " + code.message()};
+  std::sort(out.begin(), out.end());
+  if (out.empty())
+    return Error{folder + " has no folders: a calibration needs several views, a folder of pictures each"};
+  return out;
+}
+
+struct OneView {
+  MeasuredView view;
+  int width = 0, height = 0;  // 0 where it could not be read
+};
+
+OneView measure_one(const fs::path& folder, const ViewCode& code, const Board& board, WorkerPool& pool,
+                    StopSignal& stop) {
+  const std::string name = folder.filename().string();
+  const auto go_on = [&](std::size_t, std::size_t) { return !stop.stopped(); };
+  const auto [width, height] = code.projector;
+  const auto measured = [&](const auto& stack, const auto& how) {
+    // A folder of something else, or a capture cut short: the others may do.
+    if (!stack) return OneView{{.name = name, .corners = {}, .refused = stack.error().message}};
+    return OneView{measure_view(name, *stack, board, how, pool), stack->width(), stack->height()};
+  };
+  return code.stripes
+             ? measured(read_stripe_stack(folder, *code.stripes, width, height, go_on), code.colour_matrix)
+             : measured(read_gray_stack(folder, width, height, go_on), GrayDecodeOptions{});
+}
+
+}  // namespace
+
+Result<std::optional<Pattern>> stripes_of(const std::string& folder, const std::string& pattern) {
+  if (pattern == "gray") return std::optional<Pattern>();
+  const fs::path file = pattern.empty() ? fs::path(folder) / "pattern.yaml" : fs::path(pattern);
+  std::error_code ignored;
+  if (pattern.empty() && !fs::exists(file, ignored)) return std::optional<Pattern>();
+  auto read = read_pattern(file);
+  if (!read) return read.error();
+  return std::optional<Pattern>(*std::move(read));
+}
+
+Result<MeasuredViews> measure_views(const std::string& folder, const ViewCode& code, const Board& board,
+                                    int threads, StopSignal& stop) {
+  auto folders = views_in(folder);
+  if (!folders) return folders.error();
+  MeasuredViews out;
+  WorkerPool pool(threads);
+  Progress progress("calibrate", "views", folders->size());
+  for (const fs::path& path : *folders) {
+    OneView one = measure_one(path, code, board, pool, stop);
+    if (stop.stopped()) return Error{"stopped"};
+    if (one.width != 0 && out.camera.width != 0 &&
+        (out.camera.width != one.width || out.camera.height != one.height)) {
+      return Error{path.string() + " has pictures of another size than the views before it"};
+    }
+    if (one.width != 0) {
+      out.camera.width = one.width;
+      out.camera.height = one.height;
+    }
+    if (!one.view.refused.empty()) log_warning("view " + one.view.name + " is left out: " + one.view.refused);
+    out.views.push_back(std::move(one.view));
+    progress.update(out.views.size());
+  }
+  if (out.camera.width == 0)
+    return Error{"no view of " + folder + " can be used: " + out.views.front().refused};
+  return out;
+}
+
+}  // namespace relievo

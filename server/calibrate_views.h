@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// A folder of views of a board, each a folder of pictures, measured.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/pattern.h"
+#include "base/result.h"
+#include "base/rig.h"
+#include "capture/calibrate/measure_view.h"
+#include "cli/stop_signal.h"
+#include "server/size_option.h"
+
+namespace relievo {
+
+/// What was projected on the board.
+struct ViewCode {
+  std::optional<Pattern> stripes;  // none: Gray code
+  Size projector;
+  std::array<double, 9> colour_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};
+};
+
+struct MeasuredViews {
+  std::vector<MeasuredView> views;
+  PinholeModel camera;  // its size
+};
+
+/// `pattern`: "gray", or the file of the stripes' pattern; empty: FOLDER/pattern.yaml where it is there, Gray
+/// code otherwise.
+Result<std::optional<Pattern>> stripes_of(const std::string& folder, const std::string& pattern);
+
+/// Views in the order of their names; a view that cannot be used says why, in its `refused` and as a warning.
+/// Fails where none can be read at all.
+Result<MeasuredViews> measure_views(const std::string& folder, const ViewCode& code, const Board& board,
+                                    int threads, StopSignal& stop);
+
+}  // namespace relievo
