@@ -49,6 +49,7 @@ class AxisDecoder {
     frame.complement = std::move(complement);
     differencer_.difference(frame, pool_, images_.emplace_back());
     edge_finder_.find(images_.back(), pool_, edges_.emplace_back());
+    lit_.push_back(std::move(frame.picture));
   }
 
   std::vector<Found> decode() {
@@ -79,7 +80,7 @@ class AxisDecoder {
 
   void take(std::size_t frame, SlideOrder order, const SequenceResult& result, std::vector<Found>& out) {
     EdgeImage& edges = edges_[frame];
-    refiner_.refine(images_[frame], result, sequence_.shown_colours(order), pool_, edges);
+    refiner_.refine(images_[frame], lit_[frame].view(), result, sequence_.shown_colours(order), pool_, edges);
     for (int line = 0; line < edges.lines; ++line) {
       const auto l = static_cast<std::size_t>(line);
       for (std::uint32_t e = edges.line_start[l]; e < edges.line_start[l + 1]; ++e) {
@@ -96,7 +97,8 @@ class AxisDecoder {
   Refiner refiner_;
   SequenceDecoder sequence_;
   WorkerPool& pool_;
-  std::vector<DifferenceImage> images_;
+  std::vector<Image8> lit_;
+  std::vector<DifferenceImage> images_;  // of them and their complements
   std::vector<EdgeImage> edges_;
 };
 
