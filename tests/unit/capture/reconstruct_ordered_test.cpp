@@ -209,6 +209,16 @@ TEST(EdgeFinder, FindsASubPixelPlaceAndSaysHowGood) {
   EXPECT_NEAR(std::sqrt(square / 400), edges.edges[0].sigma_px, 0.5 * edges.edges[0].sigma_px);
 }
 
+/// A slide's field in which lines do not differ.
+const Image8& grey_slide() {
+  static const Image8 picture = [] {
+    Image8 out(kWidth, kLines, 3);
+    for (int line = 0; line < kLines; ++line) std::fill_n(out.row(line), 3 * kWidth, std::uint8_t{100});
+    return out;
+  }();
+  return picture;
+}
+
 TEST(Refiner, TakesASharpLumaStepOverABlurredColour) {
   // The step lies at 200; the blurred colours' crossing was found 0.8 px off.
   const Pattern pattern = sixty_stripes();
@@ -220,7 +230,8 @@ TEST(Refiner, TakesASharpLumaStepOverABlurredColour) {
   result.boundary.assign(kLines, 10);
   WorkerPool pool(1);
   const SequenceDecoder decoder(pattern);
-  Refiner(kPlain).refine(image, result, decoder.shown_colours(SlideOrder::kNewerIsFirst), pool, edges);
+  Refiner(kPlain).refine(image, grey_slide().view(), result, decoder.shown_colours(SlideOrder::kNewerIsFirst),
+                         pool, edges);
   for (const Edge& e : edges.edges) {
     EXPECT_NEAR(e.column_px, 199.5, 0.05);  // half way between the last pixel before and the first after
     EXPECT_LT(e.sigma_px, 0.5F);
@@ -240,7 +251,8 @@ TEST(Refiner, SaysWhereTheSceneItselfHasAStep) {
   result.boundary.assign(kLines, 10);
   WorkerPool pool(1);
   const SequenceDecoder decoder(pattern);
-  Refiner(kPlain).refine(image, result, decoder.shown_colours(SlideOrder::kNewerIsFirst), pool, edges);
+  Refiner(kPlain).refine(image, grey_slide().view(), result, decoder.shown_colours(SlideOrder::kNewerIsFirst),
+                         pool, edges);
   for (const Edge& e : edges.edges) {
     EXPECT_TRUE(e.at_step);
     EXPECT_GT(e.contrast, 0.4F);
