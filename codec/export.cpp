@@ -9,9 +9,9 @@
 #include <cmath>
 #include <string>
 
+#include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/surface_check.h"
-#include "codec/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -108,10 +108,7 @@ Status write_obj(const std::filesystem::path& path, const Frame3D& frame) {
     const std::string material =
         "newmtl texture\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 0\nmap_Kd " + name + ".png\n";
     std::filesystem::path library = path;
-    if (auto status =
-            write_whole_file(library.replace_extension(".mtl"), Bytes(material.begin(), material.end()));
-        !status)
-      return status;
+    if (auto status = write_whole_file(library.replace_extension(".mtl"), material); !status) return status;
     append_text(out, "mtllib " + name + ".mtl\nusemtl texture\n");
   }
   const auto turned = [](const Vec3f& v) { return Vec3f{v[0], -v[1], -v[2]}; };

@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/export.h"
 #include "codec/jpeg_texture.h"
 #include "codec/surface_check.h"
-#include "codec/whole_file.h"
 
 namespace relievo {
 namespace {

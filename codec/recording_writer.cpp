@@ -11,10 +11,10 @@
 #include <map>
 #include <system_error>
 
+#include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/mcap_records.h"
 #include "codec/recording.h"
-#include "codec/whole_file.h"
 
 namespace relievo {
 namespace {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
+#include "base/whole_file.h"
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
@@ -137,7 +138,7 @@ Status run(const Options& options) {
     before.whole->colour_matrix = calibration->matrix;
     text = to_yaml(*before.whole);
   }
-  if (const Status written = write_atomically(out, text); !written) return written;
+  if (const Status written = write_whole_file(out, text); !written) return written;
   if (options.json) {
     print_json(*calibration, out);
   } else {

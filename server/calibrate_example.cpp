@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/whole_file.h"
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/pictures.h"
@@ -64,7 +65,7 @@ Status run(const Options& options, StopSignal& stop) {
   const fs::path out = options.out;
   if (const Status made = make_folder(out / "views"); !made) return made;
   if (stripes) {
-    const Status written = write_atomically(out / "views" / "pattern.yaml", to_yaml(*stripes));
+    const Status written = write_whole_file(out / "views" / "pattern.yaml", to_yaml(*stripes));
     if (!written) return written;
   }
   Progress progress("example", "views", static_cast<std::uint64_t>(options.views));
@@ -94,7 +95,7 @@ Status run(const Options& options, StopSignal& stop) {
         !written)
       return written;
   }
-  if (const Status written = write_atomically(out / "truth.yaml", to_yaml(rig)); !written) return written;
+  if (const Status written = write_whole_file(out / "truth.yaml", to_yaml(rig)); !written) return written;
   progress.finish();
   const std::string size = std::to_string(rig.projector.width) + "x" + std::to_string(rig.projector.height);
   if (options.json) {

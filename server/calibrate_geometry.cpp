@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "base/whole_file.h"
 #include "capture/calibrate/compare_rigs.h"
 #include "capture/calibrate/geometry.h"
 #include "capture/calibrate/pictures.h"
@@ -168,7 +169,7 @@ Status run(const Options& options, StopSignal& stop) {
   rig.projector = geometry->projector;
   rig.projector_from_camera_rotation = geometry->projector_from_camera_rotation;
   rig.projector_from_camera_translation = geometry->projector_from_camera_translation;
-  if (const Status written = write_atomically(out, to_yaml(rig)); !written) return written;
+  if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
   if (!options.pictures.empty()) {
     if (const Status made = make_folder(options.pictures); !made) return made;
     const Status drawn = write_png(fs::path(options.pictures) / "residuals.png", draw_residuals(*geometry));

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/log.h"
+#include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/ray_pairs.h"
@@ -122,7 +123,7 @@ Status triangulate(const Options& options, const Rig& rig, const GrayMaps& maps,
   report.gap = spread_of(dense.gap_m);
   const fs::path out = options.out;
   if (const Status s = write_ply_points(out / "points.ply", dense.cloud); !s) return s;
-  if (const Status s = write_atomically(out / "rig.yaml", to_yaml(rig)); !s) return s;
+  if (const Status s = write_whole_file(out / "rig.yaml", to_yaml(rig)); !s) return s;
   if (options.compare.empty()) return {};
   auto reference = read_reference(options.compare, options.compare_unit);
   if (!reference) return reference.error();

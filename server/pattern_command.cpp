@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/stripe_stack.h"
@@ -16,7 +17,6 @@
 #include "capture/pattern/slides.h"
 #include "capture/rig_file.h"
 #include "codec/export.h"
-#include "codec/whole_file.h"
 #include "server/commands.h"
 #include "server/size_option.h"
 
@@ -60,7 +60,7 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   const Scan scan = options.interlaced ? Scan::kInterlaced : Scan::kProgressive;
   if (auto s = write_stripe_slides(options.out, pattern, options.size.width, options.size.height, scan); !s)
     return s;
-  if (auto s = write_atomically(fs::path(options.out) / "pattern.yaml", to_yaml(pattern)); !s) return s;
+  if (auto s = write_whole_file(fs::path(options.out) / "pattern.yaml", to_yaml(pattern)); !s) return s;
   const std::size_t count = stripe_view_names(pattern.slides, scan).size();
   const int rows = row_pattern(pattern, options.size.width, options.size.height).stripes();
   if (options.json) {

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/calibrate/pictures.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstring>
-#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+
+#include "base/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -105,27 +103,7 @@ Status write_png(const fs::path& file, const Image8& picture) {
   } catch (const cv::Exception& e) {
     return Error{"cannot encode " + file.string() + ": " + e.err};
   }
-  return write_atomically(file, std::string(bytes.begin(), bytes.end()));
-}
-
-Status write_atomically(const fs::path& file, const std::string& content) {
-  const fs::path part = file.string() + "." + std::to_string(getpid()) + ".part";
-  const auto failed = [&](const std::string& why) {
-    std::error_code ignored;
-    fs::remove(part, ignored);
-    return Error{"cannot write " + file.string() + ": " + why};
-  };
-  {
-    std::ofstream out(part, std::ios::binary);
-    if (!out) return failed(std::strerror(errno));
-    out.write(content.data(), static_cast<std::streamsize>(content.size()));
-    out.flush();
-    if (!out) return failed("is the disk full?");
-  }
-  std::error_code code;
-  fs::rename(part, file, code);
-  if (code) return failed(code.message());
-  return {};
+  return write_whole_file(file, bytes);
 }
 
 }  // namespace relievo

@@ -23,8 +23,4 @@ Image8 grey_of(const Image8& rgb);
 /// One or three channels, as PNG, written whole or not at all. The error names the file.
 Status write_png(const std::filesystem::path& file, const Image8& picture);
 
-/// Writes `content` beside `file` and renames it, so that `file` is the old one or the new one, whole. The
-/// error names the file.
-Status write_atomically(const std::filesystem::path& file, const std::string& content);
-
 }  // namespace relievo

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <string>
 
-#include "capture/calibrate/pictures.h"
+#include "base/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -203,7 +203,7 @@ Status write_ply_points(const fs::path& file, const PointCloud& cloud) {
     if (coloured) std::memcpy(bytes + 12, cloud.colours[i].data(), 3);
     out.append(bytes, coloured ? 15 : 12);
   }
-  return write_atomically(file, out);
+  return write_whole_file(file, out);
 }
 
 std::vector<float> nearest_distances(const std::vector<Vec3f>& points, const std::vector<Vec3f>& reference) {

@@ -99,18 +99,5 @@ TEST(GrayStack, DamagedAndOddPictures) {
               HasSubstr("gray_07.png cannot be read"));
 }
 
-TEST(Pictures, WholeOrNotAtAll) {
-  const TempFolder folder;
-  ASSERT_TRUE(write_atomically(folder / "rig.yaml", "old").ok());
-  EXPECT_FALSE(write_atomically(folder / "none/rig.yaml", "new").ok());
-  ASSERT_TRUE(write_atomically(folder / "rig.yaml", "new").ok());
-  std::size_t files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
-    EXPECT_EQ(entry.path().filename(), "rig.yaml");
-    ++files;
-  }
-  EXPECT_EQ(files, 1u);
-}
-
 }  // namespace
 }  // namespace relievo

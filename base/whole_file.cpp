@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "codec/whole_file.h"
+#include "base/whole_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -37,6 +37,10 @@ Status write_whole_file(const std::filesystem::path& path, std::span<const std::
   if (error == 0) return {};
   ::unlink(temporary.c_str());
   return failed(error);
+}
+
+Status write_whole_file(const std::filesystem::path& path, std::string_view text) {
+  return write_whole_file(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
 }  // namespace relievo

@@ -6,14 +6,16 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "base/result.h"
 
 namespace relievo {
 
 /// Writes under a temporary name beside `path`, then renames: replaces a file of that name, leaves nothing
-/// behind on failure.
+/// behind on failure. The error names the file.
 Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+Status write_whole_file(const std::filesystem::path& path, std::string_view text);
 
 /// Why a file could not be written, from errno, with what to do about it where that is known.
 std::string write_failure(int error);

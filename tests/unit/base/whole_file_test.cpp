@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/whole_file.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+using test::TempFolder;
+
+TEST(WholeFile, IsTheNewOneOrTheOldOneAndNothingIsLeftBeside) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_whole_file(folder / "rig.yaml", "old").ok());
+  const auto failed = write_whole_file(folder / "none/rig.yaml", "new");
+  ASSERT_FALSE(failed.ok());
+  EXPECT_NE(failed.error().message.find("none/rig.yaml"), std::string::npos) << failed.error().message;
+  ASSERT_TRUE(write_whole_file(folder / "rig.yaml", "new").ok());
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    EXPECT_EQ(entry.path().filename(), "rig.yaml");
+    ++files;
+  }
+  EXPECT_EQ(files, 1u);
+  std::ifstream in(folder / "rig.yaml");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "new");
+}
+
+TEST(WholeFile, AFolderInItsPlaceStaysWhatItIs) {
+  const TempFolder folder;
+  ASSERT_TRUE(std::filesystem::create_directory(folder / "taken"));
+  EXPECT_FALSE(write_whole_file(folder / "taken", "text").ok());
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "taken"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+}  // namespace
+}  // namespace relievo
