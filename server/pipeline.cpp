@@ -74,7 +74,7 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   ServerStatus status() const override {
-    ServerStatus s = stats_.snapshot();
+    ServerStatus s = stats_.snapshot(utc_now_ns());
     s.stream = options_.stream;
     s.drops_reconstruct = to_reconstruct_.drops();
     s.drops_encode = to_encode_.drops();

@@ -47,10 +47,10 @@ void PipelineStats::published(std::int64_t capture_time_ns, std::int64_t publish
   latency_ms_.add(milliseconds(publish_time_ns - capture_time_ns));
 }
 
-ServerStatus PipelineStats::snapshot() const {
+ServerStatus PipelineStats::snapshot(std::int64_t now_ns) const {
   std::lock_guard lock(mutex_);
   ServerStatus s;
-  s.time_ns = utc_now_ns();
+  s.time_ns = now_ns;
   s.frames_captured = captured_;
   s.frames_published = published_;
   s.drops_capture = lost_;

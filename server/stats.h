@@ -30,8 +30,8 @@ class PipelineStats {
   void encoded(double ms);
   void published(std::int64_t capture_time_ns, std::int64_t publish_time_ns);
 
-  /// All but `stream`, `state`, `message` and the queues' drops.
-  ServerStatus snapshot() const;
+  /// All but `stream`, `state`, `message` and the queues' drops; `now_ns` in UTC.
+  ServerStatus snapshot(std::int64_t now_ns) const;
 
  private:
   mutable std::mutex mutex_;
