@@ -1,183 +1,293 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/surface.h"
 
-#include <array>
-#include <cmath>
-#include <numeric>
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <utility>
 
 namespace relievo {
 namespace {
 
-Vec3f minus(const Vec3f& a, const Vec3f& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
+constexpr int kPlanes = 5;
 
-Vec3f cross(const Vec3f& a, const Vec3f& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+/// One call's grid: what the steps below share.
+class Grid {
+ public:
+  Grid(const std::vector<GridVertex>& vertices, int boundaries, int lines, const SurfaceOptions& options,
+       SurfaceScratch& scratch)
+      : vertices_(vertices),
+        boundaries_(boundaries),
+        lines_(lines),
+        stride_((boundaries + 7) / 8 * 8 + VertexRow::kPadding),
+        options_(options),
+        scratch_(scratch) {
+    scratch.workers.resize(options.pool != nullptr ? static_cast<std::size_t>(options.pool->threads()) : 1);
+    for (auto& worker : scratch.workers) worker.counts = {};
+  }
 
-float dot(const Vec3f& a, const Vec3f& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+  SurfaceCounts build(Surface& out) {
+    SurfaceCounts counts;
+    counts.duplicate = place_vertices();
+    for_lines([&](int begin, int end, SurfaceScratch::Worker& worker) { make_cells(begin, end, worker); });
+    for (const auto& worker : scratch_.workers) {
+      counts.step += worker.counts.step;
+      counts.edge_on += worker.counts.edge_on;
+    }
+    find_components();
+    counts.small_component = number_what_is_kept(out);
+    for_lines([&](int begin, int end, SurfaceScratch::Worker&) {
+      for (int line = begin; line < end; ++line) {
+        write_vertices(line, out);
+        write_triangles(line, out);
+      }
+    });
+    return counts;
+  }
 
-/// Makes scratch.parent each vertex's root and scratch.size each root's count of vertices.
-void find_components(std::size_t vertices, const std::vector<Triangle>& triangles, SurfaceScratch& scratch) {
-  auto& parent = scratch.parent;
-  parent.resize(vertices);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root_of = [&](std::uint32_t v) {
-    auto root = static_cast<std::int32_t>(v);
-    while (parent[static_cast<std::size_t>(root)] != root) {
-      auto& up = parent[static_cast<std::size_t>(root)];
+ private:
+  template <typename Work>
+  void for_lines(const Work& work) {
+    if (options_.pool == nullptr) {
+      work(0, lines_, scratch_.workers.front());
+      return;
+    }
+    options_.pool->for_ranges(lines_, [&](int begin, int end, int worker) {
+      work(begin, end, scratch_.workers[static_cast<std::size_t>(worker)]);
+    });
+  }
+
+  std::size_t cell(int line, int boundary) const {
+    return static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_) +
+           static_cast<std::size_t>(boundary);
+  }
+  float* plane(int line, int which) {
+    return scratch_.planes.data() + static_cast<std::size_t>(line * kPlanes + which) * stride_;
+  }
+  std::uint8_t* cells(int line) { return scratch_.cells.data() + static_cast<std::size_t>(line) * stride_; }
+  VertexRow row(int line) {
+    return {plane(line, 0), plane(line, 1), plane(line, 2), plane(line, 3), plane(line, 4)};
+  }
+
+  /// The better one of each place. Returns how many were not.
+  std::size_t place_vertices() {
+    std::size_t duplicates = 0;
+    scratch_.vertex.assign(cell(lines_, 0), -1);
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      const GridPoint& at = vertices_[i].at;
+      std::int32_t& slot =
+          scratch_.vertex[cell(at.line, options_.by_pixel ? static_cast<int>(at.column_px) : at.boundary)];
+      duplicates += slot >= 0;
+      if (slot < 0 || better(vertices_[i], vertices_[static_cast<std::size_t>(slot)]))
+        slot = static_cast<std::int32_t>(i);
+    }
+    scratch_.planes.resize(static_cast<std::size_t>(lines_ * kPlanes) * stride_);
+    scratch_.normals.resize(3 * cell(lines_, 0));
+    scratch_.cells.resize(static_cast<std::size_t>(lines_) * stride_);
+    scratch_.index.resize(cell(lines_, 0));
+    for_lines([&](int begin, int end, SurfaceScratch::Worker&) {
+      for (int line = begin; line < end; ++line) fill_row(line);
+    });
+    return duplicates;
+  }
+
+  void fill_row(int line) {
+    std::fill_n(plane(line, 0), kPlanes * stride_, std::numeric_limits<float>::quiet_NaN());
+    for (int b = 0; b < boundaries_; ++b) {
+      const std::int32_t vertex = scratch_.vertex[cell(line, b)];
+      if (vertex < 0) continue;
+      const Vec3f& p = vertices_[static_cast<std::size_t>(vertex)].position;
+      for (std::size_t axis = 0; axis < 3; ++axis) plane(line, static_cast<int>(axis))[b] = p[axis];
+    }
+    const VertexRow r = row(line);
+    float* x_z = plane(line, 3);
+    float* y_z = plane(line, 4);
+    for (int b = 0; b < boundaries_; ++b) {
+      x_z[b] = r.x[b] / r.z[b];
+      y_z[b] = r.y[b] / r.z[b];
+    }
+  }
+
+  /// Cells below the lines [begin, end), and their vertices' normals.
+  void make_cells(int begin, int end, SurfaceScratch::Worker& worker) {
+    const auto row_size = static_cast<std::size_t>(12) * stride_;
+    worker.normals.resize(2 * row_size);
+    CellNormals above{worker.normals.data(), static_cast<std::ptrdiff_t>(stride_)};
+    CellNormals below{worker.normals.data() + row_size, static_cast<std::ptrdiff_t>(stride_)};
+    // The cells above the first line are another worker's, who writes and counts them.
+    CellCounts not_counted;
+    worker.links.resize(4 * stride_);
+    make_row(begin - 1, above, worker, worker.links.data() + 3 * stride_, not_counted);
+    for (int line = begin; line < end; ++line) {
+      make_row(line, below, worker, cells(line), worker.counts);
+      float* normals = scratch_.normals.data() + 3 * cell(line, 0);
+      cell_kernels().normals(above, below, boundaries_, normals, boundaries_);
+      std::swap(above, below);
+    }
+  }
+
+  /// Between `line` and the next one; none outside the grid.
+  void make_row(int line, const CellNormals& normals, SurfaceScratch::Worker& worker, std::uint8_t* to,
+                CellCounts& counts) {
+    if (line < 0 || line + 1 >= lines_) {
+      std::fill_n(normals.planes, 12 * stride_, 0.F);
+      std::fill_n(to, stride_, std::uint8_t{0});
+      return;
+    }
+    std::uint8_t* links = worker.links.data();
+    if (options_.links != nullptr) {
+      const auto count = static_cast<std::size_t>(boundaries_);
+      std::memcpy(links, options_.links->along.data() + cell(line, 0), count);
+      std::memcpy(links + stride_, options_.links->across.data() + cell(line, 0), count);
+      std::memcpy(links + 2 * stride_, options_.links->across.data() + cell(line + 1, 0), count);
+    } else {
+      std::fill_n(links, 3 * stride_, std::uint8_t{1});
+    }
+    // The last of them has nothing to its right.
+    cell_kernels().make(row(line), row(line + 1), {links, links + stride_, links + 2 * stride_}, boundaries_,
+                        {options_.depth_step_ratio, options_.least_facing}, to, normals, counts);
+  }
+
+  std::int32_t root(std::int32_t run) {
+    auto& parent = scratch_.parent;
+    while (parent[static_cast<std::size_t>(run)] != run) {
+      auto& up = parent[static_cast<std::size_t>(run)];
       up = parent[static_cast<std::size_t>(up)];  // halves the path
-      root = up;
+      run = up;
     }
-    return root;
-  };
-  for (const std::vector<Triangle>* list :
-       {&triangles, static_cast<const std::vector<Triangle>*>(&scratch.cut)}) {
-    for (const Triangle& t : *list) {
-      const std::int32_t first = root_of(t[0]);
-      for (const std::uint32_t v : {t[1], t[2]}) parent[static_cast<std::size_t>(root_of(v))] = first;
-    }
+    return run;
   }
-  scratch.size.assign(vertices, 0);
-  for (std::size_t v = 0; v < vertices; ++v) {
-    parent[v] = root_of(static_cast<std::uint32_t>(v));
-    ++scratch.size[static_cast<std::size_t>(parent[v])];
+  void join(std::int32_t a, std::int32_t b) {
+    a = root(a);
+    b = root(b);
+    if (a == b) return;
+    scratch_.parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    scratch_.size[static_cast<std::size_t>(std::min(a, b))] +=
+        scratch_.size[static_cast<std::size_t>(std::max(a, b))];
   }
-}
 
-/// No depth step between two neighbours on the grid.
-bool connected(const Vec3f& a, const Vec3f& b, float ratio) {
-  const float depth = std::fabs(a[2] - b[2]);
-  // Extent across the view: the part of a - b that is at right angles to the ray through their middle.
-  const float z = 0.5F * (a[2] + b[2]);
-  const float dx = (a[0] / a[2] - b[0] / b[2]) * z;
-  const float dy = (a[1] / a[2] - b[1] / b[2]) * z;
-  return depth * depth <= ratio * ratio * (dx * dx + dy * dy);
-}
+  /// Which sides of a cell its triangles join: bit c from corner c to the next.
+  static int joined_sides(std::uint8_t bits) {
+    const bool first = bits & cell::kFirstJoins;
+    const bool second = bits & cell::kSecondJoins;
+    if (bits & cell::kTurned) return (first ? 2 | 4 : 0) | (second ? 8 | 1 : 0);
+    return (first ? 1 | 2 : 0) | (second ? 4 | 8 : 0);
+  }
+
+  /// Runs of vertices that triangles join along a line, and those that they join across lines.
+  void find_components() {
+    auto& run = scratch_.index;
+    scratch_.parent.clear();
+    scratch_.size.clear();
+    for (int line = 0; line < lines_; ++line) {
+      const std::uint8_t* above = line > 0 ? cells(line - 1) : nullptr;
+      const std::uint8_t* below = cells(line);
+      bool on = false;    // joined to the one before
+      bool down = false;  // the cell on the left joins this vertex to the one above it
+      for (int b = 0; b < boundaries_; ++b) {
+        const std::size_t at = cell(line, b);
+        const int sides_above = above != nullptr ? joined_sides(above[b]) : 0;
+        if (scratch_.vertex[at] < 0) {
+          run[at] = -1;
+        } else {
+          if (on) {
+            run[at] = run[at - 1];
+          } else {
+            run[at] = static_cast<std::int32_t>(scratch_.parent.size());
+            scratch_.parent.push_back(run[at]);
+            scratch_.size.push_back(0);
+          }
+          ++scratch_.size[static_cast<std::size_t>(root(run[at]))];
+          if (down || (sides_above & 1)) join(run[at], run[at - static_cast<std::size_t>(boundaries_)]);
+        }
+        on = (joined_sides(below[b]) & 8) || (sides_above & 2);
+        down = sides_above & 4;
+      }
+    }
+  }
+
+  /// Each line's place in the output, whose vectors get their sizes. Returns how many vertices are in small
+  /// pieces.
+  std::size_t number_what_is_kept(Surface& out) {
+    std::size_t small = 0;
+    std::uint32_t vertices = 0;
+    std::uint32_t triangles = 0;
+    scratch_.vertices_before.clear();
+    scratch_.triangles_before.clear();
+    for (int line = 0; line < lines_; ++line) {
+      scratch_.vertices_before.push_back(vertices);
+      scratch_.triangles_before.push_back(triangles);
+      for (int b = 0; b < boundaries_; ++b) {
+        std::int32_t& index = scratch_.index[cell(line, b)];
+        if (index < 0) continue;
+        if (scratch_.size[static_cast<std::size_t>(root(index))] < options_.least_component) {
+          ++small;
+          index = -1;
+          continue;
+        }
+        index = static_cast<std::int32_t>(vertices++);
+      }
+      // A cell's triangles go with its corners, whose component is one; above, they are numbered already.
+      const std::uint8_t* bits = cells(line);
+      for (int b = 0; b < boundaries_; ++b) {
+        if (!(bits[b] & (cell::kFirst | cell::kSecond))) continue;
+        triangles +=
+            cell_is_kept(line, b) ? ((bits[b] & cell::kFirst) != 0) + ((bits[b] & cell::kSecond) != 0) : 0;
+      }
+    }
+    out.positions.resize(vertices);
+    out.normals.resize(vertices);
+    out.grid.resize(vertices);
+    out.triangles.resize(triangles);
+    return small;
+  }
+
+  /// Of a cell with triangles: whether they are in no small piece. Corners 0 and 3, of which there is one,
+  /// are numbered before corners 1 and 2.
+  bool cell_is_kept(int line, int b) const {
+    return scratch_.index[cell(line, b)] >= 0 || scratch_.index[cell(line, b + 1)] >= 0;
+  }
+
+  void write_vertices(int line, Surface& out) const {
+    const float* normals = scratch_.normals.data() + 3 * cell(line, 0);
+    const auto stride = static_cast<std::size_t>(boundaries_);
+    std::size_t to = scratch_.vertices_before[static_cast<std::size_t>(line)];
+    for (std::size_t b = 0; b < stride; ++b) {
+      if (scratch_.index[cell(line, 0) + b] < 0) continue;
+      const GridVertex& v = vertices_[static_cast<std::size_t>(scratch_.vertex[cell(line, 0) + b])];
+      out.positions[to] = v.position;
+      out.grid[to] = v.at;
+      out.normals[to] = {normals[b], normals[stride + b], normals[2 * stride + b]};
+      ++to;
+    }
+  }
+
+  void write_triangles(int line, Surface& out) {
+    std::size_t to = scratch_.triangles_before[static_cast<std::size_t>(line)];
+    const std::uint8_t* bits = cells(line);
+    for (int b = 0; b < boundaries_; ++b) {
+      if (!(bits[b] & (cell::kFirst | cell::kSecond)) || !cell_is_kept(line, b)) continue;
+      const auto at = [&](std::size_t i) { return static_cast<std::uint32_t>(scratch_.index[i]); };
+      std::array<std::uint32_t, 4> q{at(cell(line, b)), at(cell(line + 1, b)), at(cell(line + 1, b + 1)),
+                                     at(cell(line, b + 1))};
+      if (bits[b] & cell::kTurned) q = {q[1], q[2], q[3], q[0]};
+      if (bits[b] & cell::kFirst) out.triangles[to++] = {q[0], q[1], q[2]};
+      if (bits[b] & cell::kSecond) out.triangles[to++] = {q[2], q[3], q[0]};
+    }
+  }
+
+  const std::vector<GridVertex>& vertices_;
+  const int boundaries_, lines_;
+  const std::size_t stride_;
+  const SurfaceOptions& options_;
+  SurfaceScratch& scratch_;
+};
 
 }  // namespace
 
 SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundaries, int lines,
                             const SurfaceOptions& options, SurfaceScratch& scratch, Surface& out) {
-  SurfaceCounts counts;
-  const auto cell = [&](int line, int boundary) {
-    return static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries) +
-           static_cast<std::size_t>(boundary);
-  };
-  auto& grid = scratch.grid;
-  grid.assign(static_cast<std::size_t>(boundaries) * static_cast<std::size_t>(lines), -1);
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const GridPoint& at = vertices[i].at;
-    std::int32_t& slot = grid[cell(at.line, options.by_pixel ? static_cast<int>(at.column_px) : at.boundary)];
-    counts.duplicate += slot >= 0;
-    if (slot < 0 || better(vertices[i], vertices[static_cast<std::size_t>(slot)]))
-      slot = static_cast<std::int32_t>(i);
-  }
-
-  // Cells between boundaries b, b + 1 and lines l, l + 1. Corners run counter-clockwise as the camera sees
-  // them (x right, y down): upper left, lower left, lower right, upper right. The image runs left to right
-  // with rising boundary number, as the projector's columns do.
-  out.triangles.clear();
-  const auto position = [&](std::int32_t i) -> const Vec3f& {
-    return vertices[static_cast<std::size_t>(i)].position;
-  };
-  scratch.cut.clear();
-  const auto add = [&](std::int32_t a, std::int32_t b, std::int32_t c, bool linked) {
-    const float r = options.depth_step_ratio;
-    if (!connected(position(a), position(b), r) || !connected(position(b), position(c), r) ||
-        !connected(position(c), position(a), r)) {
-      ++counts.step;
-      return;
-    }
-    // Order may be reversed where the surface is seen through a fold; the normal must face the camera.
-    const Vec3f n = cross(minus(position(b), position(a)), minus(position(c), position(a)));
-    const Vec3f& p = position(a);
-    const float facing = -dot(n, p);
-    const float least = options.least_facing;
-    if (!(facing > 0) || facing * facing < least * least * dot(n, n) * dot(p, p)) {
-      ++counts.edge_on;
-      return;
-    }
-    counts.step += !linked;
-    (linked ? out.triangles : scratch.cut)
-        .push_back(
-            {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(c)});
-  };
-  for (int line = 0; line + 1 < lines; ++line) {
-    for (int b = 0; b + 1 < boundaries; ++b) {
-      const std::array<std::int32_t, 4> q{grid[cell(line, b)], grid[cell(line + 1, b)],
-                                          grid[cell(line + 1, b + 1)], grid[cell(line, b + 1)]};
-      const int present = (q[0] >= 0) + (q[1] >= 0) + (q[2] >= 0) + (q[3] >= 0);
-      if (present < 3) continue;
-      // Sides from each corner to the next; a triangle has the two that do not touch the corner it leaves
-      // out.
-      std::array<bool, 4> on{true, true, true, true};
-      if (const GridLinks* links = options.links) {
-        on = {links->along[cell(line, b)] != 0, links->across[cell(line + 1, b)] != 0,
-              links->along[cell(line, b + 1)] != 0, links->across[cell(line, b)] != 0};
-      }
-      const auto add_without = [&](std::size_t corner) {
-        const std::size_t i = (corner + 1) % 4;
-        const std::size_t j = (corner + 2) % 4;
-        add(q[i], q[j], q[(corner + 3) % 4], on[i] && on[j]);
-      };
-      if (present == 3) {
-        add_without(q[0] < 0 ? 0 : q[1] < 0 ? 1 : q[2] < 0 ? 2 : 3);
-        continue;
-      }
-      // The diagonal with the smaller depth step follows the surface.
-      if (std::fabs(position(q[0])[2] - position(q[2])[2]) <=
-          std::fabs(position(q[1])[2] - position(q[3])[2])) {
-        add_without(3);
-        add_without(1);
-      } else {
-        add_without(2);
-        add_without(0);
-      }
-    }
-  }
-
-  find_components(vertices.size(), out.triangles, scratch);
-  const auto in_small_component = [&](std::size_t v) {
-    const auto root = static_cast<std::size_t>(scratch.parent[v]);
-    return scratch.size[root] < options.least_component;
-  };
-  std::erase_if(out.triangles, [&](const Triangle& t) { return in_small_component(t[0]); });
-
-  // Vertices in grid order, so that output does not depend on the order of detection.
-  auto& kept = scratch.kept;
-  kept.assign(vertices.size(), -1);
-  out.positions.clear();
-  out.normals.clear();
-  out.grid.clear();
-  for (const std::int32_t slot : grid) {
-    if (slot < 0) continue;
-    if (in_small_component(static_cast<std::size_t>(slot))) {
-      ++counts.small_component;
-      continue;
-    }
-    kept[static_cast<std::size_t>(slot)] = static_cast<std::int32_t>(out.positions.size());
-    out.positions.push_back(position(slot));
-    out.grid.push_back(vertices[static_cast<std::size_t>(slot)].at);
-  }
-  out.normals.assign(out.positions.size(), Vec3f{});
-  for (Triangle& t : out.triangles) {
-    for (std::uint32_t& v : t) v = static_cast<std::uint32_t>(kept[v]);
-    // The cross product's length weighs each triangle by its area.
-    const Vec3f n = cross(minus(out.positions[t[1]], out.positions[t[0]]),
-                          minus(out.positions[t[2]], out.positions[t[0]]));
-    for (const std::uint32_t v : t) {
-      for (std::size_t c = 0; c < 3; ++c) out.normals[v][c] += n[c];
-    }
-  }
-  for (Vec3f& n : out.normals) {
-    const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    n = length > 0 ? Vec3f{n[0] / length, n[1] / length, n[2] / length} : Vec3f{0, 0, -1};
-  }
-  return counts;
+  return Grid(vertices, boundaries, lines, options, scratch).build(out);
 }
 
 }  // namespace relievo

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "base/frame3d.h"
+#include "base/parallel.h"
 #include "capture/reconstruct/column_grid.h"
+#include "capture/reconstruct/surface_cells.h"
 
 namespace relievo {
 
@@ -33,6 +35,8 @@ struct SurfaceOptions {
   int least_component = 10;
   // Where the surface goes on from one grid place to the next: triangles keep to it. Null: depth alone tells.
   const GridLinks* links = nullptr;
+  // Shares the lines; null: the caller's thread does them all.
+  WorkerPool* pool = nullptr;
   // The grid is [line][whole column_px] instead of [line][boundary], and `boundaries` its width.
   bool by_pixel = false;
 };
@@ -47,15 +51,24 @@ struct SurfaceCounts {
 
 /// Grows with use and is kept from frame to frame.
 struct SurfaceScratch {
-  std::vector<std::int32_t> grid;  // [line][boundary]: vertex or -1
-  std::vector<std::int32_t> kept;
-  std::vector<std::int32_t> parent;  // union-find over vertices
+  struct Worker {
+    std::vector<float> normals;       // of two rows of cells
+    std::vector<std::uint8_t> links;  // of one, padded
+    CellCounts counts;
+  };
+  std::vector<std::int32_t> vertex;  // [line][boundary]: in the list, or -1
+  std::vector<float> planes;         // [line][x, y, z, x / z, y / z][boundary, padded]
+  std::vector<float> normals;        // [line][x, y, z][boundary]
+  std::vector<std::uint8_t> cells;   // [line][boundary, padded]: see namespace cell
+  std::vector<std::int32_t> index;   // [line][boundary]: in the output, or -1; before that, its run
+  std::vector<std::int32_t> parent;  // union-find over runs: vertices that hang together on a line
   std::vector<std::int32_t> size;    // of a root's component
-  std::vector<Triangle> cut;         // not made, but what they join is no small component
+  std::vector<std::uint32_t> vertices_before, triangles_before;  // of each line, in the output
+  std::vector<Worker> workers;
 };
 
 /// `vertices` in any order. Fills positions, normals, grid and triangles of `out`, in order of line and
-/// boundary.
+/// boundary. The same for any number of threads.
 SurfaceCounts build_surface(const std::vector<GridVertex>& vertices, int boundaries, int lines,
                             const SurfaceOptions& options, SurfaceScratch& scratch, Surface& out);
 

@@ -78,9 +78,10 @@ void SurfaceBuilder::build(std::vector<GridVertex>& vertices, const Triangulator
     counts.interpolated += sampled.interpolated;
     counts.alone += sampled.alone;
     made = build_surface(pixels_, rig_.camera.width, lines_,
-                         {.least_component = kLeastDenseComponent, .by_pixel = true}, scratch_, out);
+                         {.least_component = kLeastDenseComponent, .pool = &pool, .by_pixel = true}, scratch_,
+                         out);
   } else {
-    made = build_surface(vertices, boundaries_, lines_, {.links = &links_}, scratch_, out);
+    made = build_surface(vertices, boundaries_, lines_, {.links = &links_, .pool = &pool}, scratch_, out);
   }
   counts.duplicate += made.duplicate;
   counts.step += made.step;

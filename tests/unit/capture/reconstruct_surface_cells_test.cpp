@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cells of the surface: what other sets of instructions make of them is what the portable one does, to the
+// last bit. That it is right, the tests of the surface show with whichever runs here.
+#include "capture/reconstruct/surface_cells.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "capture/reconstruct/surface.h"
+
+namespace relievo {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+
+struct Rows {
+  explicit Rows(int count, std::mt19937& random) : stride(static_cast<std::size_t>(count) + 24) {
+    std::uniform_real_distribution<float> off(-0.02F, 0.02F);
+    std::bernoulli_distribution missing(0.2), step(0.1), linked(0.9);
+    planes.assign(10 * stride, kNone);
+    for (auto& row : links) {
+      row.assign(stride, 0);
+      for (auto& link : row) link = linked(random);
+    }
+    for (std::size_t line = 0; line < 2; ++line) {
+      for (std::size_t b = 0; b < static_cast<std::size_t>(count); ++b) {
+        if (missing(random)) continue;
+        float* p = planes.data() + line * 5 * stride + b;
+        p[0] = 0.01F * static_cast<float>(b) + off(random) * 0.2F;
+        p[stride] = 0.01F * static_cast<float>(line) + off(random) * 0.2F;
+        p[2 * stride] = 1 + off(random) + (step(random) ? 0.3F : 0.F);
+        p[3 * stride] = p[0] / p[2 * stride];
+        p[4 * stride] = p[stride] / p[2 * stride];
+      }
+    }
+  }
+  VertexRow row(std::size_t line) const {
+    const float* p = planes.data() + line * 5 * stride;
+    return {p, p + stride, p + 2 * stride, p + 3 * stride, p + 4 * stride};
+  }
+  std::size_t stride;
+  std::vector<float> planes;
+  std::array<std::vector<std::uint8_t>, 3> links;
+};
+
+struct Made {
+  std::vector<std::uint8_t> cells;
+  std::vector<float> planes, normals;
+  CellCounts counts;
+};
+
+Made make(const CellKernels& kernels, const Rows& rows, int count) {
+  Made out;
+  const auto size = static_cast<std::size_t>(count);
+  out.cells.assign(rows.stride, 0);
+  out.planes.assign(12 * rows.stride, 0);
+  out.normals.assign(3 * size, 0);
+  const CellNormals normals{out.planes.data(), static_cast<std::ptrdiff_t>(rows.stride)};
+  kernels.make(rows.row(0), rows.row(1), {rows.links[0].data(), rows.links[1].data(), rows.links[2].data()},
+               count, {4, 0.2F}, out.cells.data(), normals, out.counts);
+  kernels.normals(normals, normals, count, out.normals.data(), count);
+  return out;
+}
+
+TEST(SurfaceCells, AllKernelsMakeTheSame) {
+  std::mt19937 random(3);
+  for (const int count : {1, 2, 7, 8, 9, 16, 89, 299, 640}) {
+    for (int round = 0; round < 20; ++round) {
+      const Rows rows(count, random);
+      const Made reference = make(all_cell_kernels().front(), rows, count);
+      for (const CellKernels& kernels : all_cell_kernels()) {
+        const Made made = make(kernels, rows, count);
+        ASSERT_EQ(made.cells, reference.cells) << kernels.name << ", " << count;
+        ASSERT_EQ(made.planes, reference.planes) << kernels.name << ", " << count;
+        ASSERT_EQ(made.normals, reference.normals) << kernels.name << ", " << count;
+        ASSERT_EQ(made.counts.step, reference.counts.step);
+        ASSERT_EQ(made.counts.edge_on, reference.counts.edge_on);
+      }
+    }
+  }
+}
+
+TEST(SurfaceCells, TheSurfaceIsTheSameForAnyNumberOfThreads) {
+  std::mt19937 random(4);
+  std::normal_distribution<float> off(0, 0.01F);
+  std::bernoulli_distribution missing(0.2);
+  std::vector<GridVertex> vertices;
+  for (std::uint16_t l = 0; l < 50; ++l) {
+    for (std::uint16_t b = 0; b < 60; ++b) {
+      if (missing(random)) continue;
+      const float z = 1 + off(random);
+      vertices.push_back({{.boundary = b, .line = l, .column_px = 8.F * b},
+                          {0.01F * static_cast<float>(b) * z, 0.01F * static_cast<float>(l) * z, z},
+                          1});
+    }
+  }
+  SurfaceScratch scratch;
+  Surface serial;
+  const SurfaceCounts counts = build_surface(vertices, 60, 50, {}, scratch, serial);
+  ASSERT_GT(serial.triangles.size(), 1000U);
+  ASSERT_GT(counts.step + counts.edge_on, 0U);
+  for (const int threads : {1, 2, 3, 7}) {
+    WorkerPool pool(threads);
+    Surface made;
+    const SurfaceCounts again = build_surface(vertices, 60, 50, {.pool = &pool}, scratch, made);
+    EXPECT_EQ(made.positions, serial.positions);
+    EXPECT_EQ(made.normals, serial.normals);
+    EXPECT_EQ(made.triangles, serial.triangles);
+    EXPECT_EQ(again.step, counts.step);
+    EXPECT_EQ(again.edge_on, counts.edge_on);
+    EXPECT_EQ(again.small_component, counts.small_component);
+  }
+}
+
+}  // namespace
+}  // namespace relievo
