@@ -16,7 +16,8 @@ struct FilterCounts {
   bool operator==(const FilterCounts&) const = default;
 };
 
-/// Names are those of JSON, metrics and the network; never renamed.
+/// Names are those of JSON and metrics, never renamed; their order is that on the network: new ones come
+/// last.
 struct Filter {
   std::string_view name;
   std::string_view meaning;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/filter_counts.h"
 #include "base/pattern.h"
 #include "base/rig.h"
 
@@ -67,6 +68,7 @@ struct ServerStatus {
   double reconstruct_ms = 0;            // medians over the last few seconds
   double encode_ms = 0;
   double latency_ms = 0;  // capture to publish
+  FilterCounts filters;   // since the start
 };
 
 /// True where `name` may name a stream: [A-Za-z0-9_.-]{1,64}, not starting with a dot.

@@ -16,6 +16,7 @@
 
 #include "codec/byte_io.h"
 #include "codec/surface_check.h"
+#include "codec/vertex_quality.h"
 
 namespace relievo {
 namespace {
@@ -93,9 +94,11 @@ int add_attribute(draco::PointCloud& cloud, draco::GeometryAttribute::Type type,
   return id;
 }
 
-std::vector<Vec2f> clamped(std::vector<Vec2f> coordinates) {
+/// On the steps that are sent, so that no rounding of Draco's can differ from that of other sections.
+std::vector<Vec2f> stepped(std::vector<Vec2f> coordinates, int bits) {
+  const auto largest = static_cast<float>((1 << bits) - 1);
   for (Vec2f& c : coordinates)
-    for (float& x : c) x = std::clamp(x, 0.0f, 1.0f);
+    for (float& x : c) x = static_cast<float>(coordinate_step(x, bits)) / largest;
   return coordinates;
 }
 
@@ -117,8 +120,8 @@ Result<Bytes> encode(const Surface& surface, const Selection& kept, const Encode
   const int position = add_attribute(mesh, draco::GeometryAttribute::POSITION, surface.positions, kept);
   int coordinate = -1;
   if (!surface.texture_coordinates.empty())
-    coordinate =
-        add_attribute(mesh, draco::GeometryAttribute::TEX_COORD, clamped(surface.texture_coordinates), kept);
+    coordinate = add_attribute(mesh, draco::GeometryAttribute::TEX_COORD,
+                               stepped(surface.texture_coordinates, options.texture_coordinate_bits), kept);
   int normal = -1;
   if (!surface.normals.empty() && options.normal_bits > 0)
     normal = add_attribute(mesh, draco::GeometryAttribute::NORMAL, surface.normals, kept);
@@ -282,6 +285,9 @@ Result<EncodedGeometry> encode_draco(const Surface& surface, const EncodeOptions
   if (encoded.volume.size_m == 0) encoded.volume = bounding_volume(surface.positions);
   const Selection kept = select(surface, encoded.volume);
   if (kept.vertices == 0) return encoded;
+  encoded.sent.reserve(kept.vertices);
+  for (std::uint32_t v = 0; v < kept.new_index.size(); ++v)
+    if (kept.new_index[v] != kDropped) encoded.sent.push_back(v);
   try {
     for (const Packing packing : {Packing::kBest, Packing::kPlain}) {
       auto bytes = encode(surface, kept, options, encoded.volume, packing);

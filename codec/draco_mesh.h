@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "base/frame3d.h"
 #include "base/result.h"
@@ -13,10 +14,11 @@
 namespace relievo {
 
 struct EncodedGeometry {
-  Bytes bytes;                  // empty where nothing is left to send
-  std::uint32_t vertices = 0;   // as the decoder will return them
-  std::uint32_t triangles = 0;  //
-  Volume volume;                // used for quantisation
+  Bytes bytes;                      // empty where nothing is left to send
+  std::uint32_t vertices = 0;       // as the decoder will return them
+  std::uint32_t triangles = 0;      //
+  Volume volume;                    // used for quantisation
+  std::vector<std::uint32_t> sent;  // indices of the vertices that are in it, rising
 };
 
 /// Left out: vertices outside the volume and the triangles on them, triangles that use a vertex twice, and,

@@ -69,7 +69,9 @@ Status write_ply(const std::filesystem::path& path, const Surface& surface, View
   const std::vector<Vec3f>& normals = surface.normals.empty() ? derived : surface.normals;
   const bool coloured = !texture.empty() && !surface.texture_coordinates.empty();
   Bytes out;
-  out.reserve(512 + surface.positions.size() * 27 + surface.triangles.size() * 13);
+  const bool has_sigma = !surface.sigmas_m.empty();
+  const bool has_marks = !surface.interpolated.empty();
+  out.reserve(512 + surface.positions.size() * 32 + surface.triangles.size() * 13);
   append_text(out,
               "ply\nformat binary_little_endian 1.0\n"
               "comment relievo " RELIEVO_VERSION
@@ -78,14 +80,17 @@ Status write_ply(const std::filesystem::path& path, const Surface& surface, View
                   std::to_string(surface.positions.size()) +
                   "\nproperty float x\nproperty float y\nproperty float z\n"
                   "property float nx\nproperty float ny\nproperty float nz\n"
-                  "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                  "element face " +
+                  "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
+                  (has_sigma ? "property float sigma\n" : "") +
+                  (has_marks ? "property uchar interpolated\n" : "") + "element face " +
                   std::to_string(surface.triangles.size()) +
                   "\nproperty list uchar int vertex_indices\nend_header\n");
   for (std::size_t i = 0; i < surface.positions.size(); ++i) {
     for (const float x : surface.positions[i]) append(out, x);
     for (const float x : normals[i]) append(out, x);
     append_bytes(out, coloured ? sample(texture, surface.texture_coordinates[i]) : kNoTexture);
+    if (has_sigma) append(out, surface.sigmas_m[i]);
+    if (has_marks) append(out, surface.interpolated[i]);
   }
   for (const Triangle& triangle : surface.triangles) {
     append(out, std::uint8_t{3});

@@ -51,6 +51,14 @@ struct Document {
                          {"count", values.size()},
                          {"type", N == 3 ? "VEC3" : "VEC2"}});
   }
+  int add_scalars(const std::vector<float>& values) {
+    const std::size_t start = binary.size();
+    for (const float x : values) append(binary, x);
+    return add_accessor({{"bufferView", end_view(start, kArrayBuffer)},
+                         {"componentType", kFloat},
+                         {"count", values.size()},
+                         {"type", "SCALAR"}});
+  }
   int add_indices(const std::vector<Triangle>& triangles) {
     const std::size_t start = binary.size();
     for (const Triangle& triangle : triangles)
@@ -122,6 +130,11 @@ Status add_mesh(Document& document, const Frame3D& frame, int jpeg_quality) {
     if (auto status = add_material(document, frame.texture, jpeg_quality); !status) return status;
     primitive["material"] = 0;
   }
+  // Attributes of an application's own start with an underscore (glTF 2.0, 3.7.2.1).
+  if (!surface.sigmas_m.empty()) attributes["_SIGMA"] = document.add_scalars(surface.sigmas_m);
+  if (!surface.interpolated.empty())
+    attributes["_INTERPOLATED"] =
+        document.add_scalars({surface.interpolated.begin(), surface.interpolated.end()});
   primitive["attributes"] = std::move(attributes);
   document.root["meshes"] = json::array({{{"primitives", json::array({std::move(primitive)})}}});
   document.root["nodes"] = json::array({{{"mesh", 0}, {"name", "surface"}}});

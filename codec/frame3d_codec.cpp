@@ -12,6 +12,7 @@
 #include "codec/byte_io.h"
 #include "codec/draco_mesh.h"
 #include "codec/jpeg_texture.h"
+#include "codec/vertex_quality.h"
 
 namespace relievo {
 namespace {
@@ -24,6 +25,8 @@ constexpr std::size_t kEntryBytes = 8;
 constexpr int kMaxSections = 16;
 constexpr std::uint8_t kGeometrySection = 1;
 constexpr std::uint8_t kTextureSection = 2;
+constexpr std::uint8_t kQualitySection = 4;
+constexpr std::uint8_t kQualityCodec = 1;
 constexpr std::uint16_t kRequired = 0x0001;
 constexpr std::uint64_t kMaxPixelsPerByte = 256;  // of a sequential JPEG: 64 pixels take 2 bits at least
 constexpr std::uint64_t kMaxItemsPerByte = 8;
@@ -76,6 +79,7 @@ struct Layout {
   FrameHeader header;
   std::span<const std::uint8_t> geometry;
   std::span<const std::uint8_t> texture;
+  std::span<const std::uint8_t> quality;  // empty where there is none of a known codec
 };
 
 /// The table of sections and the places of those that this version knows; others are stepped over.
@@ -83,6 +87,7 @@ Status read_sections(std::span<const std::uint8_t> bytes, std::span<const std::u
                      std::size_t entry_bytes, std::size_t header_bytes, Layout& layout) {
   bool has_geometry = false;
   bool has_texture = false;
+  bool has_quality = false;
   std::uint64_t at = header_bytes;
   for (std::size_t entry = 0; entry < table.size(); entry += entry_bytes) {
     ByteReader reader(table.subspan(entry, kEntryBytes));
@@ -103,7 +108,12 @@ Status read_sections(std::span<const std::uint8_t> bytes, std::span<const std::u
       layout.header.texture = static_cast<TextureCodec>(codec);
       layout.header.texture_bytes = size;
       layout.texture = section;
-    } else if (kind == kGeometrySection || kind == kTextureSection) {
+    } else if (kind == kQualitySection && !has_quality) {
+      has_quality = true;
+      if (codec != kQualityCodec) continue;  // of a later version: the surface does without
+      layout.header.quality_bytes = size;
+      layout.quality = section;
+    } else if (kind == kGeometrySection || kind == kTextureSection || kind == kQualitySection) {
       return Error{"frame has two sections of kind " + std::to_string(kind)};
     } else if ((flags & kRequired) != 0) {
       return Error{"frame needs a section of kind " + std::to_string(kind) +
@@ -198,7 +208,12 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
   const auto geometry = encode_draco(frame.surface, options);
   if (!geometry) return geometry.error();
 
-  const int sections = has_texture ? 2 : 1;
+  Bytes quality;
+  if (options.quality && !frame.surface.texture_coordinates.empty() &&
+      geometry->vertices >= geometry->sent.size())
+    quality = encode_vertex_quality(frame.surface, geometry->sent, options.texture_coordinate_bits);
+
+  const int sections = 1 + has_texture + !quality.empty();
   const std::size_t header_bytes = kFixedBytes + static_cast<std::size_t>(sections) * kEntryBytes;
   Bytes out(kMagic.begin(), kMagic.end());
   out.reserve(header_bytes + geometry->bytes.size());
@@ -227,6 +242,12 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
     append(out, std::uint16_t{0});
     append(out, std::uint32_t{0});
   }
+  if (!quality.empty()) {
+    append(out, kQualitySection);
+    append(out, kQualityCodec);
+    append(out, std::uint16_t{0});
+    append(out, static_cast<std::uint32_t>(quality.size()));
+  }
   append_bytes(out, geometry->bytes);
   if (has_texture) {
     const std::size_t start = out.size();
@@ -234,6 +255,7 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
       return status.error();
     put(out, kTextureBytesAt, static_cast<std::uint32_t>(out.size() - start));
   }
+  append_bytes(out, quality);
   return out;
 }
 
@@ -262,6 +284,8 @@ Result<Frame3D> decode_frame(std::span<const std::uint8_t> bytes, const DecodeLi
     auto surface = decode_draco(layout->geometry, header.vertices, header.triangles);
     if (!surface) return surface.error();
     frame.surface = std::move(*surface);
+    if (!layout->quality.empty())
+      if (auto status = decode_vertex_quality(layout->quality, frame.surface); !status) return status.error();
   }
   if (header.texture != TextureCodec::kNone) {
     auto texture = decode_jpeg(layout->texture, header.texture_width, header.texture_height);

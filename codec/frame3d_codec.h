@@ -31,6 +31,7 @@ struct EncodeOptions {
   Volume volume;                     // size 0: each frame's own bounding box
   TextureCodec texture = TextureCodec::kJpeg;
   int jpeg_quality = 80;  // 1..100
+  bool quality = true;    // sigma and interpolation of each vertex, where the surface has them
 };
 
 /// What a frame says of itself; read without decoding it.
@@ -47,6 +48,7 @@ struct FrameHeader {
   std::uint32_t texture_height = 0;
   std::uint32_t geometry_bytes = 0;
   std::uint32_t texture_bytes = 0;
+  std::uint32_t quality_bytes = 0;  // 0: nothing is said of each vertex's sigma
 };
 
 /// What a decoder accepts; a frame that declares more is refused before anything is allocated.

@@ -33,6 +33,14 @@ Status check_surface(const Surface& surface) {
                  std::to_string(surface.normals.size()) + " normals and " +
                  std::to_string(surface.texture_coordinates.size()) +
                  " texture coordinates: give none or one a vertex"};
+  if (!matches(surface.sigmas_m.size()) || !matches(surface.interpolated.size()))
+    return Error{"surface has " + std::to_string(count) + " positions, but " +
+                 std::to_string(surface.sigmas_m.size()) + " sigmas and " +
+                 std::to_string(surface.interpolated.size()) +
+                 " marks of interpolation: give none or one a vertex"};
+  for (const float sigma : surface.sigmas_m)
+    if (!(std::isfinite(sigma) && sigma >= 0))
+      return Error{"surface has a sigma that is no length in metres"};
   if (!all_finite(surface.positions) || !all_finite(surface.normals) ||
       !all_finite(surface.texture_coordinates))
     return Error{"surface has a position, normal or texture coordinate that is not finite"};

@@ -9,8 +9,8 @@
 
 namespace relievo {
 
-/// Fails where normals or texture coordinates are neither none nor one a vertex, where a number is not
-/// finite, or where a triangle names a vertex that is not there.
+/// Fails where normals, texture coordinates, sigmas or marks of interpolation are neither none nor one a
+/// vertex, where a number is not finite, or where a triangle names a vertex that is not there.
 Status check_surface(const Surface& surface);
 
 /// Unit normals, one a vertex, towards the side from which the triangles run counter-clockwise (the camera):

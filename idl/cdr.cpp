@@ -30,6 +30,8 @@ class Cursor {
   explicit Cursor(std::span<const std::uint8_t> body) : body_(body), end_(body.size()) {}
 
   bool ok() const { return ok_; }
+  /// The struct being read goes on.
+  bool more() const { return ok_ && at_ < end_; }
 
   template <typename T>
   T get() {
@@ -251,6 +253,12 @@ Result<ServerStatus> read_status_cdr(std::span<const std::uint8_t> cdr) {
     status.reconstruct_ms = in.number();
     status.encode_ms = in.number();
     status.latency_ms = in.number();
+    if (!in.more()) return;  // of a server that did not count them
+    const auto count = in.get<std::uint32_t>();
+    for (std::uint32_t i = 0; i < count && in.ok(); ++i) {
+      const auto value = in.get<std::uint64_t>();
+      if (i < kFilters.size()) status.filters.*kFilters[i].count = value;
+    }
   });
   if (!in.ok()) return truncated("status");
   if (auto bad = bad_stream(status.stream)) return *bad;

@@ -2,6 +2,7 @@
 #include <dds/dds.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 
@@ -122,6 +123,10 @@ class DdsPublisher final : public Publisher {
     sample.reconstruct_ms = status.reconstruct_ms;
     sample.encode_ms = status.encode_ms;
     sample.latency_ms = status.latency_ms;
+    std::array<std::uint64_t, kFilters.size()> filters{};
+    for (std::size_t i = 0; i < kFilters.size(); ++i) filters[i] = status.filters.*kFilters[i].count;
+    sample.filters._length = sample.filters._maximum = static_cast<std::uint32_t>(filters.size());
+    sample.filters._buffer = filters.data();
     return written(dds_write(writer(Topic::kStatus), &sample), Topic::kStatus);
   }
 

@@ -16,6 +16,7 @@
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "server/commands.h"
+#include "server/evaluate_pictures.h"
 #include "server/options.h"
 
 namespace relievo {
@@ -29,6 +30,7 @@ struct Options {
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
   SurfaceBuilderOptions surface;
+  std::string pictures;
   bool json = false;
 };
 
@@ -71,10 +73,19 @@ Status run(const Options& options, StopSignal& stop) {
     return Error{options.take +
                  " has no truth/ folder to score against; relievo-server simulate writes takes with truth"};
   }
-  auto reconstructor = Reconstructor::create(
-      info.rig, info.pattern,
-      {.decoder = options.decoder, .threads = options.threads, .texture = false, .surface = options.surface});
+  auto reconstructor = Reconstructor::create(info.rig, info.pattern,
+                                             {.decoder = options.decoder,
+                                              .threads = options.threads,
+                                              .texture = !options.pictures.empty(),
+                                              .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
+
+  std::optional<EvaluationPictures> pictures;
+  if (!options.pictures.empty()) {
+    auto made = EvaluationPictures::create(options.pictures, info.rig, info.pattern);
+    if (!made) return made.error();
+    pictures = *std::move(made);
+  }
 
   Scorer scorer(info.rig, info.pattern);
   Progress progress("evaluate", "frames", info.frames.value_or(0));
@@ -101,7 +112,12 @@ Status run(const Options& options, StopSignal& stop) {
     if (truth->width() != info.rig.camera.width || truth->height() != info.rig.camera.height) {
       return Error{file.string() + " is not of the camera's size"};
     }
-    scorer.add(*truth, *result ? &(*result)->surface : nullptr);
+    Judgement judgement;
+    scorer.add(*truth, *result ? &(*result)->surface : nullptr, pictures ? &judgement : nullptr);
+    if (pictures && *result) {
+      const Status drawn = pictures->add(frame, static_cast<int>(slide), **result, judgement);
+      if (!drawn) return drawn.error();
+    }
     filters += reconstructor->report().filters;
   }
   progress.finish();
@@ -109,6 +125,10 @@ Status run(const Options& options, StopSignal& stop) {
   const Score score = scorer.score();
   if (score.frames == 0)
     return Error{"no frame of " + options.take + " could be scored: none with truth was reconstructed"};
+  if (pictures) {
+    const Status written = pictures->finish(options.take, score, filters);
+    if (!written) return written.error();
+  }
   print(score, filters, options.json);
   return {};
 }
@@ -127,6 +147,10 @@ Command evaluate_command() {
                 ->capture_default_str();
             add_decoder_option(app, options->decoder);
             add_surface_options(app, options->surface);
+            app.add_option(
+                   "--pictures", options->pictures,
+                   "Write error maps and pictures of every stage into this folder; open its index.html")
+                ->type_name("DIR");
             app.add_flag("--json", options->json, "Print the score as JSON");
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};

@@ -204,7 +204,7 @@ class ThreadedPipeline final : public Pipeline {
         continue;
       }
       any_surface = true;
-      stats_.reconstructed(milliseconds(steady_now_ns() - begin));
+      stats_.reconstructed(milliseconds(steady_now_ns() - begin), reconstructor_.report().filters);
       push(to_encode_, Reconstructed{*std::move(*result), item->capture_time_ns});
     }
   }

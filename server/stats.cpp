@@ -31,8 +31,9 @@ void PipelineStats::lost_in_capture(std::uint64_t frames) {
   lost_ += frames;
 }
 
-void PipelineStats::reconstructed(double ms) {
+void PipelineStats::reconstructed(double ms, const FilterCounts& filters) {
   std::lock_guard lock(mutex_);
+  filters_ += filters;
   reconstruct_ms_.add(ms);
 }
 
@@ -57,6 +58,7 @@ ServerStatus PipelineStats::snapshot(std::int64_t now_ns) const {
   s.reconstruct_ms = reconstruct_ms_.median();
   s.encode_ms = encode_ms_.median();
   s.latency_ms = latency_ms_.median();
+  s.filters = filters_;
   // Rate over the ring, but falling at once when frames stop coming: the time since the last one counts too.
   const std::uint64_t n = std::min<std::uint64_t>(published_, publish_times_.size());
   if (n >= 2) {

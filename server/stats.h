@@ -26,7 +26,7 @@ class PipelineStats {
  public:
   void captured();
   void lost_in_capture(std::uint64_t frames);
-  void reconstructed(double ms);
+  void reconstructed(double ms, const FilterCounts& filters = {});
   void encoded(double ms);
   void published(std::int64_t capture_time_ns, std::int64_t publish_time_ns);
 
@@ -39,6 +39,7 @@ class PipelineStats {
   std::uint64_t lost_ = 0;
   std::uint64_t published_ = 0;
   std::array<std::int64_t, 64> publish_times_{};  // ring of the last publish times, UTC ns
+  FilterCounts filters_;
   RollingMedian reconstruct_ms_, encode_ms_, latency_ms_;
 };
 

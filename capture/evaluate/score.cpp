@@ -94,12 +94,16 @@ std::vector<Scorer::Expected> Scorer::expected(const ImageF& truth) const {
   return out;
 }
 
-void Scorer::add(const ImageF& truth, const Surface* surface) {
+void Scorer::add(const ImageF& truth, const Surface* surface, Judgement* judgement) {
   const int width = truth.width();
   const int height = truth.height();
   const std::vector<Expected> visible = expected(truth);
   ++of_;
   expected_ += visible.size();
+  if (judgement != nullptr) {
+    *judgement = {};
+    for (const Expected& e : visible) judgement->boundaries.push_back({e.row, e.column_px, false});
+  }
   if (surface == nullptr) return;
   ++frames_;
   vertices_ += surface->positions.size();
@@ -117,17 +121,25 @@ void Scorer::add(const ImageF& truth, const Surface* surface) {
       z = z0 * (1 - f) + z1 * f;
     }
     const float error = std::fabs(p[2] - z);
-    if (!(z > 0) || error >= kOutlier * z) continue;
+    const bool right = z > 0 && error < kOutlier * z;
+    if (judgement != nullptr) {
+      judgement->vertices.push_back(
+          {static_cast<float>(column), static_cast<float>(row), right ? (p[2] - z) / z : 0, right});
+    }
+    if (!right) continue;
     ++right_;
     errors_.push_back(error / z);
     const int nearest = std::clamp(static_cast<int>(std::lround(column)), 0, width - 1);
     covered[at(y, nearest, width)] = true;
     if (rig_.scan == Scan::kInterlaced && y > 0) covered[at(y - 1, nearest, width)] = true;
   }
-  for (const Expected& e : visible) {
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    const Expected& e = visible[i];
     const int x = std::clamp(static_cast<int>(std::lround(e.column_px)), 1, width - 2);
-    hit_ +=
+    const bool found =
         covered[at(e.row, x - 1, width)] || covered[at(e.row, x, width)] || covered[at(e.row, x + 1, width)];
+    hit_ += found;
+    if (judgement != nullptr) judgement->boundaries[i].found = found;
   }
 }
 

@@ -10,6 +10,7 @@
 #include "base/image.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/evaluate/judge.h"
 
 namespace relievo {
 
@@ -32,8 +33,8 @@ class Scorer {
   Scorer(const Rig& rig, const Pattern& pattern);
 
   /// `truth` is depth in metres, camera height x width, 0 where there is nothing; `surface` null where the
-  /// frame should have been reconstructed and was not.
-  void add(const ImageF& truth, const Surface* surface);
+  /// frame should have been reconstructed and was not. `judgement`, where given, is overwritten.
+  void add(const ImageF& truth, const Surface* surface, Judgement* judgement = nullptr);
   Score score() const;
 
  private:

@@ -40,6 +40,8 @@ Json rig_json(const StreamInfo& info) {
 }
 
 Json status_json(const ServerStatus& status) {
+  Json filters;
+  for (const Filter& filter : kFilters) filters[std::string(filter.name)] = status.filters.*filter.count;
   return {{"time_ns", status.time_ns},
           {"state", to_string(status.state)},
           {"message", status.message},
@@ -52,7 +54,8 @@ Json status_json(const ServerStatus& status) {
           {"drops_publish", status.drops_publish},
           {"reconstruct_ms", status.reconstruct_ms},
           {"encode_ms", status.encode_ms},
-          {"latency_ms", status.latency_ms}};
+          {"latency_ms", status.latency_ms},
+          {"filters", filters}};
 }
 
 void put_u64(std::uint8_t* at, std::uint64_t value) {
@@ -232,6 +235,15 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
     out.sample(head + "\"reconstruct\"}", static_cast<double>(s.status->drops_reconstruct));
     out.sample(head + "\"encode\"}", static_cast<double>(s.status->drops_encode));
     out.sample(head + "\"publish\"}", static_cast<double>(s.status->drops_publish));
+  }
+  out.family("relievo_stream_filters_total", "counter",
+             "What each filter of the reconstruction did: points, pixels or triangles.");
+  for (const auto& s : streams) {
+    if (!s.status) continue;
+    for (const Filter& filter : kFilters) {
+      out.sample("{stream=" + label(s.info.stream) + ",filter=\"" + std::string(filter.name) + "\"}",
+                 static_cast<double>(s.status->filters.*filter.count));
+    }
   }
   out.family("relievo_stream_state", "gauge", "1 for the state the stream is in.");
   for (const auto& s : streams) {

@@ -66,7 +66,7 @@ void expect_pixel(const Image8& texture, int x, int y, const json& wanted) {
 
 TEST(FrameVectors, AreReadAsTheyWereMeant) {
   const json vectors = expected();
-  ASSERT_EQ(vectors["frames"].size(), 5u);
+  ASSERT_EQ(vectors["frames"].size(), 6u);
   for (const json& wanted : vectors["frames"]) {
     SCOPED_TRACE(wanted["file"].get<std::string>());
     const Bytes bytes = read_file(wanted["file"]);
@@ -90,6 +90,15 @@ TEST(FrameVectors, AreReadAsTheyWereMeant) {
       for (const Vec2f& c : surface.texture_coordinates) sum += c[k];
       EXPECT_NEAR(sum / static_cast<double>(surface.positions.size()),
                   wanted["mean_texture_coordinate"][k].get<double>(), 1e-4);
+    }
+    EXPECT_EQ(!surface.sigmas_m.empty(), wanted.contains("quality"));
+    if (wanted.contains("quality")) {
+      double sum = 0;
+      for (const float sigma : surface.sigmas_m) sum += sigma;
+      EXPECT_NEAR(sum, wanted["quality"]["sum_sigma_m"].get<double>(), 1e-6);
+      EXPECT_EQ(std::ranges::count_if(surface.sigmas_m, [](float s) { return s > 0; }),
+                wanted["quality"]["known"].get<int>());
+      EXPECT_EQ(std::ranges::count(surface.interpolated, 1), wanted["quality"]["interpolated"].get<int>());
     }
     if (frame->texture.empty()) continue;
     expect_pixel(frame->texture, 0, 0, wanted["first_pixel"]);

@@ -102,6 +102,7 @@ TEST(Cdr, RefusesHostileFields) {
   EXPECT_FALSE(read_status_cdr(status(4, 30).finish()).ok());
   EXPECT_FALSE(read_status_cdr(status(1, std::numeric_limits<double>::quiet_NaN()).finish()).ok());
   ASSERT_TRUE(read_status_cdr(status(1, 30).finish()).ok());
+  EXPECT_FALSE(read_status_cdr(status(1, 30).put<std::uint32_t>(2).put<std::uint64_t>(1).finish()).ok());
 }
 
 TEST(Cdr, TextLosesControlCharacters) {

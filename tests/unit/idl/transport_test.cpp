@@ -116,6 +116,8 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   status.message = "no camera";
   status.drops_encode = 7;
   status.latency_ms = 12.5;
+  status.filters.unsupported = 3;
+  status.filters.small_component = 5'000'000'000;
   ASSERT_TRUE(publisher->publish(status).ok());
 
   Inbox inbox;
@@ -131,6 +133,7 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   EXPECT_EQ(inbox.now().statuses[0].message, "no camera");
   EXPECT_EQ(inbox.now().statuses[0].drops_encode, 7u);
   EXPECT_EQ(inbox.now().statuses[0].latency_ms, 12.5);
+  EXPECT_EQ(inbox.now().statuses[0].filters, status.filters);
 }
 
 void expect_frames_arrive(std::size_t size, int count) {

@@ -12,7 +12,7 @@ export interface DecoderEvents {
 }
 
 export class Decoder {
-  want = { normals: false, edges: false };
+  want = { normals: false, edges: false, quality: false };
   private worker: Worker;
   private nextId = 1;
   private readonly pending = new Map<number, number>(); // id -> when it was handed over

@@ -4,6 +4,7 @@ import wasmUrl from 'draco3d/draco_decoder.wasm?url';
 import { DracoDecoder } from './draco';
 import { kTextureJpeg, parseFrame, type Frame } from './frame';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
+import { decodeVertexQuality } from './quality';
 import { robustExtent, triangleEdges, vertexNormals } from './surface';
 
 const post = (reply: DecodeReply, transfer: Transferable[] = []): void => {
@@ -23,6 +24,7 @@ self.onmessage = (event: MessageEvent<DecodeRequest>) => {
       const frame = await decode(request);
       const arrays = [frame.positions, frame.coordinates, frame.normals, frame.triangles, frame.edges];
       const transfer: Transferable[] = arrays.flatMap((a) => (a === null ? [] : [a.buffer]));
+      if (frame.quality !== null) transfer.push(frame.quality.sigmas.buffer, frame.quality.interpolated.buffer);
       if (frame.texture !== null) transfer.push(frame.texture);
       post(frame, transfer);
     } catch (error) {
@@ -56,6 +58,10 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     normals,
     triangles: geometry.triangles,
     edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
+    quality:
+      request.want.quality && frame.quality.length > 0 && geometry.coordinates !== null
+        ? decodeVertexQuality(frame.quality, geometry.coordinates)
+        : null,
     texture: await picture,
     extent: robustExtent(positions),
     decodeMs: performance.now() - start,

@@ -19,10 +19,12 @@ export interface Frame {
   geometry: Uint8Array; // views into the bytes given
   textureCodec: number; // 0: none
   texture: Uint8Array;
+  quality: Uint8Array; // empty: nothing is said of each vertex
 }
 
 export const kGeometryDraco = 1;
 export const kTextureJpeg = 1;
+const kQualityCodec = 1;
 
 const kFixedBytes = 64;
 const kEntryBytes = 8;
@@ -73,6 +75,7 @@ function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): O
   const nothing = bytes.subarray(0, 0);
   let geometry: Uint8Array | null = null;
   let texture: Uint8Array | null = null;
+  let quality: Uint8Array | null = null;
   let geometryCodec = 0;
   let textureCodec = 0;
   let at = headerBytes;
@@ -92,7 +95,9 @@ function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): O
       texture = section;
       textureCodec = codec;
       if (codec === 0) throw new Error('frame has a texture section without a codec');
-    } else if (kind === 1 || kind === 2) {
+    } else if (kind === 4 && quality === null) {
+      quality = codec === kQualityCodec ? section : nothing; // of a later version: the surface does without
+    } else if (kind === 1 || kind === 2 || kind === 4) {
       throw new Error(`frame has two sections of kind ${kind}`);
     } else if (required) {
       throw new Error(`frame needs a section of kind ${kind} that this viewer does not know`);
@@ -100,7 +105,7 @@ function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): O
   }
   if (at !== bytes.length) throw new Error(`frame has ${bytes.length - at} bytes behind its end`);
   if (geometry === null) throw new Error('frame has no geometry section');
-  return { geometry, geometryCodec, texture: texture ?? nothing, textureCodec };
+  return { geometry, geometryCodec, texture: texture ?? nothing, textureCodec, quality: quality ?? nothing };
 }
 
 /** FORMAT.md, "Sizes": what a frame may ask for is bounded by the bytes it brings. */

@@ -3,10 +3,11 @@
 // allocates nothing.
 import * as THREE from 'three';
 import type { DecodedFrame } from './messages';
+import { confidenceColours } from './quality';
 import { triangleEdges, vertexNormals } from './surface';
 
-export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points';
-export const kModes: readonly Mode[] = ['textured', 'shaded', 'wireframe', 'points'];
+export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points' | 'confidence';
+export const kModes: readonly Mode[] = ['textured', 'shaded', 'wireframe', 'points', 'confidence'];
 
 /** Colours of the surface where the texture is not shown; see style.css for the page's. */
 const kClay = 0xd2ccc2;
@@ -52,6 +53,7 @@ export class SurfaceMesh {
   private readonly position = floats(3);
   private readonly uv = floats(2);
   private readonly normal = floats(3);
+  private readonly colour = floats(3); // of confidence
   private readonly triangle = indices();
   private readonly edge = indices();
   private readonly solid = new THREE.BufferGeometry();
@@ -69,6 +71,7 @@ export class SurfaceMesh {
       polygonOffsetFactor: 1,
       polygonOffsetUnits: 1,
     }),
+    confidence: new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }),
     wire: new THREE.LineBasicMaterial({ color: kWire }),
     points: new THREE.PointsMaterial({ map: this.texture, size: 2, sizeAttenuation: false }),
     plainPoints: new THREE.PointsMaterial({ color: kClay, size: 2, sizeAttenuation: false }),
@@ -82,6 +85,7 @@ export class SurfaceMesh {
   private textured = false; // the frame shown has a picture and coordinates
   private hasNormals = false;
   private hasEdges = false;
+  private hasQuality = false;
 
   constructor() {
     this.object.rotation.x = Math.PI;
@@ -113,8 +117,8 @@ export class SurfaceMesh {
   }
 
   /** What the decoder should bring along for the mode. */
-  get wants(): { normals: boolean; edges: boolean } {
-    return { normals: this.mode_ === 'shaded' || !this.textured, edges: this.mode_ === 'wireframe' };
+  get wants(): { normals: boolean; edges: boolean; quality: boolean } {
+    return { normals: this.mode_ === 'shaded' || this.mode_ === 'confidence' || !this.textured, edges: this.mode_ === 'wireframe', quality: this.mode_ === 'confidence' };
   }
 
   show(frame: DecodedFrame): void {
@@ -123,6 +127,8 @@ export class SurfaceMesh {
     if (frame.coordinates !== null) grown = this.uv.set(frame.coordinates) || grown;
     if (frame.normals !== null) grown = this.normal.set(frame.normals) || grown;
     if (frame.edges !== null) grown = this.edge.set(frame.edges) || grown;
+    if (frame.quality !== null) grown = this.colour.set(confidenceColours(frame.quality)) || grown;
+    this.hasQuality = frame.quality !== null;
     this.vertices = frame.positions.length / 3;
     this.triangleIndices = frame.triangles.length;
     this.hasNormals = frame.normals !== null;
@@ -151,7 +157,7 @@ export class SurfaceMesh {
       grown = this.edge.set(triangleEdges(triangles));
       this.hasEdges = true;
     }
-    if ((this.mode_ === 'shaded' || !this.textured) && !this.hasNormals) {
+    if ((this.mode_ === 'shaded' || this.mode_ === 'confidence' || !this.textured) && !this.hasNormals) {
       const positions = (this.position.attribute.array as Float32Array).subarray(0, this.vertices * 3);
       grown = this.normal.set(vertexNormals(positions, triangles)) || grown;
       this.hasNormals = true;
@@ -167,6 +173,7 @@ export class SurfaceMesh {
       geometry.setAttribute('uv', this.uv.attribute);
     }
     this.solid.setAttribute('normal', this.normal.attribute);
+    this.solid.setAttribute('color', this.colour.attribute);
     this.solid.setIndex(this.triangle.attribute);
     this.lines.setIndex(this.edge.attribute);
   }
@@ -183,6 +190,7 @@ export class SurfaceMesh {
     this.points.material = this.textured ? this.materials.points : this.materials.plainPoints;
     if (wireframe) this.mesh.material = this.materials.fill;
     else if (this.mode_ === 'textured' && this.textured) this.mesh.material = this.materials.textured;
+    else if (this.mode_ === 'confidence' && this.hasQuality) this.mesh.material = this.materials.confidence;
     else this.mesh.material = this.materials.shaded;
   }
 }

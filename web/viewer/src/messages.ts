@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What page and worker say to each other. Arrays and pictures are transferred, never copied.
+import type { VertexQuality } from './quality';
 import type { Extent } from './surface';
 
 export interface DecodeRequest {
@@ -7,7 +8,7 @@ export interface DecodeRequest {
   id: number;
   bytes: ArrayBuffer;
   offset: number; // of the frame in `bytes`
-  want: { normals: boolean; edges: boolean };
+  want: { normals: boolean; edges: boolean; quality: boolean };
 }
 
 export interface DecodedFrame {
@@ -19,6 +20,7 @@ export interface DecodedFrame {
   normals: Float32Array<ArrayBuffer> | null;
   triangles: Uint32Array<ArrayBuffer>;
   edges: Uint32Array<ArrayBuffer> | null;
+  quality: VertexQuality | null; // null: not wanted or not sent
   texture: ImageBitmap | null;
   extent: Extent | null;
   decodeMs: number;

@@ -84,7 +84,7 @@ export class View {
     this.surface.mode = mode;
     this.invalidate();
   }
-  get wants(): { normals: boolean; edges: boolean } {
+  get wants(): { normals: boolean; edges: boolean; quality: boolean } {
     return this.surface.wants;
   }
 

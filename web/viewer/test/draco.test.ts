@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { DracoDecoder, type Geometry } from '../src/draco';
 import { parseFrame } from '../src/frame';
+import { confidenceColours, decodeVertexQuality } from '../src/quality';
 
 interface Expected {
   file: string;
@@ -21,6 +22,7 @@ interface Expected {
   max?: number[];
   mean?: number[];
   mean_texture_coordinate?: number[];
+  quality?: { known: number; interpolated: number; sum_sigma_m: number };
 }
 
 const folder = join(__dirname, '../../../tests/conformance/frame_v1');
@@ -73,6 +75,15 @@ describe('frozen frames', () => {
       expect(Math.abs(Math.max(...values) - expected.max![axis]!)).toBeLessThan(1e-4);
       expect(Math.abs(mean(values) - expected.mean[axis]!)).toBeLessThan(1e-4);
     }
+    expect(frame.quality.length > 0).toBe(expected.quality !== undefined);
+    if (expected.quality !== undefined) {
+      const { sigmas, interpolated } = decodeVertexQuality(frame.quality, geometry.coordinates!);
+      expect(sigmas.length).toBe(expected.vertices);
+      expect(Math.abs(sigmas.reduce((sum, s) => sum + s, 0) - expected.quality.sum_sigma_m)).toBeLessThan(1e-6);
+      expect(sigmas.filter((s) => s > 0).length).toBe(expected.quality.known);
+      expect(interpolated.filter((i) => i === 1).length).toBe(expected.quality.interpolated);
+      expect(confidenceColours({ sigmas, interpolated }).every((c) => c >= 0 && c <= 1)).toBe(true);
+    }
     expected.mean_texture_coordinate?.forEach((value, axis) => {
       expect(Math.abs(mean(column(geometry.coordinates!, 2, axis)) - value)).toBeLessThan(1e-4);
     });
@@ -102,6 +113,25 @@ describe('damaged frames', () => {
     }
     expect(refusals).toBeGreaterThan(10);
     expect(decoder.decode(parseFrame(whole)).positions.length).toBe(167 * 3);
+  });
+
+  it('say nothing false of vertices', () => {
+    const frame = parseFrame(load('with_quality.rlv'));
+    const coordinates = decoder.decode(frame).coordinates!;
+    for (let size = 0; size < frame.quality.length; ++size) {
+      expect(() => decodeVertexQuality(frame.quality.subarray(0, size), coordinates)).toThrow();
+    }
+    expect(() => decodeVertexQuality(frame.quality, coordinates.subarray(2))).toThrow();
+    for (let i = 0; i < 8 * frame.quality.length; ++i) {
+      const bytes = frame.quality.slice();
+      bytes[i >> 3]! ^= 1 << (i & 7);
+      try {
+        const { sigmas } = decodeVertexQuality(bytes, coordinates);
+        expect(sigmas.every((s) => s >= 0 && s < 0.1)).toBe(true);
+      } catch (error) {
+        expect((error as Error).message).toMatch(/vertex quality/);
+      }
+    }
   });
 
   it('a stream of another kind does not reach the decoder', () => {
