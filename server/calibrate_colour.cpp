@@ -11,6 +11,7 @@
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
 #include "server/calibrate_commands.h"
+#include "server/calibrate_live.h"
 
 namespace relievo {
 namespace {
@@ -19,6 +20,7 @@ constexpr const char* kChannels[] = {"red", "green", "blue"};
 
 struct Options {
   std::string captures;
+  std::string source;
   std::string out;
   std::string update;
   std::vector<int> roi;
@@ -118,12 +120,17 @@ void warn_of_weak_colours(const ColourCalibration& c) {
   }
 }
 
-Status run(const Options& options) {
+Status run(const Options& options, StopSignal& stop) {
   RigPart before;
   if (!options.update.empty()) {
     auto part = read_rig_part(options.update);
     if (!part) return part.error();
     before = *part;
+  }
+  if (!options.source.empty()) {
+    const Status taken = take_colour_captures({.source = options.source, .folder = options.captures}, stop);
+    if (!taken) return taken.error();
+    if (stop.stopped()) return {};
   }
   auto captures = read_captures(options.captures);
   if (!captures) return captures.error();
@@ -161,6 +168,10 @@ std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
   auto* update =
       app.add_option("--update", o->update,
                      "A rig.yaml: keep all but its colour matrix; written back unless --out says otherwise");
+  app.add_option(
+      "--source", o->source,
+      "Take the captures from a live source first, into the folder: a white sheet at rest under black, "
+      "red, green and blue, each with its complement");
   app.add_option("--roi", o->roi, "The target, where it should not be looked for: X,Y,WIDTH,HEIGHT")
       ->delimiter(',')
       ->expected(4);
@@ -168,7 +179,7 @@ std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
   app.final_callback([out, update] {
     if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");
   });
-  return [o](StopSignal&) { return run(*o); };
+  return [o](StopSignal& stop) { return run(*o, stop); };
 }
 
 }  // namespace relievo

@@ -15,6 +15,7 @@
 #include "capture/calibrate/rig_part.h"
 #include "capture/rig_file.h"
 #include "server/calibrate_commands.h"
+#include "server/calibrate_live.h"
 #include "server/calibrate_views.h"
 #include "server/size_option.h"
 
@@ -28,6 +29,8 @@ struct Options {
   std::string board;
   std::string pattern;
   Size projector;
+  std::string source;
+  int live_views = 8;
   std::string out;
   std::string update;
   std::string scan = "interlaced";
@@ -148,16 +151,30 @@ Status run(const Options& options, StopSignal& stop) {
     reference = *read;
   }
   const std::string out = options.out.empty() ? options.update : options.out;
+  ViewCode code{.stripes = {}, .projector = options.projector};
+  if (before.colour_matrix) code.colour_matrix = *before.colour_matrix;
+  if (!options.source.empty()) {
+    const auto taken = take_board_views({.source = options.source,
+                                         .folder = options.views,
+                                         .views = options.live_views,
+                                         .threads = options.threads,
+                                         .colour_matrix = code.colour_matrix},
+                                        *board, stop);
+    if (!taken) return taken.error();
+    if (stop.stopped()) return {};
+    code.projector = {taken->rig.projector.width, taken->rig.projector.height};
+    if (!before.scan) before.scan = taken->rig.scan;
+    if (!before.frame_rate) before.frame_rate = taken->rig.frame_rate;
+  }
   auto stripes = stripes_of(options.views, options.pattern);
   if (!stripes) return stripes.error();
-  ViewCode code{.stripes = *std::move(stripes), .projector = options.projector};
-  if (before.colour_matrix) code.colour_matrix = *before.colour_matrix;
+  code.stripes = *std::move(stripes);
   auto measured = measure_views(options.views, code, *board, options.threads, stop);
   if (stop.stopped()) return {};
   if (!measured) return measured.error();
   PinholeModel projector;
-  projector.width = options.projector.width;
-  projector.height = options.projector.height;
+  projector.width = code.projector.width;
+  projector.height = code.projector.height;
   const auto geometry = calibrate_geometry(measured->views, measured->camera, projector, {});
   if (!geometry) return geometry.error();
 
@@ -205,7 +222,16 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       "--pattern", o->pattern,
       "What was projected: gray, or the pattern.yaml of stripes (default: the one in the folder of "
       "views, else gray)");
-  add_size_option(app, "--projector", o->projector, "The projector's size in pixels")->required();
+  auto* projector = add_size_option(app, "--projector", o->projector, "The projector's size in pixels");
+  auto* source =
+      app.add_option("--source", o->source,
+                     "Take the views from a live source first, into the folder of views: a board held "
+                     "still at one pose after another, under the stripes along columns and rows");
+  app.add_option("--views", o->live_views, "Views to take from --source")
+      ->check(CLI::Range(1, 1000))
+      ->needs(source)
+      ->capture_default_str();
+  projector->excludes(source);
   auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
   auto* update =
       app.add_option("--update", o->update,
@@ -224,8 +250,9 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   app.add_flag("--json", o->json, "Print the report as JSON");
-  app.final_callback([out, update] {
+  app.final_callback([out, update, projector, source] {
     if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");
+    if (projector->empty() && source->empty()) throw CLI::RequiredError("--projector");
   });
   return [o](StopSignal& stop) { return run(*o, stop); };
 }

@@ -82,8 +82,9 @@ MeasuredView with_projector(const std::string& name, const std::vector<BoardCorn
     }
   }
   if (view.corners.size() < kLeastCorners || 4 * view.corners.size() < 3 * seen.size()) {
-    view.refused = "only " + std::to_string(view.corners.size()) + " of " + std::to_string(seen.size()) +
-                   " corners could be decoded; is the projector's light on the whole board?";
+    view.refused =
+        "only " + std::to_string(view.corners.size()) + " of " + std::to_string(seen.size()) +
+        " corners could be decoded; is the projector's light on the whole board, and its size right?";
   }
   return view;
 }

@@ -64,12 +64,15 @@ class AxisDecoder {
     };
     auto best = both(SlideOrder::kNewerIsFirst, SlideOrder::kNewerIsSecond);
     auto other = both(SlideOrder::kNewerIsSecond, SlideOrder::kNewerIsFirst);
-    const bool swapped = best[0].score + best[1].score < other[0].score + other[1].score;
-    if (swapped) std::swap(best, other);
-    take(0, swapped ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst, best[0], out);
-    take(1, swapped ? SlideOrder::kNewerIsFirst : SlideOrder::kNewerIsSecond, best[1], out);
+    swapped_ = best[0].score + best[1].score < other[0].score + other[1].score;
+    if (swapped_) std::swap(best, other);
+    take(0, swapped_ ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst, best[0], out);
+    take(1, swapped_ ? SlideOrder::kNewerIsFirst : SlideOrder::kNewerIsSecond, best[1], out);
     return out;
   }
+
+  /// Whether the slides came second before first, as decode() found.
+  bool swapped() const { return swapped_; }
 
  private:
   SequenceResult run(std::size_t frame, const DifferenceImage* other, SlideOrder order) {
@@ -100,7 +103,30 @@ class AxisDecoder {
   std::vector<Image8> lit_;
   std::vector<DifferenceImage> images_;  // of them and their complements
   std::vector<EdgeImage> edges_;
+  bool swapped_ = false;
 };
+
+/// Whether stripes lie along rows: the difference of the pictures then changes down the picture. The board's
+/// own squares change it alike in both directions.
+bool along_rows(const StripePair& pair) {
+  constexpr int kApart = 3;
+  double across = 0, down = 0;
+  const auto difference = [&](int x, int y) {
+    const std::uint8_t *l = pair.lit.row(y) + 3 * x, *c = pair.complement.row(y) + 3 * x;
+    return std::array{l[0] - c[0], l[1] - c[1], l[2] - c[2]};
+  };
+  for (int y = 0; y + kApart < pair.lit.height(); y += 2) {
+    for (int x = 0; x + kApart < pair.lit.width(); x += 2) {
+      const auto here = difference(x, y), right = difference(x + kApart, y),
+                 below = difference(x, y + kApart);
+      for (std::size_t c = 0; c < 3; ++c) {
+        across += std::abs(right[c] - here[c]);
+        down += std::abs(below[c] - here[c]);
+      }
+    }
+  }
+  return down > across;
+}
 
 /// By pixel, as GrayEdges are.
 GrayEdges sorted(std::vector<GrayEdge> edges, int width, int height) {
@@ -145,6 +171,31 @@ Pattern row_pattern(const Pattern& pattern, int projector_width, int projector_h
   const auto stripes = static_cast<int>(
       std::lround(static_cast<double>(pattern.stripes()) * projector_height / projector_width));
   out.sequence.resize(static_cast<std::size_t>(std::clamp(stripes, 2, pattern.stripes())));
+  return out;
+}
+
+Result<StripeStack> sort_stripes(std::vector<StripePair> pairs, const Pattern& pattern, int projector_width,
+                                 int projector_height, const std::array<double, 9>& colour_matrix,
+                                 WorkerPool& pool) {
+  StripeStack out{projector_width, projector_height, pattern, {}, {}};
+  for (StripePair& pair : pairs) (along_rows(pair) ? out.rows : out.columns).push_back(std::move(pair));
+  if (const Status checked = check(out); !checked) {
+    return Error{std::to_string(out.columns.size()) + " slides along columns and " +
+                 std::to_string(out.rows.size()) +
+                 " along rows are seen; does the projector show those of pattern --both-axes? (" +
+                 checked.error().message + ")"};
+  }
+  const Pattern rows = row_pattern(pattern, projector_width, projector_height);
+  for (const bool turn : {false, true}) {
+    auto& slides = turn ? out.rows : out.columns;
+    AxisDecoder decoder(turn ? rows : pattern, colour_matrix, pool);
+    for (const StripePair& pair : slides) {
+      decoder.add(turn ? turned(pair.lit) : pair.lit.clone(),
+                  turn ? turned(pair.complement) : pair.complement.clone());
+    }
+    decoder.decode();
+    if (decoder.swapped()) std::swap(slides[0], slides[1]);
+  }
   return out;
 }
 

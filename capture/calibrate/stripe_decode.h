@@ -37,6 +37,13 @@ struct StripeStack {
 /// N stripes divide the height as the contract has them divide the width.
 Pattern row_pattern(const Pattern& pattern, int projector_width, int projector_height);
 
+/// A stack of pairs in any order, such as a camera sees them go by: those with stripes along columns and
+/// along rows are told apart by their pictures, and slides by their code. Fails where there are not as many
+/// of each as the pattern has slides, and as decode_stripes().
+Result<StripeStack> sort_stripes(std::vector<StripePair> pairs, const Pattern& pattern, int projector_width,
+                                 int projector_height, const std::array<double, 9>& colour_matrix,
+                                 WorkerPool& pool);
+
 /// The boundaries of both axes. The slides may come in any order: the code tells them apart. Fails where the
 /// stack is not one or two slides of each axis in pictures of one size, or hardly a boundary is decoded.
 Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const std::array<double, 9>& colour_matrix,

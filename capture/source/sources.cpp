@@ -3,6 +3,7 @@
 #include <string>
 #include <string_view>
 
+#include "capture/calibrate/board_source.h"
 #include "capture/source/field_source.h"
 #include "capture/source/sim/sim_source.h"
 #include "capture/source/take_source.h"
@@ -17,6 +18,8 @@ struct SourceKind {
 };
 
 constexpr SourceKind kSources[] = {
+    {"sim:board", "sim:board[:BOARD]", open_board},
+    {"sim:sheet", "sim:sheet", open_sheet},
     {"sim:", "sim:SCENE", open_sim},
     {"take:", "take:DIR", open_take},
 };

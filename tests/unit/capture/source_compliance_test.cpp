@@ -145,6 +145,10 @@ const Case kCases[] = {
      [](const auto&) { return "sim:walk,width=64,height=48,scan=progressive,frames=6,drop=3" + kSmall; }},
     {"SimProgressiveLoop", true,
      [](const auto&) { return "sim:plane,width=64,height=48,scan=progressive,period=6,drop=4" + kSmall; }},
+    {"Board", false, [](const auto&) { return "sim:board,width=64,height=48,frames=7" + kSmall; }},
+    {"BoardProgressiveLoop", true,
+     [](const auto&) { return "sim:board,width=64,height=48,scan=progressive,drop=5" + kSmall; }},
+    {"Sheet", false, [](const auto&) { return "sim:sheet,width=64,height=48,frames=9" + kSmall; }},
 };
 
 INSTANTIATE_TEST_SUITE_P(Sources, SourceCompliance, testing::ValuesIn(kCases),

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the views of a calibration show together, and what is still missing: for whoever holds the board.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "base/rig.h"
+#include "capture/calibrate/measure_view.h"
+
+namespace relievo {
+
+/// One thread.
+class Coverage {
+ public:
+  /// `camera`: size in pixels; its focal length where known, else 0 and a usual one is taken.
+  explicit Coverage(const PinholeModel& camera);
+
+  /// True where the board lies almost as in a view that was added.
+  bool repeats(const MeasuredView& view) const;
+
+  /// Counts the view and says what it shows: "63 corners, its left side 25 degrees farther away".
+  std::string add(const MeasuredView& view);
+
+  /// "the board in the top left and bottom right of the picture; its upper side farther away"; empty where
+  /// nothing is.
+  std::string missing() const;
+
+ private:
+  PinholeModel camera_;
+  std::array<bool, 9> cells_{};  // of the picture, row by row, that had a corner
+  std::array<bool, 4> tilts_{};  // left, right, upper, lower side farther away
+  std::vector<std::vector<CornerSight>> added_;
+};
+
+}  // namespace relievo

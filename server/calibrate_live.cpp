@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/calibrate_live.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "base/log.h"
+#include "capture/calibrate/colour.h"
+#include "capture/calibrate/coverage.h"
+#include "capture/calibrate/measure_view.h"
+#include "capture/calibrate/pictures.h"
+#include "capture/calibrate/sheet_colours.h"
+#include "capture/calibrate/still_collector.h"
+#include "capture/calibrate/stripe_stack.h"
+#include "capture/rig_file.h"
+#include "cli/progress.h"
+#include "server/size_option.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Ends the source where the command is stopped.
+class StoppedSource {
+ public:
+  StoppedSource(FieldSource& source, StopSignal& stop) : stop_(stop) {
+    stop.on_stop([&source] { source.request_stop(); });
+  }
+  StoppedSource(const StoppedSource&) = delete;
+  StoppedSource& operator=(const StoppedSource&) = delete;
+  ~StoppedSource() { stop_.clear_on_stop(); }
+
+ private:
+  StopSignal& stop_;
+};
+
+/// Feeds frames until `taken` says that it is enough, asked each time that the scene came to rest. Frames
+/// that cannot be read are warned of.
+Status watch(FieldSource& source, std::size_t cycle, Progress& progress,
+             const std::function<Result<bool>(const StillCollector&)>& taken) {
+  StillCollector collector(cycle);
+  constexpr int kMostErrors = 100;
+  int errors = 0;
+  for (std::uint64_t done = 0;;) {
+    auto frame = source.next();
+    if (!frame) {
+      if (++errors == kMostErrors) return frame.error();
+      log_warning(frame.error().message);
+      continue;
+    }
+    if (!*frame) return {};
+    errors = 0;
+    if (collector.add(**frame)) {
+      auto enough = taken(collector);
+      if (!enough) return enough.error();
+      if (*enough) return {};
+    }
+    progress.update(++done, std::to_string(collector.at_rest()) + " of " + std::to_string(cycle) +
+                                " slides seen at rest");
+  }
+}
+
+std::string view_name(int number) {
+  char name[32];
+  std::snprintf(name, sizeof name, "view_%02d", number);
+  return name;
+}
+
+/// Takes views into their folders.
+class ViewTaker {
+ public:
+  ViewTaker(const LiveOptions& options, const Board& board, const SourceInfo& info)
+      : options_(options), board_(board), info_(info), pool_(options.threads), coverage_(info.rig.camera) {
+    std::error_code ignored;
+    while (fs::exists(fs::path(options.folder) / view_name(next_), ignored)) ++next_;
+  }
+
+  /// True where there are enough.
+  Result<bool> take(const StillCollector& collector) {
+    const auto [width, height] = Size{info_.rig.projector.width, info_.rig.projector.height};
+    auto stack = sort_stripes(collector.pairs(), info_.pattern, width, height, options_.colour_matrix, pool_);
+    if (!stack) return not_used(stack.error().message);
+    const std::string name = view_name(next_);
+    const MeasuredView view = measure_view(name, *stack, board_, options_.colour_matrix, pool_);
+    if (!view.refused.empty()) return not_used(view.refused);
+    if (coverage_.repeats(view)) return not_used("the board is where it was in a view before; move it");
+    const fs::path folder = fs::path(options_.folder) / name;
+    if (const Status made = make_folder(folder); !made) return made.error();
+    if (const Status written = write_stripe_view(folder, *stack); !written) return written.error();
+    ++next_;
+    ++taken_;
+    log_info(name + " taken (" + std::to_string(taken_) + " of " + std::to_string(options_.views) +
+             "): " + coverage_.add(view));
+    if (taken_ < options_.views && !missing().empty()) log_info("still missing: " + missing());
+    return taken_ >= options_.views;
+  }
+
+  int taken() const { return taken_; }
+  std::string missing() const { return coverage_.missing(); }
+
+ private:
+  static Result<bool> not_used(const std::string& why) {
+    log_info("at rest, but not used: " + why);
+    return false;
+  }
+
+  const LiveOptions& options_;
+  const Board& board_;
+  const SourceInfo& info_;
+  WorkerPool pool_;
+  Coverage coverage_;
+  int next_ = 0;  // number of the next view's folder
+  int taken_ = 0;
+};
+
+}  // namespace
+
+Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& board, StopSignal& stop) {
+  auto source = open_source(options.source, {});
+  if (!source) return source.error();
+  const SourceInfo info = (*source)->info();
+  if (const Status made = make_folder(options.folder); !made) return made.error();
+  const fs::path pattern = fs::path(options.folder) / "pattern.yaml";
+  std::error_code ignored;
+  if (fs::exists(pattern, ignored)) {
+    const auto before = read_pattern(pattern);
+    if (!before || to_yaml(*before) != to_yaml(info.pattern)) {
+      return Error{options.folder + " holds views of another pattern: give another folder"};
+    }
+  }
+  if (const Status written = write_atomically(pattern, to_yaml(info.pattern)); !written)
+    return written.error();
+
+  ViewTaker taker(options, board, info);
+  log_info("hold the board still at " + std::to_string(options.views) +
+           " poses, tilted differently each time, under the stripes along columns and rows");
+  Progress progress("calibrate", "frames");
+  {
+    const StoppedSource ended(**source, stop);
+    const Status watched = watch(**source, 2 * static_cast<std::size_t>(info.pattern.slides), progress,
+                                 [&](const StillCollector& c) { return taker.take(c); });
+    if (!watched) return watched.error();
+  }
+  progress.finish();
+  const std::string kept = std::to_string(taker.taken()) + " views of this run are in " + options.folder;
+  if (stop.stopped()) {
+    log_info(kept + ": the same command takes more, without --source it calibrates from what is there");
+    return info;
+  }
+  if (taker.taken() == 0) {
+    return Error{
+        options.source +
+        " ended without a view: the board must be held still under the stripes along columns and rows"};
+  }
+  if (taker.taken() < options.views) log_warning(options.source + " ended before all were taken; " + kept);
+  if (!taker.missing().empty()) log_info("not covered: " + taker.missing());
+  return info;
+}
+
+Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
+  auto source = open_source(options.source, {});
+  if (!source) return source.error();
+  if (const Status made = make_folder(options.folder); !made) return made;
+  Progress progress("calibrate", "frames");
+  bool done = false;
+  const StoppedSource ended(**source, stop);
+  const Status watched = watch(**source, 4, progress, [&](const StillCollector& collector) -> Result<bool> {
+    std::vector<Image8> pictures;
+    for (StripePair& pair : collector.pairs()) {
+      pictures.push_back(std::move(pair.lit));
+      pictures.push_back(std::move(pair.complement));
+    }
+    const auto colours = tell_colours(pictures);
+    if (!colours) {
+      log_info("at rest, but not used: " + colours.error().message);
+      return false;
+    }
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      const fs::path file = fs::path(options.folder) / (primary_name((*colours)[i]) + ".png");
+      if (const Status written = write_png(file, pictures[i]); !written) return written.error();
+    }
+    done = true;
+    return true;
+  });
+  if (!watched) return watched;
+  if (stop.stopped() || done) return {};
+  return Error{
+      options.source +
+      " ended without the captures: it must show a white sheet at rest under black, red, green and blue, "
+      "each with its complement"};
+}
+
+}  // namespace relievo
