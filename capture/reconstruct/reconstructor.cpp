@@ -12,6 +12,7 @@
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/match.h"
+#include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/surface_builder.h"
@@ -103,6 +104,7 @@ struct Reconstructor::State {
   SequenceDecoder sequence;
   Refiner refiner;
   ConsistencyCheck consistency;
+  Recovery recovery;
   Triangulator triangulator;
   SurfaceBuilder surface_builder;
 
@@ -119,6 +121,7 @@ struct Reconstructor::State {
   Match match, other_match;
   EdgeImage edges;
   SequenceResult result, other_result;
+  std::vector<RecoveredBoundary> recovered;
   std::vector<GridVertex> vertices;
   ReconstructReport report;
 
@@ -194,7 +197,14 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
     report.filters.completed = result.counts.completed;
     report.filters.rejected = checked.rejected;
     report.filters.moved = checked.moved;
-    report.matched = result.counts.in_order - result.counts.unsupported + result.counts.completed;
+    recovery.recover({.shown = newer.difference,
+                      .slide = slide,
+                      .shown_colours = sequence.shown_colours(order),
+                      .other = have_older ? &older.difference : nullptr,
+                      .other_colours = sequence.shown_colours(other(order))},
+                     refiner, edges, result, pool, recovered);
+    report.matched =
+        result.counts.in_order - result.counts.unsupported + result.counts.completed + recovered.size();
   }
 }
 
@@ -228,6 +238,8 @@ void Reconstructor::State::triangulate() {
       }
     }
   }
+  if (paper()) return;
+  for (const RecoveredBoundary& r : recovered) add_vertex(r.boundary, r.line, r.column_px, r.slope);
 }
 
 /// Whatever it holds is overwritten.

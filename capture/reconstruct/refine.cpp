@@ -15,6 +15,7 @@ constexpr float kBreak = 0.12F;       // change of luma over two columns, of its
 constexpr float kFarthest_px = 2.5F;  // between colour's place and luma's
 constexpr float kVarianceOfMedian = 2.198F;  // variance over median of the squares, of normal deviates
 constexpr int kContrastReach_px = 4;         // how far a step in the scene draws an edge
+constexpr int kLumaReach_px = 2;             // and its place in luma
 constexpr int kContrastLines = 1;            // the low-pass across lines reaches as far
 constexpr float kDark = 3;                   // grey levels of the fields' sum, below which ratios are noise
 // What the scene's contrast, 0..1, adds to a standard deviation. Zero crossings keep their place on texture
@@ -32,11 +33,13 @@ constexpr float kNoLuma_px = 0.1F;          // where luma shows no step, and
 constexpr float kNoLumaContrast_px = 0.6F;  // times contrast more
 constexpr float kLumaFactor = 1.3F;         // the middle level is itself measured
 constexpr float kLevelSlack = 0.1F;         // of a side's luma ratio about what the code tells
+constexpr float kLeastRise = 0.12F;         // of luma, between the sides of a boundary that luma shows
+constexpr float kLeastSlope = 0.2F;         // of that, a pixel
 constexpr float kStepContrast = 0.12F;      // a step of the scene that is one
 constexpr int kRowReach_px = 4;             // columns compared with the lines above and below
 constexpr float kRowStep = 0.12F;           // difference, of the sum, that is another surface's
 constexpr float kRowNoise = 3.F;            // grey levels more: noise
-constexpr float kStepNear_px = 1.2F;
+constexpr float kStepNear_px = 1.7F;
 
 /// True where the steepest place of a step of `white` around `column_px` is there.
 bool steepest_at(const float* white, int centre, float column_px) {
@@ -63,6 +66,22 @@ bool steepest_at(const float* white, int centre, float column_px) {
 }
 
 }  // namespace
+
+bool same_surface(View8 slide, int line, int other, float column_px) {
+  const int centre = static_cast<int>(std::lround(column_px));
+  if (other < 0 || other >= slide.height || centre < kRowReach_px || centre + kRowReach_px >= slide.width)
+    return false;
+  const std::uint8_t* here = slide.row(line);
+  const std::uint8_t* there = slide.row(other);
+  int difference = 0;
+  int sum = 0;
+  for (int i = 3 * (centre - kRowReach_px); i < 3 * (centre + kRowReach_px + 1); ++i) {
+    difference += std::abs(here[i] - there[i]);
+    sum += here[i] + there[i];
+  }
+  return static_cast<float>(difference) <=
+         kRowStep * static_cast<float>(sum) + kRowNoise * static_cast<float>(6 * kRowReach_px + 3);
+}
 
 Refiner::Refiner(const std::array<double, 9>& colour_matrix) {
   const Eigen::Matrix3d m =
@@ -105,7 +124,8 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
     y[static_cast<std::size_t>(i)] = ratio(d, white, width, centre - kReach_px + i);
   const auto at = [&](int x) { return y[static_cast<std::size_t>(x - centre + kReach_px)]; };
 
-  LumaPlace out{own, 0, false};
+  LumaPlace out{own, 0, 0, 0, false};
+  out.contrast = contrast_around(image, line, centre, kLumaReach_px);
   float place = own;
   for (int round = 0; round < 2; ++round) {
     // Plateaus of both sides, and how strong each channel comes back from this surface.
@@ -171,50 +191,46 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
       out.slope = std::fabs(b - a);
       found = true;
     }
-    if (!found) return {own, 0, false};
-    out.found = true;
+    out.rise = levels[1] - levels[0];
+    out.found = found;
+    if (!found) return out;
     place = out.column_px;
   }
   return out;
 }
 
-/// Whether the lines above and below show what this line does: under one slide the same surface looks the
-/// same, but for the boundary, which leans little.
-void Refiner::look_up_and_down(View8 slide, int line, Edge& edge) {
-  const int centre = static_cast<int>(std::lround(edge.column_px));
-  const std::uint8_t* here = slide.row(line);
-  const auto differs = [&](int other) {
-    if (other < 0 || other >= slide.height) return false;
-    const std::uint8_t* there = slide.row(other);
-    int difference = 0;
-    int sum = 0;
-    for (int i = 3 * (centre - kRowReach_px); i < 3 * (centre + kRowReach_px + 1); ++i) {
-      difference += std::abs(here[i] - there[i]);
-      sum += here[i] + there[i];
-    }
-    return static_cast<float>(difference) >
-           kRowStep * static_cast<float>(sum) + kRowNoise * static_cast<float>(6 * kRowReach_px + 3);
-  };
-  edge.above_differs = differs(line - 1);
-  edge.below_differs = differs(line + 1);
-}
-
-void Refiner::look_around(const DifferenceImage& image, int line, Edge& edge) {
-  const int centre = static_cast<int>(std::lround(edge.column_px));
-  if (centre < kReach_px || centre + kReach_px >= image.width) return;
-  const float* white = image.white_line(line);
+/// 0..1, of the scene in white light on this line and those beside it.
+float Refiner::contrast_around(const DifferenceImage& image, int line, int centre, int reach) {
   float brightest = 0;
   float darkest = 1e9F;
   for (int l = std::max(0, line - kContrastLines); l <= std::min(image.lines - 1, line + kContrastLines);
        ++l) {
     const float* w = image.white_line(l);
-    for (int x = centre - kContrastReach_px; x <= centre + kContrastReach_px; ++x) {
+    for (int x = centre - reach; x <= centre + reach; ++x) {
       brightest = std::max(brightest, w[x]);
       darkest = std::min(darkest, w[x]);
     }
   }
-  edge.at_step = steepest_at(white, centre, edge.column_px);
-  edge.contrast = (brightest - darkest) / (brightest + darkest + kDark);
+  return (brightest - darkest) / (brightest + darkest + kDark);
+}
+
+void Refiner::look_around(const DifferenceImage& image, int line, Edge& edge) {
+  const int centre = static_cast<int>(std::lround(edge.column_px));
+  if (centre < kReach_px || centre + kReach_px >= image.width) return;
+  edge.at_step = steepest_at(image.white_line(line), centre, edge.column_px);
+  edge.contrast = contrast_around(image, line, centre, kContrastReach_px);
+}
+
+Refiner::Place Refiner::find(const DifferenceImage& image, int line, float column_px,
+                             const Sides& sides) const {
+  const int centre = static_cast<int>(std::lround(column_px));
+  if (centre < kReach_px || centre + kReach_px >= image.width) return {column_px, 0, false, false};
+  const LumaPlace luma = luma_place(image, line, sides, share_, column_px);
+  if (std::fabs(luma.rise) < kLeastRise) return {column_px, 0, false, false};
+  if (!luma.found || luma.slope < kLeastSlope * std::fabs(luma.rise)) return {column_px, 0, false, true};
+  const float sigma = luma_sigma(image, line, luma);
+  const float level = kLevelShare * contrast_around(image, line, centre, kLumaReach_px) / luma.slope;
+  return {luma.column_px, std::sqrt(sigma * sigma + level * level), true, true};
 }
 
 void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
@@ -228,7 +244,7 @@ void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlac
   float pure_weight = 1 / colour_noise;
   if (luma.found) {
     const float sigma = luma_sigma(image, line, luma);
-    const float luma_bias = kLevelShare * edge.contrast / luma.slope;
+    const float luma_bias = kLevelShare * luma.contrast / luma.slope;
     pure_weight += 1 / (sigma * sigma);
     noise += sigma * sigma;
     w_luma = 1 / (sigma * sigma + luma_bias * luma_bias);
@@ -310,7 +326,7 @@ Refiner::Drawn Refiner::colour_drawn(const DifferenceImage& image, const EdgeIma
       if (edge.contrast < kPlain) {
         always_.push_back(excess);
       } else if (edge.contrast > kContrasty && luma.slope > kSteep) {
-        const float level = kLevelShare * edge.contrast / luma.slope;
+        const float level = kLevelShare * luma.contrast / luma.slope;
         by_contrast_.push_back((excess - level * level) / (edge.contrast * edge.contrast));
       }
     }
@@ -322,7 +338,7 @@ Refiner::Drawn Refiner::colour_drawn(const DifferenceImage& image, const EdgeIma
 
 void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
                      const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges) {
-  const float share = projected_share(image, result, colours, edges);
+  share_ = projected_share(image, result, colours, edges);
   places_.assign(edges.edges.size(), {});
   pool.for_ranges(edges.lines, [&](int begin_line, int end_line, int) {
     for (int line = begin_line; line < end_line; ++line) {
@@ -337,7 +353,7 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
         look_around(image, line, edges.edges[e]);
         places_[e] = luma_place(
             image, line, {own - left, right - own, colours[static_cast<std::size_t>(result.boundary[e])]},
-            share, own);
+            share_, own);
       }
     }
   });
@@ -349,7 +365,11 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
         if (result.boundary[e] >= 0) {
           Edge& edge = edges.edges[e];
           refine_edge(image, line, places_[e], drawn, edge);
-          if (edge.contrast > kStepContrast) look_up_and_down(slide, line, edge);
+          if (edge.contrast > kStepContrast) {
+            edge.above_differs = line > 0 && !same_surface(slide, line, line - 1, edge.column_px);
+            edge.below_differs =
+                line + 1 < slide.height && !same_surface(slide, line, line + 1, edge.column_px);
+          }
         }
   });
 }

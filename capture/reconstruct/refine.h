@@ -14,6 +14,10 @@
 
 namespace relievo {
 
+/// Whether two lines of a field under one slide show the same surface around `column_px`: it looks the same,
+/// but for boundaries, which lean little. False outside the picture.
+bool same_surface(View8 slide, int line, int other, float column_px);
+
 class Refiner {
  public:
   /// `colour_matrix` must have an inverse: luma is that of the captured colours, not of the calibrated ones.
@@ -25,15 +29,26 @@ class Refiner {
   void refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
               const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges);
 
- private:
   struct Sides {
     float free_left_px, free_right_px;  // to the next edges
-    std::array<Primary, 2> colours;
+    std::array<Primary, 2> colours;     // left and right, under the slide that the image shows
   };
+  struct Place {
+    float column_px;
+    float sigma_px;
+    bool found;
+    bool visible;  // luma differs enough between the two colours: where nothing is found, nothing is there
+  };
+  /// Whether and where luma shows a boundary near `column_px`, in the frame refined last. Any thread.
+  Place find(const DifferenceImage& image, int line, float column_px, const Sides& sides) const;
+
+ private:
   /// Where luma has the boundary.
   struct LumaPlace {
     float column_px;
-    float slope;  // of the ratio, a pixel
+    float slope;     // of the ratio, a pixel
+    float rise;      // from the left level to the right one
+    float contrast;  // of the scene in white light, near enough to spoil the place
     bool found;
   };
   /// Standard deviations of what blurred chroma does to zero crossings.
@@ -48,13 +63,14 @@ class Refiner {
                        float own) const;
   float luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const;
   Drawn colour_drawn(const DifferenceImage& image, const EdgeImage& edges);
+  static float contrast_around(const DifferenceImage& image, int line, int centre, int reach);
   static void look_around(const DifferenceImage& image, int line, Edge& edge);
-  static void look_up_and_down(View8 slide, int line, Edge& edge);
   void refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
                    Edge& edge) const;
 
   std::array<float, 3> luma_;      // of the difference image's channels
   std::array<float, 8> ratio_;     // of each primary
+  float share_ = 1;                // projected_share of the last frame
   std::vector<LumaPlace> places_;  // one an edge
   std::vector<float> always_, by_contrast_;
 };

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/recover.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace relievo {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr int kMargin = 3;
+
+// Three neighbours in line predict a fourth; how well, in pixels, was measured on simulated scenes.
+constexpr float kAcross_px = 0.08F;      // from boundaries beside it
+constexpr float kAlong_px = 0.08F;       // from lines above or below
+constexpr float kBend = 0.5F;            // more for each pixel that the three are out of line
+constexpr float kBendShare = 0.7F;       // of a bend that is taken to go on
+constexpr float kWorst_px = 0.2F;        // beyond which it is no prediction
+constexpr float kAgree = 3.F;            // standard deviations between luma's place and the prediction
+constexpr float kLeastAgree_px = 0.25F;  // but at least
+constexpr float kOtherSlide_px = 0.5F;   // between its places under both slides
+constexpr float kContrasty = 0.1F;       // contrast of the scene that may be a surface's end
+constexpr float kContradicts_px = 1.F;   // between a detected boundary's places under both slides
+constexpr float kWidest_px = 40.F;       // of a stripe
+constexpr float kLeastRoom_px = 2.F;     // to other boundaries on the line
+
+bool known(float x) {
+  return x == x;
+}
+
+}  // namespace
+
+const float* Recovery::row(int line) const {
+  return columns_.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+}
+
+void Recovery::fill(const SequenceResult& result, const EdgeImage& edges) {
+  columns_.assign(stride_ * static_cast<std::size_t>(edges.lines + 2 * kMargin), kNone);
+  for (int line = 0; line < edges.lines; ++line) {
+    float* columns = columns_.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+      if (result.boundary[e] >= 0) columns[result.boundary[e]] = edges.edges[e].column_px;
+  }
+}
+
+/// From the straightest three neighbours; others that agree with it count, too.
+Recovery::Prediction Recovery::predict(View8 slide, int line, int boundary) const {
+  std::array<Prediction, 4> all{};
+  std::size_t count = 0;
+  const auto add = [&](float a, float b, float c, float sigma_px) {
+    const float bend = a - 2 * b + c;
+    if (!known(bend)) return;
+    all[count++] = {2 * a - b + kBendShare * bend, sigma_px + kBend * std::fabs(bend)};
+  };
+  const float* here = row(line);
+  add(here[boundary - 1], here[boundary - 2], here[boundary - 3], kAcross_px);
+  add(here[boundary + 1], here[boundary + 2], here[boundary + 3], kAcross_px);
+  const auto at = [&](int l) { return row(line + l)[boundary]; };
+  // Only along the same surface: a line beside a step is easily a mixture.
+  if (known(at(-1)) && same_surface(slide, line, line - 1, at(-1))) add(at(-1), at(-2), at(-3), kAlong_px);
+  if (known(at(1)) && same_surface(slide, line, line + 1, at(1))) add(at(1), at(2), at(3), kAlong_px);
+  if (count == 0) return {kNone, 0};
+  const Prediction best =
+      *std::min_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count),
+                        [](const Prediction& a, const Prediction& b) { return a.sigma_px < b.sigma_px; });
+  float weights = 0;
+  float sum = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float off = all[i].column_px - best.column_px;
+    const float variance = all[i].sigma_px * all[i].sigma_px;
+    if (off * off > kAgree * kAgree * (variance + best.sigma_px * best.sigma_px)) continue;
+    weights += 1 / variance;
+    sum += all[i].column_px / variance;
+  }
+  return {sum / weights, 1 / std::sqrt(weights)};
+}
+
+void Recovery::recover_line(const RecoveryView& view, const Refiner& refiner, int line,
+                            std::vector<RecoveredBoundary>& out) const {
+  const float* here = row(line);
+  for (int b = 0; b < boundaries_; ++b) {
+    if (known(here[b])) continue;
+    const Prediction p = predict(view.slide, line, b);
+    if (!(p.sigma_px <= kWorst_px) || !known(p.column_px)) continue;
+    const float left = known(here[b - 1]) ? p.column_px - here[b - 1] : 100;
+    const float right = known(here[b + 1]) ? here[b + 1] - p.column_px : 100;
+    if (left < kLeastRoom_px || right < kLeastRoom_px) continue;
+    const Refiner::Place place = refiner.find(view.shown, line, p.column_px,
+                                              {left, right, view.shown_colours[static_cast<std::size_t>(b)]});
+    if (!place.found) continue;
+    if (view.other != nullptr) {
+      const Refiner::Place other = refiner.find(
+          *view.other, line, place.column_px, {left, right, view.other_colours[static_cast<std::size_t>(b)]});
+      if (!other.found || std::fabs(other.column_px - place.column_px) > kOtherSlide_px) continue;
+    }
+    const float off = std::fabs(place.column_px - p.column_px);
+    const float own_variance = place.sigma_px * place.sigma_px;
+    const float variance = p.sigma_px * p.sigma_px;
+    if (off > std::max(kLeastAgree_px, kAgree * std::sqrt(variance + own_variance))) continue;
+    const float weight = 1 / own_variance;
+    const float weights = weight + 1 / variance;
+    out.push_back(
+        {line, b, (weight * place.column_px + p.column_px / variance) / weights, 1 / std::sqrt(weights), 0});
+  }
+}
+
+void Recovery::check_line(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges, int line,
+                          SequenceResult& result) const {
+  const float* here = row(line);
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int b = result.boundary[e];
+    if (b < 0 || edges.edges[e].contrast < kContrasty) continue;
+    const float column = here[b];
+    const float left = column - here[b - 1];
+    const float right = here[b + 1] - column;
+    if (left > 0 && left < kWidest_px && right > 0 && right < kWidest_px) continue;
+    const auto sides = [](float px) { return px > 0 && px < kWidest_px ? px : kWidest_px; };
+    const Refiner::Place other =
+        refiner.find(*view.other, line, column,
+                     {sides(left), sides(right), view.other_colours[static_cast<std::size_t>(b)]});
+    if (!other.visible || (other.found && std::fabs(other.column_px - column) < kContradicts_px)) continue;
+    result.boundary[e] = -1;
+  }
+}
+
+void Recovery::recover(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges,
+                       SequenceResult& result, WorkerPool& pool, std::vector<RecoveredBoundary>& out) {
+  boundaries_ = static_cast<int>(view.shown_colours.size());
+  stride_ = view.shown_colours.size() + 2 * kMargin;
+  fill(result, edges);
+  if (view.other != nullptr) {
+    pool.for_ranges(edges.lines, [&](int begin, int end, int) {
+      for (int line = begin; line < end; ++line) check_line(view, refiner, edges, line, result);
+    });
+    fill(result, edges);
+  }
+  found_.resize(static_cast<std::size_t>(pool.threads()));
+  for (auto& found : found_) found.clear();
+  pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line)
+      recover_line(view, refiner, line, found_[static_cast<std::size_t>(worker)]);
+  });
+  out.clear();
+  for (const auto& found : found_) out.insert(out.end(), found.begin(), found.end());
+}
+
+}  // namespace relievo
