@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/whole_file.h"
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/coverage.h"
 #include "capture/calibrate/measure_view.h"
@@ -133,7 +134,7 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
       return Error{options.folder + " holds views of another pattern: give another folder"};
     }
   }
-  if (const Status written = write_atomically(pattern, to_yaml(info.pattern)); !written)
+  if (const Status written = write_whole_file(pattern, to_yaml(info.pattern)); !written)
     return written.error();
 
   ViewTaker taker(options, board, info);
