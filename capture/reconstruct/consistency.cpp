@@ -35,8 +35,8 @@ constexpr float kDoubtAcross_px = 0.05F;  // where boundaries beside it are
 // What is settled and what is given up.
 constexpr float kSuspect_px = 0.1F;       // worse than this, a boundary is weighed against its neighbours
 constexpr float kAgree = 3.F;             // standard deviations between a boundary and a prediction of it
-constexpr float kAlone_px = 0.08F;        // beside a step, without a prediction that agrees
-constexpr float kAtStep_px = 0.2F;        // beside a step, after weighing
+constexpr float kAlone_px = 0.1F;         // beside a step, without a prediction that agrees
+constexpr float kAtStep_px = 0.25F;       // beside a step, after weighing
 constexpr float kNoisy = 1.2F;            // or, where noise is strong, this many times its part
 constexpr float kGoesOn_px = 0.5F;        // off a line above or below, or the straight through two of them
 constexpr float kAtMost_px = 0.3F;        // elsewhere, for instance where texture spoils it
@@ -264,6 +264,7 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
   boundaries_ = boundaries;
   lines_ = edges.lines;
   stride_ = static_cast<std::size_t>(boundaries + 2 * kMargin);
+  result.doubted.assign(result.boundary.size(), -1);
   fill(edges, result);
   smooth_.assign(measured_.size(), kNone);
   state_.resize(static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_));
@@ -300,9 +301,13 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
         const bool is_step = edge.at_step && beside_step(s);
         const bool suspect =
             s != 0 || edge.above_differs || edge.below_differs || edge.sigma_px > kSuspect_px;
-        if (replaced || is_step || size_[cell] < kLeastPiece ||
-            (suspect && !settle(line, b, edge, settled))) {
+        if (replaced || size_[cell] < kLeastPiece) {
           result.boundary[e] = -1;
+          ++counts.rejected;
+          continue;
+        }
+        if (is_step || (suspect && !settle(line, b, edge, settled))) {
+          result.doubted[e] = std::exchange(result.boundary[e], std::int16_t{-1});
           ++counts.rejected;
           continue;
         }

@@ -23,8 +23,9 @@ struct ConsistencyCounts {
 /// Keeps its scratch memory from frame to frame. One thread.
 class ConsistencyCheck {
  public:
-  /// Gives up boundaries of `result` (-1), moves columns of `edges` and updates their standard deviations.
-  /// Where a line has a boundary twice, the last counts and the others are given up.
+  /// Gives up boundaries of `result` (-1, and those that another frame may confirm are `doubted`), moves
+  /// columns of `edges` and updates their standard deviations. Where a line has a boundary twice, the last
+  /// counts and the others are given up.
   ConsistencyCounts check(int boundaries, WorkerPool& pool, SequenceResult& result, EdgeImage& edges);
 
  private:

@@ -23,6 +23,9 @@ constexpr float kOtherSlide_px = 0.5F;   // between its places under both slides
 constexpr float kContrasty = 0.1F;       // contrast of the scene that may be a surface's end
 constexpr float kContradicts_px = 1.F;   // between a detected boundary's places under both slides
 constexpr float kWidest_px = 40.F;       // of a stripe
+constexpr float kDoubtful_px = 0.5F;     // standard deviation beyond which a doubted boundary is given up
+constexpr float kGoesOn_px = 0.5F;       // from one line to the next
+constexpr float kConfirms_px = 0.4F;     // between its place and luma's under either slide
 constexpr float kLeastRoom_px = 2.F;     // to other boundaries on the line
 
 bool known(float x) {
@@ -35,13 +38,14 @@ const float* Recovery::row(int line) const {
   return columns_.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
 }
 
-void Recovery::fill(const SequenceResult& result, const EdgeImage& edges) {
-  columns_.assign(stride_ * static_cast<std::size_t>(edges.lines + 2 * kMargin), kNone);
+void Recovery::fill(const std::vector<std::int16_t>& boundary, const EdgeImage& edges,
+                    std::vector<float>& grid) const {
+  grid.assign(stride_ * static_cast<std::size_t>(edges.lines + 2 * kMargin), kNone);
   for (int line = 0; line < edges.lines; ++line) {
-    float* columns = columns_.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+    float* columns = grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
          e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
-      if (result.boundary[e] >= 0) columns[result.boundary[e]] = edges.edges[e].column_px;
+      if (boundary[e] >= 0) columns[boundary[e]] = edges.edges[e].column_px;
   }
 }
 
@@ -126,16 +130,50 @@ void Recovery::check_line(const RecoveryView& view, const Refiner& refiner, cons
   }
 }
 
+/// A doubted boundary is there after all where luma shows it under both slides at its place, and its
+/// neighbour above or below goes on from it.
+void Recovery::settle_doubts(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges,
+                             int line, SequenceResult& result) const {
+  const auto at = [&](int l, int b) {
+    return doubted_[static_cast<std::size_t>(l + kMargin) * stride_ + kMargin + static_cast<std::size_t>(b)];
+  };
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int b = result.doubted[e];
+    if (b < 0) continue;
+    const Edge& edge = edges.edges[e];
+    const float column = edge.column_px;
+    if (edge.sigma_px > kDoubtful_px) continue;
+    const bool above = !edge.above_differs && std::fabs(at(line - 1, b) - column) < kGoesOn_px;
+    const bool below = !edge.below_differs && std::fabs(at(line + 1, b) - column) < kGoesOn_px;
+    if (!above && !below) continue;
+    const auto confirms = [&](const DifferenceImage& image, std::array<Primary, 2> colours) {
+      const Refiner::Place place = refiner.find(image, line, column, {kWidest_px, kWidest_px, colours});
+      return place.found && std::fabs(place.column_px - column) < kConfirms_px;
+    };
+    const auto i = static_cast<std::size_t>(b);
+    if (confirms(view.shown, view.shown_colours[i]) && confirms(*view.other, view.other_colours[i]))
+      result.boundary[e] = static_cast<std::int16_t>(b);
+  }
+}
+
 void Recovery::recover(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges,
                        SequenceResult& result, WorkerPool& pool, std::vector<RecoveredBoundary>& out) {
   boundaries_ = static_cast<int>(view.shown_colours.size());
   stride_ = view.shown_colours.size() + 2 * kMargin;
-  fill(result, edges);
+  fill(result.boundary, edges, columns_);
   if (view.other != nullptr) {
+    both_.resize(result.boundary.size());
+    for (std::size_t e = 0; e < both_.size(); ++e)
+      both_[e] = result.boundary[e] >= 0 ? result.boundary[e] : result.doubted[e];
+    fill(both_, edges, doubted_);
     pool.for_ranges(edges.lines, [&](int begin, int end, int) {
-      for (int line = begin; line < end; ++line) check_line(view, refiner, edges, line, result);
+      for (int line = begin; line < end; ++line) {
+        check_line(view, refiner, edges, line, result);
+        settle_doubts(view, refiner, edges, line, result);
+      }
     });
-    fill(result, edges);
+    fill(result.boundary, edges, columns_);
   }
   found_.resize(static_cast<std::size_t>(pool.threads()));
   for (auto& found : found_) found.clear();

@@ -39,7 +39,8 @@ class Recovery {
  public:
   /// Boundaries of the pattern that `result` lacks, by line and boundary. Boundaries at the end of a surface
   /// that the other slide contradicts are given up first (-1): another surface's, decoded in this one's
-  /// order. `refiner` must have refined the same frame. `out` is overwritten; its memory is reused.
+  /// order; and doubted ones that it confirms are taken back. `refiner` must have refined the same frame.
+  /// `out` is overwritten; its memory is reused.
   void recover(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges,
                SequenceResult& result, WorkerPool& pool, std::vector<RecoveredBoundary>& out);
 
@@ -48,17 +49,22 @@ class Recovery {
     float column_px;
     float sigma_px;
   };
-  void fill(const SequenceResult& result, const EdgeImage& edges);
+  void fill(const std::vector<std::int16_t>& boundary, const EdgeImage& edges,
+            std::vector<float>& grid) const;
   void check_line(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges, int line,
                   SequenceResult& result) const;
   const float* row(int line) const;
   Prediction predict(View8 slide, int line, int boundary) const;
+  void settle_doubts(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges, int line,
+                     SequenceResult& result) const;
   void recover_line(const RecoveryView& view, const Refiner& refiner, int line,
                     std::vector<RecoveredBoundary>& out) const;
 
   int boundaries_ = 0;
   std::size_t stride_ = 0;
-  std::vector<float> columns_;  // [line][boundary] with a margin: NaN where there is none
+  std::vector<std::int16_t> both_;  // one an edge: its boundary, doubted or not
+  std::vector<float> doubted_;      // as columns_, of doubted boundaries and the others
+  std::vector<float> columns_;      // [line][boundary] with a margin: NaN where there is none
   std::vector<std::vector<RecoveredBoundary>> found_;  // one a worker
 };
 

@@ -39,7 +39,7 @@ constexpr float kStepContrast = 0.12F;      // a step of the scene that is one
 constexpr int kRowReach_px = 4;             // columns compared with the lines above and below
 constexpr float kRowStep = 0.12F;           // difference, of the sum, that is another surface's
 constexpr float kRowNoise = 3.F;            // grey levels more: noise
-constexpr float kStepNear_px = 1.7F;
+constexpr float kStepNear_px = 1.2F;
 
 /// True where the steepest place of a step of `white` around `column_px` is there.
 bool steepest_at(const float* white, int centre, float column_px) {
@@ -150,7 +150,15 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
         ++n;
       }
       samples[static_cast<std::size_t>(s)] = n;
-      if (n == 0) continue;
+      if (n == 0) {
+        if (!sides.narrow) continue;
+        // Between two steps: the nearest sample still tells the surface's channels, but no level.
+        const int x = middle + direction;
+        const float unit = 1.F / (white[x] + kDark);
+        for (std::size_t c = 0; c < 3; ++c)
+          amplitude[c] = std::max(amplitude[c], std::fabs(d[static_cast<int>(c) * width + x]) * unit);
+        continue;
+      }
       measured[static_cast<std::size_t>(s)] = level / static_cast<float>(n);
       for (std::size_t c = 0; c < 3; ++c)
         amplitude[c] = std::max(amplitude[c], std::fabs(sum[c]) / static_cast<float>(n));
@@ -225,7 +233,8 @@ Refiner::Place Refiner::find(const DifferenceImage& image, int line, float colum
                              const Sides& sides) const {
   const int centre = static_cast<int>(std::lround(column_px));
   if (centre < kReach_px || centre + kReach_px >= image.width) return {column_px, 0, false, false};
-  const LumaPlace luma = luma_place(image, line, sides, share_, column_px);
+  const LumaPlace luma = luma_place(
+      image, line, {sides.free_left_px, sides.free_right_px, sides.colours, true}, share_, column_px);
   if (std::fabs(luma.rise) < kLeastRise) return {column_px, 0, false, false};
   if (!luma.found || luma.slope < kLeastSlope * std::fabs(luma.rise)) return {column_px, 0, false, true};
   const float sigma = luma_sigma(image, line, luma);

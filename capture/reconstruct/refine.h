@@ -32,6 +32,7 @@ class Refiner {
   struct Sides {
     float free_left_px, free_right_px;  // to the next edges
     std::array<Primary, 2> colours;     // left and right, under the slide that the image shows
+    bool narrow = false;                // there may be less than two pixels of a surface
   };
   struct Place {
     float column_px;

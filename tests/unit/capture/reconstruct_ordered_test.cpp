@@ -256,7 +256,7 @@ TEST(Refiner, SaysWhereTheSceneItselfHasAStep) {
   for (const Edge& e : edges.edges) {
     EXPECT_TRUE(e.at_step);
     EXPECT_GT(e.contrast, 0.4F);
-    EXPECT_GT(e.sigma_px, 0.2F);
+    EXPECT_GT(e.sigma_px, 0.1F);
   }
 }
 
