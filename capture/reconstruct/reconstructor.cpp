@@ -18,6 +18,7 @@
 #include "capture/reconstruct/surface_builder.h"
 #include "capture/reconstruct/texture.h"
 #include "capture/reconstruct/triangulate.h"
+#include "capture/reconstruct/white_texture.h"
 
 namespace relievo {
 namespace {
@@ -89,6 +90,7 @@ struct Reconstructor::State {
         sequence(p),
         refiner(r.colour_matrix),
         triangulator(r, p, line_count(r), line_step(r)),
+        white_texture(r.colour_matrix),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
   }
@@ -106,6 +108,7 @@ struct Reconstructor::State {
   ConsistencyCheck consistency;
   Recovery recovery;
   Triangulator triangulator;
+  WhiteTexture white_texture;
   SurfaceBuilder surface_builder;
 
   Observation newer;
@@ -308,7 +311,11 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
   s.surface_builder.build(s.vertices, s.triangulator, s.pool, out.surface, s.report.filters);
   s.report.surface_ms = clock.lap_ms();
   if (s.options.texture) {
-    add_fields(frame, s.pool, out.texture);
+    if (s.paper()) {
+      add_fields(frame, s.pool, out.texture);
+    } else {
+      s.white_texture.make(frame, s.vertices, s.pool, out.texture);
+    }
   } else {
     out.texture = {};  // of a frame that came back
   }

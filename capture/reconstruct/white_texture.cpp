@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/white_texture.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "capture/reconstruct/texture.h"
+
+namespace relievo {
+namespace {
+
+constexpr float kAlike = 24;   // grey levels, all channels: rows that differ by less belong together as well
+constexpr int kBeside_px = 3;  // from a boundary to where its sides' colours are pure
+constexpr float kLeastStep = 12;        // grey levels of a primary that a boundary must switch
+constexpr std::size_t kLeastSeen = 50;  // boundaries that must tell of a primary
+constexpr std::size_t kEvery = 4;       // boundaries looked at
+constexpr float kSame = 0.01F;          // gains nearer 1 are noise
+constexpr float kMostGain = 2;
+
+float mix(const std::array<float, 9>& m, std::size_t row, const float* rgb) {
+  return m[3 * row] * rgb[0] + m[3 * row + 1] * rgb[1] + m[3 * row + 2] * rgb[2];
+}
+
+void to_floats(const std::uint8_t* from, int samples, float* to) {
+  for (int i = 0; i < samples; ++i) to[i] = from[i];
+}
+
+void store_sum(const float* a, const float* b, int samples, std::uint8_t* to) {
+  for (int i = 0; i < samples; ++i)
+    to[i] = static_cast<std::uint8_t>(std::min(std::max(a[i] + b[i] + 0.5F, 0.F), 255.F));
+}
+
+}  // namespace
+
+WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix) {
+  using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
+  for (std::size_t i = 0; i < 9; ++i) {
+    matrix_[i] = static_cast<float>(colour_matrix[i]);
+    inverse_[i] = static_cast<float>(inverse.data()[i]);
+  }
+}
+
+/// Median over boundaries of how much less a primary becomes in the slide for what more it becomes in the
+/// complement, where it is switched. An edge of the scene there changes both alike and is as often on one
+/// side.
+void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices) {
+  for (auto& r : ratios_) r.clear();
+  const bool interlaced = frame.scan == Scan::kInterlaced;
+  const int height = frame.picture.height();
+  for (std::size_t i = 0; i < vertices.size(); i += kEvery) {
+    const GridPoint& at = vertices[i].at;
+    const int x = static_cast<int>(at.column_px + 0.5F);
+    const int y = interlaced ? 2 * at.line : at.line;
+    if (at.interpolated || x < kBeside_px || x + kBeside_px >= frame.picture.width() || y + 1 >= height)
+      continue;
+    const std::uint8_t* slide = frame.picture.row(y);
+    const std::uint8_t* complement = interlaced ? frame.picture.row(y + 1) : frame.complement.row(y);
+    std::array<float, 3> slide_step{};
+    std::array<float, 3> complement_step{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t left = 3 * static_cast<std::size_t>(x - kBeside_px) + c;
+      const std::size_t right = 3 * static_cast<std::size_t>(x + kBeside_px) + c;
+      slide_step[c] = static_cast<float>(slide[right] - slide[left]);
+      complement_step[c] = static_cast<float>(complement[right] - complement[left]);
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float s = mix(matrix_, c, slide_step.data());
+      const float k = mix(matrix_, c, complement_step.data());
+      if (std::fabs(s) > kLeastStep && std::fabs(k) > kLeastStep && (s > 0) != (k > 0))
+        ratios_[c].push_back(-s / k);
+    }
+  }
+  level_ = false;
+  for (std::size_t c = 0; c < 3; ++c) {
+    auto& r = ratios_[c];
+    gains_[c] = 1;
+    if (r.size() < kLeastSeen) continue;
+    const auto middle = r.begin() + static_cast<std::ptrdiff_t>(r.size() / 2);
+    std::nth_element(r.begin(), middle, r.end());
+    if (std::fabs(*middle - 1) < kSame) continue;
+    gains_[c] = std::clamp(*middle, 1 / kMostGain, kMostGain);
+    level_ = true;
+  }
+  if (!level_) return;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      float sum = 0;
+      for (std::size_t k = 0; k < 3; ++k) sum += inverse_[3 * i + k] * gains_[k] * matrix_[3 * k + j];
+      levelled_[3 * i + j] = sum;
+    }
+  }
+}
+
+void WhiteTexture::level(float* row, int width) const {
+  for (int x = 0; x < width; ++x) {
+    float* p = row + 3 * x;
+    const std::array<float, 3> rgb{p[0], p[1], p[2]};
+    for (std::size_t c = 0; c < 3; ++c) p[c] = mix(levelled_, c, rgb.data());
+  }
+}
+
+void WhiteTexture::progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const {
+  const int width = frame.picture.width();
+  to_floats(frame.picture.row(y), 3 * width, scratch.own.data());
+  to_floats(frame.complement.row(y), 3 * width, scratch.other.data());
+  level(scratch.other.data(), width);
+  store_sum(scratch.own.data(), scratch.other.data(), 3 * width, out.row(y));
+}
+
+void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const {
+  const Image8& picture = frame.picture;
+  const int width = picture.width();
+  const int height = picture.height();
+  const std::uint8_t* own = picture.row(y);
+  const std::uint8_t* above = picture.row(y > 0 ? y - 1 : y + 1);
+  const std::uint8_t* below = picture.row(y + 1 < height ? y + 1 : y - 1);
+  float* weight = scratch.weight.data();
+  if (y >= 2 && y + 2 < height) {
+    // A row above or below is of the other field, but the next ones are of this one: the more alike they are,
+    // the more what lies between belongs to the same surface.
+    const std::uint8_t* two_above = picture.row(y - 2);
+    const std::uint8_t* two_below = picture.row(y + 2);
+    for (int x = 0; x < width; ++x) {
+      int a = 0;
+      int b = 0;
+      for (int c = 0; c < 3; ++c) {
+        a += std::abs(own[3 * x + c] - two_above[3 * x + c]);
+        b += std::abs(own[3 * x + c] - two_below[3 * x + c]);
+      }
+      const auto fa = static_cast<float>(a * a) + kAlike * kAlike;
+      const auto fb = static_cast<float>(b * b) + kAlike * kAlike;
+      weight[x] = fb / (fa + fb);
+    }
+  } else {
+    std::fill_n(weight, width, 0.5F);
+  }
+  float* other = scratch.other.data();
+  for (int x = 0; x < width; ++x) {
+    for (int c = 0; c < 3; ++c) {
+      const int i = 3 * x + c;
+      other[i] = static_cast<float>(below[i]) + weight[x] * static_cast<float>(above[i] - below[i]);
+    }
+  }
+  to_floats(own, 3 * width, scratch.own.data());
+  if (level_) level(y % 2 == 0 ? other : scratch.own.data(), width);
+  store_sum(scratch.own.data(), other, 3 * width, out.row(y));
+}
+
+void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool,
+                        Image8& out) {
+  measure_gains(frame, vertices);
+  const int width = frame.picture.width();
+  const int height = frame.picture.height();
+  if (height < 2 || (frame.scan == Scan::kProgressive && !level_)) {
+    add_fields(frame, pool, out);
+    return;
+  }
+  if (out.width() != width || out.height() != height || out.channels() != 3) out = Image8(width, height, 3);
+  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  for (Scratch& s : scratch_) {
+    s.weight.resize(static_cast<std::size_t>(width));
+    s.own.resize(static_cast<std::size_t>(width) * 3);
+    s.other.resize(static_cast<std::size_t>(width) * 3);
+  }
+  pool.for_ranges(height, [&](int begin, int end, int worker) {
+    Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
+    for (int y = begin; y < end; ++y) {
+      if (frame.scan == Scan::kProgressive) {
+        progressive_row(frame, y, scratch, out);
+      } else {
+        interlaced_row(frame, y, scratch, out);
+      }
+    }
+  });
+}
+
+}  // namespace relievo

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scene as white light would show it, free of what adding the two fields (texture.h) leaves of the
+// stripes: where a field's rows are missing, they come from the row that belongs to the same surface instead
+// of from both; and where the projector's complement is not as bright as its slide, its colours are brought
+// level.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "base/image.h"
+#include "base/parallel.h"
+#include "capture/reconstruct/surface.h"
+#include "capture/source/field_source.h"
+
+namespace relievo {
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class WhiteTexture {
+ public:
+  /// `colour_matrix` is M of Eq. 1.
+  explicit WhiteTexture(const std::array<double, 9>& colour_matrix);
+
+  /// RGB, the size of the camera's picture; values saturate at 255. `vertices` are decoded boundaries, in any
+  /// order: across each, what the slide loses of a primary its complement gains, so they tell how bright one
+  /// is by the other. `out` is reused where its size fits.
+  void make(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool,
+            Image8& out);
+
+  /// What the complement's calibrated red, green and blue were multiplied by in the last frame.
+  const std::array<float, 3>& gains() const { return gains_; }
+
+ private:
+  struct Scratch {
+    std::vector<float> weight;      // [width]: of the row above
+    std::vector<float> own, other;  // [3 width]
+  };
+  void measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices);
+  void level(float* row, int width) const;
+  void progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
+  void interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
+
+  std::array<float, 9> matrix_;
+  std::array<float, 9> inverse_;
+  std::array<float, 9>
+      levelled_{};  // of captured colours, those of the complement made as bright as the slide's
+  std::array<float, 3> gains_{1, 1, 1};
+  bool level_ = false;
+  std::vector<Scratch> scratch_;
+  std::array<std::vector<float>, 3> ratios_;  // of each primary, at boundaries
+};
+
+}  // namespace relievo
