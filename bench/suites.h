@@ -10,5 +10,6 @@ Command reconstruct_suite();
 Command codec_suite();
 Command texture_suite();
 Command chain_suite();
+Command peer_suite();
 
 }  // namespace relievo::bench

@@ -190,5 +190,21 @@ TEST(Bench, FailuresAreOneLine) {
   }
 }
 
+TEST(PeerSuite, OursIsMoreExactAndMoreCompleteThanGetProjPixelOnOneScene) {
+  const Json report = report_of(
+      {"peer", "--scene", "object,width=160,height=120,projector_width=256,projector_height=192,stripes=24",
+       "--runs", "2"});
+  const Json &stripes = row(report, "relievo-stripes"), &gray = row(report, "relievo-gray"),
+             &peer = row(report, "opencv-getProjPixel");
+  for (const Json* r : {&gray, &peer}) expect_spread((*r)["decode_ms"], 2, "decode_ms");
+  EXPECT_EQ(stripes["pictures_next"], 2);
+  EXPECT_EQ(peer["pictures"], 34);  // 8 bits each way, inverses, white and black
+  EXPECT_GT(peer["completeness"], 0.5);
+  EXPECT_GT(gray["completeness"], peer["completeness"]);
+  EXPECT_GT(stripes["completeness"], 0.8);
+  EXPECT_LT(gray["median_um_per_m"], peer["median_um_per_m"]);
+  EXPECT_LT(stripes["median_um_per_m"], peer["median_um_per_m"]);
+}
+
 }  // namespace
 }  // namespace relievo::test
