@@ -239,7 +239,7 @@ void Reconstructor::State::triangulate() {
     }
   }
   if (paper()) return;
-  for (const RecoveredBoundary& r : recovered) add_vertex(r.boundary, r.line, r.column_px, r.slope);
+  for (const RecoveredBoundary& r : recovered) add_vertex(r.boundary, r.line, r.column_px, r.sigma_px, r.slope);
 }
 
 /// Whatever it holds is overwritten.
