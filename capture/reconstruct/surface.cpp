@@ -242,10 +242,13 @@ class Grid {
     return small;
   }
 
-  /// Of a cell with triangles: whether they are in no small piece. Corners 0 and 3, of which there is one,
-  /// are numbered before corners 1 and 2.
+  /// Of a cell with triangles: whether they are in no small piece. All of them have the upper corner of the
+  /// diagonal, which is numbered before corners 1 and 2.
   bool cell_is_kept(int line, int b) const {
-    return scratch_.index[cell(line, b)] >= 0 || scratch_.index[cell(line, b + 1)] >= 0;
+    const bool turned =
+        scratch_.cells[static_cast<std::size_t>(line) * stride_ + static_cast<std::size_t>(b)] &
+        cell::kTurned;
+    return scratch_.index[cell(line, turned ? b + 1 : b)] >= 0;
   }
 
   void write_vertices(int line, Surface& out) const {

@@ -116,5 +116,35 @@ TEST(SurfaceCells, TheSurfaceIsTheSameForAnyNumberOfThreads) {
   }
 }
 
+/// Pieces of all sizes that touch in the same cells: what is dropped takes its triangles with it.
+TEST(SurfaceCells, NoTriangleOfADroppedPieceStays) {
+  std::mt19937 random(5);
+  std::bernoulli_distribution missing(0.25), far(0.5);
+  SurfaceScratch scratch;
+  for (int round = 0; round < 50; ++round) {
+    std::vector<GridVertex> vertices;
+    for (std::uint16_t l = 0; l < 20; ++l) {
+      for (std::uint16_t b = 0; b < 20; ++b) {
+        if (missing(random)) continue;
+        const float z = far(random) ? 1.3F : 1;
+        vertices.push_back({{.boundary = b, .line = l, .column_px = 8.F * b},
+                            {0.01F * static_cast<float>(b) * z, 0.01F * static_cast<float>(l) * z, z},
+                            1});
+      }
+    }
+    Surface made;
+    ASSERT_GT(build_surface(vertices, 20, 20, {.least_component = 6}, scratch, made).small_component, 0U);
+    std::vector<bool> used(made.positions.size());
+    for (const Triangle& t : made.triangles) {
+      for (const std::uint32_t v : t) {
+        ASSERT_LT(v, made.positions.size());
+        used[v] = true;
+        ASSERT_EQ(made.positions[v][2], made.positions[t[0]][2]) << "a triangle bridges the step";
+      }
+    }
+    for (const bool u : used) ASSERT_TRUE(u) << "a vertex of a piece of six is in no triangle";
+  }
+}
+
 }  // namespace
 }  // namespace relievo
