@@ -178,6 +178,7 @@ export class View {
 
   /** What is on the screen, for tests and for reports of people whose picture is wrong. */
   readPixels(): PixelReport {
+    this.setScale(1); // what is seen does not depend on how quickly it was drawn
     this.renderer.render(this.scene, this.camera);
     const gl = this.renderer.getContext();
     const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
