@@ -10,7 +10,8 @@ namespace relievo {
 
 struct FilterCounts {
   std::uint64_t unsupported = 0, completed = 0, rejected = 0, moved = 0, no_point = 0, duplicate = 0,
-                filled = 0, interpolated = 0, alone = 0, step = 0, edge_on = 0, small_component = 0;
+                filled = 0, interpolated = 0, alone = 0, step = 0, edge_on = 0, small_component = 0,
+                recovered = 0;
 
   FilterCounts& operator+=(const FilterCounts& other);
   bool operator==(const FilterCounts&) const = default;
@@ -23,7 +24,7 @@ struct Filter {
   std::string_view meaning;
   std::uint64_t FilterCounts::*count;
 };
-inline constexpr std::array<Filter, 12> kFilters{{
+inline constexpr std::array<Filter, 13> kFilters{{
     {"unsupported", "decoded boundaries given up, since no neighbouring line agreed",
      &FilterCounts::unsupported},
     {"completed", "boundaries decoded by the lines above and below", &FilterCounts::completed},
@@ -39,6 +40,8 @@ inline constexpr std::array<Filter, 12> kFilters{{
     {"edge_on", "triangles not made, since they are seen edge-on", &FilterCounts::edge_on},
     {"small_component", "points left out in pieces too small to be a surface",
      &FilterCounts::small_component},
+    {"recovered", "boundaries found beside a depth step from their surface and luma",
+     &FilterCounts::recovered},
 }};
 
 inline FilterCounts& FilterCounts::operator+=(const FilterCounts& other) {

@@ -206,6 +206,7 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
                       .other = have_older ? &older.difference : nullptr,
                       .other_colours = sequence.shown_colours(other(order))},
                      refiner, edges, result, pool, recovered);
+    report.filters.recovered = recovered.size();
     report.matched =
         result.counts.in_order - result.counts.unsupported + result.counts.completed + recovered.size();
   }

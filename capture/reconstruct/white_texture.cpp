@@ -22,13 +22,84 @@ float mix(const std::array<float, 9>& m, std::size_t row, const float* rgb) {
   return m[3 * row] * rgb[0] + m[3 * row + 1] * rgb[1] + m[3 * row + 2] * rgb[2];
 }
 
-void to_floats(const std::uint8_t* from, int samples, float* to) {
+// The loops over every sample, compiled for wider registers too: the same operations, so the same results.
+#define RELIEVO_INLINE __attribute__((always_inline)) inline
+
+RELIEVO_INLINE void to_floats(const std::uint8_t* from, int samples, float* to) {
   for (int i = 0; i < samples; ++i) to[i] = from[i];
 }
 
-void store_sum(const float* a, const float* b, int samples, std::uint8_t* to) {
+RELIEVO_INLINE void store_sum(const float* a, const float* b, int samples, std::uint8_t* to) {
   for (int i = 0; i < samples; ++i)
-    to[i] = static_cast<std::uint8_t>(std::min(std::max(a[i] + b[i] + 0.5F, 0.F), 255.F));
+    to[i] = static_cast<std::uint8_t>(static_cast<int>(std::min(std::max(a[i] + b[i] + 0.5F, 0.F), 255.F)));
+}
+
+/// |a - b| of every sample, with one more at both ends like its neighbour: to[-1] to to[samples].
+RELIEVO_INLINE void differences(const std::uint8_t* a, const std::uint8_t* b, int samples, std::int16_t* to) {
+  for (int i = 0; i < samples; ++i) to[i] = static_cast<std::int16_t>(std::abs(a[i] - b[i]));
+  to[-1] = to[0];
+  to[samples] = to[samples - 1];
+}
+
+/// Between `above` and `below`, the nearer to the one whose differences are smaller; sums of three samples in
+/// a row, which for green are the pixel's own three.
+RELIEVO_INLINE void weigh(const std::uint8_t* above, const std::uint8_t* below, const std::int16_t* d_above,
+                          const std::int16_t* d_below, int samples, float* to) {
+  for (int i = 0; i < samples; ++i) {
+    const auto a = static_cast<float>(d_above[i - 1] + d_above[i] + d_above[i + 1]);
+    const auto b = static_cast<float>(d_below[i - 1] + d_below[i] + d_below[i + 1]);
+    const float fa = a * a + kAlike * kAlike;
+    const float fb = b * b + kAlike * kAlike;
+    const auto low = static_cast<float>(below[i]);
+    to[i] = low + fb / (fa + fb) * (static_cast<float>(above[i]) - low);
+  }
+}
+
+/// One row of an interlaced picture: its own samples and those of the other field.
+struct RowView {
+  const std::uint8_t *own, *above, *below;        // the row, and those beside it, of the other field
+  const std::uint8_t *field_above, *field_below;  // the next of its own field
+  int samples;
+};
+struct RowScratch {
+  std::int16_t *above, *below;
+  float *own, *other;
+};
+RELIEVO_INLINE void split_body(const RowView& row, const RowScratch& scratch) {
+  differences(row.own, row.field_above, row.samples, scratch.above);
+  differences(row.own, row.field_below, row.samples, scratch.below);
+  weigh(row.above, row.below, scratch.above, scratch.below, row.samples, scratch.other);
+  to_floats(row.own, row.samples, scratch.own);
+}
+#undef RELIEVO_INLINE
+
+struct Loops {
+  void (*split)(const RowView& row, const RowScratch& scratch);
+  void (*store_sum)(const float* a, const float* b, int samples, std::uint8_t* to);
+};
+void split_portable(const RowView& row, const RowScratch& scratch) {
+  split_body(row, scratch);
+}
+void store_sum_portable(const float* a, const float* b, int samples, std::uint8_t* to) {
+  store_sum(a, b, samples, to);
+}
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void split_avx2(const RowView& row, const RowScratch& scratch) {
+  split_body(row, scratch);
+}
+[[gnu::target("avx2")]] void store_sum_avx2(const float* a, const float* b, int samples, std::uint8_t* to) {
+  store_sum(a, b, samples, to);
+}
+#endif
+
+const Loops& loops() {
+  static const Loops best = [] {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) return Loops{split_avx2, store_sum_avx2};
+#endif
+    return Loops{split_portable, store_sum_portable};
+  }();
+  return best;
 }
 
 }  // namespace
@@ -106,7 +177,7 @@ void WhiteTexture::progressive_row(const CapturedFrame& frame, int y, Scratch& s
   to_floats(frame.picture.row(y), 3 * width, scratch.own.data());
   to_floats(frame.complement.row(y), 3 * width, scratch.other.data());
   level(scratch.other.data(), width);
-  store_sum(scratch.own.data(), scratch.other.data(), 3 * width, out.row(y));
+  loops().store_sum(scratch.own.data(), scratch.other.data(), 3 * width, out.row(y));
 }
 
 void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const {
@@ -116,36 +187,15 @@ void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& sc
   const std::uint8_t* own = picture.row(y);
   const std::uint8_t* above = picture.row(y > 0 ? y - 1 : y + 1);
   const std::uint8_t* below = picture.row(y + 1 < height ? y + 1 : y - 1);
-  float* weight = scratch.weight.data();
-  if (y >= 2 && y + 2 < height) {
-    // A row above or below is of the other field, but the next ones are of this one: the more alike they are,
-    // the more what lies between belongs to the same surface.
-    const std::uint8_t* two_above = picture.row(y - 2);
-    const std::uint8_t* two_below = picture.row(y + 2);
-    for (int x = 0; x < width; ++x) {
-      int a = 0;
-      int b = 0;
-      for (int c = 0; c < 3; ++c) {
-        a += std::abs(own[3 * x + c] - two_above[3 * x + c]);
-        b += std::abs(own[3 * x + c] - two_below[3 * x + c]);
-      }
-      const auto fa = static_cast<float>(a * a) + kAlike * kAlike;
-      const auto fb = static_cast<float>(b * b) + kAlike * kAlike;
-      weight[x] = fb / (fa + fb);
-    }
-  } else {
-    std::fill_n(weight, width, 0.5F);
-  }
+  // A row above or below is of the other field, but the next ones are of this one: the more alike they are,
+  // the more what lies between belongs to the same surface. At the picture's edge only one is there.
+  const bool inside = y >= 2 && y + 2 < height;
+  const RowView row{own,      above, below, picture.row(inside ? y - 2 : y), picture.row(inside ? y + 2 : y),
+                    3 * width};
   float* other = scratch.other.data();
-  for (int x = 0; x < width; ++x) {
-    for (int c = 0; c < 3; ++c) {
-      const int i = 3 * x + c;
-      other[i] = static_cast<float>(below[i]) + weight[x] * static_cast<float>(above[i] - below[i]);
-    }
-  }
-  to_floats(own, 3 * width, scratch.own.data());
+  loops().split(row, {scratch.above.data() + 1, scratch.below.data() + 1, scratch.own.data(), other});
   if (level_) level(y % 2 == 0 ? other : scratch.own.data(), width);
-  store_sum(scratch.own.data(), other, 3 * width, out.row(y));
+  loops().store_sum(scratch.own.data(), other, 3 * width, out.row(y));
 }
 
 void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool,
@@ -160,9 +210,11 @@ void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex
   if (out.width() != width || out.height() != height || out.channels() != 3) out = Image8(width, height, 3);
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   for (Scratch& s : scratch_) {
-    s.weight.resize(static_cast<std::size_t>(width));
-    s.own.resize(static_cast<std::size_t>(width) * 3);
-    s.other.resize(static_cast<std::size_t>(width) * 3);
+    const std::size_t samples = static_cast<std::size_t>(width) * 3;
+    s.above.resize(samples + 2);
+    s.below.resize(samples + 2);
+    s.own.resize(samples);
+    s.other.resize(samples);
   }
   pool.for_ranges(height, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "base/image.h"
@@ -32,8 +33,8 @@ class WhiteTexture {
 
  private:
   struct Scratch {
-    std::vector<float> weight;      // [width]: of the row above
-    std::vector<float> own, other;  // [3 width]
+    std::vector<std::int16_t> above, below;  // [3 width + 2]: how much the field's own rows differ
+    std::vector<float> own, other;           // [3 width]
   };
   void measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices);
   void level(float* row, int width) const;

@@ -165,6 +165,58 @@ TEST(Steps, NoTriangleBridgesOneBetweenTwoLines) {
   EXPECT_GT(counts.step, 0U);
 }
 
+/// Whether truth jumps by more than `step` of depth somewhere between two vertices, and they follow the jump.
+bool bridges(const ImageF& truth, const Surface& s, std::uint32_t a, std::uint32_t b, float step) {
+  constexpr int kSamples = 24;
+  const auto pixel = [&](std::uint32_t v, int axis) {
+    const int size = axis == 0 ? truth.width() : truth.height();
+    return s.texture_coordinates[v][static_cast<std::size_t>(axis)] * static_cast<float>(size) - 0.5F;
+  };
+  float before = 0;
+  for (int i = 0; i <= kSamples; ++i) {
+    const float t = static_cast<float>(i) / kSamples;
+    const auto at = [&](int axis) {
+      const long most = (axis == 0 ? truth.width() : truth.height()) - 1;
+      return static_cast<int>(
+          std::clamp(std::lround(pixel(a, axis) + t * (pixel(b, axis) - pixel(a, axis))), 0L, most));
+    };
+    const float z = truth.row(at(1))[at(0)];
+    const float jump = std::fabs(z - before);
+    if (before > 0 && z > 0 && jump > step * z &&
+        std::fabs(s.positions[a][2] - s.positions[b][2]) > 0.5F * jump)
+      return true;
+    before = z;
+  }
+  return false;
+}
+
+TEST(Steps, NoTriangleBridgesOneOfASimulatedScene) {
+  for (const bool dense : {false, true}) {
+    auto source = make_sim("object", {.truth = true});
+    ASSERT_TRUE(source) << source.error().message;
+    auto reconstructor = Reconstructor::create((*source)->info().rig, (*source)->info().pattern,
+                                               {.texture = false, .surface = {.dense = dense}});
+    ASSERT_TRUE(reconstructor) << reconstructor.error().message;
+    std::size_t triangles = 0;
+    std::size_t bridging = 0;
+    for (int n = 0; n < 3; ++n) {
+      auto next = (*source)->next();
+      ASSERT_TRUE(next && *next);
+      auto frame = reconstructor->add(**next);
+      ASSERT_TRUE(frame) << frame.error().message;
+      if (!*frame) continue;
+      const Surface& s = (*frame)->surface;
+      const ImageF& truth = (*source)->truth();
+      triangles += s.triangles.size();
+      for (const Triangle& t : s.triangles)
+        bridging += bridges(truth, s, t[0], t[1], 0.02F) || bridges(truth, s, t[1], t[2], 0.02F) ||
+                    bridges(truth, s, t[2], t[0], 0.02F);
+    }
+    EXPECT_GT(triangles, 20000U);
+    EXPECT_EQ(bridging, 0U) << (dense ? "dense" : "at boundaries");
+  }
+}
+
 TEST(Steps, ACreaseIsNone) {
   const StripedScene left = striped_scene();
   StripedScene right = left;

@@ -66,6 +66,44 @@ TEST(Export, PlyHoldsTheSurface) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing else left";
 }
 
+TEST(Export, QualityOfVerticesIsKept) {
+  const test::TempFolder folder;
+  Frame3D frame;
+  frame.surface.positions = {{0, 0, 1}, {0, 0.5f, 1}, {0.5f, 0, 1}};
+  frame.surface.triangles = {{0, 1, 2}};
+  frame.surface.sigmas_m = {0.001f, 0, 0.25f};
+  frame.surface.interpolated = {0, 1, 0};
+  ASSERT_TRUE(write_ply(folder / "a.ply", frame.surface, {}).ok());
+  const std::string ply = read_file(folder / "a.ply");
+  const std::size_t body = ply.find("end_header\n") + 11;
+  EXPECT_NE(ply.find("property uchar blue\nproperty float sigma\nproperty uchar interpolated\nelement face"),
+            std::string::npos);
+  ASSERT_EQ(ply.size(), body + 3 * 32 + 13);
+  EXPECT_EQ(at<float>(ply, body + 2 * 32 + 27), 0.25f);
+  EXPECT_EQ(at<std::uint8_t>(ply, body + 32 + 31), 1);
+
+  ASSERT_TRUE(write_glb(folder / "a.glb", frame).ok());
+  const std::string glb = read_file(folder / "a.glb");
+  const auto json = nlohmann::json::parse(glb.substr(20, at<std::uint32_t>(glb, 12)));
+  const auto& attributes = json["meshes"][0]["primitives"][0]["attributes"];
+  const std::size_t binary = 20 + at<std::uint32_t>(glb, 12) + 8;
+  const auto value = [&](const char* name, std::size_t vertex) {
+    const auto& accessor = json["accessors"][attributes[name].get<std::size_t>()];
+    EXPECT_EQ(accessor["type"], "SCALAR");
+    EXPECT_EQ(accessor["count"], 3);
+    const auto& view = json["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    return at<float>(glb, binary + view["byteOffset"].get<std::size_t>() + 4 * vertex);
+  };
+  EXPECT_EQ(value("_SIGMA", 0), 0.001f);
+  EXPECT_EQ(value("_SIGMA", 2), 0.25f);
+  EXPECT_EQ(value("_INTERPOLATED", 1), 1);
+
+  frame.surface.sigmas_m = {0.001f, -1, 0.25f};
+  EXPECT_FALSE(write_ply(folder / "b.ply", frame.surface, {}).ok());
+  frame.surface.sigmas_m = {0.001f};
+  EXPECT_FALSE(write_glb(folder / "b.glb", frame).ok());
+}
+
 TEST(Export, PlyWithoutTextureOrPoints) {
   const test::TempFolder folder;
   EXPECT_TRUE(write_ply(folder / "empty.ply", {}, {}).ok());

@@ -41,6 +41,8 @@ threads = 3
 decoder = "paper"
 jpeg_quality = 91
 draco_speed = 4
+dense = true
+fill_holes = 3
 )");
   ASSERT_TRUE(r.status) << r.status.error().message;
   EXPECT_EQ(r.config.source, "take:shared/bunny");
@@ -55,6 +57,8 @@ draco_speed = 4
   EXPECT_EQ(r.config.decoder, Decoder::kPaper);
   EXPECT_EQ(r.config.jpeg_quality, 91);
   EXPECT_EQ(r.config.draco_speed, 4);
+  EXPECT_TRUE(r.config.surface.dense);
+  EXPECT_EQ(r.config.surface.fill_holes, 3);
 }
 
 TEST(Config, WhatIsNotNamedStays) {
@@ -112,6 +116,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},
         Wrong{"quality_none", "jpeg_quality = 0", "jpeg_quality must be a whole number from 1 to 100"},
         Wrong{"quality_over", "jpeg_quality = 101", "jpeg_quality must be a whole number"},
+        Wrong{"holes_over", "fill_holes = 17", "fill_holes must be a whole number from 0 to 16"},
         Wrong{"speed_over", "draco_speed = 10", "draco_speed must be a whole number from 0 to 9"},
         Wrong{"speed_huge", "draco_speed = 4294967297", "draco_speed must be a whole number"},
         Wrong{"unknown", "quality = 80", "quality is no setting; there are: source stream"},

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// A take from simulate to evaluate's pictures and figures, and to the properties of a PLY: through the
+// programs.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "tests/support/process.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo::test {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Width and height, from a PNG's first chunk.
+std::pair<int, int> png_size(const fs::path& file) {
+  const std::string png = text_of(file);
+  if (png.size() < 24 || png.compare(1, 3, "PNG") != 0) return {};
+  const auto number = [&](std::size_t at) {
+    int n = 0;
+    for (std::size_t i = 0; i < 4; ++i) n = n * 256 + static_cast<unsigned char>(png[at + i]);
+    return n;
+  };
+  return {number(16), number(20)};
+}
+
+class SmallTake : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Finished made =
+        run({program("relievo-server").string(), "simulate", "--scene",
+             "object,width=320,height=240,stripes=45", "--frames", "4", "--out", take_.string()},
+            kLongPatience);
+    ASSERT_EQ(made.status, 0) << made.err;
+  }
+  json server_json(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), program("relievo-server").string());
+    arguments.emplace_back("--json");
+    const Finished done = run(arguments, kLongPatience);
+    EXPECT_EQ(done.status, 0) << done.err;
+    const json parsed = json::parse(done.out, nullptr, false);
+    EXPECT_TRUE(parsed.is_object()) << done.out;
+    return parsed.is_object() ? parsed : json::object();
+  }
+
+  const TempFolder folder_;
+  const fs::path take_ = folder_.path() / "take";
+};
+
+TEST_F(SmallTake, EvaluationShowsEveryStageOnOnePage) {
+  const fs::path pictures = folder_.path() / "deep" / "pictures";
+  const json score = server_json({"evaluate", take_.string(), "--pictures", pictures.string()});
+  EXPECT_EQ(score.value("frames", 0), 3);
+  const std::string page = text_of(pictures / "index.html");
+  int shown = 0;
+  for (const auto& entry : fs::directory_iterator(pictures)) {
+    if (entry.path().extension() != ".png") continue;
+    ++shown;
+    const auto [width, height] = png_size(entry.path());
+    EXPECT_EQ(width, 320) << entry.path();
+    EXPECT_TRUE(height == 240 || (height > 240 && height < 320)) << entry.path();  // with or without a legend
+    EXPECT_NE(page.find("src=\"" + entry.path().filename().string() + "\""), std::string::npos)
+        << entry.path();
+  }
+  EXPECT_EQ(shown, 3 * 10);
+  EXPECT_NE(text_of(pictures / "000001-depth.png"), text_of(pictures / "000001-sigma.png"));
+  EXPECT_NE(page.find(">Frame 3<"), std::string::npos);
+  EXPECT_NE(page.find("completeness"), std::string::npos);
+  // The pictures change nothing of the figures.
+  EXPECT_EQ(server_json({"evaluate", take_.string()}), score);
+}
+
+TEST_F(SmallTake, PicturesThatCannotBeWrittenAreSaid) {
+  std::ofstream(folder_.path() / "file") << "in the way";
+  const Finished done = run({program("relievo-server").string(), "evaluate", take_.string(), "--pictures",
+                             (folder_.path() / "file" / "pictures").string()},
+                            kLongPatience);
+  EXPECT_EQ(done.status, 1);
+  EXPECT_NE(done.err.find("cannot make the folder"), std::string::npos) << done.err;
+}
+
+TEST_F(SmallTake, DenseSurfacesAreMarkedAndCounted) {
+  const auto reconstruct = [&](const char* name, std::vector<std::string> more) {
+    more.insert(more.begin(), {"reconstruct", take_.string(), "--out", (folder_.path() / name).string()});
+    return server_json(more);
+  };
+  const json plain = reconstruct("plain", {});
+  const json dense = reconstruct("dense", {"--dense"});
+  const json filled = reconstruct("filled", {"--fill-holes", "4"});
+  EXPECT_EQ(plain["filters"].value("interpolated", 9), 0);
+  EXPECT_EQ(plain["filters"].value("filled", 9), 0);
+  EXPECT_GT(dense["filters"].value("interpolated", 0), 3 * plain.value("decoded", 1 << 30));
+  EXPECT_GT(dense.value("vertices_per_frame", 0.0), 4 * plain.value("vertices_per_frame", 1e9));
+  EXPECT_GT(filled["filters"].value("filled", 0), 0);
+  EXPECT_GT(filled.value("vertices_per_frame", 0.0), plain.value("vertices_per_frame", 1e9));
+  const std::string ply = text_of(folder_.path() / "dense" / "000001.ply").substr(0, 600);
+  EXPECT_NE(ply.find("property float sigma\nproperty uchar interpolated\n"), std::string::npos) << ply;
+  const Finished wrong = run({program("relievo-server").string(), "reconstruct", take_.string(), "--out",
+                              (folder_.path() / "no").string(), "--fill-holes", "17"},
+                             kLongPatience);
+  EXPECT_EQ(wrong.status, 2);
+}
+
+}  // namespace
+}  // namespace relievo::test
