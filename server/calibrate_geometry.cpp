@@ -178,7 +178,7 @@ Status run(const Options& options, StopSignal& stop) {
   const auto geometry = calibrate_geometry(measured->views, measured->camera, projector, {});
   if (!geometry) return geometry.error();
 
-  Rig rig;
+  Rig rig = before.whole.value_or(Rig{});
   rig.scan = before.scan.value_or(options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive);
   rig.frame_rate = before.frame_rate.value_or(options.frame_rate);
   rig.colour_matrix = before.colour_matrix.value_or(std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});

@@ -2,7 +2,9 @@
 #include "capture/calibrate/measure_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <utility>
 
@@ -60,6 +62,20 @@ ImageF even_light(const StripeStack& stack) {
   return out;
 }
 
+/// What the projector changes where it is bright, of 255: the 98th percentile of the difference of the
+/// coarsest bit's pictures.
+int brightest_change(const GrayStack& stack) {
+  const GrayPair& pair = stack.columns.back();
+  std::array<std::size_t, 256> histogram{};
+  for (std::size_t i = 0; i < pair.lit.size(); ++i)
+    ++histogram[static_cast<std::size_t>(std::abs(pair.lit.data()[i] - pair.inverse.data()[i]))];
+  std::size_t above = 0;
+  int change = 255;
+  for (; change > 0 && 50 * above < pair.lit.size(); --change)
+    above += histogram[static_cast<std::size_t>(change)];
+  return change;
+}
+
 MeasuredView without(const std::string& name, std::string why) {
   return {.name = name, .corners = {}, .refused = std::move(why)};
 }
@@ -97,6 +113,9 @@ MeasuredView measure_view(const std::string& name, const GrayStack& stack, const
   if (seen.size() < kLeastCorners) return without(name, no_board(board, seen.size()));
   GrayDecodeOptions whole = options;
   whole.window_px = 0;  // the edges are what is needed
+  // Of dim pictures less is asked: a black square reflects a tenth of what white does.
+  whole.min_contrast =
+      std::clamp(brightest_change(stack) * 3 / 20, std::min(6, options.min_contrast), options.min_contrast);
   auto maps = decode_gray(stack, whole, pool);
   if (!maps) return without(name, maps.error().message);
   return with_projector(

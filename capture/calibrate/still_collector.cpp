@@ -67,6 +67,7 @@ void StillCollector::accumulate(const CapturedFrame& frame, Shown& shown) {
   shown.width = frame.picture.width();
   shown.height = frame.picture.height();
   shown.scan = frame.scan;
+  shown.slide_row = frame.slide_field().data == frame.picture.data() ? 0 : 1;
   add_pixels(frame.picture, shown.sums[0]);
   if (frame.scan == Scan::kProgressive) add_pixels(frame.complement, shown.sums[1]);
   ++shown.count;
@@ -105,7 +106,7 @@ std::vector<StripePair> StillCollector::pairs() const {
   for (const Shown& s : shown_) {
     Image8 first = mean_of(s.sums[0], s.count, s.width, s.height);
     if (s.scan == Scan::kInterlaced) {
-      out.push_back(deinterlaced(first));
+      out.push_back(deinterlaced(first, s.slide_row));
     } else {
       out.push_back({std::move(first), mean_of(s.sums[1], s.count, s.width, s.height)});
     }

@@ -32,6 +32,7 @@ class StillCollector {
     std::vector<std::uint32_t> sums[2];  // of the frame's pictures
     int width = 0, height = 0;
     Scan scan = Scan::kInterlaced;
+    int slide_row = 0;  // of an interlaced frame: its first row under the slide
     std::uint32_t count = 0;
     std::uint64_t last = 0;  // of the frames added
   };

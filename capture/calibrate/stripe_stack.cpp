@@ -47,8 +47,8 @@ std::vector<std::string> stripe_view_names(int slides, Scan scan) {
   return out;
 }
 
-StripePair deinterlaced(const Image8& frame) {
-  return {one_field(frame, 0), one_field(frame, 1)};
+StripePair deinterlaced(const Image8& frame, int slide_row) {
+  return {one_field(frame, slide_row), one_field(frame, 1 - slide_row)};
 }
 
 Result<StripeStack> read_stripe_stack(const fs::path& folder, const Pattern& pattern, int projector_width,

@@ -30,7 +30,8 @@ Result<StripeStack> read_stripe_stack(const std::filesystem::path& folder, const
 Status write_stripe_view(const std::filesystem::path& folder, const StripeStack& stack);
 
 /// Each picture of the pair from the rows of an interlaced frame that show it, the rows between interpolated.
-StripePair deinterlaced(const Image8& frame);
+/// The slide is on every second row from `slide_row`, 0 or 1.
+StripePair deinterlaced(const Image8& frame, int slide_row = 0);
 
 /// Writes the slides to project, named as above, to an existing folder. Fails where stripes are narrower than
 /// a pixel.

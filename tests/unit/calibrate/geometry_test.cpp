@@ -191,6 +191,19 @@ TEST(Geometry, ViewWithoutBoardIsRefused) {
   EXPECT_THAT(view.refused, HasSubstr("the whole board is not seen"));
 }
 
+TEST(Geometry, DimPicturesAreMeasuredToo) {
+  const Rig rig = truth();
+  const Pose pose = example_poses(rig, kBoard, 1.0, 1, 1).at(0);
+  std::vector<Image8> pictures = render_gray_view(rig, kBoard, pose, {.noise = 0.5});
+  for (Image8& picture : pictures) {
+    for (std::size_t i = 0; i < picture.size(); ++i) picture.data()[i] /= 6;
+  }
+  WorkerPool pool(2);
+  const auto view = measure_view("v", stack_of(rig, pictures), kBoard, {}, pool);
+  EXPECT_EQ(view.refused, "");
+  EXPECT_GE(view.corners.size(), 60u);
+}
+
 TEST(Geometry, ResidualPictureIsDrawn) {
   const Rig rig = truth();
   const auto geometry = calibrate(rig, ideal_views(rig, 4, 0.1));

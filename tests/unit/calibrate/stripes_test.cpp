@@ -194,7 +194,8 @@ TEST(StripeFolder, SlidesAsWrittenAreDecodedBack) {
     const auto edges = decode_stripes(*stack, kNoMatrix, pool);
     ASSERT_TRUE(edges.ok()) << edges.error().message;
     EXPECT_GT(edges->columns.edges.size(), 2u * 15 * 230);
-    EXPECT_GT(edges->rows.edges.size(), 2u * 11 * 310);
+    // Beside a field's rows, what lies between them is interpolated: some edges there are given up.
+    EXPECT_GT(edges->rows.edges.size(), 2u * 11 * (scan == Scan::kProgressive ? 310 : 240));
     for (const GrayEdge& e : edges->columns.edges) ASSERT_NEAR(e.x, e.value, 0.6);
     for (const GrayEdge& e : edges->rows.edges)
       ASSERT_NEAR(e.y, e.value, scan == Scan::kProgressive ? 0.6 : 1.1);
