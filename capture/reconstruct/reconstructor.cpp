@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "base/time.h"
 #include "capture/reconstruct/consistency.h"
+#include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
@@ -90,6 +91,7 @@ struct Reconstructor::State {
         sequence(p),
         refiner(r.colour_matrix),
         triangulator(r, p, line_count(r), line_step(r)),
+        depths(p.boundaries(), r.camera.width, line_count(r)),
         white_texture(r.colour_matrix),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
@@ -108,6 +110,7 @@ struct Reconstructor::State {
   ConsistencyCheck consistency;
   Recovery recovery;
   Triangulator triangulator;
+  DepthRange depths;
   WhiteTexture white_texture;
   SurfaceBuilder surface_builder;
 
@@ -172,6 +175,7 @@ bool Reconstructor::State::match_ordered(SlideOrder tried, SequenceResult& out) 
   SequenceContext context{.order = tried};
   if (have_older) context.other = &older.difference;
   if (have_same) context.same = &same.difference;
+  context.expected = depths.columns();
   sequence.decode(edges, context, pool, out);
   return out.counts.in_order * 2 > edges.edges.size();
 }
@@ -244,6 +248,7 @@ void Reconstructor::State::triangulate() {
   if (paper()) return;
   for (const RecoveredBoundary& r : recovered)
     add_vertex(r.boundary, r.line, r.column_px, r.sigma_px, r.slope);
+  depths.update(vertices, triangulator);
 }
 
 /// Whatever it holds is overwritten.
