@@ -12,6 +12,7 @@
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
@@ -92,6 +93,7 @@ struct Reconstructor::State {
         refiner(r.colour_matrix),
         triangulator(r, p, line_count(r), line_step(r)),
         depths(p.boundaries(), r.camera.width, line_count(r)),
+        instant(p.boundaries(), line_count(r), 1e9 / r.frame_rate),
         white_texture(r.colour_matrix),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
@@ -111,6 +113,7 @@ struct Reconstructor::State {
   Recovery recovery;
   Triangulator triangulator;
   DepthRange depths;
+  InstantFilter instant;
   WhiteTexture white_texture;
   SurfaceBuilder surface_builder;
 
@@ -310,6 +313,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
   Frame3D out = s.blank_frame();
   out.number = frame.number;
   out.time_ns = frame.time_ns;
+  if (!s.paper()) s.instant.adjust(frame.time_ns, s.result, s.edges, s.recovered);
   s.triangulate();
   s.report.triangulate_ms = clock.lap_ms();
 
