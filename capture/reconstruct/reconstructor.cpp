@@ -8,9 +8,11 @@
 #include "base/parallel.h"
 #include "base/time.h"
 #include "capture/reconstruct/consistency.h"
+#include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
@@ -90,6 +92,8 @@ struct Reconstructor::State {
         sequence(p),
         refiner(r.colour_matrix),
         triangulator(r, p, line_count(r), line_step(r)),
+        depths(p.boundaries(), r.camera.width, line_count(r)),
+        instant(p.boundaries(), line_count(r), 1e9 / r.frame_rate),
         white_texture(r.colour_matrix),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
@@ -108,6 +112,8 @@ struct Reconstructor::State {
   ConsistencyCheck consistency;
   Recovery recovery;
   Triangulator triangulator;
+  DepthRange depths;
+  InstantFilter instant;
   WhiteTexture white_texture;
   SurfaceBuilder surface_builder;
 
@@ -172,6 +178,7 @@ bool Reconstructor::State::match_ordered(SlideOrder tried, SequenceResult& out) 
   SequenceContext context{.order = tried};
   if (have_older) context.other = &older.difference;
   if (have_same) context.same = &same.difference;
+  context.expected = depths.columns();
   sequence.decode(edges, context, pool, out);
   return out.counts.in_order * 2 > edges.edges.size();
 }
@@ -245,6 +252,7 @@ void Reconstructor::State::triangulate() {
   if (paper()) return;
   for (const RecoveredBoundary& r : recovered)
     add_vertex(r.boundary, r.line, r.column_px, r.sigma_px, r.slope);
+  depths.update(vertices, triangulator);
 }
 
 /// Whatever it holds is overwritten.
@@ -306,6 +314,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
   Frame3D out = s.blank_frame();
   out.number = frame.number;
   out.time_ns = frame.time_ns;
+  if (!s.paper()) s.instant.adjust(frame.time_ns, s.result, s.edges, s.recovered);
   s.triangulate();
   s.report.triangulate_ms = clock.lap_ms();
 

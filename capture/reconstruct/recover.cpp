@@ -22,6 +22,7 @@ constexpr float kLeastAgree_px = 0.25F;  // but at least
 constexpr float kOtherSlide_px = 0.5F;   // between its places under both slides
 constexpr float kContrasty = 0.1F;       // contrast of the scene that may be a surface's end
 constexpr float kContradicts_px = 1.F;   // between a detected boundary's places under both slides
+constexpr float kMoves_px = 2.5F;        // where the scene moves
 constexpr float kWidest_px = 40.F;       // of a stripe
 constexpr float kDoubtful_px = 0.5F;     // standard deviation beyond which a doubted boundary is given up
 constexpr float kGoesOn_px = 0.5F;       // from one line to the next
@@ -125,7 +126,9 @@ void Recovery::check_line(const RecoveryView& view, const Refiner& refiner, cons
     const Refiner::Place other =
         refiner.find(*view.other, line, column,
                      {sides(left), sides(right), view.other_colours[static_cast<std::size_t>(b)]});
-    if (!other.visible || (other.found && std::fabs(other.column_px - column) < kContradicts_px)) continue;
+    // Where the scene moves, the other slide saw the boundary elsewhere.
+    const float near_px = result.still[e] ? kContradicts_px : kMoves_px;
+    if (!other.visible || (other.found && std::fabs(other.column_px - column) < near_px)) continue;
     result.boundary[e] = -1;
   }
 }

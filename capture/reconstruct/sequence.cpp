@@ -21,10 +21,11 @@ constexpr OrderRules kOrder{
     .per_missing = 0.5F,  // less for each boundary missed in between
     .max_missing = 3,
 };
-constexpr float kJump = -1.6F;     // a depth step: anything may follow
-constexpr int kMaxSkipped = 3;     // false edges between two that follow each other
-constexpr float kClear = 0.5F;     // of a channel's evidence: leaves no doubt about its sign
-constexpr float kNoStripe = -100;  // agreement with what no stripe is
+constexpr float kJump = -1.6F;       // a depth step: anything may follow
+constexpr float kUnexpected = 1.0F;  // less for a boundary where no depth seen before would put it
+constexpr int kMaxSkipped = 3;       // false edges between two that follow each other
+constexpr float kClear = 0.5F;       // of a channel's evidence: leaves no doubt about its sign
+constexpr float kNoStripe = -100;    // agreement with what no stripe is
 
 // How far an edge may have moved in two frames: 1 m/s in depth is 10 px where a stripe is 8 wide.
 constexpr float kSearch_px = 14;
@@ -157,6 +158,10 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
       *gains = gain(edge, beside_[index], context, clear) - kGains.threshold;
     } else {
       used = kernels.choose(shown.table, agreement_of(edge, beside_[index]), kGains, boundary, gains);
+      for (int i = 0; i < used && context.expected != nullptr; ++i) {
+        const auto [low, high] = (*context.expected)[static_cast<std::size_t>(boundary[i])];
+        if (edge.column_px < low || edge.column_px > high) gains[i] -= kUnexpected;
+      }
     }
     const float jump_from = best_so_far + kJump;
     const bool jump = jump_from > 0;  // a path may start anywhere
@@ -311,12 +316,15 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
     s.in_order = 0;
   }
   beside_.resize(edges.edges.size());
+  out.still.resize(edges.edges.size());
   convincing_.resize(edges.edges.size());
   pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) {
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
         beside_[e] = look_beside(edges.edges[e], line, context);
+        out.still[e] = beside_[e].tracked;
+      }
       decode_line(edges, line, context, scratch_[static_cast<std::size_t>(worker)], out);
     }
   });

@@ -12,6 +12,7 @@
 
 #include "base/parallel.h"
 #include "base/pattern.h"
+#include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/line_path.h"
 #include "capture/reconstruct/match.h"
@@ -28,7 +29,8 @@ struct SequenceCounts {
 struct SequenceResult {
   std::vector<std::int16_t> boundary;  // one an edge: its index in the pattern, or -1
   std::vector<std::int16_t>
-      doubted;  // one an edge: its boundary where the surface does not confirm it, or -1
+      doubted;                      // one an edge: its boundary where the surface does not confirm it, or -1
+  std::vector<std::uint8_t> still;  // one an edge: two frames ago, under the same slide, it was where it is
   SequenceCounts counts;
   double score = 0;  // sum over the lines: the greater, the better the slides' order explains the frame
 };
@@ -38,6 +40,7 @@ struct SequenceContext {
   SlideOrder order{};
   const DifferenceImage* other = nullptr;  // the last frame under the other slide
   const DifferenceImage* same = nullptr;   // the last frame before that under the slide that the edges are of
+  const std::vector<ColumnRange>* expected = nullptr;  // of each boundary, from the depths before
 };
 
 /// Constant after construction but for scratch memory. One thread.

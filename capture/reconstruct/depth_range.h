@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where on a line a boundary can be seen, if the scene's depths are about those of the frame before. One
+// slide's colours and their order repeat over the pattern; over the depths that there are they seldom do.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "capture/reconstruct/surface.h"
+#include "capture/reconstruct/triangulate.h"
+
+namespace relievo {
+
+/// Camera columns between which a boundary lies.
+using ColumnRange = std::array<float, 2>;
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class DepthRange {
+ public:
+  /// `width` of the camera's picture, `lines` of detection.
+  DepthRange(int boundaries, int width, int lines);
+
+  /// From a frame's points; few of them change nothing.
+  void update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator);
+
+  /// One a boundary; null until a frame was seen.
+  const std::vector<ColumnRange>* columns() const { return known_ ? &columns_ : nullptr; }
+
+ private:
+  bool known_ = false;
+  int width_, lines_;
+  std::vector<ColumnRange> columns_;
+  std::vector<float> inverse_depths_;
+};
+
+}  // namespace relievo

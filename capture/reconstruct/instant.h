@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Boundaries at one instant. A boundary is found where slide and complement balance: half way between their
+// exposures, a quarter of a frame after the frame's time stamp. Where it was in the frame before tells how
+// fast it moves, and so where it was at the time stamp; where nothing moves, it averages noise.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/recover.h"
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+
+/// Remembers where the last frame had its boundaries. One thread.
+class InstantFilter {
+ public:
+  /// `frame_ns` is the time from one frame to the next.
+  InstantFilter(int boundaries, int lines, double frame_ns);
+
+  /// Moves columns of `edges` and `recovered` to `time_ns`, the frame's time stamp, where the boundary was
+  /// seen in the frame before, too, and moved no more than its neighbours; updates standard deviations.
+  void adjust(std::int64_t time_ns, const SequenceResult& result, EdgeImage& edges,
+              std::vector<RecoveredBoundary>& recovered);
+
+ private:
+  struct Seen {
+    float column_px;
+    float sigma_px;  // infinite where there is none
+  };
+  Seen* row(std::vector<Seen>& grid, int line) const;
+  void fill(const SequenceResult& result, const EdgeImage& edges,
+            const std::vector<RecoveredBoundary>& recovered);
+  void adjust_one(int line, int boundary, float share, float& column_px, float& sigma_px);
+
+  int boundaries_, lines_;
+  double frame_ns_;
+  std::size_t stride_;
+  std::int64_t before_ns_ = 0;
+  bool have_before_ = false;
+  std::vector<Seen> now_, before_;  // [line][boundary] with a margin of one
+};
+
+}  // namespace relievo
