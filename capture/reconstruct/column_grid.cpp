@@ -2,6 +2,7 @@
 #include "capture/reconstruct/column_grid.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 
@@ -51,33 +52,38 @@ bool surface_goes_on_along(const std::array<float, 4>& x, float gap, const Colum
   return std::fabs(d) <= kLean_px * step + slack;
 }
 
-void find_links(const ColumnGrid& grid, const ColumnScale& scale, GridLinks& out) {
+void find_links(const ColumnGrid& grid, const ColumnScale& scale, WorkerPool& pool, GridLinks& out) {
   const std::size_t cells =
       static_cast<std::size_t>(grid.boundaries()) * static_cast<std::size_t>(grid.lines());
   out.across.assign(cells, 0);
   out.along.assign(cells, 0);
-  out.steps = 0;
-  for (int l = 0; l < grid.lines(); ++l) {
-    const float* here = grid.line(l);
-    const float* above = grid.line(l - 1);
-    const float* below = grid.line(l + 1);
-    const float* further = grid.line(l + 2);
-    const std::size_t row = static_cast<std::size_t>(l) * static_cast<std::size_t>(grid.boundaries());
-    for (int b = 0; b < grid.boundaries(); ++b) {
-      if (!known(here[b])) continue;
-      const std::size_t cell = row + static_cast<std::size_t>(b);
-      if (known(here[b + 1])) {
-        const bool on = surface_goes_on_across({here[b - 1], here[b], here[b + 1], here[b + 2]}, 1, scale);
-        out.across[cell] = on;
-        out.steps += !on;
-      }
-      if (known(below[b])) {
-        const bool on = surface_goes_on_along({above[b], here[b], below[b], further[b]}, 1, scale);
-        out.along[cell] = on;
-        out.steps += !on;
+  std::atomic<std::size_t> steps{0};
+  pool.for_ranges(grid.lines(), [&](int begin, int end, int) {
+    std::size_t own_steps = 0;
+    for (int l = begin; l < end; ++l) {
+      const float* here = grid.line(l);
+      const float* above = grid.line(l - 1);
+      const float* below = grid.line(l + 1);
+      const float* further = grid.line(l + 2);
+      const std::size_t row = static_cast<std::size_t>(l) * static_cast<std::size_t>(grid.boundaries());
+      for (int b = 0; b < grid.boundaries(); ++b) {
+        if (!known(here[b])) continue;
+        const std::size_t cell = row + static_cast<std::size_t>(b);
+        if (known(here[b + 1])) {
+          const bool on = surface_goes_on_across({here[b - 1], here[b], here[b + 1], here[b + 2]}, 1, scale);
+          out.across[cell] = on;
+          own_steps += !on;
+        }
+        if (known(below[b])) {
+          const bool on = surface_goes_on_along({above[b], here[b], below[b], further[b]}, 1, scale);
+          out.along[cell] = on;
+          own_steps += !on;
+        }
       }
     }
-  }
+    steps += own_steps;
+  });
+  out.steps = steps;
 }
 
 void fill_holes(int size, const ColumnScale& scale, ColumnGrid& grid, std::vector<Hole>& out) {

@@ -11,6 +11,8 @@
 #include <limits>
 #include <vector>
 
+#include "base/parallel.h"
+
 namespace relievo {
 
 /// [line][boundary], NaN where nothing was decoded, with a margin of two on all sides that holds nothing, so
@@ -58,7 +60,7 @@ struct GridLinks {
   std::vector<std::uint8_t> along;   // 1: to the same boundary on the next line
   std::size_t steps = 0;             // places where both are there and the surface does not go on
 };
-void find_links(const ColumnGrid& grid, const ColumnScale& scale, GridLinks& out);
+void find_links(const ColumnGrid& grid, const ColumnScale& scale, WorkerPool& pool, GridLinks& out);
 
 struct Hole {
   std::uint16_t boundary;

@@ -70,10 +70,10 @@ const float* ConsistencyCheck::row(const std::vector<float>& grid, int line) con
   return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
 }
 
-/// Median standard deviation of the decoded edges.
+/// Median standard deviation of the decoded edges, of every fourth.
 float ConsistencyCheck::usual_sigma(const EdgeImage& edges, const SequenceResult& result) {
   sigmas_.clear();
-  for (std::size_t i = 0; i < edges.edges.size(); ++i)
+  for (std::size_t i = 0; i < edges.edges.size(); i += 4)
     if (result.boundary[i] >= 0) sigmas_.push_back(edges.edges[i].sigma_px);
   if (sigmas_.empty()) return kLeastNoise_px;
   const auto middle = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);

@@ -97,6 +97,7 @@ struct Reconstructor::State {
         white_texture(r.colour_matrix),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
+    worker_vertices.resize(static_cast<std::size_t>(pool.threads()));
   }
 
   Rig rig;
@@ -131,6 +132,14 @@ struct Reconstructor::State {
   EdgeImage edges;
   SequenceResult result, other_result;
   std::vector<RecoveredBoundary> recovered;
+  struct EdgePlace {
+    float column_px, sigma_px, slope;
+  };
+  struct Vertices {
+    std::vector<GridVertex> list;
+    std::size_t no_point = 0;
+  };
+  std::vector<Vertices> worker_vertices;
   std::vector<GridVertex> vertices;
   ReconstructReport report;
 
@@ -143,7 +152,7 @@ struct Reconstructor::State {
   bool match_paper(SlideOrder tried, Match& out);
   bool match_ordered(SlideOrder tried, SequenceResult& out);
   void match_in_order(SlideOrder predicted, View8 slide);
-  void add_vertex(int boundary, int line, float column_px, float sigma_px, float slope);
+  void add_vertex(int boundary, int line, const EdgePlace& place, Vertices& out) const;
   void triangulate();
   Frame3D blank_frame();
 };
@@ -219,40 +228,52 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
   }
 }
 
-void Reconstructor::State::add_vertex(int boundary, int line, float column_px, float sigma_px, float slope) {
+void Reconstructor::State::add_vertex(int boundary, int line, const EdgePlace& place, Vertices& out) const {
   if (boundary < 0) return;
-  const auto position = triangulator.point(boundary, line, column_px);
+  const auto position = triangulator.point(boundary, line, place.column_px);
   if (!position) {
-    ++report.filters.no_point;
+    ++out.no_point;
     return;
   }
-  vertices.push_back({{.boundary = static_cast<std::uint16_t>(boundary),
+  out.list.push_back({{.boundary = static_cast<std::uint16_t>(boundary),
                        .line = static_cast<std::uint16_t>(line),
-                       .column_px = column_px,
-                       .sigma_px = sigma_px},
+                       .column_px = place.column_px,
+                       .sigma_px = place.sigma_px},
                       *position,
-                      slope});
+                      place.slope});
 }
 
 void Reconstructor::State::triangulate() {
-  vertices.clear();
-  const auto& starts = paper() ? newer.detection.line_start : edges.line_start;
-  for (int line = 0; line < line_count(rig); ++line) {
-    const auto l = static_cast<std::size_t>(line);
-    for (std::uint32_t i = starts[l]; i < starts[l + 1]; ++i) {
-      if (paper()) {
-        const Boundary& b = newer.detection.boundaries[i];
-        add_vertex(match.boundary[i], line, b.column_px, 0, b.slope);
-      } else {
-        const Edge& e = edges.edges[i];
-        add_vertex(result.boundary[i], line, e.column_px, e.sigma_px, e.slope);
+  for (Vertices& part : worker_vertices) {
+    part.list.clear();
+    part.no_point = 0;
+  }
+  pool.for_ranges(line_count(rig), [&](int begin, int end, int worker) {
+    Vertices& out = worker_vertices[static_cast<std::size_t>(worker)];
+    const auto& starts = paper() ? newer.detection.line_start : edges.line_start;
+    for (int line = begin; line < end; ++line) {
+      const auto l = static_cast<std::size_t>(line);
+      for (std::uint32_t i = starts[l]; i < starts[l + 1]; ++i) {
+        if (paper()) {
+          const Boundary& b = newer.detection.boundaries[i];
+          add_vertex(match.boundary[i], line, {b.column_px, 0, b.slope}, out);
+        } else {
+          const Edge& e = edges.edges[i];
+          add_vertex(result.boundary[i], line, {e.column_px, e.sigma_px, e.slope}, out);
+        }
       }
     }
+  });
+  if (!paper()) {
+    for (const RecoveredBoundary& r : recovered)
+      add_vertex(r.boundary, r.line, {r.column_px, r.sigma_px, r.slope}, worker_vertices.back());
   }
-  if (paper()) return;
-  for (const RecoveredBoundary& r : recovered)
-    add_vertex(r.boundary, r.line, r.column_px, r.sigma_px, r.slope);
-  depths.update(vertices, triangulator);
+  vertices.clear();
+  for (const Vertices& part : worker_vertices) {
+    vertices.insert(vertices.end(), part.list.begin(), part.list.end());
+    report.filters.no_point += part.no_point;
+  }
+  if (!paper()) depths.update(vertices, triangulator);
 }
 
 /// Whatever it holds is overwritten.

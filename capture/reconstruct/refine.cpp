@@ -41,6 +41,11 @@ constexpr float kRowStep = 0.12F;           // difference, of the sum, that is a
 constexpr float kRowNoise = 3.F;            // grey levels more: noise
 constexpr float kStepNear_px = 1.2F;
 
+/// Of a column that is not negative; a call of std::lround takes ten times as long.
+int column_of(float column_px) {
+  return static_cast<int>(column_px + 0.5F);
+}
+
 /// True where the steepest place of a step of `white` around `column_px` is there.
 bool steepest_at(const float* white, int centre, float column_px) {
   float brightest = 0;
@@ -65,10 +70,26 @@ bool steepest_at(const float* white, int centre, float column_px) {
   return std::fabs(place - column_px) < kStepNear_px;
 }
 
+/// 0..1, of the scene in white light on this line and those beside it.
+template <int kAround_px>
+float contrast_around(const DifferenceImage& image, int line, int centre) {
+  static_assert(kContrastLines == 1);
+  const float* above = image.white_line(std::max(0, line - 1)) + centre - kAround_px;
+  const float* here = image.white_line(line) + centre - kAround_px;
+  const float* below = image.white_line(std::min(image.lines - 1, line + 1)) + centre - kAround_px;
+  float brightest = 0;
+  float darkest = 1e9F;
+  for (int i = 0; i <= 2 * kAround_px; ++i) {
+    brightest = std::max(brightest, std::max(std::max(above[i], here[i]), below[i]));
+    darkest = std::min(darkest, std::min(std::min(above[i], here[i]), below[i]));
+  }
+  return (brightest - darkest) / (brightest + darkest + kDark);
+}
+
 }  // namespace
 
 bool same_surface(View8 slide, int line, int other, float column_px) {
-  const int centre = static_cast<int>(std::lround(column_px));
+  const int centre = column_of(column_px);
   if (other < 0 || other >= slide.height || centre < kRowReach_px || centre + kRowReach_px >= slide.width)
     return false;
   const std::uint8_t* here = slide.row(line);
@@ -96,56 +117,90 @@ Refiner::Refiner(const std::array<double, 9>& colour_matrix) {
   }
 }
 
-/// Luma of the difference over that of the sum: the projected light's own, whatever the surface.
-float Refiner::ratio(const float* d, const float* white, int width, int x) const {
-  return (luma_[0] * d[x] + luma_[1] * d[width + x] + luma_[2] * d[2 * width + x]) / (white[x] + kDark);
+/// What luma_place asks of the columns around it, each of them once: difference over sum is the projected
+/// light's own, whatever the surface.
+struct Refiner::Light {
+  static constexpr int kColumns = 16;
+  static_assert(kColumns >= 2 * kReach_px + 1);
+  int first;  // column
+  std::array<float, kColumns> red, green, blue, luma;
+  std::array<std::uint8_t, kColumns> ends;  // 1: the scene changes from the column before to the one behind
+};
+
+Refiner::Light Refiner::light_around(const DifferenceImage& image, int line, int centre) const {
+  Light out;
+  out.first = std::clamp(centre - Light::kColumns / 2, 0, image.width - Light::kColumns);
+  const float* red = image.line(line) + out.first;
+  const float* green = red + image.width;
+  const float* blue = green + image.width;
+  const float* white = image.white_line(line) + out.first;
+  for (std::size_t i = 0; i < Light::kColumns; ++i) {
+    const float unit = 1.F / (white[i] + kDark);
+    out.red[i] = red[i] * unit;
+    out.green[i] = green[i] * unit;
+    out.blue[i] = blue[i] * unit;
+    out.luma[i] = luma_[0] * out.red[i] + luma_[1] * out.green[i] + luma_[2] * out.blue[i];
+  }
+  std::array<float, Light::kColumns + 2> around{};
+  std::copy_n(white, Light::kColumns, around.begin() + 1);
+  const bool at_left = out.first == 0;
+  const bool at_right = out.first + Light::kColumns == image.width;
+  if (!at_left) around.front() = white[-1];
+  if (!at_right) around.back() = white[Light::kColumns];
+  for (std::size_t i = 0; i < Light::kColumns; ++i)
+    out.ends[i] = std::fabs(around[i + 2] - around[i]) > kBreak * (around[i + 2] + around[i] + kDark);
+  if (at_left) out.ends.front() = 1;
+  if (at_right) out.ends.back() = 1;
+  return out;
 }
 
 /// Columns from `centre` on in the direction of `step` that show the same surface in the same light, as far
 /// as luma tells, `reach` at most.
-int Refiner::clear_run(const float* white, int width, int centre, int step, int reach) {
+int Refiner::clear_run(const Light& light, int centre, int step, int reach) {
   int run = 1;
   for (; run < reach; ++run) {
-    const int x = centre + step * run;
-    if (x < 1 || x + 1 >= width) break;
-    if (std::fabs(white[x + 1] - white[x - 1]) > kBreak * (white[x + 1] + white[x - 1] + kDark)) break;
+    const int i = centre + step * run - light.first;
+    if (i < 0 || i >= Light::kColumns || light.ends[static_cast<std::size_t>(i)]) break;
   }
   return run;
 }
 
 Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, const Sides& sides,
                                        float share, float own) const {
-  const int width = image.width;
-  const int centre = static_cast<int>(std::lround(own));
-  const float* d = image.line(line);
-  const float* white = image.white_line(line);
-  std::array<float, 2 * kReach_px + 1> y{};
-  for (int i = 0; i <= 2 * kReach_px; ++i)
-    y[static_cast<std::size_t>(i)] = ratio(d, white, width, centre - kReach_px + i);
-  const auto at = [&](int x) { return y[static_cast<std::size_t>(x - centre + kReach_px)]; };
+  const int centre = column_of(own);
+  const Light light = light_around(image, line, centre);
+  const auto at = [&](int x) { return light.luma[static_cast<std::size_t>(x - light.first)]; };
 
   LumaPlace out{own, 0, 0, 0, false};
-  out.contrast = contrast_around(image, line, centre, kLumaReach_px);
+  out.contrast = contrast_around<kLumaReach_px>(image, line, centre);
   float place = own;
+  const auto reach_in = [](float free) { return std::clamp(static_cast<int>(free - 1.F), 2, kPlateau_px); };
+  std::array<int, 3> last{};
   for (int round = 0; round < 2; ++round) {
+    const std::array reach_of{reach_in(sides.free_left_px + (place - own)),
+                              reach_in(sides.free_right_px - (place - own))};
+    const std::array columns{column_of(place), reach_of[0], reach_of[1]};
+    if (round > 0 && columns == last) break;  // it would find the same
+    last = columns;
     // Plateaus of both sides, and how strong each channel comes back from this surface.
     std::array<float, 2> measured{};
     std::array<int, 2> samples{};
     std::array<float, 3> amplitude{};
     for (int s = 0; s < 2; ++s) {
       const int direction = s == 0 ? -1 : 1;
-      const float free = s == 0 ? sides.free_left_px + (place - own) : sides.free_right_px - (place - own);
-      const int middle = static_cast<int>(std::lround(place));
-      const int reach = std::clamp(static_cast<int>(free - 1.F), 2, kPlateau_px);
-      const int run = clear_run(white, width, middle, direction, reach + 1);
+      const int middle = columns[0];
+      const int reach = reach_of[static_cast<std::size_t>(s)];
+      const int run = clear_run(light, middle, direction, reach + 1);
       std::array<float, 3> sum{};
       float level = 0;
       int n = 0;
       for (int i = 2; i <= reach; ++i) {
         const int x = middle + direction * i;
         if (i >= run || x < centre - kReach_px || x > centre + kReach_px) break;
-        const float unit = 1.F / (white[x] + kDark);
-        for (int c = 0; c < 3; ++c) sum[static_cast<std::size_t>(c)] += d[c * width + x] * unit;
+        const auto i_light = static_cast<std::size_t>(x - light.first);
+        sum[0] += light.red[i_light];
+        sum[1] += light.green[i_light];
+        sum[2] += light.blue[i_light];
         level += at(x);
         ++n;
       }
@@ -207,38 +262,25 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
   return out;
 }
 
-/// 0..1, of the scene in white light on this line and those beside it.
-float Refiner::contrast_around(const DifferenceImage& image, int line, int centre, int reach) {
-  float brightest = 0;
-  float darkest = 1e9F;
-  for (int l = std::max(0, line - kContrastLines); l <= std::min(image.lines - 1, line + kContrastLines);
-       ++l) {
-    const float* w = image.white_line(l);
-    for (int x = centre - reach; x <= centre + reach; ++x) {
-      brightest = std::max(brightest, w[x]);
-      darkest = std::min(darkest, w[x]);
-    }
-  }
-  return (brightest - darkest) / (brightest + darkest + kDark);
-}
-
 void Refiner::look_around(const DifferenceImage& image, int line, Edge& edge) {
-  const int centre = static_cast<int>(std::lround(edge.column_px));
+  const int centre = column_of(edge.column_px);
   if (centre < kReach_px || centre + kReach_px >= image.width) return;
-  edge.at_step = steepest_at(image.white_line(line), centre, edge.column_px);
-  edge.contrast = contrast_around(image, line, centre, kContrastReach_px);
+  edge.contrast = contrast_around<kContrastReach_px>(image, line, centre);
+  // The line alone has no more contrast than it has with its neighbours.
+  edge.at_step =
+      edge.contrast >= kStepContrast && steepest_at(image.white_line(line), centre, edge.column_px);
 }
 
 Refiner::Place Refiner::find(const DifferenceImage& image, int line, float column_px,
                              const Sides& sides) const {
-  const int centre = static_cast<int>(std::lround(column_px));
+  const int centre = column_of(column_px);
   if (centre < kReach_px || centre + kReach_px >= image.width) return {column_px, 0, false, false};
   const LumaPlace luma = luma_place(
       image, line, {sides.free_left_px, sides.free_right_px, sides.colours, true}, share_, column_px);
   if (std::fabs(luma.rise) < kLeastRise) return {column_px, 0, false, false};
   if (!luma.found || luma.slope < kLeastSlope * std::fabs(luma.rise)) return {column_px, 0, false, true};
   const float sigma = luma_sigma(image, line, luma);
-  const float level = kLevelShare * contrast_around(image, line, centre, kLumaReach_px) / luma.slope;
+  const float level = kLevelShare * contrast_around<kLumaReach_px>(image, line, centre) / luma.slope;
   return {luma.column_px, std::sqrt(sigma * sigma + level * level), true, true};
 }
 
@@ -269,7 +311,7 @@ void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlac
 }
 
 float Refiner::luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const {
-  const int x = std::clamp(static_cast<int>(std::lround(luma.column_px)), 0, image.width - 1);
+  const int x = std::clamp(column_of(luma.column_px), 0, image.width - 1);
   const float noise = image.noise *
                       std::sqrt(luma_[0] * luma_[0] + luma_[1] * luma_[1] + luma_[2] * luma_[2]) /
                       (image.white_line(line)[x] + kDark);
@@ -283,10 +325,11 @@ float Refiner::projected_share(const DifferenceImage& image, const SequenceResul
                                const EdgeImage& edges) const {
   constexpr int kBins = 64;
   constexpr int kSide_px = 3;
-  constexpr std::uint32_t kEvery = 5;
+  constexpr std::uint32_t kEvery = 3;
+  constexpr int kEveryLine = 3;
   std::array<std::uint32_t, kBins> histogram{};
   std::uint32_t total = 0;
-  for (int line = 0; line < edges.lines; ++line) {
+  for (int line = 0; line < edges.lines; line += kEveryLine) {
     const float* d = image.line(line);
     const float* white = image.white_line(line);
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
@@ -294,7 +337,7 @@ float Refiner::projected_share(const DifferenceImage& image, const SequenceResul
       if (result.boundary[e] < 0) continue;
       const auto [left, right] = colours[static_cast<std::size_t>(result.boundary[e])];
       const float step = ratio_[right] - ratio_[left];
-      const int centre = static_cast<int>(std::lround(edges.edges[e].column_px));
+      const int centre = column_of(edges.edges[e].column_px);
       if (std::fabs(step) < 0.5F || centre < kSide_px || centre + kSide_px >= image.width) continue;
       const auto ratio = [&](int x) {
         return (luma_[0] * d[x] + luma_[1] * d[image.width + x] + luma_[2] * d[2 * image.width + x]) /

@@ -58,13 +58,13 @@ class Refiner {
   };
   float projected_share(const DifferenceImage& image, const SequenceResult& result,
                         const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) const;
-  float ratio(const float* d, const float* white, int width, int x) const;
-  static int clear_run(const float* white, int width, int centre, int step, int reach);
+  struct Light;
+  Light light_around(const DifferenceImage& image, int line, int centre) const;
+  static int clear_run(const Light& light, int centre, int step, int reach);
   LumaPlace luma_place(const DifferenceImage& image, int line, const Sides& sides, float share,
                        float own) const;
   float luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const;
   Drawn colour_drawn(const DifferenceImage& image, const EdgeImage& edges);
-  static float contrast_around(const DifferenceImage& image, int line, int centre, int reach);
   static void look_around(const DifferenceImage& image, int line, Edge& edge);
   void refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
                    Edge& edge) const;

@@ -38,7 +38,7 @@ class SurfaceBuilder {
  private:
   void fill_columns(const std::vector<GridVertex>& vertices);
   float usual_sigma_px(const std::vector<GridVertex>& vertices);
-  void finish(Surface& out) const;
+  void finish(WorkerPool& pool, Surface& out) const;
 
   Rig rig_;
   int boundaries_, lines_, line_step_px_;
