@@ -17,7 +17,9 @@
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/surface_builder.h"
 #include "capture/reconstruct/texture.h"
+#include "capture/reconstruct/trace.h"
 #include "capture/reconstruct/triangulate.h"
+#include "capture/reconstruct/weak_signal.h"
 #include "capture/reconstruct/white_texture.h"
 
 namespace relievo {
@@ -104,6 +106,8 @@ struct Reconstructor::State {
   Differencer differencer;
   EdgeFinder edge_finder;
   SequenceDecoder sequence;
+  WeakSignal weak_signal;
+  Tracer tracer;
   Refiner refiner;
   ConsistencyCheck consistency;
   Recovery recovery;
@@ -135,6 +139,7 @@ struct Reconstructor::State {
   void observe(const CapturedFrame& frame);
   bool shows_same_slide() const;
   bool match_paper(SlideOrder tried, Match& out);
+  SequenceContext context(SlideOrder tried) const;
   bool match_ordered(SlideOrder tried, SequenceResult& out);
   void match_in_order(SlideOrder predicted, View8 slide);
   void add_vertex(int boundary, int line, float column_px, float sigma_px, float slope);
@@ -148,6 +153,7 @@ void Reconstructor::State::observe(const CapturedFrame& frame) {
     report.boundaries = newer.detection.boundaries.size();
   } else {
     differencer.difference(frame, pool, newer.difference);
+    weak_signal.average(pool, newer.difference);
     edge_finder.find(newer.difference, pool, edges);
     report.boundaries = edges.edges.size();
   }
@@ -168,11 +174,14 @@ bool Reconstructor::State::match_paper(SlideOrder tried, Match& out) {
   return out.valid * 2 > newer.detection.boundaries.size();
 }
 
+SequenceContext Reconstructor::State::context(SlideOrder tried) const {
+  return {.order = tried,
+          .other = have_older ? &older.difference : nullptr,
+          .same = have_same ? &same.difference : nullptr};
+}
+
 bool Reconstructor::State::match_ordered(SlideOrder tried, SequenceResult& out) {
-  SequenceContext context{.order = tried};
-  if (have_older) context.other = &older.difference;
-  if (have_same) context.same = &same.difference;
-  sequence.decode(edges, context, pool, out);
+  sequence.decode(edges, context(tried), pool, out);
   return out.counts.in_order * 2 > edges.edges.size();
 }
 
@@ -194,8 +203,11 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
   if (paper()) {
     report.matched = match.valid;
   } else {
+    const TraceCounts traced = tracer.trace(newer.difference, sequence, context(order), pool, result, edges);
     refiner.refine(newer.difference, slide, result, sequence.shown_colours(order), pool, edges);
     const ConsistencyCounts checked = consistency.check(pattern.boundaries(), pool, result, edges);
+    report.filters.traced = traced.added;
+    report.filters.retraced = traced.moved;
     report.filters.unsupported = result.counts.unsupported;
     report.filters.completed = result.counts.completed;
     report.filters.rejected = checked.rejected;
@@ -206,8 +218,8 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
                       .other = have_older ? &older.difference : nullptr,
                       .other_colours = sequence.shown_colours(other(order))},
                      refiner, edges, result, pool, recovered);
-    report.matched =
-        result.counts.in_order - result.counts.unsupported + result.counts.completed + recovered.size();
+    report.matched = result.counts.in_order - result.counts.unsupported + result.counts.completed +
+                     traced.added + recovered.size();
   }
 }
 

@@ -213,10 +213,11 @@ float Refiner::contrast_around(const DifferenceImage& image, int line, int centr
   float darkest = 1e9F;
   for (int l = std::max(0, line - kContrastLines); l <= std::min(image.lines - 1, line + kContrastLines);
        ++l) {
+    // What is dark over two pixels only is speckle, no step of the scene.
     const float* w = image.white_line(l);
     for (int x = centre - reach; x <= centre + reach; ++x) {
       brightest = std::max(brightest, w[x]);
-      darkest = std::min(darkest, w[x]);
+      darkest = std::min(darkest, std::max(std::max(w[x - 1], w[x]), w[x + 1]));
     }
   }
   return (brightest - darkest) / (brightest + darkest + kDark);
@@ -270,7 +271,7 @@ void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlac
 
 float Refiner::luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const {
   const int x = std::clamp(static_cast<int>(std::lround(luma.column_px)), 0, image.width - 1);
-  const float noise = image.noise *
+  const float noise = image.noise_at(line, x) *
                       std::sqrt(luma_[0] * luma_[0] + luma_[1] * luma_[1] + luma_[2] * luma_[2]) /
                       (image.white_line(line)[x] + kDark);
   return kLumaFactor * noise / luma.slope;
