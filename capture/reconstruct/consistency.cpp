@@ -15,6 +15,13 @@ constexpr float kStraightFit = 1.4F;
 constexpr float kBentFit = 3.F;
 constexpr float kLeastNoise_px = 0.01F;
 
+// Scatter over lines.
+constexpr int kApart = 3;                   // lines whose noise no low-pass shares
+constexpr float kMedianOfNormal = 0.6745F;  // of |N(0, 1)|
+constexpr float kBendGain = 2.4495F;        // of [1 -2 1], the square root of 6
+constexpr float kRough = 2.F;               // times what noise gives: there is speckle
+constexpr float kSpeckleTail = 1.5F;        // speckle's tails are longer than noise's
+
 // Where a neighbourhood is no longer taken to be straight.
 constexpr float kBendAcross_px = 0.4F;     // second difference over boundaries, and
 constexpr float kBendAcrossShare = 0.08F;  // of their spacing more
@@ -33,6 +40,10 @@ constexpr float kDoubtAlong_px = 0.2F;    // where lines above or below are othe
 constexpr float kDoubtAcross_px = 0.05F;  // where boundaries beside it are
 
 // What is settled and what is given up.
+constexpr float kSqueezed = 0.75F;        // of the distances beside, two distances that hide a depth step
+constexpr float kSqueezedEach = 0.95F;    // and each of the two
+constexpr float kSqueezedAlone = 0.6F;    // or one, where the boundary has one neighbour only
+constexpr float kStripe_px = 10.5F;       // stripes wider than this allow for as much more than the following
 constexpr float kSuspect_px = 0.1F;       // worse than this, a boundary is weighed against its neighbours
 constexpr float kAgree = 3.F;             // standard deviations between a boundary and a prediction of it
 constexpr float kAlone_px = 0.1F;         // beside a step, without a prediction that agrees
@@ -61,6 +72,28 @@ bool known(float x) {
   return x == x;
 }
 
+/// True where a boundary, at x[0] among those of its line, is closer to its neighbours than these are to
+/// theirs. A depth step that hides the boundary's true place looks so: its two sides show the stripes of a
+/// boundary.
+bool squeezed(const float* x) {
+  const float left = x[0] - x[-1];
+  const float right = x[1] - x[0];
+  const float before = x[-1] - x[-2];
+  const float after = x[2] - x[1];
+  if (left < 0 || right < 0) return false;  // another surface in front
+  if (!known(right)) return left < kSqueezedAlone * before;
+  if (!known(left)) return right < kSqueezedAlone * after;
+  return left + right < 2 * kSqueezed * std::min(before, after) && left < kSqueezedEach * before &&
+         right < kSqueezedEach * after;
+}
+
+/// Of one value or more, whose order changes.
+float median(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace
 
 float* ConsistencyCheck::row(std::vector<float>& grid, int line) const {
@@ -76,9 +109,36 @@ float ConsistencyCheck::usual_sigma(const EdgeImage& edges, const SequenceResult
   for (std::size_t i = 0; i < edges.edges.size(); i += 4)
     if (result.boundary[i] >= 0) sigmas_.push_back(edges.edges[i].sigma_px);
   if (sigmas_.empty()) return kLeastNoise_px;
-  const auto middle = sigmas_.begin() + static_cast<std::ptrdiff_t>(sigmas_.size() / 2);
-  std::nth_element(sigmas_.begin(), middle, sigmas_.end());
-  return std::max(kLeastNoise_px, *middle);
+  return std::max(kLeastNoise_px, median(sigmas_));
+}
+
+/// Standard deviation of the columns from one line to others, that of speckle included, which no model of
+/// noise foretells.
+float ConsistencyCheck::scatter() {
+  sigmas_.clear();
+  for (int line = kApart; line + kApart < lines_; ++line) {
+    const float* above = row(measured_, line - kApart);
+    const float* here = row(measured_, line);
+    const float* below = row(measured_, line + kApart);
+    for (int b = 0; b < boundaries_; ++b) {
+      const float bend = above[b] - 2 * here[b] + below[b];
+      if (known(bend)) sigmas_.push_back(std::fabs(bend));
+    }
+  }
+  return sigmas_.empty() ? 0 : median(sigmas_) * (1.F / (kMedianOfNormal * kBendGain));
+}
+
+/// Median distance between neighbouring boundaries.
+float ConsistencyCheck::stripe_px() {
+  sigmas_.clear();
+  for (int line = 0; line < lines_; line += 2) {
+    const float* here = row(measured_, line);
+    for (int b = 0; b + 1 < boundaries_; ++b) {
+      const float gap = here[b + 1] - here[b];
+      if (gap > 0) sigmas_.push_back(gap);
+    }
+  }
+  return sigmas_.empty() ? 0 : median(sigmas_);
 }
 
 void ConsistencyCheck::fill(const EdgeImage& edges, SequenceResult& result) {
@@ -98,12 +158,14 @@ void ConsistencyCheck::fill(const EdgeImage& edges, SequenceResult& result) {
 
 /// Quadratics over 7 or else 5 lines (Savitzky-Golay), where they fit as well as noise lets them. Missing
 /// neighbours are NaN, which no comparison lets through.
-void ConsistencyCheck::smooth_line(int line, float noise_px) {
+void ConsistencyCheck::smooth_line(int line, float usual_px) {
   std::array<const float*, 7> x{};
   for (int i = -3; i <= 3; ++i) x[static_cast<std::size_t>(i + 3)] = row(measured_, line + i);
   float* out = row(smooth_, line);
-  const float limit = kBentFit * noise_px;
+  const float* noises = row(noise_, line);
   for (int b = 0; b < boundaries_; ++b) {
+    const float noise_px = std::max(usual_px, noises[b]);
+    const float limit = kBentFit * noise_px;
     const float a = x[0][b], c = x[1][b], d = x[2][b], e = x[3][b], f = x[4][b], g = x[5][b], h = x[6][b];
     const float five = (17 * e + 12 * (d + f) - 3 * (c + g)) * (1.F / 35);
     const float slope5 = (2 * (g - c) + (f - d)) * 0.1F;
@@ -237,9 +299,11 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
   const bool below = !edge.below_differs && goes_on(1);
   if ((state & (kOpenAlong | kBentAlong)) && !above && !below) return false;
   const bool step = beside_step(state);
-  const float alone_px = std::max(kAlone_px, kNoisy * edge.noise_px);
-  const float at_step_px = std::max(kAtStep_px, kNoisy * edge.noise_px);
-  if (count == 0) return sigma_px < (step ? alone_px : kAtMost_px);
+  const float noise_px = kNoisy * row(noise_, line)[boundary];
+  const float alone_px = std::max(kAlone_px * scale_, noise_px);
+  const float at_step_px = std::max(kAtStep_px * scale_, noise_px);
+  const float at_most_px = std::max(kAtMost_px * scale_, noise_px);
+  if (count == 0) return sigma_px < (step ? alone_px : at_most_px);
   // Predictions that agree are on the boundary's side of the step.
   float weights = 1 / own_variance;
   float sum = weights * own;
@@ -253,10 +317,10 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
     sum += weight * p.column_px;
     agrees = true;
   }
-  if (!agrees) return sigma_px < (step ? alone_px : kAtMost_px);
+  if (!agrees) return sigma_px < (step ? alone_px : at_most_px);
   out.column_px = sum / weights;
   out.sigma_px = 1 / std::sqrt(weights);
-  return out.sigma_px <= (step ? at_step_px : kAtMost_px);
+  return out.sigma_px <= (step ? at_step_px : at_most_px);
 }
 
 ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, SequenceResult& result,
@@ -269,7 +333,13 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
   smooth_.assign(measured_.size(), kNone);
   state_.resize(static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_));
   counts_.assign(static_cast<std::size_t>(pool.threads()), {});
-  const float noise = usual_sigma(edges, result);
+  float noise = usual_sigma(edges, result);
+  const float scattered = scatter();
+  scale_ = std::max(1.F, stripe_px() / kStripe_px);
+  if (scattered > kRough * noise) {
+    for (float& n : noise_) n = std::max(n, scattered);
+    noise = kSpeckleTail * scattered;
+  }
   pool.for_ranges(lines_, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) smooth_line(line, noise);
   });
@@ -301,7 +371,7 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
         const bool is_step = edge.at_step && beside_step(s);
         const bool suspect =
             s != 0 || edge.above_differs || edge.below_differs || edge.sigma_px > kSuspect_px;
-        if (replaced || size_[cell] < kLeastPiece) {
+        if (replaced || squeezed(row(smooth_, line) + b) || size_[cell] < kLeastPiece) {
           result.boundary[e] = -1;
           ++counts.rejected;
           continue;

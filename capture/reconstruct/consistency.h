@@ -37,6 +37,8 @@ class ConsistencyCheck {
   const float* row(const std::vector<float>& grid, int line) const;
   void fill(const EdgeImage& edges, SequenceResult& result);
   float usual_sigma(const EdgeImage& edges, const SequenceResult& result);
+  float scatter();
+  float stripe_px();
   void smooth_line(int line, float noise_px);
   void suspect_line(int line);
   void measure_pieces();
@@ -44,6 +46,7 @@ class ConsistencyCheck {
 
   int boundaries_ = 0;
   int lines_ = 0;
+  float scale_ = 1;                  // of what is tolerated, from the stripes' width
   std::size_t stride_ = 0;           // of the grids below, which have kMargin more on all sides
   std::vector<float> measured_;      // [line][boundary]: column, NaN where there is none
   std::vector<float> noise_;         // the same: standard deviation that noise alone gives

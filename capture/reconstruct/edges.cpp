@@ -30,21 +30,23 @@ EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edg
   const float r = edge.right_reach_px;
   const auto [left_first, left_last] = columns(image.width, column_px - l, column_px - 0.5F * l);
   const auto [right_first, right_last] = columns(image.width, column_px + 0.5F * r, column_px + r);
-  const float doubt = kNoiseOfSign * image.noise + 0.5F;
+  const auto doubt = [&](int x) { return kNoiseOfSign * image.noise_at(line, x) + 0.5F; };
   Sides out;
-  row_kernels().side_evidence(image.line(line), image.width,
-                              {left_first, left_last, right_first, right_last, doubt, doubt}, out);
+  row_kernels().side_evidence(
+      image.line(line), image.width,
+      {left_first, left_last, right_first, right_last, doubt(left_first), doubt(right_first)}, out);
   return {{out.left[0], out.left[1], out.left[2]}, {out.right[0], out.right[1], out.right[2]}};
 }
 
 void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& scratch) {
   const int width = image.width;
   const float threshold = std::max(kLeastRise, kNoiseFactor * image.noise);
+  const float weak_threshold = std::max(kLeastRise, kNoiseFactor * image.weak_noise);
   auto& crossings = scratch.crossings;
   crossings.clear();
   scratch.flags.assign(static_cast<std::size_t>(width + 8),
                        0);  // so that the last ones are read at once, too
-  row_kernels().crossings(image.line(line), width, threshold, scratch.flags.data());
+  row_kernels().crossings(image.line(line), width, weak_threshold, scratch.flags.data());
   for (int x = 0; x < width; ++x) {
     if (x % 8 == 0) {  // most columns have none
       std::uint64_t eight = 0;
@@ -59,6 +61,7 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
     for (int channel = 0; channel < 3; ++channel) {
       if (!(scratch.flags[static_cast<std::size_t>(x)] >> channel & 1)) continue;
       const float* d = image.line(line) + channel * width;
+      if (image.signal_at(line, x) != Signal::kWeak && std::fabs(d[x + 2] - d[x - 1]) < threshold) continue;
       const float step = d[x + 1] - d[x];
       const Crossing found{static_cast<float>(x) - d[x] / step, std::fabs(step)};
       std::size_t place = crossings.size();
@@ -83,7 +86,7 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
     Edge edge;
     edge.column_px = first + sum / weight;
     edge.slope = std::sqrt(weight);
-    edge.sigma_px = image.noise / edge.slope;
+    edge.sigma_px = image.noise_at(line, static_cast<int>(first)) / edge.slope;
     edge.noise_px = edge.sigma_px;
     scratch.edges.push_back(edge);
   }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "base/parallel.h"
@@ -11,6 +12,13 @@
 #include "capture/source/field_source.h"
 
 namespace relievo {
+
+/// How much of the projected light comes back in one place.
+enum class Signal : std::uint8_t {
+  kNone,    // nothing that stands out of the noise
+  kWeak,    // so little that values are means over more pixels (capture/reconstruct/weak_signal.h)
+  kStrong,  // enough for each pixel by itself
+};
 
 /// D of 5.2.1: calibrated slide minus calibrated complement, low-passed along and across lines, not
 /// normalised. Line l lies at camera row 2 l of an interlaced frame, at row l of a progressive one.
@@ -20,6 +28,19 @@ struct DifferenceImage {
   std::vector<float> values;  // [line][channel][width]
   std::vector<float> white;   // [line][width]: luma of the fields' sum, what the scene shows in white light
   float noise = 0;            // standard deviation of a value, from the picture itself
+  float weak_noise = 0;       // the same where the signal is weak
+
+  static constexpr int kCellWidth = 16;
+  static constexpr int kCellLines = 8;
+  int cells = 0;               // in a row of them, 0 where none was measured: all is strong
+  std::vector<Signal> signal;  // [row of cells][cell], a cell is kCellWidth pixels of kCellLines lines
+
+  Signal signal_at(int l, int x) const {
+    if (cells == 0) return Signal::kStrong;
+    return signal[static_cast<std::size_t>(l / kCellLines) * static_cast<std::size_t>(cells) +
+                  static_cast<std::size_t>(x / kCellWidth)];
+  }
+  float noise_at(int l, int x) const { return signal_at(l, x) == Signal::kWeak ? weak_noise : noise; }
 
   const float* white_line(int l) const {
     return white.data() + static_cast<std::size_t>(l) * static_cast<std::size_t>(width);

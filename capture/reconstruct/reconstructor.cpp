@@ -19,7 +19,9 @@
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/surface_builder.h"
 #include "capture/reconstruct/texture.h"
+#include "capture/reconstruct/trace.h"
 #include "capture/reconstruct/triangulate.h"
+#include "capture/reconstruct/weak_signal.h"
 #include "capture/reconstruct/white_texture.h"
 
 namespace relievo {
@@ -109,6 +111,8 @@ struct Reconstructor::State {
   Differencer differencer;
   EdgeFinder edge_finder;
   SequenceDecoder sequence;
+  WeakSignal weak_signal;
+  Tracer tracer;
   Refiner refiner;
   ConsistencyCheck consistency;
   Recovery recovery;
@@ -150,6 +154,7 @@ struct Reconstructor::State {
   void observe(const CapturedFrame& frame);
   bool shows_same_slide() const;
   bool match_paper(SlideOrder tried, Match& out);
+  SequenceContext context(SlideOrder tried) const;
   bool match_ordered(SlideOrder tried, SequenceResult& out);
   void match_in_order(SlideOrder predicted, View8 slide);
   void add_vertex(int boundary, int line, const EdgePlace& place, Vertices& out) const;
@@ -163,6 +168,7 @@ void Reconstructor::State::observe(const CapturedFrame& frame) {
     report.boundaries = newer.detection.boundaries.size();
   } else {
     differencer.difference(frame, pool, newer.difference);
+    weak_signal.average(pool, newer.difference);
     edge_finder.find(newer.difference, pool, edges);
     report.boundaries = edges.edges.size();
   }
@@ -183,12 +189,15 @@ bool Reconstructor::State::match_paper(SlideOrder tried, Match& out) {
   return out.valid * 2 > newer.detection.boundaries.size();
 }
 
+SequenceContext Reconstructor::State::context(SlideOrder tried) const {
+  return {.order = tried,
+          .other = have_older ? &older.difference : nullptr,
+          .same = have_same ? &same.difference : nullptr,
+          .expected = depths.columns()};
+}
+
 bool Reconstructor::State::match_ordered(SlideOrder tried, SequenceResult& out) {
-  SequenceContext context{.order = tried};
-  if (have_older) context.other = &older.difference;
-  if (have_same) context.same = &same.difference;
-  context.expected = depths.columns();
-  sequence.decode(edges, context, pool, out);
+  sequence.decode(edges, context(tried), pool, out);
   return out.counts.in_order * 2 > edges.edges.size();
 }
 
@@ -210,8 +219,11 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
   if (paper()) {
     report.matched = match.valid;
   } else {
+    const TraceCounts traced = tracer.trace(newer.difference, sequence, context(order), pool, result, edges);
     refiner.refine(newer.difference, slide, result, sequence.shown_colours(order), pool, edges);
     const ConsistencyCounts checked = consistency.check(pattern.boundaries(), pool, result, edges);
+    report.filters.traced = traced.added;
+    report.filters.retraced = traced.moved;
     report.filters.unsupported = result.counts.unsupported;
     report.filters.completed = result.counts.completed;
     report.filters.rejected = checked.rejected;
@@ -223,8 +235,8 @@ void Reconstructor::State::match_in_order(SlideOrder predicted, View8 slide) {
                       .other_colours = sequence.shown_colours(other(order))},
                      refiner, edges, result, pool, recovered);
     report.filters.recovered = recovered.size();
-    report.matched =
-        result.counts.in_order - result.counts.unsupported + result.counts.completed + recovered.size();
+    report.matched = result.counts.in_order - result.counts.unsupported + result.counts.completed +
+                     traced.added + recovered.size();
   }
 }
 

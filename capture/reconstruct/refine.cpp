@@ -81,7 +81,9 @@ float contrast_around(const DifferenceImage& image, int line, int centre) {
   float darkest = 1e9F;
   for (int i = 0; i <= 2 * kAround_px; ++i) {
     brightest = std::max(brightest, std::max(std::max(above[i], here[i]), below[i]));
-    darkest = std::min(darkest, std::min(std::min(above[i], here[i]), below[i]));
+    // What is dark over two pixels only is speckle, no step of the scene.
+    const auto least_dark = [i](const float* w) { return std::max(std::max(w[i - 1], w[i]), w[i + 1]); };
+    darkest = std::min(darkest, std::min(std::min(least_dark(above), least_dark(here)), least_dark(below)));
   }
   return (brightest - darkest) / (brightest + darkest + kDark);
 }
@@ -208,10 +210,9 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
       if (n == 0) {
         if (!sides.narrow) continue;
         // Between two steps: the nearest sample still tells the surface's channels, but no level.
-        const int x = middle + direction;
-        const float unit = 1.F / (white[x] + kDark);
-        for (std::size_t c = 0; c < 3; ++c)
-          amplitude[c] = std::max(amplitude[c], std::fabs(d[static_cast<int>(c) * width + x]) * unit);
+        const auto nearest = static_cast<std::size_t>(middle + direction - light.first);
+        const std::array channels{light.red[nearest], light.green[nearest], light.blue[nearest]};
+        for (std::size_t c = 0; c < 3; ++c) amplitude[c] = std::max(amplitude[c], std::fabs(channels[c]));
         continue;
       }
       measured[static_cast<std::size_t>(s)] = level / static_cast<float>(n);
@@ -312,7 +313,7 @@ void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlac
 
 float Refiner::luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const {
   const int x = std::clamp(column_of(luma.column_px), 0, image.width - 1);
-  const float noise = image.noise *
+  const float noise = image.noise_at(line, x) *
                       std::sqrt(luma_[0] * luma_[0] + luma_[1] * luma_[1] + luma_[2] * luma_[2]) /
                       (image.white_line(line)[x] + kDark);
   return kLumaFactor * noise / luma.slope;

@@ -205,6 +205,14 @@ bool SequenceDecoder::convincing(const Edge& edge, const Beside& beside, const S
          (context.other == nullptr || !beside.tracked || gain(edge, beside, context, boundary) > kLeastGain);
 }
 
+float SequenceDecoder::other_agreement(const Edge& edge, int line, int boundary,
+                                       const SequenceContext& context) const {
+  if (context.other == nullptr) return 0;
+  const auto [left, right] = other_slide(context).colours[static_cast<std::size_t>(boundary)];
+  const EvidenceBeside beside = evidence_beside(*context.other, line, edge, edge.column_px);
+  return std::min(agreement(left, beside.left), agreement(right, beside.right));
+}
+
 /// What the other slide's frame shows beside the edge: where it stood half way between the frames around that
 /// one.
 SequenceDecoder::Beside SequenceDecoder::look_beside(const Edge& edge, int line,

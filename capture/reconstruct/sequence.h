@@ -51,6 +51,10 @@ class SequenceDecoder {
   /// `out` is overwritten; its memory is reused.
   void decode(const EdgeImage& edges, const SequenceContext& context, WorkerPool& pool, SequenceResult& out);
 
+  /// How well the side of `edge` that does so less agrees, -1..1, with what `boundary` shows in the last
+  /// frame under the other slide, were the scene still. 0 where there is no such frame.
+  float other_agreement(const Edge& edge, int line, int boundary, const SequenceContext& context) const;
+
   /// Colours to the left and right of each boundary, under the slide that the newer frame shows.
   const std::vector<std::array<Primary, 2>>& shown_colours(SlideOrder order) const {
     return slides_[order == SlideOrder::kNewerIsFirst ? 0 : 1].colours;

@@ -324,6 +324,40 @@ TEST(Consistency, GivesUpTheStepsOwnEdgeAndSmallPieces) {
   for (int l = 12; l < 18; ++l) EXPECT_EQ(s.result.boundary[static_cast<std::size_t>(l * 20 + 10)], -1);
 }
 
+TEST(Consistency, GivesUpABoundaryThatADepthStepStandsInFor) {
+  // From boundary 10 on the surface is another, half a stripe further left; 10 itself is hidden, and what
+  // shows its colours is the step.
+  Surface2D s = slanted(0.02F);
+  for (std::size_t i = 0; i < s.edges.edges.size(); ++i) {
+    if (i % 20 == 10) s.edges.edges[i].column_px -= 0.3F * kSpacing_px;
+    if (i % 20 > 10) s.edges.edges[i].column_px -= 0.6F * kSpacing_px;
+  }
+  WorkerPool pool(1);
+  ConsistencyCheck check;
+  check.check(59, pool, s.result, s.edges);
+  for (std::size_t i = 0; i < s.result.boundary.size(); ++i) {
+    if (i % 20 == 10) {
+      EXPECT_EQ(s.result.boundary[i], -1);
+    } else if (i % 20 < 9 || i % 20 > 11) {
+      EXPECT_EQ(s.result.boundary[i], static_cast<int>(i % 20));
+    }
+  }
+}
+
+TEST(Consistency, TakesSpeckleForNoise) {
+  // Columns scatter by far more than their standard deviation says: where the light is speckled.
+  Surface2D s = slanted(0.25F);
+  for (Edge& e : s.edges.edges) e.sigma_px = e.noise_px = 0.03F;
+  WorkerPool pool(1);
+  ConsistencyCheck check;
+  EXPECT_LT(check.check(59, pool, s.result, s.edges).rejected, s.result.boundary.size() / 50);
+  double square = 0;
+  int count = 0;
+  for (std::size_t i = 3 * 20; i < (kLines - 3) * 20; ++i, ++count)
+    square += std::pow(s.edges.edges[i].column_px - truth(i), 2);
+  EXPECT_LT(std::sqrt(square / count), 0.15);
+}
+
 TEST(OrderedDecoder, GivesTheSameForAnyNumberOfThreads) {
   const test::StripedScene scene = test::striped_scene(Scan::kInterlaced);
   std::vector<Surface> surfaces;
