@@ -208,10 +208,10 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
       if (n == 0) {
         if (!sides.narrow) continue;
         // Between two steps: the nearest sample still tells the surface's channels, but no level.
-        const int x = middle + direction;
-        const float unit = 1.F / (white[x] + kDark);
-        for (std::size_t c = 0; c < 3; ++c)
-          amplitude[c] = std::max(amplitude[c], std::fabs(d[static_cast<int>(c) * width + x]) * unit);
+        const auto i_light = static_cast<std::size_t>(middle + direction - light.first);
+        amplitude[0] = std::max(amplitude[0], std::fabs(light.red[i_light]));
+        amplitude[1] = std::max(amplitude[1], std::fabs(light.green[i_light]));
+        amplitude[2] = std::max(amplitude[2], std::fabs(light.blue[i_light]));
         continue;
       }
       measured[static_cast<std::size_t>(s)] = level / static_cast<float>(n);
