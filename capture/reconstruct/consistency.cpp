@@ -13,6 +13,7 @@ namespace {
 // a quadratic to within the second (the worst of its lines).
 constexpr float kStraightFit = 1.4F;
 constexpr float kBentFit = 3.F;
+constexpr float kAveraged = 0.3F;  // share of noise's variance that smoothing takes away
 constexpr float kLeastNoise_px = 0.01F;
 
 // Scatter over lines.
@@ -366,6 +367,11 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
         Edge& edge = edges.edges[e];
         const auto cell = static_cast<std::size_t>(line * boundaries_ + b);
         const std::uint8_t s = state_[cell];
+        if (row(smooth_, line)[b] != edge.column_px) {
+          const float averaged = kAveraged * edge.noise_px * edge.noise_px;
+          edge.sigma_px = std::sqrt(
+              std::max(0.5F * edge.sigma_px * edge.sigma_px, edge.sigma_px * edge.sigma_px - averaged));
+        }
         Estimate settled{row(smooth_, line)[b], edge.sigma_px};
         const bool replaced = row(measured_, line)[b] != edge.column_px;
         const bool is_step = edge.at_step && beside_step(s);

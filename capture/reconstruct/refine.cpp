@@ -24,6 +24,7 @@ constexpr float kLevelShare = 0.16F;         // of the luma ratio
 constexpr float kLeastColourBias_px = 0.4F;  // of a zero crossing
 constexpr float kMostColourBias_px = 2.F;
 constexpr float kDrawnTogether = 1.6F;      // what draws colour draws luma too, the same way
+constexpr float kModel_px = 0.012F;         // of any place: edges are not straight between samples
 constexpr float kPlain = 0.05F;             // contrast that is none,
 constexpr float kContrasty = 0.1F;          // and one by which the bias is measured
 constexpr float kSteep = 0.15F;             // slope of the luma ratio that places a boundary well, a pixel
@@ -307,7 +308,7 @@ void Refiner::refine_edge(const DifferenceImage& image, int line, const LumaPlac
       luma.found
           ? kApartShare * std::max(0.F, std::fabs(luma.column_px - own) - kApartNoise * std::sqrt(noise))
           : kNoLuma_px + kNoLumaContrast_px * edge.contrast;
-  edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + apart * apart);
+  edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + apart * apart + kModel_px * kModel_px);
   edge.noise_px = 1 / std::sqrt(pure_weight);
 }
 
