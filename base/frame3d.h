@@ -41,9 +41,13 @@ struct Frame3D {
   Frame3D& operator=(Frame3D&&) = default;
 
   std::uint64_t number = 0;  // the camera frame that completed it, counted by the source from 0
-  std::int64_t time_ns = 0;  // start of that camera frame's first field
+  // Start of that camera frame's first field; where `between`, half a frame earlier: of the white field
+  // before it.
+  std::int64_t time_ns = 0;
+  bool between = false;  // the surface half way between those of two frames (scheme white-field)
   Surface surface;
-  Image8 texture;  // RGB, registered to the camera's picture
+  Image8 texture;                    // RGB, registered to the camera's picture
+  std::int64_t texture_time_ns = 0;  // start of the first field it was made of, as time_ns
 };
 
 }  // namespace relievo

@@ -36,9 +36,16 @@ std::string_view to_string(Scan scan) {
   return scan == Scan::kInterlaced ? "interlaced" : "progressive";
 }
 
+std::string_view to_string(FieldOrder order) {
+  return order == FieldOrder::kTop ? "top" : "bottom";
+}
+
 std::string to_yaml(const Rig& rig) {
-  std::string out = "%YAML:1.0\n---\nscan: " + std::string(to_string(rig.scan)) +
-                    "\nframe_rate: " + number(rig.frame_rate) + "\n";
+  std::string out =
+      "%YAML:1.0\n---\nscan: " + std::string(to_string(rig.scan)) +
+      (rig.field_order == FieldOrder::kTop ? ""
+                                           : "\nfield_order: " + std::string(to_string(rig.field_order))) +
+      "\nframe_rate: " + number(rig.frame_rate) + "\n";
   out += pinhole("camera", rig.camera);
   out += pinhole("projector", rig.projector);
   out += matrix("projector_from_camera_rotation", 3, 3, rig.projector_from_camera_rotation);

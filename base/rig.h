@@ -8,10 +8,16 @@
 
 namespace relievo {
 
-/// How the two exposures of a frame lie in the camera's pictures.
+/// How the two exposures of a frame lie in the camera's pictures. What is projected meanwhile: Scheme.
 enum class Scan {
-  kInterlaced,   // one picture a frame: even rows under the slide, odd rows under its complement
-  kProgressive,  // two pictures a frame: the first under the slide, the second under its complement
+  kInterlaced,   // one picture a frame, its two fields exposed one after the other (see FieldOrder)
+  kProgressive,  // two pictures a frame
+};
+
+/// Which field of an interlaced frame is exposed first, and so shows the slide.
+enum class FieldOrder {
+  kTop,     // rows 0, 2, ...
+  kBottom,  // rows 1, 3, ...
 };
 
 /// A pinhole with the Brown-Conrady distortion k1 k2 p1 p2 k3 (OpenCV's order).
@@ -29,7 +35,8 @@ struct PinholeModel {
 
 struct Rig {
   Scan scan = Scan::kInterlaced;
-  double frame_rate = 0;  // frames (field pairs) a second
+  FieldOrder field_order = FieldOrder::kTop;  // of an interlaced scan
+  double frame_rate = 0;                      // frames (field pairs) a second
   PinholeModel camera;
   PinholeModel projector;
   // X_projector = rotation * X_camera + translation, metres
@@ -40,6 +47,8 @@ struct Rig {
 
 /// "interlaced" or "progressive".
 std::string_view to_string(Scan scan);
+/// "top" or "bottom".
+std::string_view to_string(FieldOrder order);
 
 /// The text of a rig.yaml (OpenCV FileStorage), with every digit needed to read the same doubles back.
 std::string to_yaml(const Rig& rig);

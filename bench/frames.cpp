@@ -16,6 +16,7 @@ CapturedFrame copy_of(const CapturedFrame& frame) {
   out.number = frame.number;
   out.time_ns = frame.time_ns;
   out.scan = frame.scan;
+  out.field_order = frame.field_order;
   out.picture = frame.picture.clone();
   out.complement = frame.complement.clone();
   return out;

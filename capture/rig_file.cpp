@@ -140,6 +140,13 @@ Rig rig_of(const cv::FileStorage& storage) {
     refuse("scan must be interlaced or progressive");
   }
   rig.scan = name == to_string(Scan::kInterlaced) ? Scan::kInterlaced : Scan::kProgressive;
+  if (const cv::FileNode order = storage["field_order"]; !order.empty()) {
+    const std::string which = order.isString() ? order.string() : "";
+    if (which != to_string(FieldOrder::kTop) && which != to_string(FieldOrder::kBottom)) {
+      refuse("field_order must be top or bottom: the field of an interlaced frame that is exposed first");
+    }
+    rig.field_order = which == to_string(FieldOrder::kTop) ? FieldOrder::kTop : FieldOrder::kBottom;
+  }
   rig.frame_rate = number(storage, "frame_rate", 0.001, 10000);
   rig.camera = pinhole(storage, "camera");
   rig.projector = pinhole(storage, "projector");
@@ -168,6 +175,11 @@ Primary primary(const cv::FileNode& entry, int index) {
 Pattern pattern_of(const cv::FileStorage& storage) {
   Pattern pattern;
   pattern.base = integer(storage, "base", 3, 6);
+  if (const cv::FileNode scheme = storage["scheme"]; !scheme.empty()) {
+    const auto named = scheme_named(scheme.isString() ? scheme.string() : "");
+    if (!named) refuse("scheme must be " + scheme_names());
+    pattern.scheme = *named;
+  }
   pattern.slides = integer(storage, "slides", 1, 12);
   const cv::FileNode palette = node(storage, "palette");
   if (!palette.isSeq()) refuse("palette must be a list of strings such as \"100\"");

@@ -41,6 +41,14 @@ class Reader {
       refuse(*node, key, "must be \"ordered\" or \"paper\"");
     }
   }
+  void scheme(std::string_view key, std::string& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    if (!value || !scheme_named(*value))
+      return refuse(*node, key, "must be " + scheme_names() + " in quotes");
+    out = *value;
+  }
   void flag(std::string_view key, bool& out) {
     if (const toml::node* node = take(key)) {
       if (const auto value = node->value_exact<bool>())
@@ -116,6 +124,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.flag("fast", config.fast);
   reader.integer("threads", 1, 64, config.threads);
   reader.decoder("decoder", config.decoder);
+  reader.scheme("scheme", config.scheme);
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.integer("jpeg_quality", 1, 100, config.jpeg_quality);

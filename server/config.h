@@ -14,6 +14,7 @@ namespace relievo {
 
 struct ServeConfig {
   std::string source = "sim:face";
+  std::string scheme;  // of a simulated source; empty: as the source says
   std::string stream;  // empty: named after the source
   int domain = 0;
   std::string interface;               // empty: Cyclone DDS chooses

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include "base/log.h"
 #include "base/time.h"
 #include "capture/evaluate/score.h"
+#include "capture/pattern/schedule.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
 #include "capture/source/npy.h"
@@ -65,6 +67,45 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
   print_filters(filters, s.frames);
 }
 
+/// Of a frame under `slide`.
+struct Truths {
+  int slide;
+  const ImageF& before;  // the frame's before, empty where it is not known
+  const ImageF& now;
+};
+
+/// What is scored and drawn.
+struct Judges {
+  Scorer scorer;
+  std::optional<EvaluationPictures> pictures = {};
+
+  /// `result` is null where the frame should have given a surface and did not.
+  Status judge(const CapturedFrame& frame, int slide, const ImageF& truth, const Frame3D* result) {
+    Judgement judgement;
+    scorer.add(truth, result ? &result->surface : nullptr, pictures ? &judgement : nullptr);
+    if (!pictures || result == nullptr || result->between) return {};
+    return pictures->add(frame, slide, *result, judgement);
+  }
+};
+
+/// White-field: two surfaces a frame, each against the truth of its own field. A progressive take has none of
+/// the times of its second pictures.
+Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, Reconstructor& reconstructor,
+                  const Truths& truths, Judges& judges) {
+  const bool interlaced = frame.scan == Scan::kInterlaced;
+  const auto at = [&](const ImageF& truth, int half) {
+    return interlaced ? truth_of_field(truth, first_row(frame.field_order, half)) : truth.clone();
+  };
+  if (completed && completed->between) {
+    if (interlaced && !truths.before.empty()) {
+      if (auto s = judges.judge(frame, 0, at(truths.before, 1), &*completed); !s) return s;
+    }
+    completed = reconstructor.next();
+  }
+  if (!completed) return {};
+  return judges.judge(frame, truths.slide, at(truths.now, 0), &*completed);
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
@@ -80,53 +121,62 @@ Status run(const Options& options, StopSignal& stop) {
                                               .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
 
-  std::optional<EvaluationPictures> pictures;
+  Judges judges{Scorer(info.rig, info.pattern)};
   if (!options.pictures.empty()) {
     auto made = EvaluationPictures::create(options.pictures, info.rig, info.pattern);
     if (!made) return made.error();
-    pictures = *std::move(made);
+    judges.pictures = *std::move(made);
   }
 
-  Scorer scorer(info.rig, info.pattern);
   Progress progress("evaluate", "frames", info.frames.value_or(0));
   FilterCounts filters;  // of the frames scored
-  std::optional<long> previous_slide;
+  std::optional<int> previous_slide;
+  ImageF previous_truth;
   std::uint64_t done = 0;
   while (!stop.stopped()) {
     auto next = (*source)->next();
     if (!next) return next.error();  // a score over part of a take would not be comparable
     if (!*next) break;
     const CapturedFrame& frame = **next;
-    // Slides alternate with time: which one this is follows from the time stamp, independently of the
-    // decoder.
-    const long slide = std::lround(seconds(frame.time_ns) * info.rig.frame_rate) % info.pattern.slides;
-    const bool decodable = info.pattern.slides == 1 || (previous_slide && *previous_slide != slide);
-    previous_slide = slide;
+    // What was projected follows from the time stamp, independently of the decoder.
+    const auto place =
+        static_cast<std::uint64_t>(std::max(0L, std::lround(seconds(frame.time_ns) * info.rig.frame_rate)));
+    const Exposure exposure = shown(info.pattern, place, 0);
+    const bool decodable =
+        exposure.light == Light::kSlide &&
+        (info.pattern.slides == 1 || (previous_slide && *previous_slide != exposure.slide));
+    if (exposure.light == Light::kSlide) previous_slide = exposure.slide;
     auto result = reconstructor->add(frame);
     if (!result) return result.error();
     progress.update(++done);
     const fs::path file = truth_of(options.take, frame.number);
-    if (frame.number < options.skip || !decodable || !fs::exists(file)) continue;
+    if (frame.number < options.skip || !fs::exists(file)) {
+      previous_truth = ImageF();
+      continue;
+    }
     auto truth = read_npy(file);
     if (!truth) return truth.error();
     if (truth->width() != info.rig.camera.width || truth->height() != info.rig.camera.height) {
       return Error{file.string() + " is not of the camera's size"};
     }
-    Judgement judgement;
-    scorer.add(*truth, *result ? &(*result)->surface : nullptr, pictures ? &judgement : nullptr);
-    if (pictures && *result) {
-      const Status drawn = pictures->add(frame, static_cast<int>(slide), **result, judgement);
-      if (!drawn) return drawn.error();
-    }
     filters += reconstructor->report().filters;
+    Status judged;
+    if (info.pattern.scheme == Scheme::kWhiteField) {
+      judged = judge_both(frame, *std::move(*result), *reconstructor,
+                          {exposure.slide, previous_truth, *truth}, judges);
+    } else if (decodable) {
+      judged = judges.judge(frame, exposure.slide, *truth, *result ? &**result : nullptr);
+    }
+    if (!judged) return judged.error();
+    previous_truth = *std::move(truth);
   }
   progress.finish();
   if (stop.stopped()) return {};  // nor would what was scored until now
-  const Score score = scorer.score();
+  const Score score = judges.scorer.score();
   if (score.frames == 0)
     return Error{"no frame of " + options.take + " could be scored: none with truth was reconstructed"};
-  if (pictures) {
-    const Status written = pictures->finish(options.take, score, filters);
+  if (judges.pictures) {
+    const Status written = judges.pictures->finish(options.take, score, filters);
     if (!written) return written.error();
   }
   print(score, filters, options.json);

@@ -34,4 +34,34 @@ void print_filters(const FilterCounts& counts, std::uint64_t frames) {
   }
 }
 
+void add_scheme_option(CLI::App& app, std::string& scheme) {
+  app.add_option("--scheme", scheme, "What a simulated projector shows in turn: " + scheme_names())
+      ->check([](const std::string& name) { return scheme_named(name) ? "" : "give " + scheme_names(); })
+      ->type_name("NAME");
+}
+
+Result<std::string> with_scheme(const std::string& source, const std::string& scheme) {
+  if (scheme.empty()) return source;
+  if (!source.starts_with("sim:"))
+    return Error{"--scheme is for simulated sources: what " + source +
+                 " was filmed under, its pattern.yaml says"};
+  if (source.find(",scheme=") != std::string::npos)
+    return Error{"the scheme is said twice, by --scheme " + scheme + " and in " + source + ": leave one out"};
+  return source + ",scheme=" + scheme;
+}
+
+const char* scheme_help() {
+  return "Schemes (rates at 29.97 frames a second; docs/SCHEMES.md):\n"
+         "  complementary  slide 1 and its complement, slide 2 and its complement: texture 30 Hz, geometry "
+         "30\n"
+         "                 Hz; colours near stripe edges suffer\n"
+         "  white-field    slide 1, white, slide 2, white: texture 30 Hz and clean, geometry 60 Hz; ambient\n"
+         "                 light and noise cost depth precision\n"
+         "  white-frame    as complementary, then one white frame: geometry 20 Hz, texture 10 Hz and best;\n"
+         "                 fast motion suffers\n"
+         "  one-slide      one slide and its complement, both 30 Hz, each frame by itself: any motion; "
+         "codes\n"
+         "                 repeat, so small surfaces cannot be placed\n";
+}
+
 }  // namespace relievo

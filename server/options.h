@@ -2,6 +2,9 @@
 // Options that several commands share.
 #pragma once
 
+#include <string>
+
+#include "base/result.h"
 #include "capture/reconstruct/reconstructor.h"
 
 namespace CLI {
@@ -18,5 +21,15 @@ void add_surface_options(CLI::App& app, SurfaceBuilderOptions& options);
 
 /// For people: the filters that did something, one a line, a frame's share.
 void print_filters(const FilterCounts& counts, std::uint64_t frames);
+
+/// --scheme NAME of a simulated source: "", or a projection scheme's name. `scheme` must outlive the parsing.
+void add_scheme_option(CLI::App& app, std::string& scheme);
+
+/// `source` filmed under `scheme`, where that is not empty. Fails where the source says its own scheme: a
+/// take's pattern.yaml does, and so does a simulated source's key.
+Result<std::string> with_scheme(const std::string& source, const std::string& scheme);
+
+/// The projection schemes with their rates and weaknesses, for help texts.
+const char* scheme_help();
 
 }  // namespace relievo

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -14,10 +15,13 @@
 #include "capture/calibrate/stripe_stack.h"
 #include "capture/pattern/bcsl.h"
 #include "capture/pattern/gray_code.h"
+#include "capture/pattern/repeating.h"
+#include "capture/pattern/schedule.h"
 #include "capture/pattern/slides.h"
 #include "capture/rig_file.h"
 #include "codec/export.h"
 #include "server/commands.h"
+#include "server/options.h"
 #include "server/size_option.h"
 
 namespace relievo {
@@ -28,6 +32,8 @@ namespace fs = std::filesystem;
 struct Options {
   std::string out;
   std::string pattern;
+  std::string scheme = "complementary";
+  std::string field_order = "top";
   int base = 6;
   int slides = 2;
   int first = 0;
@@ -77,11 +83,26 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   return {};
 }
 
+Result<Pattern> pattern_of(const Options& options) {
+  if (!options.pattern.empty()) return read_pattern(options.pattern);
+  const Scheme scheme = scheme_named(options.scheme).value_or(Scheme::kComplementary);
+  if (scheme == Scheme::kOneSlide)
+    return make_repeating_pattern(options.base, options.first, options.stripes);
+  Result<Pattern> pattern = make_pattern(options.base, options.slides, options.first, options.stripes);
+  if (pattern) pattern->scheme = scheme;
+  return pattern;
+}
+
+/// The picture of one field: "slide1", "slide1_complement" or "white".
+std::string field_name(const Exposure& exposure) {
+  if (exposure.light == Light::kWhite) return "white.png";
+  return "slide" + std::to_string(exposure.slide + 1) +
+         (exposure.light == Light::kComplement ? "_complement.png" : ".png");
+}
+
 Status run(const Options& options) {
   if (options.gray) return write_gray(options);
-  auto pattern = options.pattern.empty()
-                     ? make_pattern(options.base, options.slides, options.first, options.stripes)
-                     : read_pattern(options.pattern);
+  const auto pattern = pattern_of(options);
   if (!pattern) return pattern.error();
   if (pattern->stripes() > options.size.width) {
     return Error{std::to_string(pattern->stripes()) + " stripes do not fit " +
@@ -90,38 +111,47 @@ Status run(const Options& options) {
   if (const Status made = make_folder(options.out); !made) return made;
   if (options.both_axes) return write_both_axes(options, *pattern);
   std::vector<std::string> files;
+  std::vector<std::string> order;  // of projection: a file a field, or a frame
   const auto write = [&](const std::string& name, const Image8& picture) {
     files.push_back(name);
     return write_png(fs::path(options.out) / name, picture.view());
   };
-  for (int slide = 0; slide < pattern->slides; ++slide) {
-    const std::string number = std::to_string(slide + 1);
-    const auto [width, height] = options.size;
+  const auto [width, height] = options.size;
+  const FieldOrder first = options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+  for (int frame = 0; frame < cycle_frames(*pattern); ++frame) {
     if (options.interlaced) {
-      if (auto s = write("frame" + number + ".png", draw_interlaced(*pattern, slide, width, height)); !s)
-        return s;
+      order.push_back("frame" + std::to_string(frame + 1) + ".png");
+      if (auto s = write(order.back(), draw_interlaced(*pattern, frame, first, width, height)); !s) return s;
       continue;
     }
-    if (auto s = write("slide" + number + ".png", draw_slide(*pattern, slide, false, width, height)); !s)
-      return s;
-    if (auto s =
-            write("slide" + number + "_complement.png", draw_slide(*pattern, slide, true, width, height));
-        !s)
-      return s;
+    for (const int half : {0, 1}) {
+      const Exposure exposure = shown(*pattern, static_cast<std::uint64_t>(frame), half);
+      order.push_back(field_name(exposure));
+      if (std::count(order.begin(), order.end(), order.back()) > 1) continue;  // white again
+      if (auto s = write(order.back(), draw_field(*pattern, exposure, width, height)); !s) return s;
+    }
   }
   const std::string yaml = to_yaml(*pattern);
   files.emplace_back("pattern.yaml");
   const std::vector<std::uint8_t> bytes(yaml.begin(), yaml.end());
   if (auto s = write_whole_file(fs::path(options.out) / files.back(), bytes); !s) return s;
   if (options.json) {
-    std::printf("%s\n",
-                nlohmann::json({{"folder", options.out}, {"files", files}, {"stripes", pattern->stripes()}})
-                    .dump(2)
-                    .c_str());
-  } else {
-    std::printf("%d stripes on %d slides, %dx%d, in %s\n", pattern->stripes(), pattern->slides,
-                options.size.width, options.size.height, options.out.c_str());
+    std::printf("%s\n", nlohmann::json({{"folder", options.out},
+                                        {"files", files},
+                                        {"order", order},
+                                        {"scheme", to_string(pattern->scheme)},
+                                        {"stripes", pattern->stripes()}})
+                            .dump(2)
+                            .c_str());
+    return {};
   }
+  std::printf("%d stripes on %d slides, %dx%d, in %s\n", pattern->stripes(), pattern->slides, width, height,
+              options.out.c_str());
+  std::printf("project, a %s each, again and again:", options.interlaced ? "frame" : "field");
+  for (const std::string& name : order) std::printf(" %s", name.c_str());
+  std::printf("\n");
+  if (pattern->scheme == Scheme::kOneSlide)
+    std::printf("codes repeat; no run of %d boundaries does\n", unique_run(*pattern));
   return {};
 }
 
@@ -134,16 +164,29 @@ Command pattern_command() {
         app.add_option("--out", o->out, "Folder, made where it is missing")->required();
         auto* file =
             app.add_option("--pattern", o->pattern, "An existing pattern.yaml instead of a new pattern");
-        for (auto* option : {app.add_option("--base", o->base, "Colours: 3 to 6"),
-                             app.add_option("--slides", o->slides, "Slides shown in turn: 1 or 2 decode"),
-                             app.add_option("--first", o->first, "First stripe within the code's whole path"),
-                             app.add_option("--stripes", o->stripes, "Stripes over the projector's width")}) {
+        for (auto* option :
+             {app.add_option("--base", o->base, "Colours: 3 to 6"),
+              app.add_option("--slides", o->slides, "Slides shown in turn: 1 or 2 decode; one-slide has 1"),
+              app.add_option("--first", o->first, "First stripe within the code's whole path"),
+              app.add_option("--stripes", o->stripes, "Stripes over the projector's width")}) {
           option->capture_default_str()->excludes(file);
         }
+        app.add_option("--scheme", o->scheme, "What is projected in turn, see below")
+            ->check(
+                [](const std::string& name) { return scheme_named(name) ? "" : "give " + scheme_names(); })
+            ->type_name("NAME")
+            ->capture_default_str()
+            ->excludes(file);
         add_size_option(app, "--size", o->size, "The projector's pixels, WIDTHxHEIGHT (default 1024x768)");
         auto* interlaced = app.add_flag(
             "--interlaced", o->interlaced,
-            "A frame a slide, for interlaced video: the slide on even rows, its complement on odd ones");
+            "A picture a frame, for interlaced video: the first field on even rows, the second on odd ones");
+        app.add_option("--field-order", o->field_order,
+                       "With --interlaced: bottom puts the first field on the odd rows")
+            ->check(CLI::IsMember({"top", "bottom"}))
+            ->type_name("top|bottom")
+            ->capture_default_str()
+            ->needs(interlaced);
         auto* both = app.add_flag(
             "--both-axes", o->both_axes,
             "Stripes along columns, then along rows, for calibrate geometry: give --stripes a divisor of the "
@@ -155,6 +198,7 @@ Command pattern_command() {
             ->excludes(interlaced)
             ->excludes(both);
         app.add_flag("--json", o->json, "Print the result as JSON");
+        app.footer(scheme_help());
         return [o](StopSignal&) { return run(*o); };
       }};
 }

@@ -204,8 +204,12 @@ class ThreadedPipeline final : public Pipeline {
         continue;
       }
       any_surface = true;
-      stats_.reconstructed(milliseconds(steady_now_ns() - begin), reconstructor_.report().filters);
-      push(to_encode_, Reconstructed{*std::move(*result), item->capture_time_ns});
+      const double ms = milliseconds(steady_now_ns() - begin);
+      for (std::optional<Frame3D> made = *std::move(result); made; made = reconstructor_.next()) {
+        stats_.reconstructed(ms, reconstructor_.report().filters);
+        const std::int64_t later_ns = made->time_ns - item->frame.time_ns;  // below 0: of a field before
+        push(to_encode_, Reconstructed{*std::move(made), item->capture_time_ns + later_ns});
+      }
     }
   }
 

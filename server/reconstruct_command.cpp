@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
 
 #include "base/log.h"
 #include "base/time.h"
@@ -30,8 +32,9 @@ struct Options {
 };
 
 struct Totals {
-  std::uint64_t frames = 0, unreadable = 0, reconstructed = 0, same_slide = 0, vertices = 0, boundaries = 0,
-                matched = 0;
+  Scheme scheme{};
+  std::uint64_t frames = 0, white = 0, textures = 0, unreadable = 0, reconstructed = 0, same_slide = 0,
+                vertices = 0, boundaries = 0, matched = 0;
   FilterCounts filters;
   RollingMedian detect_ms, match_ms, triangulate_ms, surface_ms, texture_ms, total_ms;
 };
@@ -55,7 +58,10 @@ void print(const Totals& t, const Options& options) {
     nlohmann::json counts;
     for (const Filter& filter : kFilters) counts[std::string(filter.name)] = t.filters.*filter.count;
     const nlohmann::json out = {{"frames", t.frames},
+                                {"scheme", to_string(t.scheme)},
                                 {"reconstructed", t.reconstructed},
+                                {"textures", t.textures},
+                                {"white", t.white},
                                 {"unreadable", t.unreadable},
                                 {"same_slide", t.same_slide},
                                 {"vertices_per_frame", per_frame},
@@ -72,14 +78,30 @@ void print(const Totals& t, const Options& options) {
     std::printf("%s\n", out.dump(2).c_str());
     return;
   }
-  std::printf("%llu of %llu frames reconstructed into %s, %.0f vertices each, %.2f ms a frame\n",
-              static_cast<unsigned long long>(t.reconstructed), static_cast<unsigned long long>(t.frames),
-              options.out.c_str(), per_frame, t.total_ms.median());
+  if (t.scheme == Scheme::kComplementary || t.scheme == Scheme::kOneSlide) {
+    std::printf("%llu of %llu frames reconstructed into %s, %.0f vertices each, %.2f ms a frame\n",
+                static_cast<unsigned long long>(t.reconstructed), static_cast<unsigned long long>(t.frames),
+                options.out.c_str(), per_frame, t.total_ms.median());
+  } else {
+    std::printf(
+        "%s: %llu surfaces and %llu textures from %llu frames into %s, %.0f vertices each, %.2f ms a frame\n",
+        std::string(to_string(t.scheme)).c_str(), static_cast<unsigned long long>(t.reconstructed),
+        static_cast<unsigned long long>(t.textures), static_cast<unsigned long long>(t.frames),
+        options.out.c_str(), per_frame, t.total_ms.median());
+  }
   if (t.same_slide > 0) {
     std::printf("%llu frames showed the slide of the frame before: dropped frames in capture\n",
                 static_cast<unsigned long long>(t.same_slide));
   }
   if (t.reconstructed > 0) print_filters(t.filters, t.reconstructed);
+}
+
+/// NNNNNN is the frame of the take that completed it; the surface half way from the frame before has its own.
+std::string ply_name(const Frame3D& frame) {
+  char name[40];
+  std::snprintf(name, sizeof name, "%06llu%s.ply", static_cast<unsigned long long>(frame.number),
+                frame.between ? "_between" : "");
+  return name;
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -96,6 +118,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (failed) return Error{"cannot make the folder " + options.out + ": " + failed.message()};
 
   Totals totals;
+  totals.scheme = (*source)->info().pattern.scheme;
   Error last_error;
   Progress progress("reconstruct", "frames", (*source)->info().frames.value_or(0));
   while (!stop.stopped()) {
@@ -114,19 +137,20 @@ Status run(const Options& options, StopSignal& stop) {
     if (!frame) return frame.error();
     const double ms = milliseconds(steady_now_ns() - begin);
     totals.same_slide += reconstructor->report().same_slide;
+    totals.white += reconstructor->report().white;
     progress.update(totals.frames);
-    if (!*frame) continue;
-    count(reconstructor->report(), ms, totals);
-    ++totals.reconstructed;
-    totals.vertices += (*frame)->surface.positions.size();
-    char name[32];
-    std::snprintf(name, sizeof name, "%06llu.ply", static_cast<unsigned long long>((*frame)->number));
-    if (const Status written =
-            write_ply(fs::path(options.out) / name, (*frame)->surface, (*frame)->texture.view());
-        !written)
-      return written.error();
-    reconstructor->recycle(*std::move(*frame));
+    if (*frame) count(reconstructor->report(), ms, totals);
+    for (std::optional<Frame3D> surface = *std::move(frame); surface; surface = reconstructor->next()) {
+      ++totals.reconstructed;
+      totals.vertices += surface->surface.positions.size();
+      if (const Status written = write_ply(fs::path(options.out) / ply_name(*surface), surface->surface,
+                                           surface->texture.view());
+          !written)
+        return written.error();
+      reconstructor->recycle(*std::move(surface));
+    }
   }
+  totals.textures = reconstructor->textures();
   progress.finish();
   if (made && totals.reconstructed == 0) fs::remove(options.out, failed);
   print(totals, options);
@@ -145,20 +169,25 @@ Status run(const Options& options, StopSignal& stop) {
 }  // namespace
 
 Command reconstruct_command() {
-  return {"reconstruct", "Reconstruct a take: one PLY a frame", [](CLI::App& app) {
-            auto options = std::make_shared<Options>();
-            app.add_option("take", options->take, "Take folder")->type_name("TAKE")->required();
-            app.add_option("-o,--out", options->out, "Folder for NNNNNN.ply, made where it is missing")
-                ->type_name("DIR")
-                ->required();
-            app.add_option("--threads", options->threads, "Threads; any number gives the same result")
-                ->check(CLI::Range(1, 64))
-                ->capture_default_str();
-            add_decoder_option(app, options->decoder);
-            add_surface_options(app, options->surface);
-            app.add_flag("--json", options->json, "Print the summary as JSON");
-            return [options](StopSignal& stop) { return run(*options, stop); };
-          }};
+  return {
+      "reconstruct", "Reconstruct a take: one PLY a frame", [](CLI::App& app) {
+        auto options = std::make_shared<Options>();
+        app.add_option("take", options->take, "Take folder")->type_name("TAKE")->required();
+        app.add_option("-o,--out", options->out, "Folder for NNNNNN.ply, made where it is missing")
+            ->type_name("DIR")
+            ->required();
+        app.add_option("--threads", options->threads, "Threads; any number gives the same result")
+            ->check(CLI::Range(1, 64))
+            ->capture_default_str();
+        add_decoder_option(app, options->decoder);
+        add_surface_options(app, options->surface);
+        app.add_flag("--json", options->json, "Print the summary as JSON");
+        app.footer(
+            "The take's pattern.yaml says under which scheme it was filmed: under white-frame white frames "
+            "give no surface; under white-field each frame gives two, NNNNNN_between.ply half way from the "
+            "frame before and NNNNNN.ply.\n");
+        return [options](StopSignal& stop) { return run(*options, stop); };
+      }};
 }
 
 }  // namespace relievo

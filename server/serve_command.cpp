@@ -16,6 +16,7 @@
 #include "idl/transport.h"
 #include "server/commands.h"
 #include "server/config.h"
+#include "server/options.h"
 #include "server/pipeline.h"
 #include "server/sinks.h"
 #include "web/gateway/gateway.h"
@@ -108,9 +109,11 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
     if (!started) return started.error();
     gateway = *std::move(started);
   }
-  auto source = open_source(config.source, {.loop = config.loop || config.source.starts_with("sim:")});
+  const auto name = with_scheme(config.source, config.scheme);
+  if (!name) return name.error();
+  auto source = open_source(*name, {.loop = config.loop || config.source.starts_with("sim:")});
   if (!source) return source.error();
-  info.source = config.source;
+  info.source = *name;
   info.started_ns = utc_now_ns();
   info.rig = (*source)->info().rig;
   info.pattern = (*source)->info().pattern;
@@ -174,6 +177,7 @@ std::string stream_name(const std::string& name) {
 struct Flags {
   std::optional<std::string> config, source, stream, interface, web, record;
   std::optional<std::string> decoder;
+  std::string scheme;
   std::optional<int> domain, threads, jpeg_quality, draco_speed, fill_holes;
   std::optional<std::uint64_t> frames;
   bool loop = false, fast = false, dense = false;
@@ -194,6 +198,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   set(flags.record, config.record);
   set(flags.domain, config.domain);
   set(flags.threads, config.threads);
+  if (!flags.scheme.empty()) config.scheme = flags.scheme;
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
   set(flags.jpeg_quality, config.jpeg_quality);
   set(flags.draco_speed, config.draco_speed);
@@ -215,6 +220,7 @@ Command serve_command() {
         app.add_option("--source", f->source,
                        "sim:SCENE[,KEY=VALUE...] (simulate --help lists them) or take:DIR (default sim:face)")
             ->type_name("SOURCE");
+        add_scheme_option(app, f->scheme);
         app.add_option("--stream", f->stream, "Stream name (default: the source's)")
             ->type_name("NAME")
             ->check(stream_name);
@@ -254,7 +260,8 @@ Command serve_command() {
             "Examples:\n"
             "  relievo-server serve                                        the simulated face\n"
             "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for every machine around\n"
-            "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap");
+            "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n\n" +
+            std::string(scheme_help()));
         return [f](StopSignal& stop) { return run(*f, stop); };
       }};
 }

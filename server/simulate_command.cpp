@@ -12,19 +12,23 @@
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "server/commands.h"
+#include "server/options.h"
 
 namespace relievo {
 namespace {
 
 struct Options {
   std::string scene;
+  std::string scheme;
   std::uint64_t frames = 0;
   std::string out;
   bool json = false;
 };
 
 Status run(const Options& options, StopSignal& stop) {
-  std::string spec = options.scene;
+  const auto named = with_scheme("sim:" + options.scene, options.scheme);
+  if (!named) return named.error();
+  std::string spec = named->substr(4);
   if (options.frames > 0) spec += ",frames=" + std::to_string(options.frames);
   auto source = make_sim(spec, {.truth = true});
   if (!source) return source.error();
@@ -64,11 +68,12 @@ Command simulate_command() {
             ->required();
         app.add_option("--frames", options->frames, "Frames (default: one period of the scene's motion)")
             ->check(whole_number(2, 1'000'000));
+        add_scheme_option(app, options->scheme);
         app.add_option("--out", options->out, "Take folder to make")->type_name("TAKE")->required();
         app.add_flag("--json", options->json, "Print the result as JSON");
         app.footer(
             "Scenes: " + sim::scene_names() + "\n\nKeys, their values and defaults:\n" +
-            sim::sim_options_help() +
+            sim::sim_options_help() + "\n" + scheme_help() +
             "\nExample:\n  relievo-server simulate --scene face,noise=3,stripes=120 --frames 60 --out TAKE");
         return [options](StopSignal& stop) { return run(*options, stop); };
       }};

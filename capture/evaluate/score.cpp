@@ -22,6 +22,26 @@ std::size_t at(int row, int column, int width) {
 
 }  // namespace
 
+ImageF truth_of_field(const ImageF& truth, int first) {
+  ImageF out = truth.clone();
+  if (first == 0 || truth.height() < 2) return out;
+  for (int y = 0; y < truth.height(); y += 2) {
+    const float* above = truth.row(y > 0 ? y - 1 : y + 1);
+    const float* below = truth.row(y + 1 < truth.height() ? y + 1 : y - 1);
+    const float* own = truth.row(y);
+    float* to = out.row(y);
+    for (int x = 0; x < truth.width(); ++x) {
+      const float a = above[x];
+      const float b = below[x];
+      // Across a step in depth, the side that the row itself is on.
+      to[x] = a > 0 && b > 0 && std::fabs(a - b) < kDepthStep * a ? 0.5F * (a + b)
+              : std::fabs(a - own[x]) < std::fabs(b - own[x])     ? a
+                                                                  : b;
+    }
+  }
+  return out;
+}
+
 Scorer::Scorer(const Rig& rig, const Pattern& pattern) : rig_(rig), pattern_(pattern) {
   const int width = rig.camera.width;
   const int height = rig.camera.height;

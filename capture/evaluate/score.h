@@ -27,6 +27,10 @@ struct Score {
   double p95_um_per_m = 0;
 };
 
+/// The truth on even rows at the time of the field whose first row is `first` (0 or 1): as it is, or between
+/// the rows of the other field above and below. Odd rows stay as they are.
+ImageF truth_of_field(const ImageF& truth, int first);
+
 /// Collects frames of one take. One thread.
 class Scorer {
  public:

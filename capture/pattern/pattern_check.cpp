@@ -48,6 +48,10 @@ Status check_pattern(const Pattern& pattern) {
                  ", must be 3 to 6 (a zero crossing tells six primaries apart)"};
   }
   if (pattern.slides < 1) return Error{"slides is " + text(pattern.slides) + ", must be 1 or more"};
+  const bool repeats = pattern.scheme == Scheme::kOneSlide;
+  if (repeats && pattern.slides != 1) {
+    return Error{"scheme one-slide has slides: 1, not " + text(pattern.slides)};
+  }
   int vertices = 1;
   for (int s = 0; s < pattern.slides; ++s) {
     if (vertices > std::numeric_limits<int>::max() / pattern.base) {
@@ -79,7 +83,7 @@ Status check_pattern(const Pattern& pattern) {
     const std::uint64_t code = static_cast<std::uint64_t>(before) * static_cast<std::uint64_t>(vertices) +
                                static_cast<std::uint64_t>(vertex);
     const auto [found, fresh] = boundary_of_code.emplace(code, i - 1);
-    if (!fresh) {
+    if (!fresh && !repeats) {
       return Error{"boundary " + text(i - 1) + " repeats the code " + digits(pattern, i - 1) + "|" +
                    digits(pattern, i) + " of boundary " + text(found->second)};
     }

@@ -37,9 +37,22 @@ Image8 draw_row_slide(const Pattern& pattern, int slide, bool complement, int wi
   return out;
 }
 
-Image8 draw_interlaced(const Pattern& pattern, int slide, int width, int height) {
+Image8 draw_field(const Pattern& pattern, const Exposure& exposure, int width, int height) {
+  if (exposure.light != Light::kWhite)
+    return draw_slide(pattern, exposure.slide, exposure.light == Light::kComplement, width, height);
   Image8 out(width, height, 3);
-  for (int y = 0; y < height; ++y) draw_row(pattern, slide, y % 2 != 0, width, out.row(y));
+  std::fill_n(out.data(), out.size(), std::uint8_t{255});
+  return out;
+}
+
+Image8 draw_interlaced(const Pattern& pattern, int frame, FieldOrder order, int width, int height) {
+  Image8 out(width, height, 3);
+  for (const int half : {0, 1}) {
+    const Image8 field =
+        draw_field(pattern, shown(pattern, static_cast<std::uint64_t>(frame), half), width, 1);
+    for (int y = first_row(order, half); y < height; y += 2)
+      std::copy_n(field.row(0), field.stride(), out.row(y));
+  }
   return out;
 }
 

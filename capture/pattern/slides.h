@@ -4,6 +4,8 @@
 
 #include "base/image.h"
 #include "base/pattern.h"
+#include "base/rig.h"
+#include "capture/pattern/schedule.h"
 
 namespace relievo {
 
@@ -14,7 +16,10 @@ Image8 draw_slide(const Pattern& pattern, int slide, bool complement, int width,
 /// The same with the stripes along rows, from top to bottom: they divide the height.
 Image8 draw_row_slide(const Pattern& pattern, int slide, bool complement, int width, int height);
 
-/// One interlaced frame: the slide on the even rows, its complement on the odd ones.
-Image8 draw_interlaced(const Pattern& pattern, int slide, int width, int height);
+/// What one field shows: a slide, its complement, or all white.
+Image8 draw_field(const Pattern& pattern, const Exposure& exposure, int width, int height);
+
+/// Interlaced frame 0..cycle_frames()-1 of the pattern's scheme, its two fields on every second row each.
+Image8 draw_interlaced(const Pattern& pattern, int frame, FieldOrder order, int width, int height);
 
 }  // namespace relievo

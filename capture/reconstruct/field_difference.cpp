@@ -54,6 +54,21 @@ float estimate_noise(const DifferenceImage& image) {
   return 0;
 }
 
+struct Rows {
+  View8 own, other;
+};
+
+/// Lines lie at the even rows of an interlaced picture, whichever field was first.
+Rows rows_of(const CapturedFrame& frame) {
+  if (frame.scan == Scan::kProgressive) return {frame.picture.view(), frame.complement.view()};
+  return {frame.picture.view().field(0), frame.picture.view().field(1)};
+}
+
+/// Then the rows' difference has the other sign.
+bool complement_on_even_rows(const CapturedFrame& frame) {
+  return frame.scan == Scan::kInterlaced && frame.field_order == FieldOrder::kBottom;
+}
+
 }  // namespace
 
 Differencer::Differencer(const std::array<double, 9>& colour_matrix) {
@@ -69,8 +84,10 @@ Differencer::Differencer(const std::array<double, 9>& colour_matrix) {
 void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int end, Scratch& scratch,
                                       DifferenceImage& out) const {
   const RowKernels& kernels = row_kernels();
-  const View8 slide = frame.slide_field();
-  const View8 complement = frame.complement_field();
+  const Rows rows = rows_of(frame);
+  PlaneWeights weights = weights_;
+  if (complement_on_even_rows(frame))
+    for (float& w : weights.colour) w = -w;
   const int samples = 3 * out.width;
   const auto row = static_cast<std::size_t>(samples);
   scratch.rows.resize(9 * row);
@@ -82,11 +99,10 @@ void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int
   };
   const auto read = [&](int line) {
     if (line < 0 || line >= out.lines) return;
-    // An interlaced complement's rows lie half a line off the slide's: their mean is what it shows at the
-    // slide's row.
+    // An interlaced picture's other rows lie half a line off: their mean is what they show at this row.
     const int before = frame.scan == Scan::kInterlaced ? line - 1 : line;
-    kernels.combine_fields(slide.row(line), complement.row(std::clamp(before, 0, complement.height - 1)),
-                           complement.row(std::min(line, complement.height - 1)), samples, fields_at(line));
+    kernels.combine_fields(rows.own.row(line), rows.other.row(std::clamp(before, 0, rows.other.height - 1)),
+                           rows.other.row(std::min(line, rows.other.height - 1)), samples, fields_at(line));
   };
   std::int16_t* across = scratch_row(6);
   const FieldRows smooth{scratch_row(7), scratch_row(8)};
@@ -102,15 +118,15 @@ void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int
     kernels.low_pass(above.sum, here.sum, below.sum, samples, across, smooth.sum);
     const auto at = static_cast<std::size_t>(line);
     kernels.to_planes(
-        smooth, out.width, weights_,
+        smooth, out.width, weights,
         {out.values.data() + row * at, out.white.data() + static_cast<std::size_t>(out.width) * at});
   }
 }
 
 void Differencer::difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
-  const View8 slide = frame.slide_field();
-  out.width = slide.width;
-  out.lines = slide.height;
+  const View8 lines = rows_of(frame).own;
+  out.width = lines.width;
+  out.lines = lines.height;
   const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
   out.values.resize(3 * pixels);
   out.white.resize(pixels);

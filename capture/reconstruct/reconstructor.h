@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole of paper sections 5.2 to 5.4: camera frames in, surfaces out.
+// The whole of paper sections 5.2 to 5.5: camera frames in, surfaces out, by the pattern's scheme.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +34,7 @@ struct ReconstructReport {
   std::size_t boundaries = 0;  // detected in this frame
   std::size_t matched = 0;     // of which decoded with the frame before
   FilterCounts filters;        // what each filter did
+  bool white = false;          // this frame was white and gave texture alone (scheme white-frame)
   bool same_slide = false;     // this frame shows the slide of the one before: a frame was dropped (5.2.3)
 };
 
@@ -48,13 +49,20 @@ class Reconstructor {
   ~Reconstructor();
 
   /// The surface this frame completes with the last one under the other slide: the frame before, unless
-  /// frames were dropped (5.2.3). Nothing until both slides were seen. Fails where the frame's size is not
-  /// the rig's.
+  /// frames were dropped (5.2.3). Nothing until both slides were seen, and for a white frame. Fails where the
+  /// frame's size is not the rig's.
   Result<std::optional<Frame3D>> add(const CapturedFrame& frame);
 
   /// Takes back a surface that nobody needs any more, so that a later one is made in its memory. A stream
   /// whose frames all come back allocates nothing once it is warm. Any thread.
   void recycle(Frame3D&& used);
+
+  /// What else the last add() completed, in order of time: under white-field the surface of the frame itself,
+  /// add() having given the one half way from the frame before. Nothing when there is no more.
+  std::optional<Frame3D> next();
+
+  /// Textures made so far: fewer than surfaces under white-frame, half as many under white-field.
+  std::uint64_t textures() const;
 
   /// Of the last add().
   const ReconstructReport& report() const;

@@ -213,8 +213,8 @@ float SequenceDecoder::other_agreement(const Edge& edge, int line, int boundary,
   return std::min(agreement(left, beside.left), agreement(right, beside.right));
 }
 
-/// What the other slide's frame shows beside the edge: where it stood half way between the frames around that
-/// one.
+/// What the other slide's frame shows beside the edge: where it stood on the way between the frames around
+/// that one.
 SequenceDecoder::Beside SequenceDecoder::look_beside(const Edge& edge, int line,
                                                      const SequenceContext& context) {
   Beside out{{}, {}, true};
@@ -222,7 +222,7 @@ SequenceDecoder::Beside SequenceDecoder::look_beside(const Edge& edge, int line,
   if (context.same != nullptr) {
     const Displacement moved = displacement(*context.same, line, edge);
     out.tracked = moved.found && moved.px == 0;
-    px = 0.5F * moved.px;
+    px = context.other_share * moved.px;
   }
   if (context.other == nullptr) return out;
   const EvidenceBeside there = evidence_beside(*context.other, line, edge, edge.column_px + px);

@@ -41,6 +41,7 @@ struct SequenceContext {
   const DifferenceImage* other = nullptr;  // the last frame under the other slide
   const DifferenceImage* same = nullptr;   // the last frame before that under the slide that the edges are of
   const std::vector<ColumnRange>* expected = nullptr;  // of each boundary, from the depths before
+  float other_share = 0.5F;  // where `other` lies in time on the way back to `same`: 0 now, 1 there
 };
 
 /// Constant after construction but for scratch memory. One thread.

@@ -31,4 +31,10 @@ void add_fields(const CapturedFrame& frame, WorkerPool& pool, Image8& out) {
   });
 }
 
+void copy_picture(const Image8& from, Image8& to) {
+  if (to.width() != from.width() || to.height() != from.height() || to.channels() != from.channels())
+    to = Image8(from.width(), from.height(), from.channels());
+  std::copy_n(from.data(), from.size(), to.data());
+}
+
 }  // namespace relievo

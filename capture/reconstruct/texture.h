@@ -13,4 +13,7 @@ namespace relievo {
 /// the other field's rows above and below. Values saturate at 255. `out` is reused where its size fits.
 void add_fields(const CapturedFrame& frame, WorkerPool& pool, Image8& out);
 
+/// `to` becomes `from`; its memory is reused where the size fits.
+void copy_picture(const Image8& from, Image8& to);
+
 }  // namespace relievo

@@ -4,7 +4,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "capture/pattern/schedule.h"
 #include "capture/reconstruct/texture.h"
 
 namespace relievo {
@@ -128,6 +130,7 @@ void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<G
       continue;
     const std::uint8_t* slide = frame.picture.row(y);
     const std::uint8_t* complement = interlaced ? frame.picture.row(y + 1) : frame.complement.row(y);
+    if (interlaced && first_row(frame.field_order, 0) == 1) std::swap(slide, complement);
     std::array<float, 3> slide_step{};
     std::array<float, 3> complement_step{};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -194,7 +197,7 @@ void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& sc
                     3 * width};
   float* other = scratch.other.data();
   loops().split(row, {scratch.above.data() + 1, scratch.below.data() + 1, scratch.own.data(), other});
-  if (level_) level(y % 2 == 0 ? other : scratch.own.data(), width);
+  if (level_) level(y % 2 == first_row(frame.field_order, 0) ? other : scratch.own.data(), width);
   loops().store_sum(scratch.own.data(), other, 3 * width, out.row(y));
 }
 

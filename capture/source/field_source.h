@@ -15,19 +15,25 @@
 
 namespace relievo {
 
-/// One camera frame: the exposure under a slide and the one under its complement. Owns its pixels.
+/// One camera frame: two exposures one after the other. The first is under a slide, the second under what the
+/// pattern's scheme says: the slide's complement, or white; of a white frame both are under white. Owns its
+/// pixels.
 struct CapturedFrame {
   std::uint64_t number = 0;  // counted by the source from 0; a looping source keeps counting
   std::int64_t time_ns = 0;  // start of the first field, since the source's own start (see SourceInfo::live)
   Scan scan = Scan::kInterlaced;
+  FieldOrder field_order = FieldOrder::kTop;
   Image8 picture;     // RGB: the interlaced picture, or the progressive one under the slide
-  Image8 complement;  // progressive only: the picture under the complement
+  Image8 complement;  // progressive only: the picture under the complement, or what the scheme has for it
 
-  /// The exposure under the slide: even rows of an interlaced picture, or the whole first picture.
-  View8 slide_field() const { return scan == Scan::kInterlaced ? picture.view().field(0) : picture.view(); }
-  /// The exposure under the complement: odd rows of an interlaced picture, or the whole second picture.
-  View8 complement_field() const {
-    return scan == Scan::kInterlaced ? picture.view().field(1) : complement.view();
+  /// The exposure under the slide: every second row of an interlaced picture, or the whole first picture.
+  View8 slide_field() const { return scan == Scan::kInterlaced ? field(0) : picture.view(); }
+  /// The exposure after it: the other rows of an interlaced picture, or the whole second picture.
+  View8 complement_field() const { return scan == Scan::kInterlaced ? field(1) : complement.view(); }
+
+ private:
+  View8 field(int half) const {
+    return picture.view().field(field_order == FieldOrder::kTop ? half : 1 - half);
   }
 };
 

@@ -58,6 +58,7 @@ class TakeSource final : public FieldSource {
     frame.number = stamps_[index].frame + pass_ * pass_frames_;
     frame.time_ns = stamps_[index].time_ns + static_cast<std::int64_t>(pass_) * pass_ns_;
     frame.scan = info_.rig.scan;
+    frame.field_order = info_.rig.field_order;
     frame.picture = std::move(pictures->first);
     frame.complement = std::move(pictures->second);
     return std::optional(std::move(frame));

@@ -13,6 +13,7 @@
 #include "base/pattern.h"
 #include "base/rig.h"
 #include "capture/pattern/bcsl.h"
+#include "capture/pattern/schedule.h"
 #include "capture/source/field_source.h"
 #include "capture/source/npy.h"
 #include "capture/source/take_files.h"
@@ -99,6 +100,38 @@ inline Image8 draw_field(const StripedScene& scene, int slide, bool complement) 
     }
   }
   return picture;
+}
+
+/// One field under what a scheme shows.
+inline Image8 draw_field(const StripedScene& scene, const Exposure& exposure) {
+  if (exposure.light != Light::kWhite)
+    return draw_field(scene, exposure.slide, exposure.light == Light::kComplement);
+  Image8 slide = draw_field(scene, 0, false);
+  const Image8 complement = draw_field(scene, 0, true);
+  const int ambient = static_cast<int>(std::lround(scene.ambient));
+  for (std::size_t i = 0; i < slide.size(); ++i) {
+    slide.data()[i] =
+        static_cast<std::uint8_t>(std::min(255, slide.data()[i] + complement.data()[i] - ambient));
+  }
+  return slide;
+}
+
+/// Camera frame `number`, counted with the lost ones, under the pattern's scheme and the rig's field order.
+inline CapturedFrame draw_scheme_frame(const StripedScene& scene, std::uint64_t number) {
+  CapturedFrame frame;
+  frame.number = number;
+  frame.time_ns = std::llround(static_cast<double>(number) * 1e9 / scene.rig.frame_rate);
+  frame.scan = scene.rig.scan;
+  frame.field_order = scene.rig.field_order;
+  frame.picture = draw_field(scene, shown(scene.pattern, number, 0));
+  Image8 second = draw_field(scene, shown(scene.pattern, number, 1));
+  if (frame.scan == Scan::kProgressive) {
+    frame.complement = std::move(second);
+  } else {
+    for (int y = first_row(frame.field_order, 1); y < frame.picture.height(); y += 2)
+      std::copy_n(second.row(y), second.stride(), frame.picture.row(y));
+  }
+  return frame;
 }
 
 /// Camera frame `number` under `slide` (0 or 1).

@@ -112,6 +112,7 @@ Window window_of(Vec3 centre, float radius) {
 Rig make_rig(const SimOptions& o, const SceneView& view) {
   Rig rig;
   rig.scan = o.scan;
+  rig.field_order = o.field_order;
   rig.frame_rate = o.rate;
   // Wide pictures: between keeping the width in view and keeping the height.
   const double f = view.camera_f_px * 0.5 * (o.width / 640.0 + o.height / 480.0);
@@ -157,7 +158,11 @@ struct Renderer::Placed {
 
 Renderer::Renderer(const SimOptions& options, const Rig& rig, const Pattern& pattern,
                    std::shared_ptr<const Scene> scene)
-    : options_(options), rig_(rig), scene_(std::move(scene)), rays_(pixel_rays(rig.camera)) {
+    : options_(options),
+      rig_(rig),
+      scene_(std::move(scene)),
+      pattern_(pattern),
+      rays_(pixel_rays(rig.camera)) {
   for (int slide = 0; slide < pattern.slides; ++slide) {
     lights_.emplace_back(pattern, slide, rig.projector.width, options.defocus);
   }
@@ -187,7 +192,6 @@ Renderer::Renderer(const SimOptions& options, const Rig& rig, const Pattern& pat
 
 RenderedFrame Renderer::render(std::uint64_t index, bool with_truth) const {
   const bool interlaced = rig_.scan == Scan::kInterlaced;
-  const StripeLight* light = &lights_[index % lights_.size()];
   RenderedFrame frame;
   const int width = rig_.camera.width, height = rig_.camera.height;
   frame.picture = Image8(width, height, 3);
@@ -196,10 +200,11 @@ RenderedFrame Renderer::render(std::uint64_t index, bool with_truth) const {
   ImageF* truth = with_truth ? &frame.truth : nullptr;
   for (const int half : {0, 1}) {
     const double time_s = (static_cast<double>(index) + 0.5 * half) / rig_.frame_rate;
-    const Field field{light,
-                      half == 1,
+    const Exposure exposure = shown(pattern_, index, half);
+    const Field field{&lights_[static_cast<std::size_t>(exposure.slide)],
+                      exposure.light,
                       time_s,
-                      interlaced ? half : 0,
+                      interlaced ? first_row(rig_.field_order, half) : 0,
                       interlaced ? 2 : 1,
                       2 * index + static_cast<unsigned>(half)};
     render_field(field, interlaced || half == 0 ? frame.picture : frame.complement,
@@ -291,8 +296,11 @@ Vec3 Renderer::shade(const std::vector<Placed>& shapes, const Placed& seen, cons
   constexpr float kWidest = 24;  // projector columns to one side: grazing surfaces are dim mixtures anyway
   const float u0 = std::clamp(column(q - half_q), u - kWidest, u + kWidest);
   const float u1 = std::clamp(column(q + half_q), u - kWidest, u + kWidest);
-  Vec3 projected = field.light->mean(u0, u1);
-  if (field.complement) projected = Vec3{1, 1, 1} - projected;
+  Vec3 projected{1, 1, 1};
+  if (field.light != Light::kWhite) {
+    projected = field.stripes->mean(u0, u1);
+    if (field.light == Light::kComplement) projected = Vec3{1, 1, 1} - projected;
+  }
   const Vec3 light = camera_colour_from_projected_ * projected;
 
   const float r2 = dot(to_light, to_light), inverse_r = 1 / std::sqrt(r2);

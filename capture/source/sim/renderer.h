@@ -9,6 +9,7 @@
 #include "base/image.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/pattern/schedule.h"
 #include "capture/source/sim/scene.h"
 #include "capture/source/sim/sim_options.h"
 #include "capture/source/sim/stripe_light.h"
@@ -30,7 +31,8 @@ class Renderer {
   Renderer(const SimOptions& options, const Rig& rig, const Pattern& pattern,
            std::shared_ptr<const Scene> scene);
 
-  /// Camera frame `index`, lost ones counted: it shows slide index % slides. Each field is rendered at its
+  /// Camera frame `index`, lost ones counted: it shows what the pattern's
+  /// scheme has for it (capture/pattern/schedule.h). Each field is rendered at its
   /// own time, half a frame apart; each row of the truth at its field's time, a progressive truth at the
   /// first picture's. The same index gives the same bytes on every thread.
   RenderedFrame render(std::uint64_t index, bool with_truth) const;
@@ -39,8 +41,8 @@ class Renderer {
   struct Row;
   struct Placed;
   struct Field {
-    const StripeLight* light;
-    bool complement;
+    const StripeLight* stripes;
+    Light light;
     double time_s;
     int first_row, row_step;
     std::uint64_t noise_key;
@@ -56,6 +58,7 @@ class Renderer {
   SimOptions options_;
   Rig rig_;
   std::shared_ptr<const Scene> scene_;
+  Pattern pattern_;
   std::vector<StripeLight> lights_;    // one a slide
   std::vector<Vec3> rays_;             // one a pixel, z = 1
   Mat3 camera_colour_from_projected_;  // crosstalk, inverse of Eq. 1's M

@@ -42,6 +42,8 @@ constexpr Key kKeys[] = {
     {"seed", &SimOptions::seed, 0, 4294967295.0, "of the noise"},
 };
 
+constexpr int kWhiteFramePeriod = 84;  // of cycles of 2, 3, 4, 6 or 7 frames
+
 std::string text(double value) {
   char out[32];
   std::snprintf(out, sizeof out, "%.10g", value);
@@ -51,7 +53,7 @@ std::string text(double value) {
 std::string key_names() {
   std::string out = "scan";
   for (const Key& key : kKeys) out += ", " + std::string(key.name);
-  return out;
+  return out + ", field_order, scheme";
 }
 
 Status set(SimOptions& options, const std::string& name, const std::string& value) {
@@ -60,6 +62,17 @@ Status set(SimOptions& options, const std::string& name, const std::string& valu
       return Error{"scan=" + value + ": give interlaced or progressive"};
     }
     options.scan = value == "interlaced" ? Scan::kInterlaced : Scan::kProgressive;
+    return {};
+  }
+  if (name == "field_order") {
+    if (value != "top" && value != "bottom") return Error{"field_order=" + value + ": give top or bottom"};
+    options.field_order = value == "top" ? FieldOrder::kTop : FieldOrder::kBottom;
+    return {};
+  }
+  if (name == "scheme") {
+    const auto scheme = scheme_named(value);
+    if (!scheme) return Error{"scheme=" + value + ": give " + scheme_names()};
+    options.scheme = *scheme;
     return {};
   }
   for (const Key& key : kKeys) {
@@ -84,6 +97,8 @@ Status set(SimOptions& options, const std::string& name, const std::string& valu
 
 Result<SimOptions> parse_sim_options(const std::string& spec) {
   SimOptions options;
+  bool slides_given = false;
+  bool period_given = false;
   std::size_t at = spec.find(',');
   options.scene = spec.substr(0, at);
   while (at != std::string::npos) {
@@ -95,11 +110,22 @@ Result<SimOptions> parse_sim_options(const std::string& spec) {
     if (const Status status = set(options, item.substr(0, equals), item.substr(equals + 1)); !status) {
       return status.error();
     }
+    slides_given = slides_given || item.starts_with("slides=");
+    period_given = period_given || item.starts_with("period=");
     at = end;
   }
-  if (options.period % options.slides != 0 || options.period % 2 != 0) {
-    return Error{"period=" + std::to_string(options.period) + ": give an even number that slides=" +
-                 std::to_string(options.slides) + " divides, so that a loop goes on with the right slide"};
+  if (options.scheme == Scheme::kOneSlide) {
+    if (slides_given && options.slides != 1)
+      return Error{"slides=" + std::to_string(options.slides) + ": scheme=one-slide has one"};
+    options.slides = 1;
+  }
+  const bool white_frame = options.scheme == Scheme::kWhiteFrame;
+  const int cycle = options.slides + (white_frame ? 1 : 0);
+  if (white_frame && !period_given) options.period = kWhiteFramePeriod / cycle * cycle;
+  if (options.period % cycle != 0 || options.period % 2 != 0) {
+    return Error{"period=" + std::to_string(options.period) + ": give an even number that " +
+                 (white_frame ? "slides + 1 (scheme=white-frame) = " : "slides=") + std::to_string(cycle) +
+                 " divides, so that a loop goes on with the right slide"};
   }
   if (options.scan == Scan::kInterlaced && options.height % 2 != 0) {
     return Error{"height=" + std::to_string(options.height) + ": an interlaced picture has an even height"};
@@ -114,7 +140,10 @@ Result<SimOptions> parse_sim_options(const std::string& spec) {
 
 std::string sim_options_help() {
   const SimOptions defaults;
-  std::string out = "scan=interlaced|progressive (interlaced)\n";
+  std::string out =
+      "scan=interlaced|progressive (interlaced)\n"
+      "field_order=top|bottom (top): the field that an interlaced frame exposes first\n"
+      "scheme=complementary|white-field|white-frame|one-slide (complementary): what is projected in turn\n";
   for (const Key& key : kKeys) {
     const double value =
         std::visit([&](auto field) { return static_cast<double>(defaults.*field); }, key.field);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "base/pattern.h"
 #include "base/result.h"
 #include "base/rig.h"
 
@@ -15,14 +16,16 @@ struct SimOptions {
   std::string scene = "face";
   int width = 640, height = 480;  // camera pixels
   Scan scan = Scan::kInterlaced;
+  FieldOrder field_order = FieldOrder::kTop;
   double rate = 29.97;  // frames a second
   int frames = 0;       // frames of one pass; 0: one period
-  int period = 80;      // frames until all motion repeats; a looped source renders these once
-  int drop = 0;         // every n-th camera frame is lost; 0: none
+  int period = 80;  // frames until all motion repeats; a looped source renders these once. 84 of white-frame
+  int drop = 0;     // every n-th camera frame is lost; 0: none
 
   int projector_width = 1024, projector_height = 768;
-  int base = 6, slides = 2, stripes = 90;
-  int first = 0;  // first stripe within the code's whole path
+  Scheme scheme = Scheme::kComplementary;
+  int base = 6, slides = 2, stripes = 90;  // slides is 1 under the scheme one-slide
+  int first = 0;                           // first stripe within the code's whole path
 
   double noise = 1.2;       // sigma, of 255
   double chroma = 1.0;      // sigma of the chroma blur along a line, camera pixels

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "capture/pattern/bcsl.h"
+#include "capture/pattern/repeating.h"
 #include "capture/source/sim/render_ahead.h"
 #include "capture/source/sim/renderer.h"
 #include "capture/source/sim/scene.h"
@@ -51,6 +52,7 @@ class Simulator final : public SimSource {
     frame.number = number_++;
     frame.time_ns = std::llround(static_cast<double>(index) * 1e9 / info_.rig.frame_rate);
     frame.scan = info_.rig.scan;
+    frame.field_order = info_.rig.field_order;
     frame.picture = rendered->picture.clone();
     frame.complement = rendered->complement.clone();
     truth_ = rendered;
@@ -88,8 +90,14 @@ Result<std::unique_ptr<SimSource>> make_sim(const std::string& spec, const SimRu
   if (!options) return options.error().in(name);
   Result<std::shared_ptr<const sim::Scene>> scene = sim::make_scene(options->scene);
   if (!scene) return scene.error().in(name);
-  Result<Pattern> pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
+  const auto make = [&] {
+    return options->scheme == Scheme::kOneSlide
+               ? make_repeating_pattern(options->base, options->first, options->stripes)
+               : make_pattern(options->base, options->slides, options->first, options->stripes);
+  };
+  Result<Pattern> pattern = make();
   if (!pattern) return pattern.error().in(name);
+  pattern->scheme = options->scheme;
 
   SourceInfo info;
   info.name = name;

@@ -44,6 +44,15 @@ TEST(PatternCheck, WorksForOneSlideAndForThree) {
   EXPECT_FALSE(check_pattern({3, 3, kThree, {0, 12}}));            // 000 110: the third slide has no boundary
 }
 
+TEST(PatternCheck, OneSlideAloneMayRepeatCodes) {
+  EXPECT_TRUE(check_pattern({3, 1, kThree, {0, 1, 2, 0, 1}, Scheme::kOneSlide}));
+  EXPECT_FALSE(check_pattern({3, 1, kThree, {0, 1, 2, 0, 1}, Scheme::kWhiteField}));
+  EXPECT_FALSE(check_pattern({3, 1, kThree, {0, 1, 1, 0}, Scheme::kOneSlide}));
+  const Status two = check_pattern({3, 2, kThree, table_1_path(), Scheme::kOneSlide});
+  ASSERT_FALSE(two);
+  EXPECT_EQ(two.error().message, "scheme one-slide has slides: 1, not 2");
+}
+
 TEST(PatternCheck, RefusesSlidesThatOverflow) {
   EXPECT_FALSE(check_pattern({6, 13, {1, 2, 4, 6, 5, 3}, {0, 1}}));
 }

@@ -151,6 +151,45 @@ TEST(PatternFile, ReadsBack) {
   }
 }
 
+TEST(RigFile, FieldOrderIsTopUnlessItSaysOtherwise) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  Rig rig = test::small_rig(Scan::kInterlaced);
+  EXPECT_EQ(to_yaml(rig).find("field_order"), std::string::npos);
+  for (const FieldOrder order : {FieldOrder::kTop, FieldOrder::kBottom}) {
+    rig.field_order = order;
+    test::write_text(file, to_yaml(rig));
+    const Result<Rig> read = read_rig(file);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->field_order, order);
+  }
+  test::write_text(file, replaced(to_yaml(rig), "field_order: bottom", "field_order: odd"));
+  const Result<Rig> read = read_rig(file);
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr("field_order must be top or bottom"));
+}
+
+TEST(PatternFile, SchemeIsComplementaryUnlessItSaysOtherwise) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "pattern.yaml";
+  Pattern pattern{3, 1, {1, 2, 4}, {0, 1, 2, 0}};
+  EXPECT_EQ(to_yaml(pattern).find("scheme"), std::string::npos);
+  for (const Scheme scheme :
+       {Scheme::kComplementary, Scheme::kWhiteField, Scheme::kWhiteFrame, Scheme::kOneSlide}) {
+    pattern.scheme = scheme;
+    test::write_text(file, to_yaml(pattern));
+    const Result<Pattern> read = read_pattern(file);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->scheme, scheme);
+    EXPECT_EQ(read->sequence, pattern.sequence);
+  }
+  test::write_text(file, replaced(to_yaml(pattern), "one-slide", "striped"));
+  const Result<Pattern> read = read_pattern(file);
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message,
+              HasSubstr("scheme must be complementary, white-field, white-frame or one-slide"));
+}
+
 TEST(PatternFile, RefusesByName) {
   test::TempFolder folder;
   const auto file = folder.path() / "pattern.yaml";

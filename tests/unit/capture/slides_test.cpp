@@ -41,11 +41,14 @@ TEST(Slides, SlideAndComplementMakeWhite) {
   ASSERT_TRUE(pattern);
   const Image8 slide = draw_slide(*pattern, 1, false, 200, 2);
   const Image8 complement = draw_slide(*pattern, 1, true, 200, 2);
-  const Image8 frame = draw_interlaced(*pattern, 1, 200, 2);
+  const Image8 frame = draw_interlaced(*pattern, 1, FieldOrder::kTop, 200, 2);
+  const Image8 lower = draw_interlaced(*pattern, 1, FieldOrder::kBottom, 200, 2);
   for (int i = 0; i < 600; ++i) {
     ASSERT_EQ(slide.row(0)[i] + complement.row(0)[i], 255);
     ASSERT_EQ(frame.row(0)[i], slide.row(0)[i]);
     ASSERT_EQ(frame.row(1)[i], complement.row(0)[i]);
+    ASSERT_EQ(lower.row(0)[i], complement.row(0)[i]);
+    ASSERT_EQ(lower.row(1)[i], slide.row(0)[i]);
   }
 }
 

@@ -30,6 +30,7 @@ Read read(const std::string& text) {
 TEST(Config, EverySetting) {
   const Read r = read(R"(# a comment
 source = "take:shared/bunny"
+scheme = "white-frame"
 stream = "bunny"
 domain = 7
 web = "[::1]:9000"
@@ -46,6 +47,7 @@ fill_holes = 3
 )");
   ASSERT_TRUE(r.status) << r.status.error().message;
   EXPECT_EQ(r.config.source, "take:shared/bunny");
+  EXPECT_EQ(r.config.scheme, "white-frame");
   EXPECT_EQ(r.config.stream, "bunny");
   EXPECT_EQ(r.config.domain, 7);
   EXPECT_EQ(r.config.web, "[::1]:9000");
@@ -111,6 +113,8 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"loop_number", "loop = 1", "loop must be true or false"},
         Wrong{"loop_text", "loop = \"yes\"", "loop must be true or false"},
         Wrong{"fast_number", "fast = 0", "fast must be true or false"},
+        Wrong{"scheme_unknown", "scheme = \"striped\"",
+              "scheme must be complementary, white-field, white-frame or one-slide in quotes"},
         Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\" or \"paper\""},
         Wrong{"threads_none", "threads = 0", "threads must be a whole number from 1 to 64"},
         Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/slide_decoder.h"
+
+#include <utility>
+
+#include "capture/reconstruct/consistency.h"
+#include "capture/reconstruct/detect.h"
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/instant.h"
+#include "capture/reconstruct/match.h"
+#include "capture/reconstruct/recover.h"
+#include "capture/reconstruct/refine.h"
+#include "capture/reconstruct/sequence.h"
+#include "capture/reconstruct/trace.h"
+#include "capture/reconstruct/weak_signal.h"
+
+namespace relievo {
+namespace {
+
+SlideOrder other(SlideOrder order) {
+  return order == SlideOrder::kNewerIsFirst ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst;
+}
+
+/// What is kept of one frame, for the decoder in use.
+struct Observation {
+  std::int64_t time_ns = 0;
+  Detection detection;         // the paper's
+  DifferenceImage difference;  // the ordered one's
+};
+
+}  // namespace
+
+struct SlideDecoder::State {
+  State(const Rig& rig, const Pattern& p, const ReconstructOptions& options)
+      : pattern(p),
+        paper(options.decoder == Decoder::kPaper),
+        detector(rig.colour_matrix, DetectOptions{}),
+        table(p),
+        differencer(rig.colour_matrix),
+        sequence(p),
+        refiner(rig.colour_matrix),
+        instant(p.boundaries(),
+                rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height,
+                1e9 / rig.frame_rate) {}
+
+  Pattern pattern;
+  bool paper;
+  Detector detector;
+  TransitionTable table;
+  Differencer differencer;
+  EdgeFinder edge_finder;
+  SequenceDecoder sequence;
+  WeakSignal weak_signal;
+  Tracer tracer;
+  Refiner refiner;
+  ConsistencyCheck consistency;
+  Recovery recovery;
+  InstantFilter instant;
+
+  Observation newer;
+  Observation previous;  // the frame before
+  Observation older;     // the last frame under the slide that `newer` does not show
+  Observation same;      // the last one before `older` under the slide that `newer` shows
+  bool have_previous = false;
+  bool have_same = false;
+  bool have_older = false;
+  SlideOrder order = SlideOrder::kNewerIsSecond;  // of the last decoded pair
+  bool order_known = false;
+
+  const std::vector<ColumnRange>* expected = nullptr;  // of the frame being decoded
+  Match match, other_match;
+  EdgeImage edges;
+  SequenceResult result, other_result;
+  std::vector<RecoveredBoundary> recovered;
+
+  bool shows_same_slide() const;
+  bool match_paper(SlideOrder tried, Match& out);
+  SequenceContext context(SlideOrder tried) const;
+  bool match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out);
+  void match_in_order(SlideOrder predicted, WorkerPool& pool);
+  void list(std::vector<DecodedBoundary>& out) const;
+};
+
+bool SlideDecoder::State::shows_same_slide() const {
+  return paper ? same_slide(newer.detection, previous.detection)
+               : same_slide(newer.difference, previous.difference);
+}
+
+/// True where the order explains most of what was seen.
+bool SlideDecoder::State::match_paper(SlideOrder tried, Match& out) {
+  if (pattern.slides == 1) {
+    decode_single_slide(newer.detection, table, out);
+  } else {
+    match_boundaries(newer.detection, older.detection, tried, table, out);
+  }
+  return out.valid * 2 > newer.detection.boundaries.size();
+}
+
+SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
+  SequenceContext out{.order = tried};
+  out.expected = expected;
+  if (have_older) out.other = &older.difference;
+  if (have_same) {
+    out.same = &same.difference;
+    const auto back = static_cast<float>(newer.time_ns - same.time_ns);
+    if (back > 0) out.other_share = static_cast<float>(newer.time_ns - older.time_ns) / back;
+  }
+  return out;
+}
+
+bool SlideDecoder::State::match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out) {
+  sequence.decode(edges, context(tried), pool, out);
+  return out.counts.in_order * 2 > edges.edges.size();
+}
+
+/// `predicted` is the order if slides alternate. Where it explains little, both are tried: "each frame is
+/// decoded using the tuple which gives more valid stripe positions" (5.3).
+void SlideDecoder::State::match_in_order(SlideOrder predicted, WorkerPool& pool) {
+  order = predicted;
+  const bool good = paper ? match_paper(order, match) : match_ordered(order, pool, result);
+  if (pattern.slides == 1 || (good && order_known)) return;
+  const bool other_good =
+      paper ? match_paper(other(order), other_match) : match_ordered(other(order), pool, other_result);
+  order_known = good || other_good;
+  if (paper ? other_match.valid > match.valid : other_result.score > result.score) {
+    std::swap(match, other_match);
+    std::swap(result, other_result);
+    order = other(order);
+  }
+}
+
+void SlideDecoder::State::list(std::vector<DecodedBoundary>& out) const {
+  out.clear();
+  const auto& starts = paper ? newer.detection.line_start : edges.line_start;
+  for (std::size_t line = 0; line + 1 < starts.size(); ++line) {
+    for (std::uint32_t i = starts[line]; i < starts[line + 1]; ++i) {
+      const int boundary = paper ? match.boundary[i] : result.boundary[i];
+      if (boundary < 0) continue;
+      if (paper) {
+        const Boundary& b = newer.detection.boundaries[i];
+        out.push_back({boundary, static_cast<int>(line), b.column_px, 0, b.slope});
+      } else {
+        const Edge& e = edges.edges[i];
+        out.push_back({boundary, static_cast<int>(line), e.column_px, e.sigma_px, e.slope});
+      }
+    }
+  }
+  if (paper) return;
+  for (const RecoveredBoundary& r : recovered)
+    out.push_back({r.boundary, r.line, r.column_px, r.sigma_px, r.slope});
+}
+
+SlideDecoder::SlideDecoder(const Rig& rig, const Pattern& pattern, const ReconstructOptions& options)
+    : state_(std::make_unique<State>(rig, pattern, options)) {}
+SlideDecoder::SlideDecoder(SlideDecoder&&) noexcept = default;
+SlideDecoder& SlideDecoder::operator=(SlideDecoder&&) noexcept = default;
+SlideDecoder::~SlideDecoder() = default;
+
+void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report) {
+  State& s = *state_;
+  std::swap(s.newer, s.previous);
+  s.newer.time_ns = pair.time_ns;
+  if (s.paper) {
+    s.detector.detect(pair, pool, s.newer.detection);
+    report.boundaries = s.newer.detection.boundaries.size();
+  } else {
+    s.differencer.difference(pair, pool, s.newer.difference);
+    s.weak_signal.average(pool, s.newer.difference);
+    s.edge_finder.find(s.newer.difference, pool, s.edges);
+    report.boundaries = s.edges.edges.size();
+  }
+  // Two frames in a row under one slide: one between them was dropped (5.2.3). The newer takes the place of
+  // the one before, as in the paper, and is decoded all the same, with the last frame under the other slide.
+  const bool have_previous = std::exchange(s.have_previous, true);
+  report.same_slide = s.pattern.slides == 2 && have_previous && s.shows_same_slide();
+  if (s.pattern.slides == 2 && have_previous && !report.same_slide) {
+    // previous becomes other, other becomes same; the memory of the oldest serves the next frame.
+    std::swap(s.same, s.previous);
+    std::swap(s.same, s.older);
+    s.have_same = std::exchange(s.have_older, true);
+  }
+}
+
+bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report,
+                          std::vector<DecodedBoundary>& out) {
+  State& s = *state_;
+  if (!s.have_older && s.pattern.slides == 2) return false;
+  const CapturedFrame& pair = view.pair;
+  s.expected = view.expected;
+  s.match_in_order(report.same_slide ? s.order : other(s.order), pool);
+  if (s.paper) {
+    report.matched = s.match.valid;
+  } else {
+    // A row a line, whichever of the two fields that is.
+    const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();
+    const TraceCounts traced =
+        s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
+    report.filters.traced = traced.added;
+    report.filters.retraced = traced.moved;
+    s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges);
+    const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
+    const SequenceCounts& counts = s.result.counts;
+    report.filters.unsupported = counts.unsupported;
+    report.filters.completed = counts.completed;
+    report.filters.rejected = checked.rejected;
+    report.filters.moved = checked.moved;
+    s.recovery.recover({.shown = s.newer.difference,
+                        .slide = rows,
+                        .shown_colours = s.sequence.shown_colours(s.order),
+                        .other = s.have_older ? &s.older.difference : nullptr,
+                        .other_colours = s.sequence.shown_colours(other(s.order))},
+                       s.refiner, s.edges, s.result, pool, s.recovered);
+    report.filters.recovered = s.recovered.size();
+    report.matched =
+        counts.in_order - counts.unsupported + counts.completed + traced.added + s.recovered.size();
+    // Under white-field the difference is of the slide's own instant already.
+    if (s.pattern.scheme != Scheme::kWhiteField)
+      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered);
+  }
+  s.list(out);
+  return true;
+}
+
+}  // namespace relievo

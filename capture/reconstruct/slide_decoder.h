@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Slides seen one after the other in, decoded boundaries out (paper 5.2, 5.3): keeps the frames before that a
+// code takes, finds out which slide each shows, and hands each frame to the decoder that was chosen.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/pattern.h"
+#include "base/rig.h"
+#include "capture/reconstruct/depth_range.h"
+#include "capture/reconstruct/reconstructor.h"
+#include "capture/source/field_source.h"
+
+namespace relievo {
+
+/// A projected boundary found in the picture.
+struct DecodedBoundary {
+  int boundary;
+  int line;
+  float column_px;
+  float sigma_px;  // standard deviation of column_px; 0: not known
+  float slope;     // the greater, the surer
+};
+
+/// What decode() is to decode.
+struct SlideView {
+  const CapturedFrame& pair;
+  const std::vector<ColumnRange>* expected;  // of each boundary, from the depths before; null: not known
+};
+
+/// One stream's. One thread.
+class SlideDecoder {
+ public:
+  /// `pattern` must be valid (check_pattern) and have one or two slides.
+  SlideDecoder(const Rig& rig, const Pattern& pattern, const ReconstructOptions& options);
+  SlideDecoder(SlideDecoder&&) noexcept;
+  SlideDecoder& operator=(SlideDecoder&&) noexcept;
+  ~SlideDecoder();
+
+  /// Looks at a frame whose exposures are a slide and its complement. Sets report.boundaries and .same_slide.
+  void observe(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
+
+  /// Decodes the frame observed last, which is `view.pair`, into `out`; false while
+  /// the other slide was not seen. Sets report.matched and .filters. `out`'s memory is reused.
+  bool decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report,
+              std::vector<DecodedBoundary>& out);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace relievo
