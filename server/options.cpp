@@ -61,7 +61,7 @@ const char* scheme_help() {
          "                 fast motion suffers\n"
          "  one-slide      one slide and its complement, both 30 Hz, each frame by itself: any motion; "
          "codes\n"
-         "                 repeat, so small surfaces cannot be placed\n";
+         "                 repeat, so small surfaces may be misplaced\n";
 }
 
 }  // namespace relievo
