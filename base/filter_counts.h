@@ -9,8 +9,8 @@
 namespace relievo {
 
 struct FilterCounts {
-  std::uint64_t unsupported = 0, completed = 0, traced = 0, retraced = 0, rejected = 0, moved = 0,
-                no_point = 0, duplicate = 0, filled = 0, interpolated = 0, alone = 0, step = 0, edge_on = 0,
+  std::uint64_t unsupported = 0, completed = 0, traced = 0, rejected = 0, moved = 0, no_point = 0,
+                duplicate = 0, filled = 0, interpolated = 0, alone = 0, step = 0, edge_on = 0,
                 small_component = 0, recovered = 0;
 
   FilterCounts& operator+=(const FilterCounts& other);
@@ -24,12 +24,11 @@ struct Filter {
   std::string_view meaning;
   std::uint64_t FilterCounts::*count;
 };
-inline constexpr std::array<Filter, 15> kFilters{{
+inline constexpr std::array<Filter, 14> kFilters{{
     {"unsupported", "decoded boundaries given up, since no neighbouring line agreed",
      &FilterCounts::unsupported},
     {"completed", "boundaries decoded by the lines above and below", &FilterCounts::completed},
     {"traced", "boundaries seen only by averaging along those on the lines around", &FilterCounts::traced},
-    {"retraced", "boundaries put back where those on the lines around are", &FilterCounts::retraced},
     {"rejected", "decoded boundaries given up, since no surface passes through them",
      &FilterCounts::rejected},
     {"moved", "boundaries beside a depth step put back on their surface", &FilterCounts::moved},

@@ -36,10 +36,11 @@ constexpr float kLumaFactor = 1.3F;         // the middle level is itself measur
 constexpr float kLevelSlack = 0.1F;         // of a side's luma ratio about what the code tells
 constexpr float kLeastRise = 0.12F;         // of luma, between the sides of a boundary that luma shows
 constexpr float kLeastSlope = 0.2F;         // of that, a pixel
-constexpr float kStepContrast = 0.12F;      // a step of the scene that is one
-constexpr int kRowReach_px = 4;             // columns compared with the lines above and below
-constexpr float kRowStep = 0.12F;           // difference, of the sum, that is another surface's
-constexpr float kRowNoise = 3.F;            // grey levels more: noise
+constexpr float kWideStripe_px = 12.F;
+constexpr float kStepContrast = 0.12F;  // a step of the scene that is one
+constexpr int kRowReach_px = 4;         // columns compared with the lines above and below
+constexpr float kRowStep = 0.12F;       // difference, of the sum, that is another surface's
+constexpr float kRowNoise = 3.F;        // grey levels more: noise
 constexpr float kStepNear_px = 1.2F;
 
 /// Of a column that is not negative; a call of std::lround takes ten times as long.
@@ -71,9 +72,24 @@ bool steepest_at(const float* white, int centre, float column_px) {
   return std::fabs(place - column_px) < kStepNear_px;
 }
 
+/// Mean distance of neighbouring boundaries that follow each other in the pattern.
+float usual_stripe_px(const SequenceResult& result, const EdgeImage& edges) {
+  float sum = 0;
+  int count = 0;
+  for (int line = 0; line < edges.lines; line += 4) {
+    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)] + 1;
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+      if (result.boundary[e - 1] < 0 || result.boundary[e] != result.boundary[e - 1] + 1) continue;
+      sum += edges.edges[e].column_px - edges.edges[e - 1].column_px;
+      ++count;
+    }
+  }
+  return count > 0 ? sum / static_cast<float>(count) : 0;
+}
+
 /// 0..1, of the scene in white light on this line and those beside it.
 template <int kAround_px>
-float contrast_around(const DifferenceImage& image, int line, int centre) {
+float contrast_around(const DifferenceImage& image, int line, int centre, bool wide_stripes) {
   static_assert(kContrastLines == 1);
   const float* above = image.white_line(std::max(0, line - 1)) + centre - kAround_px;
   const float* here = image.white_line(line) + centre - kAround_px;
@@ -82,9 +98,14 @@ float contrast_around(const DifferenceImage& image, int line, int centre) {
   float darkest = 1e9F;
   for (int i = 0; i <= 2 * kAround_px; ++i) {
     brightest = std::max(brightest, std::max(std::max(above[i], here[i]), below[i]));
+    darkest = std::min(darkest, std::min(std::min(above[i], here[i]), below[i]));
+  }
+  if (wide_stripes) {
     // What is dark over two pixels only is speckle, no step of the scene.
-    const auto least_dark = [i](const float* w) { return std::max(std::max(w[i - 1], w[i]), w[i + 1]); };
-    darkest = std::min(darkest, std::min(std::min(least_dark(above), least_dark(here)), least_dark(below)));
+    darkest = 1e9F;
+    for (const float* w : {above, here, below})
+      for (int i = 0; i <= 2 * kAround_px; ++i)
+        darkest = std::min(darkest, std::max(std::max(w[i - 1], w[i]), w[i + 1]));
   }
   return (brightest - darkest) / (brightest + darkest + kDark);
 }
@@ -175,7 +196,7 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
   const auto at = [&](int x) { return light.luma[static_cast<std::size_t>(x - light.first)]; };
 
   LumaPlace out{own, 0, 0, 0, false};
-  out.contrast = contrast_around<kLumaReach_px>(image, line, centre);
+  out.contrast = contrast_around<kLumaReach_px>(image, line, centre, wide_stripes_);
   float place = own;
   const auto reach_in = [](float free) { return std::clamp(static_cast<int>(free - 1.F), 2, kPlateau_px); };
   std::array<int, 3> last{};
@@ -264,10 +285,10 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
   return out;
 }
 
-void Refiner::look_around(const DifferenceImage& image, int line, Edge& edge) {
+void Refiner::look_around(const DifferenceImage& image, int line, Edge& edge) const {
   const int centre = column_of(edge.column_px);
   if (centre < kReach_px || centre + kReach_px >= image.width) return;
-  edge.contrast = contrast_around<kContrastReach_px>(image, line, centre);
+  edge.contrast = contrast_around<kContrastReach_px>(image, line, centre, wide_stripes_);
   // The line alone has no more contrast than it has with its neighbours.
   edge.at_step =
       edge.contrast >= kStepContrast && steepest_at(image.white_line(line), centre, edge.column_px);
@@ -282,7 +303,8 @@ Refiner::Place Refiner::find(const DifferenceImage& image, int line, float colum
   if (std::fabs(luma.rise) < kLeastRise) return {column_px, 0, false, false};
   if (!luma.found || luma.slope < kLeastSlope * std::fabs(luma.rise)) return {column_px, 0, false, true};
   const float sigma = luma_sigma(image, line, luma);
-  const float level = kLevelShare * contrast_around<kLumaReach_px>(image, line, centre) / luma.slope;
+  const float level =
+      kLevelShare * contrast_around<kLumaReach_px>(image, line, centre, wide_stripes_) / luma.slope;
   return {luma.column_px, std::sqrt(sigma * sigma + level * level), true, true};
 }
 
@@ -393,6 +415,7 @@ Refiner::Drawn Refiner::colour_drawn(const DifferenceImage& image, const EdgeIma
 void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
                      const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges) {
   share_ = projected_share(image, result, colours, edges);
+  wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   places_.assign(edges.edges.size(), {});
   pool.for_ranges(edges.lines, [&](int begin_line, int end_line, int) {
     for (int line = begin_line; line < end_line; ++line) {

@@ -65,12 +65,13 @@ class Refiner {
                        float own) const;
   float luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const;
   Drawn colour_drawn(const DifferenceImage& image, const EdgeImage& edges);
-  static void look_around(const DifferenceImage& image, int line, Edge& edge);
+  void look_around(const DifferenceImage& image, int line, Edge& edge) const;
   void refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
                    Edge& edge) const;
 
   std::array<float, 3> luma_;      // of the difference image's channels
   std::array<float, 8> ratio_;     // of each primary
+  bool wide_stripes_ = false;      // in the last frame, so wide that two dark pixels are speckle
   float share_ = 1;                // projected_share of the last frame
   std::vector<LumaPlace> places_;  // one an edge
   std::vector<float> always_, by_contrast_;

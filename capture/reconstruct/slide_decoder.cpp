@@ -194,10 +194,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   } else {
     // A row a line, whichever of the two fields that is.
     const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();
-    const TraceCounts traced =
+    const std::size_t traced =
         s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
-    report.filters.traced = traced.added;
-    report.filters.retraced = traced.moved;
+    report.filters.traced = traced;
     s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges);
     const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
     const SequenceCounts& counts = s.result.counts;
@@ -212,8 +211,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
                         .other_colours = s.sequence.shown_colours(other(s.order))},
                        s.refiner, s.edges, s.result, pool, s.recovered);
     report.filters.recovered = s.recovered.size();
-    report.matched =
-        counts.in_order - counts.unsupported + counts.completed + traced.added + s.recovered.size();
+    report.matched = counts.in_order - counts.unsupported + counts.completed + traced + s.recovered.size();
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered);

@@ -10,9 +10,8 @@
 namespace relievo {
 namespace {
 
-constexpr int kReach = 4;         // lines to each side that tell where a boundary is
-constexpr float kLean_px = 2.5F;  // how far a boundary moves from one line to the next
-constexpr float kBend_px = 0.4F;  // second difference over lines above which a boundary is looked at again
+constexpr int kReach = 4;             // lines to each side that tell where a boundary is
+constexpr float kLean_px = 2.5F;      // how far a boundary moves from one line to the next
 constexpr float kStraight_px = 0.7F;  // of the straight line through its neighbours, one that counts
 constexpr int kLeastBeyond = 3;       // lines that continue a boundary past its end
 constexpr int kAverage = 3;           // lines to each side that the evidence is averaged over
@@ -195,7 +194,7 @@ float Tracer::spacing(int line, int boundary, int side) const {
 }
 
 void Tracer::trace_boundary(const DifferenceImage& image, int boundary, const SequenceDecoder& sequence,
-                            const SequenceContext& context, Scratch& scratch, EdgeImage& edges) const {
+                            const SequenceContext& context, Scratch& scratch) const {
   const std::array<Primary, 2> colours =
       sequence.shown_colours(context.order)[static_cast<std::size_t>(boundary)];
   const std::size_t row = static_cast<std::size_t>(boundary) * static_cast<std::size_t>(lines_);
@@ -205,57 +204,36 @@ void Tracer::trace_boundary(const DifferenceImage& image, int boundary, const Se
   const auto reaches = [&](int line) {
     return std::array{0.45F * spacing(line, boundary, -1), 0.45F * spacing(line, boundary, 1)};
   };
-  const auto apply = [&](const Measure& m, Edge& edge) {
-    edge.column_px = m.column_px;
-    edge.slope = m.slope;
-    edge.sigma_px = edge.noise_px = m.noise / std::max(m.slope, 0.01F);
-  };
   const auto visit = [&](int line) {
     float& here = columns[static_cast<std::size_t>(line)];
-    const bool present = known(here);
-    if (present) {
-      if (line == 0 || line + 1 == lines_) return;
-      const float bend = columns[static_cast<std::size_t>(line) - 1] - 2 * here +
-                         columns[static_cast<std::size_t>(line) + 1];
-      if (std::fabs(bend) <= kBend_px) return;
-    } else {
-      const bool above = line > 0 && known(columns[static_cast<std::size_t>(line) - 1]);
-      const bool below = line + 1 < lines_ && known(columns[static_cast<std::size_t>(line) + 1]);
-      if (!above && !below) return;
-    }
+    if (known(here)) return;
+    const bool above = line > 0 && known(columns[static_cast<std::size_t>(line) - 1]);
+    const bool below = line + 1 < lines_ && known(columns[static_cast<std::size_t>(line) + 1]);
+    if (!above && !below) return;
     const auto fit = fit_around(columns.data(), lines_, line);
     if (!fit) return;
-    if (present && (std::fabs(fit->column_px - here) < kBend_px || fit->above < kLeastBeside ||
-                    fit->below < kLeastBeside))
-      return;
     // Past a boundary's end only what lies further out tells whether it goes on.
     const std::array<int, 2> over{fit->above > 0 && (fit->below == 0) ? 0 : -kAverage,
                                   fit->below > 0 && (fit->above == 0) ? 0 : kAverage};
     const auto m = measure(image, line, *fit, colours, reaches(line), over);
     if (!m) return;
-    if (present) {
-      if (std::fabs(m->column_px - fit->column_px) > std::fabs(here - fit->column_px)) return;
-      apply(*m, edges.edges[static_cast<std::size_t>(grid_[row + static_cast<std::size_t>(line)])]);
-      ++scratch.counts.moved;
-    } else {
-      Added added{line, static_cast<std::int16_t>(boundary), {}};
-      apply(*m, added.edge);
-      const std::array<float, 2> reach = reaches(line);
-      added.edge.left_reach_px = std::min(reach[0], 6.F);
-      added.edge.right_reach_px = std::min(reach[1], 6.F);
-      const bool end = fit->above < kLeastBeside || fit->below < kLeastBeside;
-      if (end && (image.signal_at(line, static_cast<int>(m->column_px)) == Signal::kStrong ||
-                  sequence.other_agreement(added.edge, line, boundary, context) < kOtherSide)) {
-        return;
-      }
-      scratch.added.push_back(added);
-      ++scratch.counts.added;
+    Added added{line, static_cast<std::int16_t>(boundary), {}};
+    added.edge.column_px = m->column_px;
+    added.edge.slope = m->slope;
+    added.edge.sigma_px = added.edge.noise_px = m->noise / std::max(m->slope, 0.01F);
+    const std::array<float, 2> reach = reaches(line);
+    added.edge.left_reach_px = std::min(reach[0], static_cast<float>(kWindow_px));
+    added.edge.right_reach_px = std::min(reach[1], static_cast<float>(kWindow_px));
+    const bool end = fit->above < kLeastBeside || fit->below < kLeastBeside;
+    if (end && (image.signal_at(line, static_cast<int>(m->column_px)) == Signal::kStrong ||
+                sequence.other_agreement(added.edge, line, boundary, context) < kOtherSide)) {
+      return;
     }
+    scratch.added.push_back(added);
     here = m->column_px;
   };
   for (int line = 0; line < lines_; ++line) visit(line);
-  for (int line = lines_ - 1; line >= 0; --line)
-    if (!known(columns[static_cast<std::size_t>(line)])) visit(line);
+  for (int line = lines_ - 1; line >= 0; --line) visit(line);
 }
 
 void Tracer::insert(SequenceResult& result, EdgeImage& edges) {
@@ -292,13 +270,12 @@ void Tracer::insert(SequenceResult& result, EdgeImage& edges) {
   std::swap(merged_boundary_, result.boundary);
 }
 
-TraceCounts Tracer::trace(const DifferenceImage& image, const SequenceDecoder& sequence,
+std::size_t Tracer::trace(const DifferenceImage& image, const SequenceDecoder& sequence,
                           const SequenceContext& context, WorkerPool& pool, SequenceResult& result,
                           EdgeImage& edges) {
   boundaries_ = static_cast<int>(sequence.shown_colours(context.order).size());
   lines_ = edges.lines;
   const std::size_t cells = static_cast<std::size_t>(boundaries_) * static_cast<std::size_t>(lines_);
-  grid_.assign(cells, -1);
   column_.assign(cells, kNone);
   for (int line = 0; line < lines_; ++line) {
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
@@ -307,26 +284,19 @@ TraceCounts Tracer::trace(const DifferenceImage& image, const SequenceDecoder& s
       const std::size_t cell =
           static_cast<std::size_t>(result.boundary[e]) * static_cast<std::size_t>(lines_) +
           static_cast<std::size_t>(line);
-      grid_[cell] = static_cast<std::int32_t>(e);
       column_[cell] = edges.edges[e].column_px;
     }
   }
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   for (Scratch& s : scratch_) {
     s.added.clear();
-    s.counts = {};
   }
   pool.for_ranges(boundaries_, [&](int begin, int end, int worker) {
     for (int b = begin; b < end; ++b)
-      trace_boundary(image, b, sequence, context, scratch_[static_cast<std::size_t>(worker)], edges);
+      trace_boundary(image, b, sequence, context, scratch_[static_cast<std::size_t>(worker)]);
   });
   insert(result, edges);
-  TraceCounts total;
-  for (const Scratch& s : scratch_) {
-    total.added += s.counts.added;
-    total.moved += s.counts.moved;
-  }
-  return total;
+  return added_.size();
 }
 
 }  // namespace relievo

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decoded boundaries followed from line to line. A boundary hardly changes its place over a few lines, so
 // where it is known there, what it should look like here is known too: averaged along it, evidence suffices
-// that is too weak on one line alone, and what speckle, a hole in the texture or noise moved is put back.
+// that is too weak on one line alone or that speckle hides there.
 #pragma once
 
 #include <array>
@@ -15,18 +15,12 @@
 
 namespace relievo {
 
-/// Every count is of boundaries on a line.
-struct TraceCounts {
-  std::size_t added = 0;  // between or beyond those decoded
-  std::size_t moved = 0;  // off the place of their own line
-};
-
 /// Keeps its scratch memory from frame to frame. One thread.
 class Tracer {
  public:
   /// Adds edges to `edges` and their boundaries to `result`, and moves edges.
   /// `image` is what the edges were found in; `sequence` and `context` are what decoded them.
-  TraceCounts trace(const DifferenceImage& image, const SequenceDecoder& sequence,
+  std::size_t trace(const DifferenceImage& image, const SequenceDecoder& sequence,
                     const SequenceContext& context, WorkerPool& pool, SequenceResult& result,
                     EdgeImage& edges);
 
@@ -42,17 +36,15 @@ class Tracer {
   struct Scratch {
     std::vector<Added> added;
     std::vector<float> columns;  // of one boundary: one a line, NaN where there is none
-    TraceCounts counts;
   };
   void trace_boundary(const DifferenceImage& image, int boundary, const SequenceDecoder& sequence,
-                      const SequenceContext& context, Scratch& scratch, EdgeImage& edges) const;
+                      const SequenceContext& context, Scratch& scratch) const;
   void insert(SequenceResult& result, EdgeImage& edges);
   float spacing(int line, int boundary, int side) const;
 
   int boundaries_ = 0;
   int lines_ = 0;
-  std::vector<std::int32_t> grid_;  // [boundary][line]: edge or -1
-  std::vector<float> column_;       // [boundary][line]: of the edge, or NaN
+  std::vector<float> column_;  // [boundary][line]: of the edge, or NaN
   std::vector<Scratch> scratch_;
   std::vector<Added> added_;
   EdgeImage merged_;
