@@ -198,7 +198,7 @@ Refiner::LumaPlace Refiner::luma_place(const DifferenceImage& image, int line, c
   LumaPlace out{own, 0, 0, 0, false};
   out.contrast = contrast_around<kLumaReach_px>(image, line, centre, wide_stripes_);
   float place = own;
-  const auto reach_in = [](float free) { return std::clamp(static_cast<int>(free - 1.F), 2, kPlateau_px); };
+  const auto reach_in = [](float free) { return std::clamp(static_cast<int>(free - 2.F), 2, kPlateau_px); };
   std::array<int, 3> last{};
   for (int round = 0; round < 2; ++round) {
     const std::array reach_of{reach_in(sides.free_left_px + (place - own)),
