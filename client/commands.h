@@ -10,6 +10,7 @@ Command streams_command();
 Command record_command();
 Command play_command();
 Command info_command();
+Command recover_command();
 Command export_command();
 Command web_command();
 

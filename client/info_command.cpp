@@ -204,7 +204,7 @@ Status describe_file(const Options& options, StopSignal& stop) {
     j["duration_s"] = duration_s;
     j["recovered"] = summary.recovered;
     j["lost_bytes"] = summary.lost_bytes;
-    j["damaged_parts"] = recorded->damaged();
+    j["damaged_parts"] = recorded->damaged() + summary.damage.size();
     j["attachments"] = nlohmann::json::array();
     for (const auto& attachment : summary.attachments) j["attachments"].push_back(attachment.name);
     if (info) j["info"] = info_json(*info);
@@ -217,11 +217,12 @@ Status describe_file(const Options& options, StopSignal& stop) {
   if (info) print_info(*info);
   print_frames(totals);
   if (summary.recovered) {
-    std::printf("recovered   the recording was cut short; all but the last %s were readable\n",
+    std::printf("recovered   the recording was cut short or damaged; all but %s were readable\n",
                 bytes_text(summary.lost_bytes).c_str());
   }
+  for (const std::string& line : summary.damage) std::printf("damaged     %s\n", line.c_str());
   if (recorded->damaged() > 0) {
-    std::printf("damaged     %llu parts could not be read\n",
+    std::printf("damaged     %llu parts could not be read; `relievo recover` writes a copy without them\n",
                 static_cast<unsigned long long>(recorded->damaged()));
   }
   return {};

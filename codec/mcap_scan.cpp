@@ -13,23 +13,12 @@
 #include <utility>
 
 #include "codec/byte_io.h"
+#include "codec/mcap_walk.h"
 
 namespace relievo::mcap {
 namespace {
 
 constexpr std::uint64_t kMaxSummaryBytes = 256u << 20;
-constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels
-
-/// The first one of an id counts; the specification has all of an id equal.
-bool add_schema(Contents& contents, std::optional<Schema> schema) {
-  if (schema && schema->id != 0) contents.schemas.try_emplace(schema->id, *schema);
-  return schema.has_value();
-}
-
-bool add_channel(Contents& contents, std::optional<Channel> channel) {
-  if (channel) contents.channels.try_emplace(channel->id, *channel);
-  return channel.has_value();
-}
 
 /// From the summary at the file's end; nothing where there is none or any byte of it is wrong.
 std::optional<Contents> read_index(const File& file) {
@@ -58,9 +47,9 @@ std::optional<Contents> read_index(const File& file) {
     if (!record) return std::nullopt;
     bool ok = true;
     if (record->op == Op::kSchema) {
-      ok = add_schema(contents, read_schema(record->content));
+      ok = contents.add(read_schema(record->content));
     } else if (record->op == Op::kChannel) {
-      ok = add_channel(contents, read_channel(record->content));
+      ok = contents.add(read_channel(record->content));
     } else if (record->op == Op::kChunkIndex) {
       auto index = read_chunk_index(record->content);
       ok = index.has_value();
@@ -82,114 +71,18 @@ std::optional<Contents> read_index(const File& file) {
   return contents;
 }
 
-/// Goes through a file from its start.
-class Scan {
- public:
-  explicit Scan(const File& file) : file_(file) {}
-
-  Result<Contents> run() {
-    std::uint64_t at = kMagic.size();
-    bool ended = false;
-    while (!ended) {
-      const auto head = file_.read(at, kRecordHeaderBytes);
-      if (!head) break;
-      ByteReader reader(*head);
-      const auto op = static_cast<Op>(reader.read<std::uint8_t>());
-      const auto length = reader.read<std::uint64_t>();
-      if (length > file_.size() - at - kRecordHeaderBytes) break;
-      if (static_cast<int>(op) == 0) break;  // not a record: zeros that a power loss left
-      if (op == Op::kMessage) return Error{file_.name() + ": messages outside chunks are not supported"};
-      if (!read_record(op, at, at + kRecordHeaderBytes, length)) break;
-      at += kRecordHeaderBytes + length;
-      ended = op == Op::kFooter;
-    }
-    const auto magic = file_.read(at, kMagic.size());
-    const bool whole = ended && magic && at + kMagic.size() == file_.size() &&
-                       std::equal(kMagic.begin(), kMagic.end(), magic->begin());
-    contents_.recovered = !whole || !plain_end_;
-    contents_.lost_bytes = whole ? 0 : file_.size() - at;
-    for (const auto& [id, count] : counts_) contents_.statistics.channel_messages.emplace_back(id, count);
-    contents_.statistics.chunks = static_cast<std::uint32_t>(contents_.chunks.size());
-    return std::move(contents_);
-  }
-
- private:
-  /// False where the record cannot be: all behind it is lost.
-  bool read_record(Op op, std::uint64_t at, std::uint64_t content_at, std::uint64_t length) {
-    if (op == Op::kChunk) return read_chunk(at, content_at, length);
-    if (op == Op::kSchema || op == Op::kChannel || op == Op::kFooter) {
-      const auto content = length <= kMaxSmallRecordBytes ? file_.read(content_at, length) : Error{""};
-      if (!content) return false;
-      if (op == Op::kSchema) return add_schema(contents_, read_schema(*content));
-      if (op == Op::kChannel) return add_channel(contents_, read_channel(*content));
-      const auto footer = read_footer(*content);
-      // A footer that points to a summary means that the summary was there, but not as it should be.
-      plain_end_ = footer && footer->summary_start == 0;
-      return footer.has_value();
-    }
-    if (op == Op::kAttachment && !behind_data_) {
-      // Its data may be large; the name is all that is wanted here.
-      const auto start = file_.read(content_at, std::min<std::uint64_t>(length, 4096));
-      if (!start) return false;
-      ByteReader reader(*start);
-      reader.take(16);
-      AttachmentIndex index;
-      index.offset = at;
-      index.length = kRecordHeaderBytes + length;
-      index.name = reader.read_string();
-      contents_.attachments.push_back(std::move(index));
-      return true;
-    }
-    if (op == Op::kDataEnd) behind_data_ = true;
-    return true;
-  }
-
-  bool read_chunk(std::uint64_t at, std::uint64_t content_at, std::uint64_t length) {
-    const auto start = file_.read(content_at, std::min<std::uint64_t>(length, 256));
-    if (!start) return false;
-    const auto header = read_chunk_header(*start);
-    if (!header || header->second + header->first.records_size > length) return false;
-    const ChunkIndex chunk{.start_time = header->first.start_time,
-                           .end_time = header->first.end_time,
-                           .offset = at,
-                           .length = kRecordHeaderBytes + length,
-                           .message_index_offsets = {},
-                           .message_index_length = 0,
-                           .compression = header->first.compression,
-                           .compressed_size = header->first.records_size,
-                           .uncompressed_size = header->first.uncompressed_size};
-    contents_.chunks.push_back(chunk);
-    // A damaged chunk stays listed: whoever reads on meets its error.
-    if (const auto records = read_chunk_records(file_, chunk); records) count(*records);
-    return true;
-  }
-
-  void count(std::span<const std::uint8_t> records) {
-    while (!records.empty()) {
-      const auto record = take_record(records);
-      if (!record) return;
-      if (record->op == Op::kSchema) add_schema(contents_, read_schema(record->content));
-      if (record->op == Op::kChannel) add_channel(contents_, read_channel(record->content));
-      if (record->op != Op::kMessage) continue;
-      const auto message = read_message(record->content);
-      if (!message) return;
-      Statistics& statistics = contents_.statistics;
-      const std::uint64_t time = message->first.log_time;
-      statistics.start_time = statistics.messages == 0 ? time : std::min(statistics.start_time, time);
-      statistics.end_time = std::max(statistics.end_time, time);
-      ++statistics.messages;
-      ++counts_[message->first.channel_id];
-    }
-  }
-
-  const File& file_;
-  Contents contents_;
-  std::map<std::uint16_t, std::uint64_t> counts_;
-  bool behind_data_ = false;
-  bool plain_end_ = false;
-};
-
 }  // namespace
+
+/// The first one of an id counts; the specification has all of an id equal.
+bool Contents::add(const std::optional<Schema>& schema) {
+  if (schema && schema->id != 0) schemas.try_emplace(schema->id, *schema);
+  return schema.has_value();
+}
+
+bool Contents::add(const std::optional<Channel>& channel) {
+  if (channel) channels.try_emplace(channel->id, *channel);
+  return channel.has_value();
+}
 
 Result<std::unique_ptr<File>> File::open(const std::filesystem::path& path) {
   const int handle = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -225,7 +118,7 @@ Result<Bytes> File::read(std::uint64_t offset, std::uint64_t length) const {
   return bytes;
 }
 
-Result<Contents> read_contents(const File& file) {
+Result<Contents> read_contents(const File& file, ReadContents how) {
   const std::uint64_t start_bytes = std::min<std::uint64_t>(file.size(), kMagic.size());
   const auto magic = file.read(0, start_bytes);
   if (!magic) return magic.error();
@@ -234,11 +127,13 @@ Result<Contents> read_contents(const File& file) {
   if (file.size() < kMagic.size()) {
     Contents nothing;
     nothing.recovered = true;
-    nothing.lost_bytes = file.size();
+    if (file.size() > 0) nothing.gaps.push_back({0, file.size()});
     return nothing;
   }
-  if (auto contents = read_index(file)) return std::move(*contents);
-  return Scan(file).run();
+  if (how == ReadContents::kByIndex) {
+    if (auto contents = read_index(file)) return std::move(*contents);
+  }
+  return walk_records(file);
 }
 
 Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk) {

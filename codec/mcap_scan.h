@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,12 @@ class File {
   const std::uint64_t size_;
 };
 
+/// Bytes that are no records.
+struct Gap {
+  std::uint64_t offset = 0;
+  std::uint64_t length = 0;
+};
+
 struct Contents {
   std::map<std::uint16_t, Schema> schemas;    // by id, none 0
   std::map<std::uint16_t, Channel> channels;  // by id
@@ -44,11 +51,20 @@ struct Contents {
   std::vector<AttachmentIndex> attachments;
   Statistics statistics;
   bool recovered = false;
-  std::uint64_t lost_bytes = 0;
+  std::vector<Gap> gaps;  // in the file's order
+
+  /// False where there is nothing: it was malformed.
+  bool add(const std::optional<Schema>& schema);
+  bool add(const std::optional<Channel>& channel);
+};
+
+enum class ReadContents {
+  kByIndex,    // or, where the index is missing or wrong, as below
+  kByWalking,  // through the whole file: finds all that is whole, wherever it lies
 };
 
 /// Fails where the file is no MCAP file or cannot be read; a file cut short gives what is whole.
-Result<Contents> read_contents(const File& file);
+Result<Contents> read_contents(const File& file, ReadContents how);
 
 /// A chunk's records, checked against its CRC. Errors name no file or place: the caller knows both.
 Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk);

@@ -69,6 +69,8 @@ class RecordingWriter {
   virtual Status write(const RecordedMessage& message) = 0;
   /// Closes the open chunk where it is older than chunk_ns: call while no messages come.
   virtual Status flush_if_due(std::int64_t now_ns) = 0;
+  /// Bytes so far, those of the open chunk among them.
+  virtual std::uint64_t size() const = 0;
   /// Writes the index and closes.
   virtual Status finish() = 0;
 };
@@ -81,15 +83,22 @@ struct RecordingSummary {
   std::int64_t start_ns = 0;  // log times of the first and last message
   std::int64_t end_ns = 0;
   std::uint64_t messages = 0;
-  std::vector<std::string> damage;  // a line for each attachment left out because its bytes are wrong
-  bool recovered = false;           // the file was cut short; its index was rebuilt from what is whole
-  std::uint64_t lost_bytes = 0;     // at its end, not readable
+  std::vector<std::string> damage;  // a line for each part left out because its bytes are wrong
+  bool recovered = false;           // its index was rebuilt from what is whole
+  std::uint64_t lost_bytes = 0;     // that are no records: at its end where it was cut short
 };
 
-/// Reads a file, whole or cut short (never changing it). One thread.
+/// Reads a file, whole, cut short or damaged (never changing it). One thread.
 class RecordingReader {
  public:
-  static Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& file);
+  struct Options {
+    bool rebuild_index = false;  // even where there is one: finds what a damaged file's index does not
+  };
+  static Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& file,
+                                                       const Options& options);
+  static Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& file) {
+    return open(file, Options{});
+  }
   virtual ~RecordingReader() = default;
 
   virtual const RecordingSummary& summary() const = 0;

@@ -22,8 +22,8 @@ class Reader final : public RecordingReader {
  public:
   explicit Reader(std::unique_ptr<mcap::File> file) : file_(std::move(file)) {}
 
-  Status open() {
-    auto contents = mcap::read_contents(*file_);
+  Status open(mcap::ReadContents how) {
+    auto contents = mcap::read_contents(*file_, how);
     if (!contents) return contents.error();
     contents_ = std::move(*contents);
     std::ranges::stable_sort(contents_.chunks, {}, &mcap::ChunkIndex::start_time);
@@ -45,7 +45,12 @@ class Reader final : public RecordingReader {
     summary_.start_ns = to_ns(contents_.statistics.start_time);
     summary_.end_ns = to_ns(contents_.statistics.end_time);
     summary_.recovered = contents_.recovered;
-    summary_.lost_bytes = contents_.lost_bytes;
+    for (const mcap::Gap& gap : contents_.gaps) {
+      summary_.lost_bytes += gap.length;
+      if (gap.offset + gap.length < file_->size())
+        summary_.damage.push_back(std::to_string(gap.length) + " bytes at byte " +
+                                  std::to_string(gap.offset) + " are no part of a recording");
+    }
     return load_attachments();
   }
 
@@ -175,11 +180,14 @@ class Reader final : public RecordingReader {
 
 }  // namespace
 
-Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::filesystem::path& file) {
+Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const std::filesystem::path& file,
+                                                               const Options& options) {
   auto handle = mcap::File::open(file);
   if (!handle) return handle.error();
   auto reader = std::make_unique<Reader>(std::move(*handle));
-  if (auto status = reader->open(); !status) return status.error();
+  using enum mcap::ReadContents;
+  if (auto status = reader->open(options.rebuild_index ? kByWalking : kByIndex); !status)
+    return status.error();
   return std::unique_ptr<RecordingReader>(std::move(reader));
 }
 

@@ -104,6 +104,8 @@ class Writer final : public RecordingWriter {
     return !chunk_.empty() && due ? flush() : Status();
   }
 
+  std::uint64_t size() const override { return offset_ + chunk_.size(); }
+
   Status finish() override {
     if (!failure_.empty()) return Error{failure_};
     if (file_ < 0) return {};

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/mcap_walk.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "codec/byte_io.h"
+
+namespace relievo::mcap {
+namespace {
+
+constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels
+constexpr std::uint64_t kMostHeaderBytes = 256;            // of a chunk, before its records
+constexpr std::uint64_t kWindowBytes = 1u << 20;           // read at once while looking for a record
+
+/// Where a record that begins at `at` lies; nothing where the file is too short for it.
+struct Extent {
+  Op op{};
+  std::uint64_t at = 0;
+  std::uint64_t length = 0;  // of its content
+
+  std::uint64_t content() const { return at + kRecordHeaderBytes; }
+  std::uint64_t end() const { return content() + length; }
+};
+
+class Walk {
+ public:
+  explicit Walk(const File& file) : file_(file), effort_left_(4 * file.size()) {}
+
+  Result<Contents> run() {
+    std::uint64_t at = kMagic.size();
+    bool ended = false;
+    while (!ended && at < file_.size()) {
+      const auto record = extent(at);
+      loose_messages_ = loose_messages_ || (record && record->op == Op::kMessage);
+      if (record && add(*record)) {
+        at = record->end();
+        ended = record->op == Op::kFooter;
+        continue;
+      }
+      const std::uint64_t next = find_next(at + 1);
+      contents_.gaps.push_back({at, next - at});
+      at = next;
+    }
+    if (loose_messages_ && contents_.chunks.empty())
+      return Error{file_.name() + ": messages outside chunks are not supported"};
+    const auto magic = file_.read(at, kMagic.size());
+    const bool whole = ended && magic && at + kMagic.size() == file_.size() &&
+                       std::equal(kMagic.begin(), kMagic.end(), magic->begin());
+    if (ended && !whole && at < file_.size()) contents_.gaps.push_back({at, file_.size() - at});
+    contents_.recovered = !whole || !plain_end_ || !contents_.gaps.empty();
+    for (const auto& [id, count] : counts_) contents_.statistics.channel_messages.emplace_back(id, count);
+    contents_.statistics.chunks = static_cast<std::uint32_t>(contents_.chunks.size());
+    return std::move(contents_);
+  }
+
+ private:
+  std::optional<Extent> extent(std::uint64_t at) const {
+    const auto head = file_.read(at, kRecordHeaderBytes);
+    if (!head) return std::nullopt;
+    ByteReader reader(*head);
+    Extent out{.op = static_cast<Op>(reader.read<std::uint8_t>()), .at = at};
+    out.length = reader.read<std::uint64_t>();
+    if (static_cast<int>(out.op) == 0) return std::nullopt;  // zeros that a power loss left
+    if (out.length > file_.size() - out.content()) return std::nullopt;
+    return out;
+  }
+
+  /// True where a record could begin at `at`, or the file ends there.
+  bool goes_on_at(std::uint64_t at) const {
+    const auto next = extent(at);
+    return at == file_.size() || (next && next->op <= Op::kDataEnd);
+  }
+
+  /// False where the record, or its length, cannot be.
+  bool add(const Extent& record) {
+    switch (record.op) {
+      case Op::kChunk:
+        return add_chunk(record);
+      case Op::kAttachment:
+        return goes_on_at(record.end()) && (behind_data_ || add_attachment(record));
+      case Op::kSchema:
+      case Op::kChannel: {
+        const auto content = small_content(record);
+        if (!content) return false;
+        const bool read = record.op == Op::kSchema ? contents_.add(read_schema(*content))
+                                                   : contents_.add(read_channel(*content));
+        return read && goes_on_at(record.end());
+      }
+      case Op::kFooter: {
+        const auto content = small_content(record);
+        const auto footer = content ? read_footer(*content) : std::nullopt;
+        // A footer that points to a summary means that the summary was there, but not as it should be.
+        plain_end_ = footer && footer->summary_start == 0;
+        return footer.has_value();
+      }
+      case Op::kMessage:  // in our files, a chunk or an attachment whose first byte was changed
+        return false;
+      case Op::kMessageIndex: {
+        const auto head = file_.read(record.content(), std::min<std::uint64_t>(record.length, 6));
+        ByteReader reader(head ? std::span<const std::uint8_t>(*head) : std::span<const std::uint8_t>());
+        reader.read<std::uint16_t>();
+        const auto entries_bytes = reader.read<std::uint32_t>();
+        return reader.ok() && record.length == reader.position() + entries_bytes;
+      }
+      case Op::kDataEnd:
+        behind_data_ = true;
+        return true;
+      default:
+        return goes_on_at(record.end());
+    }
+  }
+
+  Result<Bytes> small_content(const Extent& record) const {
+    if (record.length > kMaxSmallRecordBytes) return Error{"too large"};
+    return file_.read(record.content(), record.length);
+  }
+
+  std::optional<ChunkIndex> chunk_at(const Extent& record) const {
+    const auto start = file_.read(record.content(), std::min(record.length, kMostHeaderBytes));
+    if (!start) return std::nullopt;
+    const auto header = read_chunk_header(*start);
+    if (!header || header->first.records_size > record.length ||
+        header->second > record.length - header->first.records_size)
+      return std::nullopt;
+    return ChunkIndex{.start_time = header->first.start_time,
+                      .end_time = header->first.end_time,
+                      .offset = record.at,
+                      .length = kRecordHeaderBytes + record.length,
+                      .message_index_offsets = {},
+                      .message_index_length = 0,
+                      .compression = header->first.compression,
+                      .compressed_size = header->first.records_size,
+                      .uncompressed_size = header->first.uncompressed_size};
+  }
+
+  bool add_chunk(const Extent& record) {
+    const auto chunk = chunk_at(record);
+    if (!chunk) return false;
+    if (const auto records = read_chunk_records(file_, *chunk)) {
+      count(*records);
+    } else if (!goes_on_at(record.end())) {
+      return false;  // its length is wrong too, it may reach over others
+    }
+    contents_.chunks.push_back(*chunk);
+    return true;
+  }
+
+  bool add_attachment(const Extent& record) {
+    // Its data may be large; the name is all that is wanted here.
+    const auto start = file_.read(record.content(), std::min<std::uint64_t>(record.length, 4096));
+    if (!start) return false;
+    ByteReader reader(*start);
+    reader.take(16);
+    AttachmentIndex index;
+    index.offset = record.at;
+    index.length = kRecordHeaderBytes + record.length;
+    index.name = reader.read_string();
+    if (!reader.ok()) return false;
+    contents_.attachments.push_back(std::move(index));
+    return true;
+  }
+
+  void count(std::span<const std::uint8_t> records) {
+    while (!records.empty()) {
+      const auto record = take_record(records);
+      if (!record) return;
+      if (record->op == Op::kSchema) contents_.add(read_schema(record->content));
+      if (record->op == Op::kChannel) contents_.add(read_channel(record->content));
+      if (record->op != Op::kMessage) continue;
+      const auto message = read_message(record->content);
+      if (!message) return;
+      Statistics& statistics = contents_.statistics;
+      const std::uint64_t time = message->first.log_time;
+      statistics.start_time = statistics.messages == 0 ? time : std::min(statistics.start_time, time);
+      statistics.end_time = std::max(statistics.end_time, time);
+      ++statistics.messages;
+      ++counts_[message->first.channel_id];
+    }
+  }
+
+  /// The first place from `at` where a chunk or an attachment is whole; the file's end where there is none.
+  std::uint64_t find_next(std::uint64_t at) {
+    while (at < file_.size()) {
+      const auto window = file_.read(at, std::min(kWindowBytes, file_.size() - at));
+      if (!window) break;
+      for (std::size_t i = 0; i < window->size(); ++i) {
+        const auto op = static_cast<Op>((*window)[i]);
+        if ((op == Op::kChunk || op == Op::kAttachment) && is_whole(at + i)) return at + i;
+      }
+      at += window->size();
+    }
+    return file_.size();
+  }
+
+  /// By its CRC. Bytes made to look like many large records cannot keep us for longer than a few times what
+  /// reading the file takes.
+  bool is_whole(std::uint64_t at) {
+    const auto record = extent(at);
+    if (!record || record->length > std::min(kMaxChunkBytes, effort_left_)) return false;
+    if (record->op == Op::kChunk) {
+      const auto chunk = chunk_at(*record);
+      if (!chunk || chunk->compressed_size != chunk->uncompressed_size || !chunk->compression.empty())
+        return false;
+      effort_left_ -= record->length;
+      return read_chunk_records(file_, *chunk).ok();
+    }
+    const auto sizes = file_.read(record->content(), std::min<std::uint64_t>(record->length, 4096));
+    if (!sizes) return false;
+    ByteReader reader(*sizes);  // times, name, media type, and the data's size, which must fit
+    reader.take(16);
+    reader.read_string();
+    reader.read_string();
+    const auto data_size = reader.read<std::uint64_t>();
+    if (!reader.ok() || data_size + reader.position() + sizeof(std::uint32_t) != record->length) return false;
+    effort_left_ -= record->length;
+    const auto content = file_.read(record->content(), record->length);
+    return content && read_attachment(*content);
+  }
+
+  const File& file_;
+  Contents contents_;
+  std::map<std::uint16_t, std::uint64_t> counts_;
+  std::uint64_t effort_left_;  // bytes that may yet be read to tell whether a record is whole
+  bool loose_messages_ = false;
+  bool behind_data_ = false;
+  bool plain_end_ = false;
+};
+
+}  // namespace
+
+Result<Contents> walk_records(const File& file) {
+  return Walk(file).run();
+}
+
+}  // namespace relievo::mcap

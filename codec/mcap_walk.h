@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Goes through an MCAP file's records from its start, over damage: for files without an index.
+#pragma once
+
+#include "base/result.h"
+#include "codec/mcap_scan.h"
+
+namespace relievo::mcap {
+
+/// Reads the whole file once. Where bytes are no records, looks for the next chunk or attachment whose CRC is
+/// right, and goes on there; what was passed over is in `gaps`. A chunk whose own bytes are wrong is listed
+/// (whoever reads it meets the error) where what follows it shows that its length is right.
+Result<Contents> walk_records(const File& file);
+
+}  // namespace relievo::mcap

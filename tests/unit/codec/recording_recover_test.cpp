@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// Damaged recordings: whatever is whole is found, wherever the damage lies, and copied to a sound file.
+#include "codec/recording_recover.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "codec/mcap_records.h"
+#include "tests/support/temp_folder.h"
+#include "tests/unit/codec/sample_recording.h"
+
+namespace relievo {
+namespace {
+
+using namespace test;
+
+constexpr int kMessages = 23;  // five a chunk: chunks of 5, 5, 5, 5, 3
+
+bool always(std::uint64_t) {
+  return true;
+}
+
+/// Where chunk `number` begins and how long it is.
+std::pair<std::size_t, std::size_t> chunk_extent(const Bytes& file, int number) {
+  std::span<const std::uint8_t> rest = std::span(file).subspan(mcap::kMagic.size());
+  for (;;) {
+    const std::size_t at = file.size() - rest.size();
+    const auto record = mcap::take_record(rest);
+    if (!record) return {0, 0};
+    if (record->op == mcap::Op::kChunk && number-- == 0)
+      return {at, mcap::kRecordHeaderBytes + record->content.size()};
+  }
+}
+
+/// The numbers of the messages that a sound copy of the file holds, each checked against what was written.
+std::set<int> recovered_from(const TempFolder& folder, std::span<const std::uint8_t> bytes,
+                             RecoveredRecording* report = nullptr) {
+  write_file(folder / "bad.mcap", bytes);
+  std::filesystem::remove(folder / "copy.mcap");
+  const auto done = recover_recording(folder / "bad.mcap", folder / "copy.mcap", always);
+  EXPECT_TRUE(done.ok()) << (done ? "" : done.error().message);
+  if (!done) return {};
+  if (report) *report = *done;
+  const auto reader = open(folder / "copy.mcap");
+  EXPECT_FALSE(reader->summary().recovered);
+  EXPECT_TRUE(reader->summary().damage.empty());
+  std::set<int> out;
+  const ReadBack back = read_all(*reader);
+  EXPECT_TRUE(back.errors.empty());
+  EXPECT_EQ(back.messages.size(), done->messages);
+  for (const RecordedMessage& m : back.messages) {
+    EXPECT_EQ(m.data, payload(static_cast<int>(m.sequence), 40));
+    EXPECT_EQ(reader->summary().channels.at(m.channel).topic,
+              m.sequence % 4 == 3 ? "relievo/status" : "relievo/frame");
+    out.insert(static_cast<int>(m.sequence));
+  }
+  return out;
+}
+
+std::set<int> all_but(int first, int last) {
+  std::set<int> out;
+  for (int i = 0; i < kMessages; ++i) {
+    if (i < first || i > last) out.insert(i);
+  }
+  return out;
+}
+
+class RecordingRecover : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_sample(folder_ / "a.mcap", kMessages);
+    whole_ = read_file(folder_ / "a.mcap");
+  }
+  TempFolder folder_;
+  Bytes whole_;
+};
+
+TEST_F(RecordingRecover, OfAWholeFileIsEverything) {
+  RecoveredRecording report;
+  EXPECT_EQ(recovered_from(folder_, whole_, &report), all_but(-1, -1));
+  EXPECT_EQ(report.attachments, 2u);
+  EXPECT_EQ(report.lost_bytes, 0u);
+  EXPECT_TRUE(report.left_out.empty());
+  EXPECT_EQ(read_file(folder_ / "bad.mcap"), whole_) << "the damaged file is not touched";
+}
+
+TEST_F(RecordingRecover, ABadChunkCostsItselfAlone) {
+  for (const std::size_t inside : {60u, 200u}) {
+    Bytes bytes = whole_;
+    bytes[chunk_extent(whole_, 1).first + inside] ^= 0x40;
+    RecoveredRecording report;
+    EXPECT_EQ(recovered_from(folder_, bytes, &report), all_but(5, 9));
+    EXPECT_EQ(report.left_out.size(), 1u);
+  }
+}
+
+/// Through its length a chunk seems to reach over others, or out of the file.
+TEST_F(RecordingRecover, AWrongLengthLosesNoOtherChunk) {
+  for (const std::size_t byte : {1u, 2u, 3u, 5u, 8u}) {
+    for (const int change : {0x01, 0x10, 0xff}) {
+      Bytes bytes = whole_;
+      bytes[chunk_extent(whole_, 1).first + byte] ^= static_cast<std::uint8_t>(change);
+      EXPECT_TRUE(std::ranges::includes(recovered_from(folder_, bytes), all_but(5, 9)))
+          << byte << " " << change;
+    }
+  }
+}
+
+TEST_F(RecordingRecover, BytesMissingInTheMiddleLoseNoOtherChunk) {
+  const auto [at, length] = chunk_extent(whole_, 2);
+  Bytes bytes = whole_;
+  bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(at) + 30,
+              bytes.begin() + static_cast<std::ptrdiff_t>(at) + 97);
+  RecoveredRecording report;
+  EXPECT_EQ(recovered_from(folder_, bytes, &report), all_but(10, 14));
+  EXPECT_GT(report.lost_bytes, 0u);
+}
+
+TEST_F(RecordingRecover, ForeignBytesInTheMiddleLoseNothing) {
+  Bytes bytes = whole_;
+  const Bytes foreign(5000, 0);
+  bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(chunk_extent(whole_, 3).first), foreign.begin(),
+               foreign.end());
+  RecoveredRecording report;
+  EXPECT_EQ(recovered_from(folder_, bytes, &report), all_but(-1, -1));
+  EXPECT_EQ(report.lost_bytes, 5000u);
+  ASSERT_EQ(report.left_out.size(), 1u);
+  EXPECT_NE(report.left_out[0].find("5000 bytes at byte"), std::string::npos) << report.left_out[0];
+}
+
+TEST_F(RecordingRecover, ACrashAfterDamageLosesTheLastChunkAndTheDamagedOne) {
+  const auto [last, length] = chunk_extent(whole_, 4);
+  Bytes bytes(whole_.begin(), whole_.begin() + static_cast<std::ptrdiff_t>(last + length / 2));
+  bytes[chunk_extent(whole_, 0).first + 8] ^= 1;  // a length beyond the file
+  std::set<int> wanted;
+  for (int i = 5; i < 20; ++i) wanted.insert(i);
+  EXPECT_EQ(recovered_from(folder_, bytes), wanted);
+}
+
+/// Any one byte: never more than one chunk is lost, never anything wrong is kept.
+TEST_F(RecordingRecover, AnyByteCostsOneChunkAtMost) {
+  for (std::size_t at = chunk_extent(whole_, 0).first; at < whole_.size(); ++at) {
+    Bytes bytes = whole_;
+    bytes[at] ^= at % 2 == 0 ? 0xff : 0x03;
+    write_file(folder_ / "bad.mcap", bytes);
+    const auto reader = RecordingReader::open(folder_ / "bad.mcap", {.rebuild_index = true});
+    ASSERT_TRUE(reader.ok()) << at << ": " << reader.error().message;
+    const ReadBack back = read_all(**reader);
+    ASSERT_GE(back.messages.size(), 18u) << at;
+    for (const RecordedMessage& m : back.messages)
+      ASSERT_EQ(m.data, payload(static_cast<int>(m.sequence), 40)) << at;
+  }
+}
+
+/// Bytes that look like the heads of many large chunks cost no more than reading the file a few times would.
+TEST_F(RecordingRecover, AFileMadeToBeSlowIsReadAllTheSame) {
+  Bytes heads;
+  for (int i = 0; i < 20000; ++i) {
+    mcap::append_chunk_header(heads, {.start_time = 1,
+                                      .end_time = 2,
+                                      .uncompressed_size = 400'000,
+                                      .uncompressed_crc = 7,
+                                      .compression = "",
+                                      .records_size = 400'000});
+  }
+  Bytes bytes = whole_;
+  bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(chunk_extent(whole_, 3).first), heads.begin(),
+               heads.end());
+  EXPECT_TRUE(std::ranges::includes(recovered_from(folder_, bytes), all_but(15, kMessages - 1)));
+}
+
+TEST_F(RecordingRecover, RefusesWhatItCannotDoAndLeavesNoFile) {
+  write_file(folder_ / "there.mcap", {});
+  const auto over = recover_recording(folder_ / "a.mcap", folder_ / "there.mcap", always);
+  ASSERT_FALSE(over.ok());
+  EXPECT_NE(over.error().message.find("exists already"), std::string::npos);
+  EXPECT_TRUE(read_file(folder_ / "there.mcap").empty());
+
+  write_file(folder_ / "cut.mcap", std::span(whole_).first(chunk_extent(whole_, 0).first + 20));
+  const auto nothing = recover_recording(folder_ / "cut.mcap", folder_ / "copy.mcap", always);
+  ASSERT_FALSE(nothing.ok());
+  EXPECT_NE(nothing.error().message.find("nothing can be recovered"), std::string::npos);
+
+  int calls = 0;
+  const auto stopped = recover_recording(folder_ / "a.mcap", folder_ / "copy.mcap",
+                                         [&](std::uint64_t) { return ++calls < 3; });
+  ASSERT_TRUE(stopped.ok());
+  EXPECT_TRUE(stopped->stopped);
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+    EXPECT_EQ(entry.path().filename().string().find("copy"), std::string::npos) << entry.path();
+}
+
+}  // namespace
+}  // namespace relievo
