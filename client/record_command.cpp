@@ -11,6 +11,7 @@
 #include "base/time.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
+#include "cli/quantities.h"
 #include "client/commands.h"
 #include "client/options.h"
 #include "idl/recorder.h"
@@ -27,7 +28,8 @@ struct Options {
   std::string file;
   std::uint64_t frames = 0;
   double seconds = 0;
-  double wait_s = -1;  // below 0: for ever
+  double wait_s = -1;                                        // below 0: for ever
+  std::string split_size, split_every, keep_size, keep_for;  // quantities; empty: none
   bool json = false;
 };
 
@@ -37,10 +39,20 @@ std::string default_file(const std::string& stream) {
   return stream + '-' + time + ".mcap";
 }
 
+// The texts were checked when they were given.
+SegmentOptions segments_of(const Options& options) {
+  SegmentOptions out;
+  if (!options.split_size.empty()) out.split_bytes = parse_bytes(options.split_size).value();
+  if (!options.split_every.empty()) out.split_s = parse_duration_s(options.split_every).value();
+  if (!options.keep_size.empty()) out.keep_bytes = parse_bytes(options.keep_size).value();
+  if (!options.keep_for.empty()) out.keep_s = parse_duration_s(options.keep_for).value();
+  return out;
+}
+
 // Found out before waiting for a stream rather than after.
-Status check_target(const std::filesystem::path& file) {
+Status check_target(const std::filesystem::path& file, bool split) {
   std::error_code error;
-  if (std::filesystem::exists(file, error)) {
+  if (!split && std::filesystem::exists(file, error)) {
     return Error{file.string() + " exists already: name another file with --out, or remove it"};
   }
   const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
@@ -84,6 +96,7 @@ void report(const Options& options, const Recorder::Counts& counts) {
   if (options.json) {
     const nlohmann::json j = {{"file", counts.bytes > 0 ? options.file : ""},
                               {"stream", options.stream},
+                              {"files", counts.files},
                               {"frames", counts.frames},
                               {"lost", counts.lost},
                               {"bytes", counts.bytes},
@@ -92,7 +105,9 @@ void report(const Options& options, const Recorder::Counts& counts) {
   } else if (counts.bytes == 0) {
     std::puts("nothing was received; no file was written");
   } else {
-    std::printf("%s: %llu frames in %s, %s, %llu lost\n", options.file.c_str(),
+    const std::string files =
+        counts.files > 1 ? " (" + std::to_string(counts.files) + " files)" : std::string();
+    std::printf("%s%s: %llu frames in %s, %s, %llu lost\n", options.file.c_str(), files.c_str(),
                 static_cast<unsigned long long>(counts.frames), duration_text(counts.duration_s).c_str(),
                 bytes_text(counts.bytes).c_str(), static_cast<unsigned long long>(counts.lost));
   }
@@ -100,8 +115,13 @@ void report(const Options& options, const Recorder::Counts& counts) {
 
 Status run(Options options, StopSignal& stop) {
   if (options.file.empty()) options.file = default_file(options.stream);
-  if (auto status = check_target(options.file); !status) return status;
-  Recorder recorder({options.file, options.stream, options.frames, options.seconds});
+  const SegmentOptions segments = segments_of(options);
+  if (auto status = check_target(options.file, segments.split()); !status) return status;
+  Recorder recorder({.file = options.file,
+                     .stream = options.stream,
+                     .max_frames = options.frames,
+                     .max_s = options.seconds,
+                     .segments = segments});
   auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks());
   if (!subscriber) return subscriber.error();
   const Status watched = watch(options, recorder, stop);
@@ -137,8 +157,33 @@ Command record_command() {
         app.add_option("--wait", options->wait_s,
                        "Seconds to wait for the stream, at first and when it has gone (default: for ever)")
             ->check(number(0, 1e9));
+        auto* size = app.add_option("--split-size", options->split_size,
+                                    "Begin a new file, FILE_000001.mcap, where one is as large, e.g. 2GB")
+                         ->type_name("SIZE")
+                         ->check(byte_count());
+        auto* every = app.add_option("--split-every", options->split_every, "or as long, e.g. 10min")
+                          ->type_name("TIME")
+                          ->check(duration());
+        auto* keep_size = app.add_option("--keep-size", options->keep_size,
+                                         "Remove the oldest of these files while all are larger, e.g. 100GB")
+                              ->type_name("SIZE")
+                              ->check(byte_count());
+        auto* keep_for =
+            app.add_option("--keep-for", options->keep_for, "Remove those that ended longer ago, e.g. 7d")
+                ->type_name("TIME")
+                ->check(duration());
         app.add_flag("--json", options->json, "Print the result as JSON");
-        app.footer("Example:\n  relievo record face --out face.mcap --seconds 10");
+        app.final_callback([size, every, keep_size, keep_for] {
+          const bool keeps = !keep_size->empty() || !keep_for->empty();
+          if (keeps && size->empty() && every->empty()) {
+            throw CLI::ValidationError("--keep-size, --keep-for",
+                                       "remove whole files: give --split-size or --split-every too");
+          }
+        });
+        app.footer(
+            "Examples:\n"
+            "  relievo record face --out face.mcap --seconds 10\n"
+            "  relievo record face --out face.mcap --split-every 10min --keep-size 100GB");
         return [options](StopSignal& stop) { return run(*options, stop); };
       }};
 }

@@ -22,7 +22,8 @@ std::uint32_t sequence_of(const RawSample& sample) {
 
 }  // namespace
 
-Recorder::Recorder(Options options) : options_(std::move(options)) {}
+Recorder::Recorder(Options options)
+    : options_(std::move(options)), segments_(options_.file, options_.segments) {}
 
 Subscriber::Callbacks Recorder::callbacks() {
   Subscriber::Callbacks callbacks;
@@ -33,7 +34,8 @@ Subscriber::Callbacks Recorder::callbacks() {
   callbacks.info = [this](const StreamInfo& info) {
     std::lock_guard lock(mutex_);
     counts_.live = true;
-    add_attachments(info);
+    info_ = info;
+    add_attachments();
   };
   callbacks.lost = [this](const std::string&, std::uint64_t count) {
     std::lock_guard lock(mutex_);
@@ -89,9 +91,15 @@ void Recorder::add(const RawSample& sample) {
     limit_reached_ = true;
     return;
   }
-  if (!writer_) fail(open_file());
+  if (!writer_) {
+    segment_ns_ = sample.receive_time_ns;
+    fail(open_file());
+  } else if (is_frame && options_.segments.split() &&
+             segments_.is_full(writer_->size(), seconds(sample.receive_time_ns - segment_ns_))) {
+    fail(next_segment(sample.receive_time_ns));
+  }
   if (!error_) fail(write(sample));
-  if (sample.topic == Topic::kInfo) info_cdr_ = sample.cdr;
+  if (sample.topic == Topic::kInfo) info_sample_ = sample;
   if (error_) return;
   counts_.bytes += sample.cdr.size();
   counts_.live = true;
@@ -102,27 +110,30 @@ void Recorder::add(const RawSample& sample) {
   limit_reached_ = options_.max_frames > 0 && counts_.frames >= options_.max_frames;
 }
 
-void Recorder::add_attachments(const StreamInfo& info) {
-  if (!writer_ || error_ || limit_reached_) return;  // raw comes before, so there is a writer
+void Recorder::add_attachments() {
+  // raw comes before info, so there are a writer and a sample.
+  if (!writer_ || !info_ || !info_sample_ || error_ || limit_reached_) return;
   // A server that came back with the same calibration does not make the file longer.
-  if (const std::string yaml = to_yaml(info.rig); yaml != rig_yaml_) {
+  if (const std::string yaml = to_yaml(info_->rig); yaml != rig_yaml_) {
     rig_yaml_ = yaml;
     fail(writer_->add_attachment(yaml_attachment("rig.yaml", yaml)));
   }
-  if (const std::string yaml = to_yaml(info.pattern); !error_ && yaml != pattern_yaml_) {
+  if (const std::string yaml = to_yaml(info_->pattern); !error_ && yaml != pattern_yaml_) {
     pattern_yaml_ = yaml;
     fail(writer_->add_attachment(yaml_attachment("pattern.yaml", yaml)));
   }
-  if (!error_ && info_cdr_ != attached_info_cdr_) {
-    attached_info_cdr_ = info_cdr_;
+  if (!error_ && info_sample_->cdr != info_cdr_) {
+    info_cdr_ = info_sample_->cdr;
     fail(writer_->add_attachment({kInfoAttachment, "application/octet-stream", utc_now_ns(), info_cdr_}));
   }
 }
 
 Status Recorder::open_file() {
-  auto writer = RecordingWriter::create(options_.file, {});
+  open_ = options_.segments.split() ? segments_.next() : options_.file;
+  auto writer = RecordingWriter::create(open_, {});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
+  ++counts_.files;
   for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
     const TopicType& type = topic_type(topic);
     auto channel =
@@ -131,6 +142,24 @@ Status Recorder::open_file() {
     if (!channel) return channel.error();
     channels_[static_cast<std::size_t>(topic)] = *channel;
   }
+  return {};
+}
+
+/// Each file can be read without the others: it begins with the stream's description.
+Status Recorder::next_segment(std::int64_t now_ns) {
+  if (const Status finished = writer_->finish(); !finished) return finished;
+  if (const Status opened = open_file(); !opened) return opened;
+  segment_ns_ = now_ns;
+  rig_yaml_.clear();
+  pattern_yaml_.clear();
+  info_cdr_.clear();
+  if (info_sample_) {
+    RawSample info = *info_sample_;
+    info.receive_time_ns = now_ns;
+    if (const Status written = write(info); !written) return written;
+  }
+  add_attachments();
+  if (const Status removed = segments_.remove_old(open_); !removed) log_warning(removed.error().message);
   return {};
 }
 

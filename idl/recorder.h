@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "codec/recording.h"
+#include "idl/recording_segments.h"
 #include "idl/transport.h"
 
 namespace relievo {
@@ -29,11 +30,13 @@ class Recorder {
     std::string stream;
     std::uint64_t max_frames = 0;  // 0: no limit
     double max_s = 0;              // after the first frame; 0: no limit
+    SegmentOptions segments;       // where it splits, `file` names them: see RecordingSegments
   };
   struct Counts {
     std::uint64_t frames = 0;
     std::uint64_t lost = 0;
     std::uint64_t bytes = 0;  // of samples
+    std::uint64_t files = 0;  // begun
     double duration_s = 0;    // first to last frame
     bool live = false;        // the stream is there now
   };
@@ -56,8 +59,9 @@ class Recorder {
 
  private:
   void add(const RawSample& sample);
-  void add_attachments(const StreamInfo& info);
+  void add_attachments();
   Status open_file();
+  Status next_segment(std::int64_t now_ns);
   Status write(const RawSample& sample);
   void fail(const Status& status);
 
@@ -65,8 +69,13 @@ class Recorder {
   mutable std::mutex mutex_;
   std::unique_ptr<RecordingWriter> writer_;  // made with the first sample, so that no empty file is left
   std::uint16_t channels_[3] = {};
-  std::string rig_yaml_, pattern_yaml_;  // as attached last
-  Bytes info_cdr_, attached_info_cdr_;   // as received last, as attached last
+  const RecordingSegments segments_;
+  std::filesystem::path open_;            // the file being written
+  std::int64_t segment_ns_ = 0;           // when its first sample was received
+  std::optional<StreamInfo> info_;        // as received last,
+  std::optional<RawSample> info_sample_;  // and as it came
+  std::string rig_yaml_, pattern_yaml_;   // as attached last
+  Bytes info_cdr_;                        // as attached last
   std::optional<Error> error_;
   Counts counts_;
   std::int64_t first_frame_ns_ = 0;

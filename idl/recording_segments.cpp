@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "idl/recording_segments.h"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdio>
+#include <optional>
+#include <system_error>
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Of STEM_000123.EXTENSION.
+std::optional<std::uint64_t> number_of(const fs::path& file, const fs::path& whole) {
+  const std::string name = file.stem().string();
+  const std::string head = whole.stem().string() + "_";
+  if (file.extension() != whole.extension() || !name.starts_with(head)) return std::nullopt;
+  const char* const from = name.data() + head.size();
+  const char* const to = name.data() + name.size();
+  std::uint64_t number = 0;
+  const auto [end, failed] = std::from_chars(from, to, number);
+  // Only names that we would give: face_2.mcap is somebody's own file.
+  if (failed != std::errc() || end != to || to - from < 6) return std::nullopt;
+  return number;
+}
+
+}  // namespace
+
+std::vector<fs::path> RecordingSegments::there() const {
+  std::vector<std::pair<std::uint64_t, fs::path>> found;
+  std::error_code ignored;
+  const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
+    if (const auto number = number_of(entry.path(), file_)) found.emplace_back(*number, entry.path());
+  }
+  std::ranges::sort(found);
+  std::vector<fs::path> out;
+  for (auto& [number, path] : found) out.push_back(std::move(path));
+  return out;
+}
+
+fs::path RecordingSegments::next() const {
+  const std::vector<fs::path> before = there();
+  const std::uint64_t number = before.empty() ? 0 : *number_of(before.back(), file_) + 1;
+  char digits[32];
+  std::snprintf(digits, sizeof digits, "_%06llu", static_cast<unsigned long long>(number));
+  return file_.parent_path() / (file_.stem().string() + digits + file_.extension().string());
+}
+
+bool RecordingSegments::is_full(std::uint64_t bytes, double duration_s) const {
+  return (options_.split_bytes > 0 && bytes >= options_.split_bytes) ||
+         (options_.split_s > 0 && duration_s >= options_.split_s);
+}
+
+Status RecordingSegments::remove_old(const fs::path& open) const {
+  if (options_.keep_bytes == 0 && options_.keep_s <= 0) return {};
+  std::vector<fs::path> files = there();
+  std::erase_if(files, [&](const fs::path& f) { return f.filename() == open.filename(); });
+  std::error_code error, failed;
+  std::uint64_t bytes = 0;
+  const auto size_of = [&](const fs::path& file) {
+    const std::uintmax_t size = fs::file_size(file, error);
+    return error ? 0 : static_cast<std::uint64_t>(size);
+  };
+  for (const fs::path& file : files) bytes += size_of(file);
+  bytes += size_of(open);
+  fs::path kept;
+  for (const fs::path& file : files) {
+    const auto written = fs::last_write_time(file, error);
+    const double age_s =
+        error ? 0 : std::chrono::duration<double>(fs::file_time_type::clock::now() - written).count();
+    const bool old = options_.keep_s > 0 && age_s > options_.keep_s;
+    const bool much = options_.keep_bytes > 0 && bytes > options_.keep_bytes;
+    if (!old && !much) break;
+    const std::uint64_t size = size_of(file);
+    if (fs::remove(file, error)) {
+      bytes -= size;
+    } else if (error) {
+      failed = error;
+      kept = file;
+    }
+  }
+  return failed ? Status(Error{"cannot remove the old recording " + kept.string() + ": " + failed.message()})
+                : Status();
+}
+
+}  // namespace relievo

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings of many files, and damaged ones: real processes on the loopback.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "codec/recording.h"
+#include "idl/cdr.h"
+#include "tests/support/own_domain.h"
+#include "tests/support/patience.h"
+#include "tests/support/process.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::program;
+using testing::HasSubstr;
+
+const std::string kDomain = std::to_string(test::own_domain());
+
+std::vector<std::string> record(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {program("relievo"), "record", "face"});
+  arguments.insert(arguments.end(), {"--domain", kDomain, "--interface", "lo", "--json"});
+  return arguments;
+}
+
+std::vector<fs::path> files_in(const fs::path& folder) {
+  std::vector<fs::path> out;
+  for (const auto& entry : fs::directory_iterator(folder)) out.push_back(entry.path());
+  std::ranges::sort(out);
+  return out;
+}
+
+nlohmann::json info(const fs::path& file) {
+  const auto done = test::run({program("relievo"), "info", file, "--json"});
+  EXPECT_EQ(done.status, 0) << done.err;
+  return nlohmann::json::parse(done.out, nullptr, false);
+}
+
+/// Of the frames in a file.
+std::vector<std::uint64_t> sequence_numbers(const fs::path& file) {
+  auto reader = RecordingReader::open(file);
+  EXPECT_TRUE(reader.ok()) << (reader ? "" : reader.error().message);
+  std::vector<std::uint64_t> out;
+  while (reader) {
+    const auto message = (*reader)->next();
+    EXPECT_TRUE(message.ok()) << (message ? "" : message.error().message);
+    if (!message || !*message) break;
+    if ((*reader)->summary().channels[(**message).channel].topic != "relievo/frame") continue;
+    const auto frame = read_frame_cdr((**message).data);
+    EXPECT_TRUE(frame.ok());
+    if (frame) out.push_back(frame->sequence);
+  }
+  return out;
+}
+
+TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
+  const test::TempFolder folder;
+  test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  const auto command = record({"--out", folder / "face.mcap", "--split-size", "600kB", "--frames", "100"});
+  for (int run = 1; run <= 2; ++run) {
+    const auto done = test::run(command);
+    ASSERT_EQ(done.status, 0) << done.err;
+    const auto result = nlohmann::json::parse(done.out);
+    EXPECT_EQ(result["frames"], 100);
+    // 20 kB a frame: 30 a file, so four files a run; the second run goes on counting.
+    EXPECT_EQ(result["files"], 4);
+    const std::vector<fs::path> files = files_in(folder.path());
+    ASSERT_EQ(files.size(), 4u * static_cast<std::size_t>(run));
+    EXPECT_EQ(files.back().filename(), run == 1 ? "face_000003.mcap" : "face_000007.mcap");
+    std::vector<std::uint64_t> sequence;
+    for (auto file = files.end() - 4; file != files.end(); ++file) {
+      const auto description = info(*file);
+      EXPECT_EQ(description["recovered"], false);
+      EXPECT_EQ(description["info"]["pattern"]["stripes"], 7) << "described in each file";
+      EXPECT_THAT(description["attachments"].dump(),
+                  HasSubstr(R"(["rig.yaml","pattern.yaml","stream_info.cdr"])"));
+      for (const std::uint64_t number : sequence_numbers(*file)) sequence.push_back(number);
+    }
+    ASSERT_EQ(sequence.size(), 100u);
+    EXPECT_EQ(sequence.back() - sequence.front(), 99u + result["lost"].get<std::uint64_t>());
+  }
+}
+
+TEST(RecordFiles, OldSegmentsGo) {
+  const test::TempFolder folder;
+  test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  const auto done = test::run(record(
+      {"--out", folder / "face.mcap", "--split-size", "200kB", "--keep-size", "700kB", "--frames", "100"}));
+  ASSERT_EQ(done.status, 0) << done.err;
+  EXPECT_EQ(nlohmann::json::parse(done.out)["files"], 10);
+  const std::vector<fs::path> files = files_in(folder.path());
+  EXPECT_EQ(files.back().filename(), "face_000009.mcap");
+  std::uintmax_t bytes = 0;
+  for (const fs::path& file : files) bytes += fs::file_size(file);
+  EXPECT_GE(files.size(), 3u);
+  EXPECT_LE(bytes, 700'000u + 250'000u) << "the one being written comes on top";
+
+  const auto refused = test::run(record({"--out", folder / "face.mcap", "--keep-size", "1MB"}));
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--split-size"));
+}
+
+TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
+  const test::TempFolder folder;
+  {
+    test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    const auto done = test::run(record({"--out", folder / "face.mcap", "--frames", "120"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  const std::size_t whole = sequence_numbers(folder / "face.mcap").size();
+  ASSERT_EQ(whole, 120u);
+  {  // 4 kB of it were overwritten, and its end with the index is missing
+    std::fstream file(folder / "face.mcap", std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(fs::file_size(folder / "face.mcap") / 2));
+    file << std::string(4096, '\x06');
+  }
+  fs::resize_file(folder / "face.mcap", fs::file_size(folder / "face.mcap") - 500);
+
+  const auto done = test::run({program("relievo"), "recover", folder / "face.mcap", "--json"});
+  ASSERT_EQ(done.status, 0) << done.err;
+  const auto result = nlohmann::json::parse(done.out);
+  const fs::path copy = folder / "face-recovered.mcap";
+  EXPECT_EQ(result["file"], copy.string());
+  EXPECT_FALSE(result["left_out"].empty());
+  const std::size_t kept = sequence_numbers(copy).size();
+  EXPECT_LT(kept, whole);
+  EXPECT_GE(kept, whole / 3);
+  const auto description = info(copy);
+  EXPECT_EQ(description["recovered"], false);
+  EXPECT_EQ(description["frames"], kept);
+  EXPECT_EQ(description["damaged_parts"], 0);
+
+  const auto again = test::run({program("relievo"), "recover", folder / "face.mcap"});
+  EXPECT_EQ(again.status, 1);
+  EXPECT_THAT(again.err, HasSubstr("exists already"));
+}
+
+}  // namespace
+}  // namespace relievo
