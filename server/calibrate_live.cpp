@@ -76,7 +76,11 @@ std::string view_name(int number) {
 class ViewTaker {
  public:
   ViewTaker(const LiveOptions& options, const Board& board, const SourceInfo& info)
-      : options_(options), board_(board), info_(info), pool_(options.threads), coverage_(info.rig.camera) {
+      : options_(options),
+        board_(board),
+        info_(info),
+        pool_(options.threads),
+        coverage_(info.rig.camera, info.rig.projector) {
     std::error_code ignored;
     while (fs::exists(fs::path(options.folder) / view_name(next_), ignored)) ++next_;
   }
@@ -98,8 +102,12 @@ class ViewTaker {
     log_info(name + " taken (" + std::to_string(taken_) + " of " + std::to_string(options_.views) +
              "): " + coverage_.add(view));
     if (taken_ < options_.views && !missing().empty()) log_info("still missing: " + missing());
+    if (const Status drawn = draw(); !drawn) return drawn.error();
     return taken_ >= options_.views;
   }
+
+  /// Into FOLDER/coverage.png.
+  Status draw() const { return write_png(fs::path(options_.folder) / "coverage.png", coverage_.draw()); }
 
   int taken() const { return taken_; }
   std::string missing() const { return coverage_.missing(); }
@@ -138,8 +146,10 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
     return written.error();
 
   ViewTaker taker(options, board, info);
+  if (const Status drawn = taker.draw(); !drawn) return drawn.error();
   log_info("hold the board still at " + std::to_string(options.views) +
-           " poses, tilted differently each time, under the stripes along columns and rows");
+           " poses, tilted differently each time, under the stripes along columns and rows; " +
+           (fs::path(options.folder) / "coverage.png").string() + " shows what was seen");
   Progress progress("calibrate", "frames");
   {
     const StoppedSource ended(**source, stop);

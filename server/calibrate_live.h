@@ -22,7 +22,8 @@ struct LiveOptions {
 
 /// Takes a view, FOLDER/view_NN, each time that the board is held still at a new pose under the stripes along
 /// columns and rows, and logs what it sees and what is missing. Ends with enough views, with the source, or
-/// stopped; says what was left. FOLDER/pattern.yaml is written first. Fails where no view was taken.
+/// stopped; says what was left. FOLDER/pattern.yaml is written first, FOLDER/coverage.png with each view.
+/// Fails where no view was taken.
 Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& board, StopSignal& stop);
 
 /// Takes FOLDER/RGB.png of each of the 8 primaries on a white sheet at rest.

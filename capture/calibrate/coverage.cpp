@@ -49,7 +49,8 @@ std::string listed(const std::vector<std::string>& words) {
 
 }  // namespace
 
-Coverage::Coverage(const PinholeModel& camera) : camera_(camera) {}
+Coverage::Coverage(const PinholeModel& camera, const PinholeModel& projector)
+    : camera_(camera), projector_(projector) {}
 
 bool Coverage::repeats(const MeasuredView& view) const {
   return std::any_of(added_.begin(), added_.end(), [&](const std::vector<CornerSight>& before) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/image.h"
 #include "base/rig.h"
 #include "capture/calibrate/measure_view.h"
 
@@ -14,8 +15,8 @@ namespace relievo {
 /// One thread.
 class Coverage {
  public:
-  /// `camera`: size in pixels; its focal length where known, else 0 and a usual one is taken.
-  explicit Coverage(const PinholeModel& camera);
+  /// Sizes in pixels; the camera's focal length where known, else 0 and a usual one is taken.
+  Coverage(const PinholeModel& camera, const PinholeModel& projector);
 
   /// True where the board lies almost as in a view that was added.
   bool repeats(const MeasuredView& view) const;
@@ -27,8 +28,12 @@ class Coverage {
   /// nothing is.
   std::string missing() const;
 
+  /// RGB, camera left, projector right: where corners were seen, the last view's boldly; parts of the
+  /// camera's picture without any are red; below, the four tilts, those still missing in red.
+  Image8 draw() const;
+
  private:
-  PinholeModel camera_;
+  PinholeModel camera_, projector_;
   std::array<bool, 9> cells_{};  // of the picture, row by row, that had a corner
   std::array<bool, 4> tilts_{};  // left, right, upper, lower side farther away
   std::vector<std::vector<CornerSight>> added_;

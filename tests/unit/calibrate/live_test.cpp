@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -145,7 +147,7 @@ MeasuredView turned_board(double about_x, double about_y, double shift_x_m) {
 }
 
 TEST(Coverage, SaysWhichSideIsFartherAndWhatIsMissing) {
-  Coverage coverage(truth().camera);
+  Coverage coverage(truth().camera, truth().projector);
   EXPECT_THAT(coverage.missing(), HasSubstr("top left, top, top right"));
   // About y (down), x turns towards -z: the right side comes nearer, so the left one is farther away.
   const MeasuredView left = turned_board(0, 0.4, 0);
@@ -157,6 +159,33 @@ TEST(Coverage, SaysWhichSideIsFartherAndWhatIsMissing) {
               HasSubstr("63 corners, its lower side farther away by 2"));
   EXPECT_EQ(coverage.add(turned_board(0, 0, 0.2)), "63 corners");
   EXPECT_THAT(coverage.missing(), HasSubstr("its right and upper side farther away"));
+}
+
+/// How many pixels are exactly of a colour.
+std::size_t count_of(const Image8& picture, std::array<int, 3> rgb) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(picture.width()) * picture.height(); ++i) {
+    const std::uint8_t* p = picture.data() + 3 * i;
+    count += p[0] == rgb[0] && p[1] == rgb[1] && p[2] == rgb[2];
+  }
+  return count;
+}
+
+TEST(Coverage, ThePictureLosesItsRedWhereCornersWereSeen) {
+  constexpr std::array<int, 3> kMissing = {92, 36, 36}, kSeen = {30, 64, 44};
+  Coverage coverage(truth().camera, truth().projector);
+  const Image8 before = coverage.draw();
+  EXPECT_EQ(count_of(before, kSeen), 0u);
+  const std::size_t missing = count_of(before, kMissing);
+  EXPECT_GT(missing, 200000u);
+  coverage.add(turned_board(0, 0, 0));
+  const Image8 after = coverage.draw();
+  EXPECT_EQ(after.width(), before.width());
+  EXPECT_GT(count_of(after, kSeen), 20000u);
+  EXPECT_LT(count_of(after, kMissing), missing - 20000);
+  // As wide as both devices' pictures at one height.
+  EXPECT_EQ(before.width(), 720 * truth().camera.width / truth().camera.height + 8 +
+                                720 * truth().projector.width / truth().projector.height);
 }
 
 }  // namespace
