@@ -265,6 +265,11 @@ Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes) {
   return layout->header;
 }
 
+bool is_key_frame(std::span<const std::uint8_t> bytes) {
+  return bytes.size() >= kFixedBytes && std::equal(kMagic.begin(), kMagic.end(), bytes.begin()) &&
+         bytes[4] == kVersion && (bytes[5] & kKeyFrame) != 0;
+}
+
 Result<Frame3D> decode_frame(std::span<const std::uint8_t> bytes, const DecodeLimits& limits) {
   const auto layout = read_layout(bytes);
   if (!layout) return layout.error();

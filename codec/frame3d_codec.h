@@ -68,6 +68,10 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options);
 /// Checks the whole layout (sizes, version, no trailing bytes), not the payloads. Any input.
 Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes);
 
+/// Whether the frame says that it can be decoded without any frame before it. Looks at its first bytes alone;
+/// false for what is no frame of a known version. Any input.
+bool is_key_frame(std::span<const std::uint8_t> bytes);
+
 /// Any thread. Any input: hostile bytes give an error, never a crash, a hang or an allocation beyond the
 /// limits. Vertex order is the codec's; `grid` is empty for Draco.
 Result<Frame3D> decode_frame(std::span<const std::uint8_t> bytes, const DecodeLimits& limits = {});

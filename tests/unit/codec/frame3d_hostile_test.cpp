@@ -44,6 +44,16 @@ TEST(HostileFrame, ANewerVersionIsNamed) {
   EXPECT_FALSE(read_frame_header(with<std::uint8_t>(valid(), 4, 0)).ok());
 }
 
+TEST(HostileFrame, OnlyAFrameOfAKnownVersionIsAKeyFrame) {
+  const Bytes bytes = valid();
+  EXPECT_TRUE(is_key_frame(bytes));
+  EXPECT_FALSE(is_key_frame(with<std::uint8_t>(bytes, 5, 0)));
+  EXPECT_FALSE(is_key_frame(with<std::uint8_t>(bytes, 4, 2)));
+  EXPECT_FALSE(is_key_frame(with<std::uint8_t>(bytes, 0, 'X')));
+  EXPECT_FALSE(is_key_frame(std::span(bytes).first(63)));
+  EXPECT_FALSE(is_key_frame({}));
+}
+
 TEST(HostileFrame, UnknownFlagsAndCodecsAreRefused) {
   EXPECT_NE(refusal(with<std::uint8_t>(valid(), 5, 3)).find("flags"), std::string::npos);
   EXPECT_NE(refusal(with<std::uint8_t>(valid(), 65, 7)).find("codec 7"), std::string::npos);
