@@ -5,6 +5,7 @@
 
 #include "base/log.h"
 #include "base/time.h"
+#include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -18,6 +19,11 @@ std::uint32_t sequence_of(const RawSample& sample) {
   if (sample.topic != Topic::kFrame) return 0;
   const auto frame = read_frame_cdr(sample.cdr);
   return frame ? static_cast<std::uint32_t>(frame->sequence) : 0;
+}
+
+bool decodes_alone(const RawSample& sample) {
+  const auto frame = read_frame_cdr(sample.cdr);
+  return frame && is_key_frame(frame->data);
 }
 
 }  // namespace
@@ -94,8 +100,7 @@ void Recorder::add(const RawSample& sample) {
   if (!writer_) {
     segment_ns_ = sample.receive_time_ns;
     fail(open_file());
-  } else if (is_frame && options_.segments.split() &&
-             segments_.is_full(writer_->size(), seconds(sample.receive_time_ns - segment_ns_))) {
+  } else if (is_frame && segment_ends_before(sample)) {
     fail(next_segment(sample.receive_time_ns));
   }
   if (!error_) fail(write(sample));
@@ -143,6 +148,15 @@ Status Recorder::open_file() {
     channels_[static_cast<std::size_t>(topic)] = *channel;
   }
   return {};
+}
+
+/// At a frame that decodes without those before; where none comes, at twice the limits all the same.
+bool Recorder::segment_ends_before(const RawSample& sample) const {
+  if (!options_.segments.split()) return false;
+  const std::uint64_t bytes = writer_->size();
+  const double duration_s = seconds(sample.receive_time_ns - segment_ns_);
+  return segments_.is_full(bytes, duration_s) &&
+         (decodes_alone(sample) || segments_.is_full(bytes / 2, duration_s / 2));
 }
 
 /// Each file can be read without the others: it begins with the stream's description.

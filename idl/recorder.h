@@ -61,6 +61,7 @@ class Recorder {
   void add(const RawSample& sample);
   void add_attachments();
   Status open_file();
+  bool segment_ends_before(const RawSample& sample) const;
   Status next_segment(std::int64_t now_ns);
   Status write(const RawSample& sample);
   void fail(const Status& status);
