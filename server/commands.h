@@ -12,6 +12,8 @@ Command reconstruct_command();
 Command evaluate_command();
 Command import_command();
 Command pattern_command();
+Command plan_command();
+Command project_command();
 Command calibrate_command();
 
 }  // namespace relievo

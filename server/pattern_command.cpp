@@ -13,15 +13,16 @@
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/stripe_stack.h"
-#include "capture/pattern/bcsl.h"
 #include "capture/pattern/gray_code.h"
 #include "capture/pattern/repeating.h"
 #include "capture/pattern/schedule.h"
 #include "capture/pattern/slides.h"
-#include "capture/rig_file.h"
+#include "capture/projector/slide_video.h"
+#include "cli/checks.h"
 #include "codec/export.h"
 #include "server/commands.h"
 #include "server/options.h"
+#include "server/pattern_options.h"
 #include "server/size_option.h"
 
 namespace relievo {
@@ -31,17 +32,14 @@ namespace fs = std::filesystem;
 
 struct Options {
   std::string out;
-  std::string pattern;
-  std::string scheme = "complementary";
+  PatternOptions pattern;
   std::string field_order = "top";
-  int base = 6;
-  int slides = 2;
-  int first = 0;
-  int stripes = 90;
   Size size{1024, 768};
   bool interlaced = false;
   bool gray = false;
   bool both_axes = false;
+  double rate = 29.97;
+  double seconds = 10;
   bool json = false;
 };
 
@@ -83,16 +81,6 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   return {};
 }
 
-Result<Pattern> pattern_of(const Options& options) {
-  if (!options.pattern.empty()) return read_pattern(options.pattern);
-  const Scheme scheme = scheme_named(options.scheme).value_or(Scheme::kComplementary);
-  if (scheme == Scheme::kOneSlide)
-    return make_repeating_pattern(options.base, options.first, options.stripes);
-  Result<Pattern> pattern = make_pattern(options.base, options.slides, options.first, options.stripes);
-  if (pattern) pattern->scheme = scheme;
-  return pattern;
-}
-
 /// The picture of one field: "slide1", "slide1_complement" or "white".
 std::string field_name(const Exposure& exposure) {
   if (exposure.light == Light::kWhite) return "white.png";
@@ -100,14 +88,54 @@ std::string field_name(const Exposure& exposure) {
          (exposure.light == Light::kComplement ? "_complement.png" : ".png");
 }
 
-Status run(const Options& options) {
-  if (options.gray) return write_gray(options);
-  const auto pattern = pattern_of(options);
-  if (!pattern) return pattern.error();
-  if (pattern->stripes() > options.size.width) {
-    return Error{std::to_string(pattern->stripes()) + " stripes do not fit " +
-                 std::to_string(options.size.width) + " projector columns: ask for fewer with --stripes"};
+/// Beside FILE.mkv, FILE.pattern.yaml, so that what was played is known.
+Status write_video(const Options& options, const Pattern& pattern, StopSignal& stop) {
+  const fs::path file = options.out;
+  const auto video = write_slide_video(
+      file, pattern,
+      {.width = options.size.width,
+       .height = options.size.height,
+       .interlaced = options.interlaced,
+       .field_order = options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop,
+       .frame_rate = options.rate,
+       .duration_s = options.seconds,
+       .stopped = [&stop] { return stop.stopped(); }});
+  if (!video) return stop.stopped() ? Status() : video.error();
+  const fs::path yaml = fs::path(file).replace_extension(".pattern.yaml");
+  if (auto s = write_whole_file(yaml, to_yaml(pattern)); !s) return s;
+  const double rate = static_cast<double>(video->rate_numerator) / video->rate_denominator;
+  if (options.json) {
+    const nlohmann::json json = {{"file", options.out},
+                                 {"pattern", yaml.string()},
+                                 {"pictures", video->pictures},
+                                 {"rate", {video->rate_numerator, video->rate_denominator}},
+                                 {"interlaced", options.interlaced},
+                                 {"scheme", to_string(pattern.scheme)},
+                                 {"stripes", pattern.stripes()}};
+    std::printf("%s\n", json.dump(2).c_str());
+  } else {
+    std::printf(
+        "%llu %s of %d stripes, %dx%d, %.2f a second, %.1f s, in %s: play it in a loop, full screen\n",
+        static_cast<unsigned long long>(video->pictures), options.interlaced ? "frames" : "fields",
+        pattern.stripes(), options.size.width, options.size.height, rate,
+        static_cast<double>(video->pictures) / rate, options.out.c_str());
   }
+  return {};
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  if (fs::path(options.out).extension() == ".mkv") {
+    if (options.gray || options.both_axes)
+      return Error{options.out + ": Gray code and --both-axes are written as pictures, give a folder"};
+    const auto pattern = pattern_of(options.pattern);
+    if (!pattern) return pattern.error();
+    if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;
+    return write_video(options, *pattern, stop);
+  }
+  if (options.gray) return write_gray(options);
+  const auto pattern = pattern_of(options.pattern);
+  if (!pattern) return pattern.error();
+  if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;
   if (const Status made = make_folder(options.out); !made) return made;
   if (options.both_axes) return write_both_axes(options, *pattern);
   std::vector<std::string> files;
@@ -159,24 +187,15 @@ Status run(const Options& options) {
 
 Command pattern_command() {
   return {
-      "pattern", "Write the slides to project as pictures, with their pattern.yaml", [](CLI::App& app) {
+      "pattern", "Write the slides to project as pictures or video, with their pattern.yaml",
+      [](CLI::App& app) {
         auto o = std::make_shared<Options>();
-        app.add_option("--out", o->out, "Folder, made where it is missing")->required();
-        auto* file =
-            app.add_option("--pattern", o->pattern, "An existing pattern.yaml instead of a new pattern");
-        for (auto* option :
-             {app.add_option("--base", o->base, "Colours: 3 to 6"),
-              app.add_option("--slides", o->slides, "Slides shown in turn: 1 or 2 decode; one-slide has 1"),
-              app.add_option("--first", o->first, "First stripe within the code's whole path"),
-              app.add_option("--stripes", o->stripes, "Stripes over the projector's width")}) {
-          option->capture_default_str()->excludes(file);
-        }
-        app.add_option("--scheme", o->scheme, "What is projected in turn, see below")
-            ->check(
-                [](const std::string& name) { return scheme_named(name) ? "" : "give " + scheme_names(); })
-            ->type_name("NAME")
-            ->capture_default_str()
-            ->excludes(file);
+        app.add_option(
+               "--out", o->out,
+               "Folder, made where it is missing, or video FILE.mkv: lossless (FFV1), to be played in a loop")
+            ->type_name("DIR|FILE.mkv")
+            ->required();
+        auto* file = add_pattern_options(app, o->pattern);
         add_size_option(app, "--size", o->size, "The projector's pixels, WIDTHxHEIGHT (default 1024x768)");
         auto* interlaced = app.add_flag(
             "--interlaced", o->interlaced,
@@ -197,9 +216,15 @@ Command pattern_command() {
             ->excludes(file)
             ->excludes(interlaced)
             ->excludes(both);
+        app.add_option("--rate", o->rate, "Of a video: frames (field pairs) a second")
+            ->check(number(1, 1000))
+            ->capture_default_str();
+        app.add_option("--seconds", o->seconds, "Of a video: its length, rounded up to whole cycles")
+            ->check(number(0.01, 36000))
+            ->capture_default_str();
         app.add_flag("--json", o->json, "Print the result as JSON");
         app.footer(scheme_help());
-        return [o](StopSignal&) { return run(*o); };
+        return [o](StopSignal& stop) { return run(*o, stop); };
       }};
 }
 

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/pattern_options.h"
+
+#include <CLI/CLI.hpp>
+
+#include "capture/pattern/bcsl.h"
+#include "capture/pattern/repeating.h"
+#include "capture/rig_file.h"
+
+namespace relievo {
+
+CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& o) {
+  auto* file = app.add_option("--pattern", o.file, "An existing pattern.yaml instead of a new pattern");
+  for (auto* option :
+       {app.add_option("--base", o.base, "Colours: 3 to 6"),
+        app.add_option("--slides", o.slides, "Slides shown in turn: 1 or 2 decode; one-slide has 1"),
+        app.add_option("--first", o.first, "First stripe within the code's whole path"),
+        app.add_option("--stripes", o.stripes, "Stripes over the projector's width")}) {
+    option->capture_default_str()->excludes(file);
+  }
+  app.add_option("--scheme", o.scheme, "What is projected in turn, see below")
+      ->check([](const std::string& name) { return scheme_named(name) ? "" : "give " + scheme_names(); })
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->excludes(file);
+  return file;
+}
+
+Result<Pattern> pattern_of(const PatternOptions& options) {
+  if (!options.file.empty()) return read_pattern(options.file);
+  const Scheme scheme = scheme_named(options.scheme).value_or(Scheme::kComplementary);
+  if (scheme == Scheme::kOneSlide)
+    return make_repeating_pattern(options.base, options.first, options.stripes);
+  Result<Pattern> pattern = make_pattern(options.base, options.slides, options.first, options.stripes);
+  if (pattern) pattern->scheme = scheme;
+  return pattern;
+}
+
+Status fits_projector(const Pattern& pattern, int projector_width) {
+  if (pattern.stripes() <= projector_width) return {};
+  return Error{std::to_string(pattern.stripes()) + " stripes do not fit " + std::to_string(projector_width) +
+               " projector columns: ask for fewer with --stripes"};
+}
+
+}  // namespace relievo
