@@ -2,46 +2,75 @@
 #include "base/parallel.h"
 
 #include <algorithm>
-#include <condition_variable>
-#include <cstdint>
-#include <mutex>
+#include <atomic>
 #include <thread>
-#include <vector>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 namespace relievo {
+namespace {
+
+// How often a thread looks for what it waits for before it sleeps: some tens of microseconds, about what
+// waking it would take. A frame has some tens of calls close to each other.
+constexpr int kLooks = 1500;
+
+void pause_shortly() {
+#if defined(__x86_64__)
+  _mm_pause();
+#else
+  std::this_thread::yield();
+#endif
+}
+
+/// Returns when `value` is no longer `old`.
+void wait_for_change(const std::atomic<int>& value, int old) {
+  for (int i = 0; i < kLooks; ++i) {
+    if (value.load(std::memory_order_acquire) != old) return;
+    pause_shortly();
+  }
+  value.wait(old, std::memory_order_acquire);
+}
+
+}  // namespace
 
 struct WorkerPool::State {
-  std::mutex mutex;
-  std::condition_variable start;
-  std::condition_variable done;
   Task task;
-  int pending = 0;
-  std::uint64_t round = 0;
-  bool stop = false;
+  std::atomic<int> round{0};    // of tasks; wraps
+  std::atomic<int> pending{0};  // helpers that have not finished this one
+  bool stop = false;            // set before the last round
   int threads = 1;
   std::vector<std::thread> helpers;
 
+  int bound(int i) const {
+    if (task.before == nullptr) return static_cast<int>(static_cast<std::int64_t>(task.count) * i / threads);
+    if (i == threads) return task.count;
+    const auto least =
+        static_cast<std::uint32_t>(std::uint64_t{task.before[task.count]} * static_cast<std::uint64_t>(i) /
+                                   static_cast<std::uint64_t>(threads));
+    return static_cast<int>(std::lower_bound(task.before, task.before + task.count, least) - task.before);
+  }
+
   void run_range(int worker) const {
-    const auto bound = [&](int i) {
-      return static_cast<int>(static_cast<std::int64_t>(task.count) * i / threads);
-    };
     const int begin = bound(worker);
     const int end = bound(worker + 1);
     if (begin < end) task.call(task.work, begin, end, worker);
   }
 
   void helper(int worker) {
-    std::uint64_t seen = 0;
-    std::unique_lock lock(mutex);
-    while (true) {
-      start.wait(lock, [&] { return stop || round != seen; });
+    for (int seen = 0;;) {
+      wait_for_change(round, seen);
+      seen = round.load(std::memory_order_acquire);
       if (stop) return;
-      seen = round;
-      lock.unlock();
       run_range(worker);
-      lock.lock();
-      if (--pending == 0) done.notify_one();
+      if (pending.fetch_sub(1, std::memory_order_acq_rel) == 1) pending.notify_one();
     }
+  }
+
+  void start_round() {
+    round.fetch_add(1, std::memory_order_release);
+    round.notify_all();
   }
 };
 
@@ -51,11 +80,8 @@ WorkerPool::WorkerPool(int threads) : state_(std::make_unique<State>()) {
 }
 
 WorkerPool::~WorkerPool() {
-  {
-    std::lock_guard lock(state_->mutex);
-    state_->stop = true;
-  }
-  state_->start.notify_all();
+  state_->stop = true;
+  state_->start_round();
   for (auto& helper : state_->helpers) helper.join();
 }
 
@@ -69,16 +95,11 @@ void WorkerPool::run(const Task& task) {
     if (task.count > 0) task.call(task.work, 0, task.count, 0);
     return;
   }
-  {
-    std::lock_guard lock(s.mutex);
-    s.task = task;
-    s.pending = s.threads - 1;
-    ++s.round;
-  }
-  s.start.notify_all();
+  s.task = task;
+  s.pending.store(s.threads - 1, std::memory_order_relaxed);
+  s.start_round();
   s.run_range(0);
-  std::unique_lock lock(s.mutex);
-  s.done.wait(lock, [&] { return s.pending == 0; });
+  while (const int left = s.pending.load(std::memory_order_acquire)) wait_for_change(s.pending, left);
 }
 
 }  // namespace relievo

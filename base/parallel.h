@@ -3,11 +3,14 @@
 // out.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 namespace relievo {
 
-/// One caller at a time. A pool of one thread runs everything on the caller's.
+/// One caller at a time. A pool of one thread runs everything on the caller's. Between calls that follow each
+/// other closely the threads stay awake; otherwise they sleep.
 class WorkerPool {
  public:
   explicit WorkerPool(int threads);
@@ -22,18 +25,30 @@ class WorkerPool {
   /// so a run repeats exactly. Allocates nothing.
   template <typename Work>
   void for_ranges(int count, const Work& work) {
-    run({count, &work, [](const void* w, int begin, int end, int worker) {
-           (*static_cast<const Work*>(w))(begin, end, worker);
-         }});
+    run(task_of(work, count, nullptr));
+  }
+
+  /// The same over rows that hold unequal amounts of work, in ranges with about as much each: `before[i]` is
+  /// how much all rows before row i hold, and one more, the last, how much all of them do.
+  template <typename Work>
+  void for_shares(const std::vector<std::uint32_t>& before, const Work& work) {
+    run(task_of(work, static_cast<int>(before.size()) - 1, before.data()));
   }
 
  private:
   struct State;
   struct Task {
     int count = 0;
+    const std::uint32_t* before = nullptr;  // null: every row holds as much
     const void* work = nullptr;
     void (*call)(const void* work, int begin, int end, int worker) = nullptr;
   };
+  template <typename Work>
+  static Task task_of(const Work& work, int count, const std::uint32_t* before) {
+    return {count, before, &work, [](const void* w, int begin, int end, int worker) {
+              (*static_cast<const Work*>(w))(begin, end, worker);
+            }};
+  }
   void run(const Task& task);
 
   std::unique_ptr<State> state_;

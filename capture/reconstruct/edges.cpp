@@ -2,6 +2,7 @@
 #include "capture/reconstruct/edges.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -23,22 +24,61 @@ std::array<int, 2> columns(int width, float from, float to) {
   return {first, std::clamp(static_cast<int>(to + 0.5F), first, width - 1)};
 }
 
+/// What tells how doubtful evidence is on a line.
+class Doubts {
+ public:
+  Doubts(const DifferenceImage& image, int line)
+      : signal_(image.cells == 0
+                    ? nullptr
+                    : image.signal.data() + static_cast<std::size_t>(line / DifferenceImage::kCellLines) *
+                                                static_cast<std::size_t>(image.cells)),
+        strong_(kNoiseOfSign * image.noise + 0.5F),
+        weak_(kNoiseOfSign * image.weak_noise + 0.5F) {}
+  float at(int x) const {
+    return signal_ != nullptr && signal_[x / DifferenceImage::kCellWidth] == Signal::kWeak ? weak_ : strong_;
+  }
+
+ private:
+  const Signal* signal_;
+  float strong_, weak_;
+};
+
+SideWindows windows_beside(const Doubts& doubts, int width, const Edge& edge, float column_px) {
+  const float l = edge.left_reach_px;
+  const float r = edge.right_reach_px;
+  const auto [left_first, left_last] = columns(width, column_px - l, column_px - 0.5F * l);
+  const auto [right_first, right_last] = columns(width, column_px + 0.5F * r, column_px + r);
+  return {left_first, left_last, right_first, right_last, doubts.at(left_first), doubts.at(right_first)};
+}
+
+SideEvidence three_of(const std::array<float, 4>& side) {
+  return {side[0], side[1], side[2]};
+}
+
 }  // namespace
 
 EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edge& edge, float column_px) {
-  const float l = edge.left_reach_px;
-  const float r = edge.right_reach_px;
-  const auto [left_first, left_last] = columns(image.width, column_px - l, column_px - 0.5F * l);
-  const auto [right_first, right_last] = columns(image.width, column_px + 0.5F * r, column_px + r);
-  const auto doubt = [&](int x) { return kNoiseOfSign * image.noise_at(line, x) + 0.5F; };
+  const SideWindows windows = windows_beside(Doubts(image, line), image.width, edge, column_px);
   Sides out;
-  row_kernels().side_evidence(
-      image.line(line), image.width,
-      {left_first, left_last, right_first, right_last, doubt(left_first), doubt(right_first)}, out);
-  return {{out.left[0], out.left[1], out.left[2]}, {out.right[0], out.right[1], out.right[2]}};
+  row_kernels().side_evidence(image.line(line), image.width, &windows, 1, &out);
+  return {three_of(out.left), three_of(out.right)};
 }
 
-void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& scratch) {
+void EdgeSides::look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count,
+                     const float* off_px) {
+  windows_.resize(count);
+  sides_.resize(count);
+  const Doubts doubts(image, line);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float column = off_px == nullptr ? edges[i].column_px : edges[i].column_px + off_px[i];
+    windows_[i] = windows_beside(doubts, image.width, edges[i], column);
+  }
+  row_kernels().side_evidence(image.line(line), image.width, windows_.data(), static_cast<int>(count),
+                              sides_.data());
+}
+
+std::uint32_t EdgeFinder::crossings_of_line(const DifferenceImage& image, int line, Scratch& scratch,
+                                            Found* found) {
   const int width = image.width;
   const float threshold = std::max(kLeastRise, kNoiseFactor * image.noise);
   const float weak_threshold = std::max(kLeastRise, kNoiseFactor * image.weak_noise);
@@ -47,32 +87,32 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
   scratch.flags.assign(static_cast<std::size_t>(width + 8),
                        0);  // so that the last ones are read at once, too
   row_kernels().crossings(image.line(line), width, weak_threshold, scratch.flags.data());
-  for (int x = 0; x < width; ++x) {
-    if (x % 8 == 0) {  // most columns have none
-      std::uint64_t eight = 0;
-      std::memcpy(&eight, scratch.flags.data() + x, sizeof eight);
-      if (eight == 0) {
-        x += 7;
-        continue;
-      }
-    }
-    if (scratch.flags[static_cast<std::size_t>(x)] == 0) continue;
+  const auto take = [&](int x, unsigned flags) {
     const std::size_t first_here = crossings.size();
-    for (int channel = 0; channel < 3; ++channel) {
-      if (!(scratch.flags[static_cast<std::size_t>(x)] >> channel & 1)) continue;
-      const float* d = image.line(line) + channel * width;
-      if (image.signal_at(line, x) != Signal::kWeak && std::fabs(d[x + 2] - d[x - 1]) < threshold) continue;
+    const bool weak = image.signal_at(line, x) == Signal::kWeak;
+    for (; flags != 0; flags &= flags - 1) {
+      const float* d = image.line(line) + std::countr_zero(flags) * width;
+      if (!weak && std::fabs(d[x + 2] - d[x - 1]) < threshold) continue;
       const float step = d[x + 1] - d[x];
-      const Crossing found{static_cast<float>(x) - d[x] / step, std::fabs(step)};
+      const Crossing here{static_cast<float>(x) - d[x] / step, std::fabs(step)};
       std::size_t place = crossings.size();
-      crossings.push_back(found);
-      for (; place > first_here && found.column_px < crossings[place - 1].column_px; --place)
+      crossings.push_back(here);
+      for (; place > first_here && here.column_px < crossings[place - 1].column_px; --place)
         crossings[place] = crossings[place - 1];
-      crossings[place] = found;
+      crossings[place] = here;
+    }
+  };
+  for (int x = 0; x < width; x += 8) {  // most columns have none
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, scratch.flags.data() + x, sizeof eight);
+    while (eight != 0) {
+      const int k = std::countr_zero(eight) / 8;
+      take(x + k, static_cast<unsigned>(eight >> (8 * k)) & 0xff);
+      eight &= ~(std::uint64_t{0xff} << (8 * k));
     }
   }
 
-  const std::size_t begin = scratch.edges.size();
+  Found* next = found;
   for (std::size_t i = 0; i < crossings.size();) {
     // A crossing's variance goes with 1 / slope^2, which is the weight of the mean.
     float weight = 0;
@@ -83,44 +123,57 @@ void EdgeFinder::edges_of_line(const DifferenceImage& image, int line, Scratch& 
       weight += w;
       sum += w * (crossings[i].column_px - first);
     }
-    Edge edge;
-    edge.column_px = first + sum / weight;
-    edge.slope = std::sqrt(weight);
-    edge.sigma_px = image.noise_at(line, static_cast<int>(first)) / edge.slope;
-    edge.noise_px = edge.sigma_px;
-    scratch.edges.push_back(edge);
+    *next++ = {first + sum / weight, std::sqrt(weight), image.noise_at(line, static_cast<int>(first))};
   }
-  const std::size_t end = scratch.edges.size();
-  for (std::size_t i = begin; i < end; ++i) {
-    Edge& e = scratch.edges[i];
-    const float left_gap = i > begin ? e.column_px - scratch.edges[i - 1].column_px : 2 * kMaxReach_px;
-    const float right_gap = i + 1 < end ? scratch.edges[i + 1].column_px - e.column_px : 2 * kMaxReach_px;
+  return static_cast<std::uint32_t>(next - found);
+}
+
+void EdgeFinder::make_edges(const DifferenceImage& image, int line, const Found* found, std::size_t count,
+                            EdgeSides& sides, Edge* edges) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const Found& f = found[i];
+    Edge e;
+    e.column_px = f.column_px;
+    e.slope = f.slope;
+    e.sigma_px = f.noise / f.slope;
+    e.noise_px = e.sigma_px;
+    const float left_gap = i > 0 ? f.column_px - found[i - 1].column_px : 2 * kMaxReach_px;
+    const float right_gap = i + 1 < count ? found[i + 1].column_px - f.column_px : 2 * kMaxReach_px;
     e.left_reach_px = std::clamp(0.55F * left_gap, 1.F, kMaxReach_px);
     e.right_reach_px = std::clamp(0.55F * right_gap, 1.F, kMaxReach_px);
-    const EvidenceBeside beside = evidence_beside(image, line, e, e.column_px);
-    e.left = beside.left;
-    e.right = beside.right;
+    edges[i] = e;
   }
-  scratch.counts.push_back(static_cast<std::uint32_t>(end - begin));
+  sides.look(image, line, edges, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    edges[i].left = three_of(sides[i].left);
+    edges[i].right = three_of(sides[i].right);
+  }
 }
 
 void EdgeFinder::find(const DifferenceImage& image, WorkerPool& pool, EdgeImage& out) {
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
-  for (Scratch& s : scratch_) {
-    s.edges.clear();
-    s.counts.clear();
-  }
-  pool.for_ranges(image.lines, [&](int begin, int end, int worker) {
-    for (int line = begin; line < end; ++line)
-      edges_of_line(image, line, scratch_[static_cast<std::size_t>(worker)]);
-  });
+  // Crossings that lie closer together are one edge.
+  most_on_line_ = static_cast<std::size_t>(image.width) / static_cast<std::size_t>(kMerge_px) + 2;
+  found_.resize(most_on_line_ * static_cast<std::size_t>(image.lines));
   out.lines = image.lines;
-  out.edges.clear();
-  out.line_start.assign(1, 0);
-  for (const Scratch& s : scratch_) {
-    out.edges.insert(out.edges.end(), s.edges.begin(), s.edges.end());
-    for (const std::uint32_t count : s.counts) out.line_start.push_back(out.line_start.back() + count);
-  }
+  out.line_start.resize(static_cast<std::size_t>(image.lines) + 1);
+  out.line_start[0] = 0;
+  pool.for_ranges(image.lines, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) {
+      out.line_start[static_cast<std::size_t>(line) + 1] =
+          crossings_of_line(image, line, scratch_[static_cast<std::size_t>(worker)], found_on(line));
+    }
+  });
+  for (std::size_t line = 0; line < static_cast<std::size_t>(image.lines); ++line)
+    out.line_start[line + 1] += out.line_start[line];
+  out.edges.resize(out.line_start.back());
+  pool.for_shares(out.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) {
+      const std::uint32_t first = out.line_start[static_cast<std::size_t>(line)];
+      make_edges(image, line, found_on(line), out.line_start[static_cast<std::size_t>(line) + 1] - first,
+                 scratch_[static_cast<std::size_t>(worker)].sides, out.edges.data() + first);
+    }
+  });
 }
 
 }  // namespace relievo

@@ -9,6 +9,7 @@
 
 #include "base/parallel.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/rows.h"
 
 namespace relievo {
 
@@ -47,6 +48,20 @@ struct EvidenceBeside {
 /// frame's difference image.
 EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edge& edge, float column_px);
 
+/// The same for many edges of a line at once. Keeps its scratch memory. One thread.
+class EdgeSides {
+ public:
+  /// Looks beside `count` edges, at their own columns plus `off_px` (one an edge; null: none).
+  void look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count,
+            const float* off_px = nullptr);
+  /// Of the edges looked at last.
+  const Sides& operator[](std::size_t i) const { return sides_[i]; }
+
+ private:
+  std::vector<SideWindows> windows_;
+  std::vector<Sides> sides_;
+};
+
 /// Keeps its scratch memory from frame to frame. One thread.
 class EdgeFinder {
  public:
@@ -59,14 +74,24 @@ class EdgeFinder {
     float column_px;
     float slope;
   };
+  struct Found {
+    float column_px;
+    float slope;
+    float noise;  // of the difference there
+  };
   struct Scratch {
     std::vector<std::uint8_t> flags;
     std::vector<Crossing> crossings;
-    std::vector<Edge> edges;
-    std::vector<std::uint32_t> counts;
+    EdgeSides sides;
   };
-  static void edges_of_line(const DifferenceImage& image, int line, Scratch& scratch);
+  Found* found_on(int line) { return found_.data() + static_cast<std::size_t>(line) * most_on_line_; }
+  static std::uint32_t crossings_of_line(const DifferenceImage& image, int line, Scratch& scratch,
+                                         Found* found);
+  static void make_edges(const DifferenceImage& image, int line, const Found* found, std::size_t count,
+                         EdgeSides& sides, Edge* edges);
 
+  std::size_t most_on_line_ = 0;
+  std::vector<Found> found_;  // [line][most_on_line_]
   std::vector<Scratch> scratch_;
 };
 

@@ -10,6 +10,8 @@
 #include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/luma_place.h"
+#include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/sequence.h"
 
 namespace relievo {
@@ -29,11 +31,7 @@ class Refiner {
   void refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
               const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges);
 
-  struct Sides {
-    float free_left_px, free_right_px;  // to the next edges
-    std::array<Primary, 2> colours;     // left and right, under the slide that the image shows
-    bool narrow = false;                // there may be less than two pixels of a surface
-  };
+  using Sides = LumaSides;
   struct Place {
     float column_px;
     float sigma_px;
@@ -44,12 +42,9 @@ class Refiner {
   Place find(const DifferenceImage& image, int line, float column_px, const Sides& sides) const;
 
  private:
-  /// Where luma has the boundary.
-  struct LumaPlace {
-    float column_px;
-    float slope;     // of the ratio, a pixel
-    float rise;      // from the left level to the right one
-    float contrast;  // of the scene in white light, near enough to spoil the place
+  /// Where luma has the boundary of an edge, and what noise and contrast make of it.
+  struct LumaSeen {
+    float column_px, sigma_px, level_px;
     bool found;
   };
   /// Standard deviations of what blurred chroma does to zero crossings.
@@ -58,23 +53,17 @@ class Refiner {
   };
   float projected_share(const DifferenceImage& image, const SequenceResult& result,
                         const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) const;
-  struct Light;
-  Light light_around(const DifferenceImage& image, int line, int centre) const;
-  static int clear_run(const Light& light, int centre, int step, int reach);
-  LumaPlace luma_place(const DifferenceImage& image, int line, const Sides& sides, float share,
-                       float own) const;
-  float luma_sigma(const DifferenceImage& image, int line, const LumaPlace& luma) const;
-  Drawn colour_drawn(const DifferenceImage& image, const EdgeImage& edges);
-  void look_around(const DifferenceImage& image, int line, Edge& edge) const;
-  void refine_edge(const DifferenceImage& image, int line, const LumaPlace& luma, const Drawn& drawn,
-                   Edge& edge) const;
+  void look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaSides& sides,
+               int worker, Edge& edge, LumaSeen& out);
+  Drawn colour_drawn();
+  static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);
 
-  std::array<float, 3> luma_;      // of the difference image's channels
-  std::array<float, 8> ratio_;     // of each primary
-  bool wide_stripes_ = false;      // in the last frame, so wide that two dark pixels are speckle
-  float share_ = 1;                // projected_share of the last frame
-  std::vector<LumaPlace> places_;  // one an edge
-  std::vector<float> always_, by_contrast_;
+  LumaPlacer placer_;
+  bool wide_stripes_ = false;    // in the last frame, so wide that two dark pixels are speckle
+  float share_ = 1;              // projected_share of the last frame
+  std::vector<LumaLine> light_;  // one a worker
+  std::vector<LumaSeen> seen_;   // one an edge
+  RankedSample always_, by_contrast_;
 };
 
 }  // namespace relievo

@@ -134,20 +134,25 @@ std::array<float, 4> evidence(const float* planes, int width, int first, int las
   return {out[0], out[1], out[2], 0};
 }
 
-void side_evidence_portable(const float* planes, int width, const SideWindows& w, Sides& out) {
-  out.left = evidence(planes, width, w.left_first, w.left_last, w.left_doubt);
-  out.right = evidence(planes, width, w.right_first, w.right_last, w.right_doubt);
+void side_evidence_portable(const float* planes, int width, const SideWindows* windows, int count,
+                            Sides* out) {
+  for (int i = 0; i < count; ++i) {
+    const SideWindows& w = windows[i];
+    out[i].left = evidence(planes, width, w.left_first, w.left_last, w.left_doubt);
+    out[i].right = evidence(planes, width, w.right_first, w.right_last, w.right_doubt);
+  }
 }
 
 #if defined(__x86_64__)
 
 /// Both sides at once, the left in the lower half of each register.
-[[gnu::target("avx2")]] void side_evidence_avx2(const float* planes, int width, const SideWindows& w,
-                                                Sides& out) {
+[[gnu::target("avx2"), gnu::always_inline]] inline void one_side_evidence_avx2(const float* planes, int width,
+                                                                               const SideWindows& w,
+                                                                               Sides& out) {
   const int left_count = w.left_last - w.left_first + 1;
   const int right_count = w.right_last - w.right_first + 1;
   if (left_count > 4 || right_count > 4 || w.left_first + 4 > width || w.right_first + 4 > width) {
-    side_evidence_portable(planes, width, w, out);
+    side_evidence_portable(planes, width, &w, 1, &out);
     return;
   }
   const __m256i count = _mm256_set_m128i(_mm_set1_epi32(right_count), _mm_set1_epi32(left_count));
@@ -177,6 +182,11 @@ void side_evidence_portable(const float* planes, int width, const SideWindows& w
   const __m256 evidence =
       _mm256_max_ps(_mm256_set1_ps(-1), _mm256_min_ps(_mm256_set1_ps(1), _mm256_mul_ps(sum, unit)));
   _mm256_storeu_ps(out.left.data(), evidence);  // and the right behind it
+}
+
+[[gnu::target("avx2")]] void side_evidence_avx2(const float* planes, int width, const SideWindows* windows,
+                                                int count, Sides* out) {
+  for (int i = 0; i < count; ++i) one_side_evidence_avx2(planes, width, windows[i], out[i]);
 }
 
 #endif

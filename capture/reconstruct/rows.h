@@ -67,9 +67,9 @@ struct RowKernels {
   /// x + 1 and rises or falls the same way by `least_rise` or more from x - 1 to x + 2. `flags` is [width].
   void (*crossings)(const float* planes, int width, float least_rise, std::uint8_t* flags);
 
-  /// Mean m of `planes` ([3][width]) in each window over kClearShare * (largest |m| of the channels) + doubt,
-  /// clamped to -1..1.
-  void (*side_evidence)(const float* planes, int width, const SideWindows& windows, Sides& out);
+  /// For each of `count` edges: mean m of `planes` ([3][width]) in each window over kClearShare * (largest
+  /// |m| of the channels) + doubt, clamped to -1..1.
+  void (*side_evidence)(const float* planes, int width, const SideWindows* windows, int count, Sides* out);
 };
 
 /// Those that run on this machine, the reference first and the best last.

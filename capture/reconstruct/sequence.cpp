@@ -36,10 +36,6 @@ constexpr float kLeastSide = 0.4F;  // of agreement on each side: no channel may
 constexpr float kLeastOwn = 1.1F;   // of both sides
 constexpr float kLeastGain = 2.0F;  // with the other slide's frame, where the scene held still
 
-// Lines above and below.
-constexpr float kLean_px = 2.5F;           // how far a boundary moves from one line to the next
-constexpr float kCompleteEvidence = 1.2F;  // gain for a boundary that a neighbouring line predicts
-
 float agreement(Primary colour, const SideEvidence& e) {
   return ((colour & 1 ? e[0] : -e[0]) + (colour & 2 ? e[1] : -e[1]) + (colour & 4 ? e[2] : -e[2])) *
          (1.F / 3);
@@ -65,17 +61,21 @@ bool alike(const SideEvidence& a, const SideEvidence& b) {
   return dot > 0.5F * size;
 }
 
+/// Where it is not where it was.
 Displacement displacement(const DifferenceImage& same, int line, const Edge& edge) {
   const auto matches = [&](float px) {
     const EvidenceBeside there = evidence_beside(same, line, edge, edge.column_px + px);
     return alike(edge.left, there.left) && alike(edge.right, there.right);
   };
-  if (matches(0)) return {true, 0};
   for (float px = kSearchStep_px; px <= kSearch_px; px += kSearchStep_px) {
     if (matches(px)) return {true, px};
     if (matches(-px)) return {true, -px};
   }
   return {false, 0};
+}
+
+SideEvidence three_of(const std::array<float, 4>& side) {
+  return {side[0], side[1], side[2]};
 }
 
 /// Gain from the other slide's frame, where the colours on the two sides agree with it by `left` and `right`.
@@ -120,17 +120,27 @@ EdgeAgreement SequenceDecoder::agreement_of(const Edge& edge, const Beside& besi
   return out;
 }
 
-/// The boundary that an edge is beyond doubt, or -1: every channel on both sides in both frames is clear.
-int SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown) {
-  if (!beside.tracked) return -1;
+/// What an edge is beyond doubt: every channel on both sides in both frames is clear.
+SequenceDecoder::Clear SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside,
+                                                       const Slide& shown) {
+  Clear out{-1, 0, 0};
+  if (!beside.tracked) return out;
   std::size_t code = 0;
   float least = kClear;
+  std::array<float, 4> agreements{};  // with the colours that the signs tell
+  std::size_t i = 0;
   for (const SideEvidence* side : {&edge.left, &edge.right, &beside.left, &beside.right}) {
     const SideEvidence& e = *side;
     code = code * 8 + static_cast<std::size_t>((e[0] > 0 ? 1 : 0) | (e[1] > 0 ? 2 : 0) | (e[2] > 0 ? 4 : 0));
-    least = std::min({least, std::fabs(e[0]), std::fabs(e[1]), std::fabs(e[2])});
+    const std::array size{std::fabs(e[0]), std::fabs(e[1]), std::fabs(e[2])};
+    least = std::min(std::min(least, size[0]), std::min(size[1], size[2]));
+    agreements[i++] = (size[0] + size[1] + size[2]) * (1.F / 3);
   }
-  return least >= kClear ? shown.by_code[code] : -1;
+  if (least < kClear) return out;
+  out.boundary = shown.by_code[code];
+  out.own = agreements[0] + agreements[1];
+  out.gain = out.own + (agreements[2] + agreements[3]);
+  return out;
 }
 
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
@@ -143,6 +153,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
   const int count = static_cast<int>(end - begin);
   PathCandidates& candidates = scratch.candidates;
   candidates.resize(static_cast<std::size_t>(count));
+  scratch.clear.resize(static_cast<std::size_t>(count));
   float best_so_far = 0;
   std::int32_t best_end = -1;  // place at which the best path so far ends
   for (int e = 0; e < count; ++e) {
@@ -152,10 +163,14 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     std::int32_t* boundary = candidates.boundary.data() + own;
     float* gains = candidates.gain.data() + own;
     int& used = candidates.used[static_cast<std::size_t>(e)];
-    if (const int clear = clear_boundary(edge, beside_[index], shown); clear >= 0) {
+    const Clear clear = clear_boundary(edge, beside_[index], shown);
+    // Of a clear edge; what a doubtful one shows is asked once its path is known.
+    convincing_[index] = clear.own > kLeastOwn && (context.other == nullptr || clear.gain > kLeastGain);
+    scratch.clear[static_cast<std::size_t>(e)] = clear.boundary >= 0;
+    if (clear.boundary >= 0) {
       used = 1;
-      *boundary = clear;
-      *gains = gain(edge, beside_[index], context, clear) - kGains.threshold;
+      *boundary = clear.boundary;
+      *gains = clear.gain - kGains.threshold;
     } else {
       used = kernels.choose(shown.table, agreement_of(edge, beside_[index]), kGains, boundary, gains);
       for (int i = 0; i < used && context.expected != nullptr; ++i) {
@@ -180,7 +195,8 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     const std::uint32_t index = begin + static_cast<std::uint32_t>(a / kPlaces);
     const std::int32_t boundary = candidates.boundary[static_cast<std::size_t>(a)];
     out.boundary[index] = static_cast<std::int16_t>(boundary);
-    convincing_[index] = convincing(edges.edges[index], beside_[index], context, boundary);
+    if (scratch.clear[static_cast<std::size_t>(a / kPlaces)] == 0)
+      convincing_[index] = convincing(edges.edges[index], beside_[index], context, boundary);
     ++scratch.in_order;
   }
   scratch.score += best_so_far;
@@ -213,105 +229,39 @@ float SequenceDecoder::other_agreement(const Edge& edge, int line, int boundary,
   return std::min(agreement(left, beside.left), agreement(right, beside.right));
 }
 
-/// What the other slide's frame shows beside the edge: where it stood on the way between the frames around
-/// that one.
-SequenceDecoder::Beside SequenceDecoder::look_beside(const Edge& edge, int line,
-                                                     const SequenceContext& context) {
-  Beside out{{}, {}, true};
-  float px = 0;
-  if (context.same != nullptr) {
-    const Displacement moved = displacement(*context.same, line, edge);
-    out.tracked = moved.found && moved.px == 0;
-    px = context.other_share * moved.px;
-  }
-  if (context.other == nullptr) return out;
-  const EvidenceBeside there = evidence_beside(*context.other, line, edge, edge.column_px + px);
-  out.left = there.left;
-  out.right = there.right;
-  return out;
-}
-
-void SequenceDecoder::check_and_complete(const EdgeImage& edges, const SequenceContext& context,
-                                         SequenceResult& out) {
-  const auto cell = [&](int line, int boundary) -> std::int32_t& {
-    return grid_[static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_) +
-                 static_cast<std::size_t>(boundary)];
+/// What the other slide's frame shows beside a line's edges: where each stood on the way between the frames
+/// around that one.
+void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const SequenceContext& context,
+                                  Scratch& scratch, SequenceResult& out) {
+  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
+  const std::size_t count = edges.line_start[static_cast<std::size_t>(line) + 1] - begin;
+  const Edge* of_line = edges.edges.data() + begin;
+  Beside* beside = beside_.data() + begin;
+  const auto looked = [&](std::size_t i) {
+    return EvidenceBeside{three_of(scratch.sides[i].left), three_of(scratch.sides[i].right)};
   };
-  grid_.assign(static_cast<std::size_t>(edges.lines) * static_cast<std::size_t>(boundaries_), -1);
-  const auto edges_of = [&](int line) {
-    return std::array{edges.line_start[static_cast<std::size_t>(line)],
-                      edges.line_start[static_cast<std::size_t>(line) + 1]};
-  };
-  const auto column = [&](std::int32_t e) { return edges.edges[static_cast<std::size_t>(e)].column_px; };
-  for (int line = 0; line < edges.lines; ++line) {
-    const auto [begin, end] = edges_of(line);
-    for (std::uint32_t e = begin; e < end; ++e) {
-      if (out.boundary[e] < 0) continue;
-      std::int32_t& slot = cell(line, out.boundary[e]);
-      if (slot < 0 || edges.edges[e].slope > edges.edges[static_cast<std::size_t>(slot)].slope) {
-        if (slot >= 0) out.boundary[static_cast<std::size_t>(slot)] = -1;
-        slot = static_cast<std::int32_t>(e);
-      } else {
-        out.boundary[e] = -1;
+  scratch.off_px.assign(count, 0);
+  bool moved = false;
+  if (context.same != nullptr) scratch.sides.look(*context.same, line, of_line, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    beside[i] = {{}, {}, true};
+    if (context.same != nullptr) {
+      const EvidenceBeside there = looked(i);
+      if (!alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {
+        beside[i].tracked = false;
+        moved = true;
+        scratch.off_px[i] = context.other_share * displacement(*context.same, line, of_line[i]).px;
       }
     }
+    out.still[begin + i] = beside[i].tracked;
   }
-
-  // A boundary stays where a neighbour on the grid agrees with it: above, below, left or right.
-  const auto near_above_or_below = [&](int line, int boundary, float x) {
-    for (const int d : {-2, -1, 1, 2}) {
-      if (line + d < 0 || line + d >= edges.lines) continue;
-      const std::int32_t other = cell(line + d, boundary);
-      if (other >= 0 && std::fabs(column(other) - x) <= kLean_px * static_cast<float>(std::abs(d)))
-        return true;
-    }
-    return false;
-  };
-  for (int line = 0; line < edges.lines; ++line) {
-    const auto [begin, end] = edges_of(line);
-    for (std::uint32_t e = begin; e < end; ++e) {
-      const int b = out.boundary[e];
-      if (b < 0) continue;
-      const float x = edges.edges[e].column_px;
-      int support = near_above_or_below(line, b, x) ? 2 : 0;
-      if (e > begin && b > 0 && out.boundary[e - 1] == b - 1) ++support;
-      if (e + 1 < end && b + 1 < boundaries_ && out.boundary[e + 1] == b + 1) ++support;
-      if (support >= 2 && convincing_[e] != 0) continue;
-      cell(line, b) = -1;
-      out.boundary[e] = -1;
-      ++out.counts.unsupported;
-    }
+  if (context.other == nullptr) return;
+  scratch.sides.look(*context.other, line, of_line, count, moved ? scratch.off_px.data() : nullptr);
+  for (std::size_t i = 0; i < count; ++i) {
+    const EvidenceBeside there = looked(i);
+    beside[i].left = there.left;
+    beside[i].right = there.right;
   }
-
-  // What a line did not decode, its neighbours predict.
-  const auto complete = [&](int line, int from) {
-    if (from < 0 || from >= edges.lines) return;
-    const auto [begin, end] = edges_of(line);
-    const auto [other_begin, other_end] = edges_of(from);
-    std::uint32_t k = other_begin;
-    for (std::uint32_t e = begin; e < end; ++e) {
-      if (out.boundary[e] >= 0) continue;
-      const Edge& edge = edges.edges[e];
-      while (k < other_end && edges.edges[k].column_px < edge.column_px - kLean_px) ++k;
-      float nearest = kLean_px;
-      int best = -1;
-      for (std::uint32_t n = k; n < other_end && edges.edges[n].column_px <= edge.column_px + kLean_px; ++n) {
-        const int b = out.boundary[n];
-        if (b < 0 || cell(line, b) >= 0) continue;
-        const float distance = std::fabs(edges.edges[n].column_px - edge.column_px);
-        if (distance > nearest) continue;
-        if (gain(edge, beside_[e], context, b) < kCompleteEvidence) continue;
-        nearest = distance;
-        best = b;
-      }
-      if (best < 0) continue;
-      out.boundary[e] = static_cast<std::int16_t>(best);
-      cell(line, best) = static_cast<std::int32_t>(e);
-      ++out.counts.completed;
-    }
-  };
-  for (int line = 1; line < edges.lines; ++line) complete(line, line - 1);
-  for (int line = edges.lines - 2; line >= 0; --line) complete(line, line + 1);
 }
 
 void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& context, WorkerPool& pool,
@@ -326,14 +276,11 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
   beside_.resize(edges.edges.size());
   out.still.resize(edges.edges.size());
   convincing_.resize(edges.edges.size());
-  pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
-      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-        beside_[e] = look_beside(edges.edges[e], line, context);
-        out.still[e] = beside_[e].tracked;
-      }
-      decode_line(edges, line, context, scratch_[static_cast<std::size_t>(worker)], out);
+      look_beside(edges, line, context, scratch, out);
+      decode_line(edges, line, context, scratch, out);
     }
   });
   out.score = 0;
@@ -341,7 +288,8 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
     out.score += s.score;
     out.counts.in_order += s.in_order;
   }
-  check_and_complete(edges, context, out);
+  check(edges, pool, out);
+  complete(edges, context, out);
 }
 
 bool same_slide(const DifferenceImage& a, const DifferenceImage& b) {

@@ -62,10 +62,21 @@ class SequenceDecoder {
   }
 
  private:
+  /// An edge whose boundary is not settled.
+  struct Open {
+    int line;
+    std::uint32_t edge;
+    bool left, right;  // its neighbour on that side is the boundary's own
+  };
   struct Scratch {
-    PathCandidates candidates;  // of one line
+    EdgeSides sides;            // of one line
+    std::vector<float> off_px;  // of its edges: how far off the other slide's frame showed them
+    PathCandidates candidates;
+    std::vector<std::uint8_t> clear;  // one an edge of it
     double score = 0;
     std::size_t in_order = 0;
+    std::vector<Open> open;  // of the worker's lines
+    std::size_t unsupported = 0;
   };
   struct Slide {
     std::vector<std::array<Primary, 2>> colours;  // of each boundary
@@ -81,12 +92,23 @@ class SequenceDecoder {
     bool tracked;  // the edge was found two frames ago, so this belongs to it
   };
 
-  static Beside look_beside(const Edge& edge, int line, const SequenceContext& context);
+  /// What an edge shows where nothing of it is in doubt.
+  struct Clear {
+    int boundary;     // -1: something is, or no boundary of the pattern shows so
+    float own, gain;  // of its own frame, and with the other slide's
+  };
+
+  void look_beside(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
+                   SequenceResult& out);
   static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
-  static int clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown);
+  static Clear clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
-  void check_and_complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
+  std::int32_t& cell(int line, int boundary);
+  void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
+  bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);
+  void check(const EdgeImage& edges, WorkerPool& pool, SequenceResult& out);
+  void complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);
   bool convincing(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
   float gain(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
 
@@ -103,6 +125,8 @@ class SequenceDecoder {
   std::vector<Beside> beside_;            // one an edge
   std::vector<std::uint8_t> convincing_;  // one an edge: what it was decoded as by its line is
   std::vector<std::int32_t> grid_;        // [line][boundary]: edge or -1
+  std::vector<std::uint8_t> verdict_;     // one an edge
+  std::vector<Open> without_;             // edges without a boundary, in order
 };
 
 /// True where both pictures were taken under the same slide (5.2.3): the signs of what stands out agree.

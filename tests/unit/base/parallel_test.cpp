@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -28,6 +30,48 @@ TEST(WorkerPool, EveryIndexOnceAnyCountAnyThreads) {
       for (const int n : seen) ASSERT_EQ(n, 1) << count << " on " << threads;
       for (const int n : calls) ASSERT_LE(n, 1);
     }
+  }
+}
+
+TEST(WorkerPool, SharesHoldAboutAsMuchEach) {
+  for (const int threads : {1, 2, 3, 7}) {
+    WorkerPool pool(threads);
+    for (const std::uint32_t heavy : {0U, 1U, 50U}) {  // the work of every row of the last third
+      std::vector<std::uint32_t> before{0};
+      for (std::uint32_t i = 0; i < 90; ++i) before.push_back(before.back() + (i < 60 ? 1 : heavy));
+      std::vector<int> seen(90);
+      std::vector<std::uint32_t> work(static_cast<std::size_t>(threads));
+      pool.for_shares(before, [&](int begin, int end, int worker) {
+        ASSERT_TRUE(0 <= begin && begin < end && end <= 90);
+        for (int i = begin; i < end; ++i) ++seen[static_cast<std::size_t>(i)];
+        work[static_cast<std::size_t>(worker)] +=
+            before[static_cast<std::size_t>(end)] - before[static_cast<std::size_t>(begin)];
+      });
+      for (const int n : seen) ASSERT_EQ(n, 1) << heavy << " on " << threads;
+      // No more than its share, and a row that lies across two of them.
+      for (const std::uint32_t w : work)
+        ASSERT_LE(w, before.back() / static_cast<std::uint32_t>(threads) + std::max(1U, heavy) + 1);
+    }
+    int calls = 0;
+    pool.for_shares({}, [&](int, int, int) { ++calls; });
+    pool.for_shares({0}, [&](int, int, int) { ++calls; });
+    EXPECT_EQ(calls, 0);
+    std::vector<int> seen(4);
+    pool.for_shares({0, 0, 0, 0, 0}, [&](int begin, int end, int) {
+      for (int i = begin; i < end; ++i) ++seen[static_cast<std::size_t>(i)];
+    });
+    EXPECT_EQ(seen, (std::vector{1, 1, 1, 1}));
+  }
+}
+
+/// Long enough that helpers go to sleep between the calls.
+TEST(WorkerPool, HelpersWakeAgain) {
+  WorkerPool pool(3);
+  for (int round = 0; round < 5; ++round) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::atomic<int> sum{0};
+    pool.for_ranges(30, [&](int begin, int end, int) { sum += end - begin; });
+    ASSERT_EQ(sum, 30);
   }
 }
 

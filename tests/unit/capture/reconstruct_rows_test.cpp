@@ -145,9 +145,13 @@ TEST_P(Rows, SideEvidence) {
       const SideWindows windows{left,  std::min(width, left + count(random)) - 1,
                                 right, std::min(width, right + count(random)) - 1,
                                 0.5F,  2.5F};
-      Sides got, reference;
-      kernels().side_evidence(planes.data(), width, windows, got);
-      all_row_kernels().front().side_evidence(planes.data(), width, windows, reference);
+      // The second of two, so that the first is not taken for it.
+      const std::array two{SideWindows{0, 0, width - 1, width - 1, 1, 1}, windows};
+      std::array<Sides, 2> both;
+      Sides reference;
+      kernels().side_evidence(planes.data(), width, two.data(), 2, both.data());
+      all_row_kernels().front().side_evidence(planes.data(), width, &windows, 1, &reference);
+      const Sides& got = both[1];
       ASSERT_EQ(got.left, reference.left);
       ASSERT_EQ(got.right, reference.right);
       for (const bool is_left : {true, false}) {

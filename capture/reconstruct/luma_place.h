@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where luma has a boundary whose code is known: luma is sharp where colour is blurred, and the code tells
+// which levels it steps between. Difference over sum is the projected light's own, whatever the surface.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/pattern.h"
+#include "capture/reconstruct/field_difference.h"
+
+namespace relievo {
+
+constexpr int kLumaReach_px = 7;      // columns to each side of a place that it takes
+constexpr float kDarkSum = 3;         // grey levels of the fields' sum, below which ratios are noise
+constexpr int kContrastReach_px = 4;  // how far a step in the scene draws an edge
+constexpr int kLumaContrast_px = 2;   // and its place in luma
+
+struct LumaSides {
+  float free_left_px, free_right_px;  // to the next edges
+  std::array<Primary, 2> colours;     // left and right, under the slide that the image shows
+  bool narrow = false;                // there may be less than two pixels of a surface
+};
+
+struct LumaPlace {
+  float column_px = 0;
+  float slope = 0;  // of the ratio, a pixel
+  float rise = 0;   // from the left level to the right one
+  bool found = false;
+};
+
+/// Ratios of consecutive columns of a line. Whoever made it owns the memory.
+struct LumaView {
+  static constexpr int kMargin = 8;
+  int first;                 // column of the first entry of each
+  const float* light;        // [column][red, green, blue, luma]
+  const float* luma;         // [column]: the last of them again
+  const std::uint8_t* ends;  // [column], with kMargin more of 1 on both sides; 1: the scene changes from the
+                             // column before to the one behind
+};
+
+/// A whole line's; memory is kept from line to line.
+class LumaLine {
+ public:
+  LumaView view() const { return {0, light_.data(), luma_.data(), ends_.data() + LumaView::kMargin}; }
+  /// Of the scene in white light around a column, 0..1, on this line and those beside it; columns within
+  /// kLumaReach_px of the picture's edge have none.
+  float contrast(int column) const { return contrast_[static_cast<std::size_t>(column)]; }
+  /// The same as near as spoils luma's place.
+  float luma_contrast(int column) const { return luma_contrast_[static_cast<std::size_t>(column)]; }
+
+ private:
+  friend class LumaPlacer;
+  std::vector<float> light_, luma_, contrast_, luma_contrast_, brightest_, darkest_;
+  std::vector<std::uint8_t> ends_;
+};
+
+/// Constant; any thread.
+class LumaPlacer {
+ public:
+  /// `colour_matrix` must have an inverse: luma is that of the captured colours, not of the calibrated ones.
+  explicit LumaPlacer(const std::array<double, 9>& colour_matrix);
+
+  /// Of the difference image's channels.
+  const std::array<float, 3>& weights() const { return weights_; }
+  /// Ratio that a primary has in light that is the projector's alone.
+  float ratio(Primary colour) const { return ratio_[colour]; }
+
+  /// `wide_stripes`: stripes are so wide that what is dark over two pixels only is speckle.
+  void read_line(const DifferenceImage& image, int line, bool wide_stripes, LumaLine& out) const;
+
+  /// Near `own_px`, kLumaReach_px or more inside the picture, on a line that was read. `share` of what the
+  /// frame shows is the projector's light.
+  LumaPlace place(const LumaView& view, const LumaSides& sides, float share, float own_px) const;
+
+  /// The same on any line, of which only the columns around are read.
+  LumaPlace place(const DifferenceImage& image, int line, const LumaSides& sides, float share,
+                  float own_px) const;
+
+  /// Standard deviation of a place, from noise.
+  float sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const;
+
+ private:
+  std::array<float, 3> weights_;
+  std::array<float, 8> ratio_;
+  float size_;  // of weights_, the root of the sum of squares
+};
+
+/// 0..1, of the scene in white light on a line and those beside it, `around_px` (kContrastReach_px or
+/// kLumaContrast_px) to each side of a column.
+float contrast_around(const DifferenceImage& image, int line, int column, int around_px, bool wide_stripes);
+
+}  // namespace relievo

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/ranked_sample.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace relievo {
+namespace {
+
+constexpr std::uint32_t kBuckets = 2048;
+
+/// Whole numbers in the order of the values.
+std::int32_t key_of(float value) {
+  const auto bits = std::bit_cast<std::int32_t>(value);
+  return bits ^ ((bits >> 31) & 0x7fffffff);
+}
+
+}  // namespace
+
+std::size_t RankedSample::size() const {
+  std::size_t out = 0;
+  for (const auto& part : parts_) out += part.size();
+  return out;
+}
+
+float RankedSample::at(std::size_t rank) {
+  std::int32_t least = INT32_MAX;
+  std::int32_t most = INT32_MIN;
+  for (const auto& part : parts_) {
+    for (const float value : part) {
+      const std::int32_t key = key_of(value);
+      least = key < least ? key : least;
+      most = key > most ? key : most;
+    }
+  }
+  // Keys grow with the logarithm of values, so that a few that are far off do not crowd the others.
+  const std::uint32_t range = static_cast<std::uint32_t>(most) - static_cast<std::uint32_t>(least);
+  const int shift =
+      std::max(0, static_cast<int>(std::bit_width(range)) - static_cast<int>(std::bit_width(kBuckets - 1)));
+  const auto bucket_of = [&](float value) {
+    return (static_cast<std::uint32_t>(key_of(value)) - static_cast<std::uint32_t>(least)) >> shift;
+  };
+  counts_.assign(kBuckets, 0);
+  for (const auto& part : parts_)
+    for (const float value : part) ++counts_[bucket_of(value)];
+  std::uint32_t wanted = 0;
+  while (rank >= counts_[wanted]) rank -= counts_[wanted++];
+  bucket_.clear();
+  for (const auto& part : parts_)
+    for (const float value : part)
+      if (bucket_of(value) == wanted) bucket_.push_back(value);
+  const auto at_rank = bucket_.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(bucket_.begin(), at_rank, bucket_.end());
+  return *at_rank;
+}
+
+}  // namespace relievo
