@@ -21,6 +21,7 @@ constexpr const char* kChannels[] = {"red", "green", "blue"};
 struct Options {
   std::string captures;
   std::string source;
+  ProjectorFlags projector;
   std::string out;
   std::string update;
   std::vector<int> roi;
@@ -128,7 +129,9 @@ Status run(const Options& options, StopSignal& stop) {
     before = *part;
   }
   if (!options.source.empty()) {
-    const Status taken = take_colour_captures({.source = options.source, .folder = options.captures}, stop);
+    const Status taken = take_colour_captures(
+        {.source = options.source, .folder = options.captures, .projector = options.projector.choice()},
+        stop);
     if (!taken) return taken.error();
     if (stop.stopped()) return {};
   }
@@ -168,10 +171,11 @@ std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
   auto* update =
       app.add_option("--update", o->update,
                      "A rig.yaml: keep all but its colour matrix; written back unless --out says otherwise");
-  app.add_option(
+  auto* source = app.add_option(
       "--source", o->source,
       "Take the captures from a live source first, into the folder: a white sheet at rest under black, "
       "red, green and blue, each with its complement");
+  add_live_projector_options(app, *source, o->projector);
   app.add_option("--roi", o->roi, "The target, where it should not be looked for: X,Y,WIDTH,HEIGHT")
       ->delimiter(',')
       ->expected(4);

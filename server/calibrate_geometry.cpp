@@ -30,6 +30,7 @@ struct Options {
   std::string pattern;
   Size projector;
   std::string source;
+  ProjectorFlags projector;
   int live_views = 8;
   std::string out;
   std::string update;
@@ -158,7 +159,8 @@ Status run(const Options& options, StopSignal& stop) {
                                          .folder = options.views,
                                          .views = options.live_views,
                                          .threads = options.threads,
-                                         .colour_matrix = code.colour_matrix},
+                                         .colour_matrix = code.colour_matrix,
+                                         .projector = options.projector.choice()},
                                         *board, stop);
     if (!taken) return taken.error();
     if (stop.stopped()) return {};
@@ -232,6 +234,7 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       ->needs(source)
       ->capture_default_str();
   projector->excludes(source);
+  add_live_projector_options(app, *source, o->projector);
   auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
   auto* update =
       app.add_option("--update", o->update,

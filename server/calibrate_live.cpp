@@ -153,8 +153,16 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
   Progress progress("calibrate", "frames");
   {
     const StoppedSource ended(**source, stop);
-    const Status watched = watch(**source, 2 * static_cast<std::size_t>(info.pattern.slides), progress,
-                                 [&](const StillCollector& c) { return taker.take(c); });
+    const Status watched = project_while(
+        options.projector, {info.rig.projector.width, info.rig.projector.height},
+        [&](Size size) {
+          return draw_stripe_slides(info.pattern, size.width, size.height, Scan::kProgressive);
+        },
+        [&] {
+          return watch(**source, 2 * static_cast<std::size_t>(info.pattern.slides), progress,
+                       [&](const StillCollector& c) { return taker.take(c); });
+        },
+        stop);
     if (!watched) return watched.error();
   }
   progress.finish();
@@ -180,7 +188,7 @@ Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
   Progress progress("calibrate", "frames");
   bool done = false;
   const StoppedSource ended(**source, stop);
-  const Status watched = watch(**source, 4, progress, [&](const StillCollector& collector) -> Result<bool> {
+  const auto take = [&](const StillCollector& collector) -> Result<bool> {
     std::vector<Image8> pictures;
     for (StripePair& pair : collector.pairs()) {
       pictures.push_back(std::move(pair.lit));
@@ -197,7 +205,11 @@ Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
     }
     done = true;
     return true;
-  });
+  };
+  const Status watched = project_while(
+      options.projector, {0, 0},
+      [](Size size) -> Result<std::vector<Image8>> { return draw_sheet_colours(size.width, size.height); },
+      [&] { return watch(**source, 4, progress, take); }, stop);
   if (!watched) return watched;
   if (stop.stopped() || done) return {};
   return Error{

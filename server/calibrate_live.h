@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes a calibration's captures from a live source, into the folders that the calibration then reads.
+// Takes a calibration's captures from a live source, into the folders that the calibration then reads, and
+// projects what they need. Where it projects, call it from the main thread.
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 
 #include "base/result.h"
 #include "capture/calibrate/board.h"
 #include "capture/source/field_source.h"
 #include "cli/stop_signal.h"
+#include "server/live_projector.h"
 
 namespace relievo {
 
@@ -18,6 +21,7 @@ struct LiveOptions {
   int views = 8;       // to take
   int threads = 2;
   std::array<double, 9> colour_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  // as far as it is known
+  std::optional<LiveProjector> projector;                          // none: somebody else projects
 };
 
 /// Takes a view, FOLDER/view_NN, each time that the board is held still at a new pose under the stripes along

@@ -30,4 +30,16 @@ Result<std::vector<Primary>> tell_colours(const std::vector<Image8>& pictures) {
   return out;
 }
 
+std::vector<Image8> draw_sheet_colours(int width, int height) {
+  std::vector<Image8> out;
+  for (const unsigned colour : {0u, 1u, 2u, 4u}) {
+    for (const unsigned shown : {colour, 7u - colour}) {
+      Image8& picture = out.emplace_back(width, height, 3);
+      for (std::size_t i = 0; i < picture.size(); ++i)
+        picture.data()[i] = (shown >> (i % 3) & 1u) != 0 ? 255 : 0;
+    }
+  }
+  return out;
+}
+
 }  // namespace relievo

@@ -15,4 +15,7 @@ namespace relievo {
 /// the pictures do not show each colour once.
 Result<std::vector<Primary>> tell_colours(const std::vector<Image8>& pictures);
 
+/// What to project for them: black, red, green and blue, each before its complement; whole pictures, RGB.
+std::vector<Image8> draw_sheet_colours(int width, int height);
+
 }  // namespace relievo

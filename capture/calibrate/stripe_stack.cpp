@@ -102,32 +102,38 @@ Status write_stripe_view(const fs::path& folder, const StripeStack& stack) {
   return {};
 }
 
-Status write_stripe_slides(const fs::path& folder, const Pattern& pattern, int projector_width,
-                           int projector_height, Scan scan) {
+Result<std::vector<Image8>> draw_stripe_slides(const Pattern& pattern, int projector_width,
+                                               int projector_height, Scan scan) {
   if (pattern.stripes() > projector_width) {
     return Error{std::to_string(pattern.stripes()) + " stripes do not fit " +
                  std::to_string(projector_width) + " projector columns: ask for fewer"};
   }
   const Pattern rows = row_pattern(pattern, projector_width, projector_height);
-  const auto names = stripe_view_names(pattern.slides, scan);
-  std::size_t at = 0;
+  std::vector<Image8> out;
   for (const bool along_rows : {false, true}) {
     for (int slide = 0; slide < pattern.slides; ++slide) {
-      for (const bool complement : {false, true}) {
-        if (scan == Scan::kInterlaced && complement) continue;
-        const auto draw = [&](bool inverse) {
-          return along_rows ? draw_row_slide(rows, slide, inverse, projector_width, projector_height)
-                            : draw_slide(pattern, slide, inverse, projector_width, projector_height);
-        };
-        Image8 picture = draw(complement);
-        if (scan == Scan::kInterlaced) {
-          const Image8 other = draw(true);
-          for (int y = 1; y < projector_height; y += 2)
-            std::copy_n(other.row(y), other.stride(), picture.row(y));
-        }
-        if (Status written = write_png(folder / (names[at++] + ".png"), picture); !written) return written;
+      const auto draw = [&](bool complement) {
+        return along_rows ? draw_row_slide(rows, slide, complement, projector_width, projector_height)
+                          : draw_slide(pattern, slide, complement, projector_width, projector_height);
+      };
+      Image8 lit = draw(false), other = draw(true);
+      if (scan == Scan::kInterlaced) {
+        for (int y = 1; y < projector_height; y += 2) std::copy_n(other.row(y), other.stride(), lit.row(y));
       }
+      out.push_back(std::move(lit));
+      if (scan != Scan::kInterlaced) out.push_back(std::move(other));
     }
+  }
+  return out;
+}
+
+Status write_stripe_slides(const fs::path& folder, const Pattern& pattern, int projector_width,
+                           int projector_height, Scan scan) {
+  const auto slides = draw_stripe_slides(pattern, projector_width, projector_height, scan);
+  if (!slides) return slides.error();
+  const auto names = stripe_view_names(pattern.slides, scan);
+  for (std::size_t i = 0; i < slides->size(); ++i) {
+    if (Status written = write_png(folder / (names[i] + ".png"), (*slides)[i]); !written) return written;
   }
   return {};
 }

@@ -33,8 +33,11 @@ Status write_stripe_view(const std::filesystem::path& folder, const StripeStack&
 /// The slide is on every second row from `slide_row`, 0 or 1.
 StripePair deinterlaced(const Image8& frame, int slide_row = 0);
 
-/// Writes the slides to project, named as above, to an existing folder. Fails where stripes are narrower than
-/// a pixel.
+/// The slides to project, in that order. Fails where stripes are narrower than a pixel.
+Result<std::vector<Image8>> draw_stripe_slides(const Pattern& pattern, int projector_width,
+                                               int projector_height, Scan scan);
+
+/// Writes them, named as above, to an existing folder.
 Status write_stripe_slides(const std::filesystem::path& folder, const Pattern& pattern, int projector_width,
                            int projector_height, Scan scan);
 

@@ -36,8 +36,12 @@ std::vector<Image8> cycle_of(const Pattern& pattern, const ShowOptions& options,
 }  // namespace
 
 Result<ShowReport> show_slides(Display& display, const Pattern& pattern, const ShowOptions& options) {
+  return show_cycle(display, cycle_of(pattern, options, display.output().mode), options);
+}
+
+Result<ShowReport> show_cycle(Display& display, const std::vector<Image8>& cycle,
+                              const ShowOptions& options) {
   const DisplayMode& mode = display.output().mode;
-  const std::vector<Image8> cycle = cycle_of(pattern, options, mode);
   if (const Status loaded = display.load(cycle); !loaded) return loaded.error();
   const double told_hz = mode.refresh_hz > 0 ? mode.refresh_hz : kAssumed_hz;
   const auto each = static_cast<std::uint64_t>(options.refreshes_each);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "base/pattern.h"
 #include "base/result.h"
@@ -37,6 +38,9 @@ struct ShowOptions {
 /// refresh's picture stays the one that the schedule has for it and a camera in step stays in step. A display
 /// that does not wait for its refresh is paced by the clock.
 Result<ShowReport> show_slides(Display& display, const Pattern& pattern, const ShowOptions& options);
+
+/// The same of any pictures, of the display's size, in turn. What `options` says of fields does not matter.
+Result<ShowReport> show_cycle(Display& display, const std::vector<Image8>& cycle, const ShowOptions& options);
 
 /// Shows one still picture (a field of the schedule or anything else) until stopped: to aim and focus.
 Status show_still(Display& display, Image8 picture, const std::function<bool()>& stopped);
