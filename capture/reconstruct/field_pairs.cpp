@@ -88,6 +88,11 @@ bool FieldPairs::white(const CapturedFrame& frame, Image8& out) const {
   return true;
 }
 
+void FieldPairs::forget() {
+  white_ = {};
+  contrasts_.clear();
+}
+
 bool FieldPairs::is_white(const CapturedFrame& frame) {
   const View8 first = frame.slide_field();
   const View8 second = frame.complement_field();

@@ -31,6 +31,9 @@ class FieldPairs {
   /// When what white() gives was exposed, or else the frame read last.
   std::int64_t texture_time_ns() const { return texture_time_ns_; }
 
+  /// Frames read before are not to be set against later ones.
+  void forget();
+
   /// Textures so far: under white-frame the white frames, else the frames.
   std::uint64_t textures() const { return textures_; }
 

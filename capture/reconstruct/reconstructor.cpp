@@ -74,6 +74,7 @@ struct Reconstructor::State {
         pattern(p),
         options(o),
         pool(o.threads),
+        steps(p, r),
         pairs(p.scheme, r),
         decoder(r, p, o),
         triangulator(r, p, line_count(r), line_step(r)),
@@ -88,6 +89,7 @@ struct Reconstructor::State {
   Pattern pattern;
   ReconstructOptions options;
   WorkerPool pool;
+  StepKeeper steps;
   FieldPairs pairs;
   SlideDecoder decoder;
   Triangulator triangulator;
@@ -112,11 +114,19 @@ struct Reconstructor::State {
   std::mutex spare_mutex;
   std::vector<Frame3D> spare;  // handed back; guarded by spare_mutex
 
+  void forget();
   Frame3D blank_frame();
   void make_surface(const std::vector<DecodedBoundary>& boundaries, Surface& out);
   void make_texture(const CapturedFrame& frame, Image8& out);
   std::optional<Frame3D> surface_between(const CapturedFrame& frame);
 };
+
+/// What was seen before, but for the depths.
+void Reconstructor::State::forget() {
+  pairs.forget();
+  decoder = SlideDecoder(rig, pattern, options);
+  before = {};
+}
 
 /// Whatever it holds is overwritten.
 Frame3D Reconstructor::State::blank_frame() {
@@ -234,12 +244,17 @@ std::optional<Frame3D> Reconstructor::next() {
   return std::exchange(state_->waiting, std::nullopt);
 }
 
-Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& frame) {
+Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured) {
   State& s = *state_;
-  if (auto fits = check_fits(frame, s.rig); !fits) return fits.error();
+  if (auto fits = check_fits(captured, s.rig); !fits) return fits.error();
   s.report = {};
   s.waiting.reset();
   StageClock clock;
+  const CapturedFrame* in_step = s.steps.read(captured);
+  s.report.step = s.steps.report();
+  if (s.report.step.restarted) s.forget();
+  if (in_step == nullptr) return std::optional<Frame3D>();
+  const CapturedFrame& frame = *in_step;
   const CapturedFrame* pair = s.pairs.read(frame, s.pool);
   s.report.white = pair == nullptr;
   if (pair == nullptr) return std::optional<Frame3D>();

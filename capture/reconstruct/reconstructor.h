@@ -11,6 +11,7 @@
 #include "base/pattern.h"
 #include "base/result.h"
 #include "base/rig.h"
+#include "capture/reconstruct/step_keeping.h"
 #include "capture/reconstruct/surface_builder.h"
 #include "capture/source/field_source.h"
 
@@ -34,6 +35,7 @@ struct ReconstructReport {
   std::size_t boundaries = 0;  // detected in this frame
   std::size_t matched = 0;     // of which decoded with the frame before
   FilterCounts filters;        // what each filter did
+  StepReport step;             // of projector and camera; a frame of mixed exposures is dropped
   bool white = false;          // this frame was white and gave texture alone (scheme white-frame)
   bool same_slide = false;     // this frame shows the slide of the one before: a frame was dropped (5.2.3)
 };
@@ -49,8 +51,8 @@ class Reconstructor {
   ~Reconstructor();
 
   /// The surface this frame completes with the last one under the other slide: the frame before, unless
-  /// frames were dropped (5.2.3). Nothing until both slides were seen, and for a white frame. Fails where the
-  /// frame's size is not the rig's.
+  /// frames were dropped (5.2.3). Nothing until both slides were seen, for a white frame, and where each
+  /// exposure is under two slides (report().step). Fails where the frame's size is not the rig's.
   Result<std::optional<Frame3D>> add(const CapturedFrame& frame);
 
   /// Takes back a surface that nobody needs any more, so that a later one is made in its memory. A stream

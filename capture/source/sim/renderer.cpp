@@ -200,17 +200,32 @@ RenderedFrame Renderer::render(std::uint64_t index, bool with_truth) const {
   ImageF* truth = with_truth ? &frame.truth : nullptr;
   for (const int half : {0, 1}) {
     const double time_s = (static_cast<double>(index) + 0.5 * half) / rig_.frame_rate;
-    const Exposure exposure = shown(pattern_, index, half);
-    const Field field{&lights_[static_cast<std::size_t>(exposure.slide)],
-                      exposure.light,
-                      time_s,
-                      interlaced ? first_row(rig_.field_order, half) : 0,
-                      interlaced ? 2 : 1,
-                      2 * index + static_cast<unsigned>(half)};
+    const std::uint64_t number = 2 * index + static_cast<unsigned>(half);
+    const Field field{glows(number), time_s, interlaced ? first_row(rig_.field_order, half) : 0,
+                      interlaced ? 2 : 1, number};
     render_field(field, interlaced || half == 0 ? frame.picture : frame.complement,
                  interlaced || half == 0 ? truth : nullptr);
   }
   return frame;
+}
+
+/// Of camera field `field`, counted from the first: the slide at its beginning, and the next one where that
+/// comes before the exposure's end.
+std::array<Renderer::Glow, 2> Renderer::glows(std::uint64_t field) const {
+  const double field_s = 0.5 / rig_.frame_rate;
+  const double begin = static_cast<double>(field) * (1 + options_.drift * field_s) + options_.phase;
+  const double slot = std::floor(begin);
+  const double beyond = std::max(0.0, begin + options_.shutter - (slot + 1)) / options_.shutter;
+  const auto glow = [&](double place, double share) {
+    const double cycle = 2.0 * cycle_frames(pattern_);
+    const auto in_cycle = static_cast<std::uint64_t>(place - cycle * std::floor(place / cycle));
+    const Exposure exposure = shown(pattern_, in_cycle / 2, static_cast<int>(in_cycle % 2));
+    return Glow{&lights_[static_cast<std::size_t>(exposure.slide)], exposure.light,
+                static_cast<float>(share)};
+  };
+  constexpr double kLeast = 1e-6;
+  if (beyond < kLeast) return {glow(slot, 1), glow(slot, 0)};
+  return {glow(slot, 1 - beyond), glow(slot + 1, beyond)};
 }
 
 void Renderer::render_field(const Field& field, Image8& out, ImageF* truth) const {
@@ -296,10 +311,15 @@ Vec3 Renderer::shade(const std::vector<Placed>& shapes, const Placed& seen, cons
   constexpr float kWidest = 24;  // projector columns to one side: grazing surfaces are dim mixtures anyway
   const float u0 = std::clamp(column(q - half_q), u - kWidest, u + kWidest);
   const float u1 = std::clamp(column(q + half_q), u - kWidest, u + kWidest);
-  Vec3 projected{1, 1, 1};
-  if (field.light != Light::kWhite) {
-    projected = field.stripes->mean(u0, u1);
-    if (field.light == Light::kComplement) projected = Vec3{1, 1, 1} - projected;
+  Vec3 projected{0, 0, 0};
+  for (const Glow& glow : field.glows) {
+    if (glow.share == 0) continue;
+    Vec3 shown_now{1, 1, 1};
+    if (glow.light != Light::kWhite) {
+      shown_now = glow.stripes->mean(u0, u1);
+      if (glow.light == Light::kComplement) shown_now = Vec3{1, 1, 1} - shown_now;
+    }
+    projected = projected + shown_now * glow.share;
   }
   const Vec3 light = camera_colour_from_projected_ * projected;
 

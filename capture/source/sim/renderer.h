@@ -2,6 +2,7 @@
 // The simulated rig: casts a ray a pixel and lights it with the projector's stripes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -40,14 +41,20 @@ class Renderer {
  private:
   struct Row;
   struct Placed;
-  struct Field {
+  /// What the projector shows during a part of an exposure.
+  struct Glow {
     const StripeLight* stripes;
     Light light;
+    float share;  // of the exposure's time
+  };
+  struct Field {
+    std::array<Glow, 2> glows;  // the second of share 0 where one slide is shown all the time
     double time_s;
     int first_row, row_step;
     std::uint64_t noise_key;
   };
 
+  std::array<Glow, 2> glows(std::uint64_t field) const;
   void render_field(const Field& field, Image8& out, ImageF* truth) const;
   void trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const;
   Vec3 shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,

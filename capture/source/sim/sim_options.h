@@ -27,6 +27,13 @@ struct SimOptions {
   int base = 6, slides = 2, stripes = 90;  // slides is 1 under the scheme one-slide
   int first = 0;                           // first stripe within the code's whole path
 
+  // A projector without genlock, in fields of the camera: how far the shown slide's time has gone when frame
+  // 0's first exposure begins, and how much the projector gains each second. An exposure across a slide
+  // change mixes both.
+  double phase = 0;
+  double drift = 0;
+  double shutter = 1;  // exposure, of a field
+
   double noise = 1.2;       // sigma, of 255
   double chroma = 1.0;      // sigma of the chroma blur along a line, camera pixels
   double defocus = 0.7;     // sigma of the projector's blur, projector pixels

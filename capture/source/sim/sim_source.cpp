@@ -34,9 +34,10 @@ class Simulator final : public SimSource {
     const std::uint64_t bytes =
         static_cast<std::uint64_t>(options.width) * static_cast<std::uint64_t>(options.height) *
         ((options.scan == Scan::kInterlaced ? 3u : 6u) + (run.truth ? 4u : 0u)) * period_;
-    ahead.keep = loop_ && bytes <= kLoopBytes;
+    ahead.keep = loop_ && bytes <= kLoopBytes && options.drift == 0;
     if (ahead.keep) ahead.paced_rate = options.rate;
-    if (loop_ && !ahead.keep) ahead.count = ~std::uint64_t{0};  // too large to keep: rendered anew, for ever
+    if (loop_ && !ahead.keep)
+      ahead.count = ~std::uint64_t{0};  // too large to keep, or never the same: rendered anew
     keep_ = ahead.keep;
     frames_ = std::make_unique<sim::RenderAhead>(std::move(renderer), ahead);
   }

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// A projector without genlock: the phase that was simulated is found, mixed exposures are dropped and nothing
+// else, frames a field off are regrouped, and what is reconstructed lies where the scene is.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "capture/reconstruct/reconstructor.h"
+#include "capture/reconstruct/step_keeping.h"
+#include "capture/source/sim/sim_source.h"
+
+namespace relievo {
+namespace {
+
+const std::string kSmall = ",width=320,height=240,stripes=45";
+
+struct Kept {
+  std::vector<StepReport> reports;
+  std::vector<bool> given;
+};
+
+Kept keep(const std::string& spec) {
+  auto source = make_sim(spec, {.threads = 1});
+  EXPECT_TRUE(source) << source.error().message;
+  StepKeeper keeper((*source)->info().pattern, (*source)->info().rig);
+  Kept out;
+  while (true) {
+    auto frame = (*source)->next();
+    if (!frame || !*frame) break;
+    out.given.push_back(keeper.read(**frame) != nullptr);
+    out.reports.push_back(keeper.report());
+  }
+  return out;
+}
+
+/// Between phases, which go round at 2.
+double apart(double a, double b) {
+  return std::fabs(std::remainder(a - b, 2));
+}
+
+TEST(StepKeeper, FindsThePhase) {
+  for (const std::string more : {"", ",scan=progressive", ",field_order=bottom", ",scheme=white-field",
+                                 ",noise=5,ambient=0.5", ",albedo=0.3"}) {
+    for (const double phase : {0.0, 0.15, 0.4, 0.75, 1.0, 1.3, 1.9, 3.1}) {
+      const Kept kept =
+          keep("object,frames=3,phase=" + std::to_string(phase) + more + ",width=192,height=144,stripes=30");
+      ASSERT_EQ(kept.reports.size(), 3U);
+      EXPECT_FALSE(kept.reports[0].phase);  // a phase takes two frames
+      for (std::size_t i = 1; i < 3; ++i) {
+        ASSERT_TRUE(kept.reports[i].phase) << phase << more;
+        EXPECT_LT(apart(*kept.reports[i].phase, phase), 0.02) << phase << more;
+      }
+    }
+  }
+}
+
+TEST(StepKeeper, AShortExposureFitsIntoASlide) {
+  for (const double phase : {0.0, 0.2, 0.4}) {
+    const Kept kept = keep("object,frames=3,shutter=0.5,phase=" + std::to_string(phase) + kSmall);
+    EXPECT_LT(apart(*kept.reports[2].phase, 0), 0.02) << phase;
+    EXPECT_TRUE(kept.given[2]);
+  }
+  const Kept kept = keep("object,frames=3,shutter=0.5,phase=0.7" + kSmall);
+  EXPECT_LT(apart(*kept.reports[2].phase, 0.4), 0.02);  // of the exposure: 0.2 of its 0.5 fields
+  EXPECT_FALSE(kept.given[2]);
+}
+
+TEST(StepKeeper, MotionIsNoMixture) {
+  const Kept kept = keep("walk,frames=8" + kSmall);
+  for (std::size_t i = 0; i < kept.given.size(); ++i) {
+    EXPECT_TRUE(kept.given[i]) << i;
+    EXPECT_FALSE(kept.reports[i].regrouped) << i;
+  }
+}
+
+TEST(StepKeeper, OtherSchemesAreTakenAsTheyAre) {
+  for (const std::string scheme : {"white-frame", "one-slide"}) {
+    const Kept kept = keep("object,frames=4,phase=0.4,scheme=" + scheme + kSmall);
+    for (const bool given : kept.given) EXPECT_TRUE(given);
+  }
+}
+
+TEST(StepDrift, IsTheSimulatedOne) {
+  for (const double drift : {1.5, -0.8}) {
+    const Kept kept = keep("plane,frames=40,phase=6,drift=" + std::to_string(drift) + kSmall);
+    StepDrift measured;
+    int mixed = 0;
+    int truly_mixed = 0;
+    for (std::size_t i = 1; i < kept.reports.size(); ++i) {
+      const double time_s = static_cast<double>(i) / 29.97;
+      ASSERT_TRUE(kept.reports[i].phase) << i;
+      measured.add(std::llround(time_s * 1e9), *kept.reports[i].phase);
+      mixed += kept.reports[i].mixed;
+      const double phase = 6 + drift * time_s;
+      truly_mixed += std::fabs(phase - std::round(phase)) > 0.2;
+      EXPECT_EQ(kept.given[i] || kept.reports[i].mixed || kept.reports[i].restarted, true) << i;
+    }
+    ASSERT_TRUE(measured.per_second());
+    EXPECT_NEAR(*measured.per_second(), drift, 0.05 * std::fabs(drift));
+    EXPECT_GT(truly_mixed, 5);
+    // The phase is that of two frames' middle: a frame or two at each end of a stretch may differ.
+    EXPECT_NEAR(mixed, truly_mixed, 4);
+  }
+}
+
+TEST(StepDrift, KnowsNothingFromLittle) {
+  StepDrift drift;
+  for (int i = 0; i < 11; ++i) drift.add(i * 33'000'000, 0.1F);
+  EXPECT_FALSE(drift.per_second());
+  for (int i = 11; i < 40; ++i) drift.add(i * 33'000'000, 0.1F);
+  ASSERT_TRUE(drift.per_second());
+  EXPECT_NEAR(*drift.per_second(), 0, 1e-6);
+}
+
+TEST(StepAdvice, SaysWhatToDo) {
+  EXPECT_NE(step_advice(0.3F, std::nullopt, 29.97).find("shorten them to 70 %"), std::string::npos);
+  EXPECT_NE(step_advice(1.7F, 0.001, 29.97).find("begin them later"), std::string::npos);
+  const std::string drifts = step_advice(0.3F, -0.5, 29.97);
+  EXPECT_NE(drifts.find("-0.50 fields a second, so every 2.0 s"), std::string::npos) << drifts;
+  EXPECT_NE(drifts.find("genlock"), std::string::npos);
+}
+
+struct Surfaces {
+  std::size_t count = 0;
+  std::size_t vertices = 0;
+  std::size_t wrong = 0;  // more than 5 mm off the plane
+  std::size_t mixed = 0;
+  std::size_t regrouped = 0;
+};
+
+/// Of the plane scene, which stands still.
+Surfaces reconstruct(const std::string& more) {
+  auto source = make_sim("plane" + more + kSmall, {.threads = 1});
+  EXPECT_TRUE(source) << source.error().message;
+  auto reconstructor =
+      Reconstructor::create((*source)->info().rig, (*source)->info().pattern, {.texture = true});
+  EXPECT_TRUE(reconstructor);
+  Surfaces out;
+  const double length = std::sqrt(0.2 * 0.2 + 0.1 * 0.1 + 1);
+  while (true) {
+    auto frame = (*source)->next();
+    if (!frame || !*frame) break;
+    auto made = reconstructor->add(**frame);
+    EXPECT_TRUE(made) << made.error().message;
+    out.mixed += reconstructor->report().step.mixed;
+    out.regrouped += reconstructor->report().step.regrouped;
+    for (std::optional<Frame3D> surface = *std::move(made); surface; surface = reconstructor->next()) {
+      ++out.count;
+      EXPECT_LE(surface->time_ns, (*frame)->time_ns);
+      EXPECT_FALSE(surface->texture.empty());
+      for (const Vec3f& p : surface->surface.positions) {
+        ++out.vertices;
+        const double off = (0.2 * static_cast<double>(p[0]) - 0.1 * static_cast<double>(p[1]) -
+                            (static_cast<double>(p[2]) - 1)) /
+                           length;
+        out.wrong += std::fabs(off) > 0.005;
+      }
+    }
+  }
+  return out;
+}
+
+TEST(StepKeeping, FramesAFieldOffGiveTheSameSurface) {
+  for (const std::string more : {"", ",scan=progressive", ",field_order=bottom", ",scheme=white-field"}) {
+    const Surfaces in_step = reconstruct(",frames=8" + more);
+    const Surfaces off = reconstruct(",frames=8,phase=1" + more);
+    const Surfaces other = reconstruct(",frames=8,phase=3.1" + more);
+    EXPECT_EQ(in_step.mixed + off.mixed + other.mixed, 0U) << more;
+    EXPECT_EQ(in_step.regrouped, 0U) << more;
+    // Of 8: the first is told from by the second, the second's own mate was not kept, then a surface takes
+    // two.
+    EXPECT_EQ(off.regrouped, 6U) << more;
+    EXPECT_EQ(other.regrouped, 6U) << more;
+    ASSERT_GT(off.count, 0U) << more;
+    const auto each = [](const Surfaces& s) {
+      return static_cast<double>(s.vertices) / static_cast<double>(s.count);
+    };
+    EXPECT_GT(each(off), 0.97 * each(in_step)) << more;
+    EXPECT_GT(each(other), 0.97 * each(in_step)) << more;
+    for (const Surfaces& s : {in_step, off, other})
+      EXPECT_LT(static_cast<double>(s.wrong), 0.005 * static_cast<double>(s.vertices)) << more;
+  }
+}
+
+TEST(StepKeeping, MixedExposuresGiveNothing) {
+  for (const std::string phase : {"0.35", "0.5", "0.65", "1.5"}) {
+    const Surfaces s = reconstruct(",frames=6,phase=" + phase);
+    EXPECT_EQ(s.count, 0U) << phase;
+    EXPECT_EQ(s.mixed, 5U) << phase;  // all of which a phase is known
+  }
+}
+
+TEST(StepKeeping, ADriftingRigGivesSurfacesInBetweenAndNoWrongOnes) {
+  const Surfaces s = reconstruct(",frames=60,drift=2,phase=0.1");
+  EXPECT_GT(s.mixed, 20U);
+  EXPECT_GT(s.count, 12U);
+  EXPECT_GT(s.regrouped, 8U);
+  EXPECT_LT(static_cast<double>(s.wrong), 0.01 * static_cast<double>(s.vertices));
+}
+
+TEST(StepKeeping, LostFramesAreNotRegroupedAcross) {
+  const Surfaces s = reconstruct(",frames=12,phase=1,drop=4");
+  EXPECT_EQ(s.mixed, 0U);
+  EXPECT_GT(s.count, 3U);
+  EXPECT_LT(static_cast<double>(s.wrong), 0.01 * static_cast<double>(s.vertices));
+}
+
+}  // namespace
+}  // namespace relievo
