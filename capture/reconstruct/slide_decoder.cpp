@@ -214,7 +214,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.matched = counts.in_order - counts.unsupported + counts.completed + traced + s.recovered.size();
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
-      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered);
+      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered, pool);
   }
   s.list(out);
   return true;
