@@ -7,12 +7,10 @@
 #include <limits>
 #include <utility>
 
+#include "capture/reconstruct/smooth_columns.h"
+
 namespace relievo {
 namespace {
-// Smoothing, in standard deviations of a column: a straight line fits to within the first (root mean square),
-// a quadratic to within the second (the worst of its lines).
-constexpr float kStraightFit = 1.4F;
-constexpr float kBentFit = 3.F;
 constexpr float kAveraged = 0.3F;  // share of noise's variance that smoothing takes away
 constexpr float kLeastNoise_px = 0.01F;
 
@@ -88,13 +86,6 @@ bool squeezed(const float* x) {
          right < kSqueezedEach * after;
 }
 
-/// Of one value or more, whose order changes.
-float median(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 float* ConsistencyCheck::row(std::vector<float>& grid, int line) const {
@@ -104,96 +95,73 @@ const float* ConsistencyCheck::row(const std::vector<float>& grid, int line) con
   return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
 }
 
-/// Median standard deviation of the decoded edges, of every fourth.
-float ConsistencyCheck::usual_sigma(const EdgeImage& edges, const SequenceResult& result) {
-  sigmas_.clear();
-  for (std::size_t i = 0; i < edges.edges.size(); i += 4)
-    if (result.boundary[i] >= 0) sigmas_.push_back(edges.edges[i].sigma_px);
-  if (sigmas_.empty()) return kLeastNoise_px;
-  return std::max(kLeastNoise_px, median(sigmas_));
-}
-
-/// Standard deviation of the columns from one line to others, that of speckle included, which no model of
-/// noise foretells.
-float ConsistencyCheck::scatter() {
-  sigmas_.clear();
-  for (int line = kApart; line + kApart < lines_; ++line) {
-    const float* above = row(measured_, line - kApart);
-    const float* here = row(measured_, line);
-    const float* below = row(measured_, line + kApart);
-    for (int b = 0; b < boundaries_; ++b) {
-      const float bend = above[b] - 2 * here[b] + below[b];
-      if (known(bend)) sigmas_.push_back(std::fabs(bend));
-    }
+void ConsistencyCheck::reset(int boundaries, int lines, int workers) {
+  const std::size_t stride = (static_cast<std::size_t>(boundaries) + 7) / 8 * 8 + 2 * kMargin;
+  if (boundaries != boundaries_ || lines != lines_) {
+    boundaries_ = boundaries;
+    lines_ = lines;
+    stride_ = stride;
+    // What lies around the lines stays as it is here.
+    for (auto* grid : {&measured_, &smooth_, &trusted_})
+      grid->assign(stride_ * static_cast<std::size_t>(lines_ + 2 * kMargin), kNone);
+    noise_.assign(measured_.size(), 0);
   }
-  return sigmas_.empty() ? 0 : median(sigmas_) * (1.F / (kMedianOfNormal * kBendGain));
+  const std::size_t cells = static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_);
+  state_.resize(cells);
+  piece_.resize(cells);
+  size_.resize(cells);
+  seams_.assign(static_cast<std::size_t>(workers), 0);
+  counts_.assign(static_cast<std::size_t>(workers), {});
+  for (RankedSample* sample : {&sigmas_, &bends_, &gaps_}) sample->reset(workers);
 }
 
-/// Median distance between neighbouring boundaries.
-float ConsistencyCheck::stripe_px() {
-  sigmas_.clear();
-  for (int line = 0; line < lines_; line += 2) {
-    const float* here = row(measured_, line);
-    for (int b = 0; b + 1 < boundaries_; ++b) {
-      const float gap = here[b + 1] - here[b];
-      if (gap > 0) sigmas_.push_back(gap);
-    }
+/// The columns of a line, and what they tell of all lines: standard deviations of every fourth edge, and the
+/// distances of neighbouring boundaries.
+void ConsistencyCheck::fill_line(const EdgeImage& edges, const SequenceResult& result, int line, int worker) {
+  float* columns = row(measured_, line);
+  float* noises = row(noise_, line);
+  std::fill_n(columns, boundaries_, kNone);
+  std::fill_n(noises, boundaries_, 0.F);
+  std::vector<float>& sigmas = sigmas_.of(worker);
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    if (result.boundary[e] < 0) continue;
+    columns[result.boundary[e]] = edges.edges[e].column_px;
+    noises[result.boundary[e]] = edges.edges[e].noise_px;
+    if (e % 4 == 0) sigmas.push_back(edges.edges[e].sigma_px);
   }
-  return sigmas_.empty() ? 0 : median(sigmas_);
-}
-
-void ConsistencyCheck::fill(const EdgeImage& edges, SequenceResult& result) {
-  measured_.assign(stride_ * static_cast<std::size_t>(lines_ + 2 * kMargin), kNone);
-  noise_.assign(measured_.size(), 0);
-  for (int line = 0; line < lines_; ++line) {
-    float* columns = row(measured_, line);
-    float* noises = row(noise_, line);
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      if (result.boundary[e] < 0) continue;
-      columns[result.boundary[e]] = edges.edges[e].column_px;
-      noises[result.boundary[e]] = edges.edges[e].noise_px;
-    }
+  if (line % 2 != 0) return;
+  std::vector<float>& gaps = gaps_.of(worker);
+  std::size_t n = gaps.size();
+  gaps.resize(n + static_cast<std::size_t>(boundaries_));
+  for (int b = 0; b + 1 < boundaries_; ++b) {
+    gaps[n] = columns[b + 1] - columns[b];
+    n += gaps[n] > 0;
   }
+  gaps.resize(n);
 }
 
-/// Quadratics over 7 or else 5 lines (Savitzky-Golay), where they fit as well as noise lets them. Missing
-/// neighbours are NaN, which no comparison lets through.
-void ConsistencyCheck::smooth_line(int line, float usual_px) {
-  std::array<const float*, 7> x{};
-  for (int i = -3; i <= 3; ++i) x[static_cast<std::size_t>(i + 3)] = row(measured_, line + i);
-  float* out = row(smooth_, line);
-  const float* noises = row(noise_, line);
+/// Bends of the columns from one line to others: their standard deviation is that of the columns, speckle
+/// included, which no model of noise foretells.
+void ConsistencyCheck::bends_of_line(int line, int worker) {
+  const float* above = row(measured_, line - kApart);
+  const float* here = row(measured_, line);
+  const float* below = row(measured_, line + kApart);
+  std::vector<float>& bends = bends_.of(worker);
+  std::size_t n = bends.size();
+  bends.resize(n + static_cast<std::size_t>(boundaries_));
   for (int b = 0; b < boundaries_; ++b) {
-    const float noise_px = std::max(usual_px, noises[b]);
-    const float limit = kBentFit * noise_px;
-    const float a = x[0][b], c = x[1][b], d = x[2][b], e = x[3][b], f = x[4][b], g = x[5][b], h = x[6][b];
-    const float five = (17 * e + 12 * (d + f) - 3 * (c + g)) * (1.F / 35);
-    const float slope5 = (2 * (g - c) + (f - d)) * 0.1F;
-    const float bend5 = (2 * (c + g) - (d + f) - 2 * e) * (1.F / 14);
-    const float worst5 = std::max(
-        {std::fabs(five - e), std::fabs(five - slope5 + bend5 - d), std::fabs(five + slope5 + bend5 - f),
-         std::fabs(five - 2 * slope5 + 4 * bend5 - c), std::fabs(five + 2 * slope5 + 4 * bend5 - g)});
-    const float seven = (7 * e + 6 * (d + f) + 3 * (c + g) - 2 * (a + h)) * (1.F / 21);
-    const float slope7 = (3 * (h - a) + 2 * (g - c) + (f - d)) * (1.F / 28);
-    const float bend7 = (5 * (a + h) - 3 * (d + f) - 4 * e) * (1.F / 84);
-    const float worst7 = std::max(
-        {std::fabs(seven - e), std::fabs(seven - slope7 + bend7 - d), std::fabs(seven + slope7 + bend7 - f),
-         std::fabs(seven - 2 * slope7 + 4 * bend7 - c), std::fabs(seven + 2 * slope7 + 4 * bend7 - g),
-         std::fabs(seven - 3 * slope7 + 9 * bend7 - a), std::fabs(seven + 3 * slope7 + 9 * bend7 - h)});
-    const float line7 = (a + c + d + e + f + g + h) * (1.F / 7);
-    const float square7 = (a - line7 + 3 * slope7) * (a - line7 + 3 * slope7) +
-                          (c - line7 + 2 * slope7) * (c - line7 + 2 * slope7) +
-                          (d - line7 + slope7) * (d - line7 + slope7) + (e - line7) * (e - line7) +
-                          (f - line7 - slope7) * (f - line7 - slope7) +
-                          (g - line7 - 2 * slope7) * (g - line7 - 2 * slope7) +
-                          (h - line7 - 3 * slope7) * (h - line7 - 3 * slope7);
-    const bool straight7 = square7 <= 7 * kStraightFit * kStraightFit * noise_px * noise_px;
-    // max() drops a NaN it meets second, so the values themselves are asked.
-    const bool good5 = worst5 <= limit && five == five;
-    const bool good7 = worst7 <= limit && seven == seven;
-    out[b] = straight7 ? line7 : good7 ? seven : good5 ? five : e;
+    bends[n] = std::fabs(above[b] - 2 * here[b] + below[b]);
+    n += known(bends[n]);
   }
+  bends.resize(n);
+}
+
+/// Where columns fit as well as noise lets them to what their neighbours along the boundary show.
+void ConsistencyCheck::smooth_line(int line, float usual_px) {
+  std::array<const float*, 7> rows{};
+  for (int i = -3; i <= 3; ++i) rows[static_cast<std::size_t>(i + 3)] = row(measured_, line + i);
+  smoothers().back().smooth(rows, row(noise_, line), boundaries_, usual_px, row(smooth_, line));
 }
 
 void ConsistencyCheck::suspect_line(int line) {
@@ -222,40 +190,51 @@ void ConsistencyCheck::suspect_line(int line) {
   }
 }
 
-/// Size of the piece of surface each boundary belongs to: what hangs together along boundaries and lines.
-void ConsistencyCheck::measure_pieces() {
-  const auto cells = static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_);
-  piece_.resize(cells);
-  size_.assign(cells, 1);
-  const auto root = [&](std::int32_t i) {
-    while (piece_[static_cast<std::size_t>(i)] != i) {
-      auto& up = piece_[static_cast<std::size_t>(i)];
-      up = piece_[static_cast<std::size_t>(up)];
-      i = up;
-    }
-    return i;
-  };
-  const auto join = [&](std::int32_t a, std::int32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    if (a > b) std::swap(a, b);
-    piece_[static_cast<std::size_t>(b)] = a;
-    size_[static_cast<std::size_t>(a)] += size_[static_cast<std::size_t>(b)];
-  };
-  for (int line = 0; line < lines_; ++line) {
-    const float* here = row(measured_, line);
-    const float* above = row(measured_, line - 1);
-    for (int b = 0; b < boundaries_; ++b) {
-      const std::int32_t i = line * boundaries_ + b;
-      piece_[static_cast<std::size_t>(i)] = i;
-      if (!known(here[b])) continue;
-      if (std::fabs(here[b] - above[b]) < kLean_px) join(i - boundaries_, i);
-      if (std::fabs(here[b] - here[b - 1]) < kWidest_px) join(i - 1, i);
-    }
+/// Of a cell in piece_.
+std::int32_t ConsistencyCheck::root(std::int32_t i) {
+  while (piece_[static_cast<std::size_t>(i)] != i) {
+    auto& up = piece_[static_cast<std::size_t>(i)];
+    up = piece_[static_cast<std::size_t>(up)];
+    i = up;
   }
-  for (std::size_t i = 0; i < cells; ++i)
-    size_[i] = size_[static_cast<std::size_t>(root(static_cast<std::int32_t>(i)))];
+  return i;
+}
+
+void ConsistencyCheck::join(std::int32_t a, std::int32_t b) {
+  a = root(a);
+  b = root(b);
+  if (a == b) return;
+  if (a > b) std::swap(a, b);
+  piece_[static_cast<std::size_t>(b)] = a;
+  size_[static_cast<std::size_t>(a)] += size_[static_cast<std::size_t>(b)];
+}
+
+void ConsistencyCheck::join_to_above(int line) {
+  const float* here = row(measured_, line);
+  const float* above = row(measured_, line - 1);
+  const std::int32_t first = line * boundaries_;
+  for (int b = 0; b < boundaries_; ++b)
+    if (std::fabs(here[b] - above[b]) < kLean_px) join(first + b - boundaries_, first + b);
+}
+
+/// The pieces of surface that lines [begin, end) show: what hangs together along boundaries and lines.
+void ConsistencyCheck::measure_pieces(int begin, int end) {
+  for (int line = begin; line < end; ++line) {
+    const float* here = row(measured_, line);
+    const std::int32_t first = line * boundaries_;
+    for (int b = 0; b < boundaries_; ++b) {
+      piece_[static_cast<std::size_t>(first + b)] = first + b;
+      size_[static_cast<std::size_t>(first + b)] = 1;
+      if (std::fabs(here[b] - here[b - 1]) < kWidest_px) join(first + b - 1, first + b);
+    }
+    if (line > begin) join_to_above(line);
+  }
+}
+
+std::int32_t ConsistencyCheck::piece_size(std::size_t cell) const {
+  auto i = static_cast<std::int32_t>(cell);
+  while (piece_[static_cast<std::size_t>(i)] != i) i = piece_[static_cast<std::size_t>(i)];
+  return size_[static_cast<std::size_t>(i)];
 }
 
 /// Weighs a suspect boundary's own place against what its neighbours predict. False where it is to be given
@@ -326,30 +305,36 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
 
 ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, SequenceResult& result,
                                           EdgeImage& edges) {
-  boundaries_ = boundaries;
-  lines_ = edges.lines;
-  stride_ = static_cast<std::size_t>(boundaries + 2 * kMargin);
+  reset(boundaries, edges.lines, pool.threads());
   result.doubted.assign(result.boundary.size(), -1);
-  fill(edges, result);
-  smooth_.assign(measured_.size(), kNone);
-  state_.resize(static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_));
-  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
-  float noise = usual_sigma(edges, result);
-  const float scattered = scatter();
-  scale_ = std::max(1.F, stripe_px() / kStripe_px);
-  if (scattered > kRough * noise) {
-    for (float& n : noise_) n = std::max(n, scattered);
-    noise = kSpeckleTail * scattered;
-  }
-  pool.for_ranges(lines_, [&](int begin, int end, int) {
-    for (int line = begin; line < end; ++line) smooth_line(line, noise);
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) fill_line(edges, result, line, worker);
   });
-  measure_pieces();
-  trusted_ = smooth_;
+  pool.for_ranges(lines_, [&](int begin, int end, int worker) {
+    seams_[static_cast<std::size_t>(worker)] = begin;
+    measure_pieces(begin, end);
+    for (int line = std::max(begin, kApart); line < std::min(end, lines_ - kApart); ++line)
+      bends_of_line(line, worker);
+  });
+  for (const int line : seams_)
+    if (line > 0) join_to_above(line);
+  float noise = std::max(kLeastNoise_px, sigmas_.median(kLeastNoise_px));
+  const float scattered = bends_.median(0) * (1.F / (kMedianOfNormal * kBendGain));
+  scale_ = std::max(1.F, gaps_.median(0) / kStripe_px);
+  const bool rough = scattered > kRough * noise;
+  if (rough) noise = kSpeckleTail * scattered;
   pool.for_ranges(lines_, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) {
+      float* noises = row(noise_, line);
+      for (int b = 0; rough && b < boundaries_; ++b) noises[b] = std::max(noises[b], scattered);
+      smooth_line(line, noise);
+    }
+  });
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) {
       suspect_line(line);
       float* trusted = row(trusted_, line);
+      std::copy_n(row(smooth_, line), boundaries_, trusted);
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
         if (result.boundary[e] >= 0 && edges.edges[e].sigma_px > kTrusted_px)
@@ -357,7 +342,7 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
       }
     }
   });
-  pool.for_ranges(lines_, [&](int begin, int end, int worker) {
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     ConsistencyCounts& counts = counts_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
@@ -377,7 +362,7 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
         const bool is_step = edge.at_step && beside_step(s);
         const bool suspect =
             s != 0 || edge.above_differs || edge.below_differs || edge.sigma_px > kSuspect_px;
-        if (replaced || squeezed(row(smooth_, line) + b) || size_[cell] < kLeastPiece) {
+        if (replaced || squeezed(row(smooth_, line) + b) || piece_size(cell) < kLeastPiece) {
           result.boundary[e] = -1;
           ++counts.rejected;
           continue;

@@ -10,6 +10,7 @@
 
 #include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/sequence.h"
 
 namespace relievo {
@@ -35,13 +36,16 @@ class ConsistencyCheck {
   };
   float* row(std::vector<float>& grid, int line) const;
   const float* row(const std::vector<float>& grid, int line) const;
-  void fill(const EdgeImage& edges, SequenceResult& result);
-  float usual_sigma(const EdgeImage& edges, const SequenceResult& result);
-  float scatter();
-  float stripe_px();
+  void reset(int boundaries, int lines, int workers);
+  void fill_line(const EdgeImage& edges, const SequenceResult& result, int line, int worker);
+  void bends_of_line(int line, int worker);
   void smooth_line(int line, float noise_px);
   void suspect_line(int line);
-  void measure_pieces();
+  std::int32_t root(std::int32_t i);
+  void join(std::int32_t a, std::int32_t b);
+  void join_to_above(int line);
+  void measure_pieces(int begin, int end);
+  std::int32_t piece_size(std::size_t cell) const;
   bool settle(int line, int boundary, const Edge& edge, Estimate& out) const;
 
   int boundaries_ = 0;
@@ -53,9 +57,10 @@ class ConsistencyCheck {
   std::vector<float> smooth_;        // the same, noise averaged along the boundary
   std::vector<float> trusted_;       // of these, those that no contrast in the scene draws off their place
   std::vector<std::uint8_t> state_;  // [line][boundary]: what the neighbourhood is like (see consistency.cpp)
-  std::vector<std::int32_t> piece_, size_;  // [line][boundary]: of the connected piece of surface
-  std::vector<float> sigmas_;
-  std::vector<ConsistencyCounts> counts_;  // one a worker
+  std::vector<std::int32_t> piece_, size_;  // [line][boundary]: union-find over connected pieces of surface
+  std::vector<int> seams_;                  // each worker's first line there
+  RankedSample sigmas_, bends_, gaps_;      // what lines tell, see fill_line() and bends_of_line()
+  std::vector<ConsistencyCounts> counts_;   // one a worker
 };
 
 }  // namespace relievo

@@ -6,6 +6,8 @@
 #include <array>
 #include <vector>
 
+#include "base/parallel.h"
+#include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/surface.h"
 #include "capture/reconstruct/triangulate.h"
 
@@ -21,16 +23,18 @@ class DepthRange {
   DepthRange(int boundaries, int width, int lines);
 
   /// From a frame's points; few of them change nothing.
-  void update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator);
+  void update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator, WorkerPool& pool);
 
   /// One a boundary; null until a frame was seen.
   const std::vector<ColumnRange>* columns() const { return known_ ? &columns_ : nullptr; }
 
  private:
+  ColumnRange range_of(int boundary, std::array<float, 2> range, const Triangulator& triangulator) const;
+
   bool known_ = false;
   int width_, lines_;
   std::vector<ColumnRange> columns_;
-  std::vector<float> inverse_depths_;
+  RankedSample inverse_depths_;
 };
 
 }  // namespace relievo

@@ -33,16 +33,18 @@ InstantFilter::Seen* InstantFilter::row(std::vector<Seen>& grid, int line) const
 }
 
 void InstantFilter::fill(const SequenceResult& result, const EdgeImage& edges,
-                         const std::vector<RecoveredBoundary>& recovered) {
-  std::fill(now_.begin(), now_.end(), Seen{0, kNone});
-  for (int line = 0; line < lines_; ++line) {
-    Seen* here = row(now_, line);
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      const Edge& edge = edges.edges[e];
-      if (result.boundary[e] >= 0) here[result.boundary[e]] = {edge.column_px, edge.sigma_px};
+                         const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool) {
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) {
+      Seen* here = row(now_, line);
+      std::fill_n(here, boundaries_, Seen{0, kNone});
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        const Edge& edge = edges.edges[e];
+        if (result.boundary[e] >= 0) here[result.boundary[e]] = {edge.column_px, edge.sigma_px};
+      }
     }
-  }
+  });
   for (const RecoveredBoundary& r : recovered) row(now_, r.line)[r.boundary] = {r.column_px, r.sigma_px};
 }
 
@@ -72,19 +74,21 @@ void InstantFilter::adjust_one(int line, int boundary, float share, float& colum
 }
 
 void InstantFilter::adjust(std::int64_t time_ns, const SequenceResult& result, EdgeImage& edges,
-                           std::vector<RecoveredBoundary>& recovered) {
-  fill(result, edges, recovered);
+                           std::vector<RecoveredBoundary>& recovered, WorkerPool& pool) {
+  fill(result, edges, recovered, pool);
   const double frames = static_cast<double>(time_ns - before_ns_) / frame_ns_;
   if (have_before_ && frames > 0.5 && frames < kFrames + 0.5) {
     const auto share = static_cast<float>(kPhase / frames);
-    for (int line = 0; line < lines_; ++line) {
-      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-        Edge& edge = edges.edges[e];
-        if (result.boundary[e] >= 0)
-          adjust_one(line, result.boundary[e], share, edge.column_px, edge.sigma_px);
+    pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+      for (int line = begin; line < end; ++line) {
+        for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+             e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+          Edge& edge = edges.edges[e];
+          if (result.boundary[e] >= 0)
+            adjust_one(line, result.boundary[e], share, edge.column_px, edge.sigma_px);
+        }
       }
-    }
+    });
     for (RecoveredBoundary& r : recovered) adjust_one(r.line, r.boundary, share, r.column_px, r.sigma_px);
   }
   std::swap(now_, before_);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
@@ -22,7 +23,7 @@ class InstantFilter {
   /// Moves columns of `edges` and `recovered` to `time_ns`, the frame's time stamp, where the boundary was
   /// seen in the frame before, too, and moved no more than its neighbours; updates standard deviations.
   void adjust(std::int64_t time_ns, const SequenceResult& result, EdgeImage& edges,
-              std::vector<RecoveredBoundary>& recovered);
+              std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
 
  private:
   struct Seen {
@@ -31,7 +32,7 @@ class InstantFilter {
   };
   Seen* row(std::vector<Seen>& grid, int line) const;
   void fill(const SequenceResult& result, const EdgeImage& edges,
-            const std::vector<RecoveredBoundary>& recovered);
+            const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
   void adjust_one(int line, int boundary, float share, float& column_px, float& sigma_px);
 
   int boundaries_, lines_;

@@ -59,8 +59,36 @@ int choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, c
 using Eight = float __attribute__((vector_size(32), aligned(4), may_alias));
 using EightInts = std::int32_t __attribute__((vector_size(32), aligned(4), may_alias));
 
+/// For an edge with one candidate.
+[[gnu::always_inline]] inline void extend_one(const PathStep& step, const OrderRules& rules,
+                                              PathCandidates& candidates) {
+  const auto own = static_cast<std::size_t>(step.edge) * kPlaces;
+  const std::int32_t before = candidates.boundary[own] - 1;
+  float value = 0;
+  std::int32_t from = -1;
+  for (int edge = step.first; edge < step.edge; ++edge) {
+    const int begin = edge * kPathCandidates;
+    const int end = begin + candidates.used[static_cast<std::size_t>(edge)];
+    for (int p = begin; p < end; ++p) {
+      const std::int32_t missing = before - candidates.boundary[static_cast<std::size_t>(p)];
+      if (missing < 0 || missing > rules.max_missing) continue;
+      const float by_way = (candidates.best[static_cast<std::size_t>(p)] + rules.in_order) -
+                           rules.per_missing * static_cast<float>(missing);
+      from = by_way > value ? p : from;
+      value = by_way > value ? by_way : value;
+    }
+  }
+  const bool start = !(value > step.start);
+  candidates.best[own] = (start ? step.start : value) + candidates.gain[own];
+  candidates.from[own] = start ? step.start_from : from;
+}
+
 [[gnu::always_inline]] inline void extend_body(const PathStep& step, const OrderRules& rules,
                                                PathCandidates& candidates) {
+  if (candidates.used[static_cast<std::size_t>(step.edge)] == 1) {
+    extend_one(step, rules, candidates);
+    return;
+  }
   const std::int32_t* boundary = candidates.boundary.data();
   const float* best = candidates.best.data();
   const int own = step.edge * kPathCandidates;

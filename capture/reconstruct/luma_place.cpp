@@ -3,47 +3,19 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "capture/reconstruct/luma_rows.h"
 
 namespace relievo {
 namespace {
 
-constexpr int kPlateau_px = 5;        // of the columns, where a side's level is measured: from 2 px on
-constexpr float kBreak = 0.12F;       // change of luma over two columns, of its sum, at which a surface ends
-constexpr float kFarthest_px = 2.5F;  // between colour's place and luma's
-constexpr float kLevelSlack = 0.1F;   // of a side's luma ratio about what the code tells
-constexpr float kLumaFactor = 1.3F;   // the middle level is itself measured
-static_assert(kPlateau_px < LumaView::kMargin);
-static_assert(std::endian::native == std::endian::little, "clear_run() counts bytes from the lowest");
-
-// Red, green, blue and luma at once.
-using Four = float __attribute__((vector_size(16)));
-
-Four four_at(const float* p) {
-  Four out;
-  std::memcpy(&out, p, sizeof out);
-  return out;
-}
-
-Four size_of(Four v) {
-  return v < 0 ? -v : v;
-}
+constexpr float kBreak = 0.12F;      // change of luma over two columns, of its sum, at which a surface ends
+constexpr float kLumaFactor = 1.3F;  // the middle level is itself measured
 
 /// Of a column that is not negative; a call of std::lround takes ten times as long.
 int column_of(float column_px) {
   return static_cast<int>(column_px + 0.5F);
-}
-
-/// Columns from the one at `ends` on in a direction (-1 or 1) that show the same surface in the same light,
-/// as far as luma tells, kMargin + 1 at most.
-int clear_run(const std::uint8_t* ends, int direction) {
-  std::uint64_t eight = 0;
-  std::memcpy(&eight, direction > 0 ? ends + 1 : ends - 8, sizeof eight);
-  return 1 + (direction > 0 ? std::countr_zero(eight) : std::countl_zero(eight)) / 8;
 }
 
 }  // namespace
@@ -65,15 +37,17 @@ void LumaPlacer::read_line(const DifferenceImage& image, int line, bool wide_str
   const LumaKernels& kernels = luma_kernels();
   const int width = image.width;
   const auto columns = static_cast<std::size_t>(width);
-  for (auto* row : {&out.luma_, &out.contrast_, &out.luma_contrast_, &out.brightest_, &out.darkest_})
+  for (auto* row : {&out.contrast_, &out.luma_contrast_, &out.brightest_, &out.darkest_})
     row->resize(columns);
-  out.light_.resize(4 * columns);
+  out.stride_ = columns + 2 * LumaView::kMargin;
+  out.ratios_.resize(4 * out.stride_);
   out.ends_.assign(columns + 2 * LumaView::kMargin, 1);
   if (width < 2 * kLumaReach_px) return;
   const float* red = image.line(line);
   const float* white = image.white_line(line);
-  kernels.ratios({red, red + width, red + 2 * width, white}, width, weights_, kDarkSum, out.light_.data(),
-                 out.luma_.data());
+  const auto row = [&](std::size_t i) { return out.ratios_.data() + i * out.stride_ + LumaView::kMargin; };
+  kernels.ratios({red, red + width, red + 2 * width, white}, width, weights_, kDarkSum,
+                 {row(0), row(1), row(2), row(3)});
   kernels.ends(white + 1, width - 2, kBreak, kDarkSum, out.ends_.data() + LumaView::kMargin + 1);
   const float* above = image.white_line(std::max(0, line - 1));
   const float* below = image.white_line(std::min(image.lines - 1, line + 1));
@@ -88,112 +62,35 @@ void LumaPlacer::read_line(const DifferenceImage& image, int line, bool wide_str
   }
 }
 
-LumaPlace LumaPlacer::place(const LumaView& view, const LumaSides& sides, float share, float own_px) const {
-  const int centre = column_of(own_px);
-  const float* luma = view.luma - view.first;
-  const float* light = view.light - 4 * view.first;
-  const std::uint8_t* ends = view.ends - view.first;
-  const Four weights{weights_[0], weights_[1], weights_[2], 0};
-
-  LumaPlace out{.column_px = own_px};
-  float place = own_px;
-  const auto reach_in = [](float free) { return std::clamp(static_cast<int>(free - 2.F), 2, kPlateau_px); };
-  std::array<int, 3> last{};
-  for (int round = 0; round < 2; ++round) {
-    const std::array reach_of{reach_in(sides.free_left_px + (place - own_px)),
-                              reach_in(sides.free_right_px - (place - own_px))};
-    const std::array columns{column_of(place), reach_of[0], reach_of[1]};
-    if (round > 0 && columns == last) break;  // it would find the same
-    last = columns;
-    // Plateaus of both sides, and how strong each channel comes back from this surface.
-    std::array<float, 2> measured{};
-    std::array<int, 2> samples{};
-    Four amplitude{};
-    for (int s = 0; s < 2; ++s) {
-      const int direction = s == 0 ? -1 : 1;
-      const int middle = columns[0];
-      const int inside = kLumaReach_px + direction * (centre - middle);
-      const int furthest =
-          std::min({reach_of[static_cast<std::size_t>(s)], clear_run(ends + middle, direction) - 1, inside});
-      const int n = std::max(0, furthest - 1);  // from two columns away on
-      samples[static_cast<std::size_t>(s)] = n;
-      if (n == 0) {
-        if (!sides.narrow) continue;
-        // Between two steps: the nearest sample still tells the surface's channels, but no level.
-        const Four nearest = size_of(four_at(light + 4 * (middle + direction)));
-        amplitude = amplitude < nearest ? nearest : amplitude;
-        continue;
-      }
-      Four sum{};
-      for (int i = 2; i <= furthest; ++i) sum += four_at(light + 4 * (middle + direction * i));
-      const Four mean = sum / static_cast<float>(n);
-      measured[static_cast<std::size_t>(s)] = mean[3];
-      const Four size = size_of(mean);
-      amplitude = amplitude < size ? size : amplitude;
-    }
-    // Expected levels: this surface's channels under the code's colours. A surface in the projector's white
-    // light alone would have `share`.
-    const Four parts = weights * amplitude;
-    const float total = parts[0] + parts[1] + parts[2];
-    if (!(total > 0)) return out;
-    const Four levels_of = parts * share / total;
-    std::array<float, 2> expected{};
-    for (std::size_t s = 0; s < 2; ++s) {
-      const Primary colour = sides.colours[s];
-      for (int c = 0; c < 3; ++c) expected[s] += (colour >> c & 1) ? levels_of[c] : -levels_of[c];
-    }
-    std::array<float, 2> levels{};
-    for (std::size_t s = 0; s < 2; ++s) {
-      const float off = measured[1 - s] - expected[1 - s];
-      if (samples[s] > 0) {
-        levels[s] = std::clamp(measured[s], expected[s] - kLevelSlack, expected[s] + kLevelSlack);
-      } else {
-        levels[s] = expected[s] + (samples[1 - s] > 0 ? std::clamp(off, -kLevelSlack, kLevelSlack) : 0);
-      }
-    }
-    const float middle = 0.5F * (levels[0] + levels[1]);
-    const bool rising = levels[1] > levels[0];
-    float nearest = kFarthest_px;
-    bool found = false;
-    for (int x = centre - 4; x < centre + 4; ++x) {
-      const float a = luma[x] - middle;
-      const float b = luma[x + 1] - middle;
-      if ((a > 0) == (b > 0) || (b > a) != rising) continue;
-      const float column = static_cast<float>(x) - a / (b - a);
-      if (std::fabs(column - place) >= nearest) continue;
-      nearest = std::fabs(column - place);
-      out.column_px = column;
-      out.slope = std::fabs(b - a);
-      found = true;
-    }
-    out.rise = levels[1] - levels[0];
-    out.found = found;
-    if (!found) return out;
-    place = out.column_px;
-  }
-  return out;
+void LumaPlacer::places(const LumaLine& line, float share, const LumaQuery* queries, std::size_t count,
+                        LumaPlace* out) const {
+  luma_kernels().places(line.view(), {weights_, share}, queries, static_cast<int>(count), out);
 }
 
-LumaPlace LumaPlacer::place(const DifferenceImage& image, int line, const LumaSides& sides, float share,
-                            float own_px) const {
+LumaPlace LumaPlacer::place(const DifferenceImage& image, int line, float share,
+                            const LumaQuery& query) const {
   constexpr int kColumns = 16;
   constexpr int kMargin = LumaView::kMargin;
   static_assert(kColumns > 2 * kLumaReach_px);
-  std::array<float, 4 * kColumns> light;
-  std::array<float, kColumns> luma;
+  std::array<std::array<float, kColumns + 2 * kMargin>, 4> ratios;
   std::array<std::uint8_t, kColumns + 2 * kMargin> ends;
   ends.fill(1);
+  for (auto& row : ratios) row.fill(0);
   const int width = image.width;
-  const int first = std::clamp(column_of(own_px) - kColumns / 2, 0, width - kColumns);
+  const int first = std::clamp(column_of(query.own_px) - kColumns / 2, 0, width - kColumns);
   const float* red = image.line(line) + first;
   const float* white = image.white_line(line) + first;
   const LumaKernels& kernels = luma_kernels();
-  kernels.ratios({red, red + width, red + 2 * width, white}, kColumns, weights_, kDarkSum, light.data(),
-                 luma.data());
+  const auto row = [&](std::size_t i) { return ratios[i].data() + kMargin; };
+  kernels.ratios({red, red + width, red + 2 * width, white}, kColumns, weights_, kDarkSum,
+                 {row(0), row(1), row(2), row(3)});
   const int begin = first == 0 ? 1 : 0;
   const int end = first + kColumns == width ? kColumns - 1 : kColumns;
   kernels.ends(white + begin, end - begin, kBreak, kDarkSum, ends.data() + kMargin + begin);
-  return place({first, light.data(), luma.data(), ends.data() + kMargin}, sides, share, own_px);
+  LumaPlace out;
+  kernels.places({first, row(0), row(1), row(2), row(3), ends.data() + kMargin}, {weights_, share}, &query, 1,
+                 &out);
+  return out;
 }
 
 float LumaPlacer::sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const {

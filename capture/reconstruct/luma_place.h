@@ -9,41 +9,21 @@
 
 #include "base/pattern.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/luma_rows.h"
 
 namespace relievo {
 
-constexpr int kLumaReach_px = 7;      // columns to each side of a place that it takes
 constexpr float kDarkSum = 3;         // grey levels of the fields' sum, below which ratios are noise
 constexpr int kContrastReach_px = 4;  // how far a step in the scene draws an edge
 constexpr int kLumaContrast_px = 2;   // and its place in luma
 
-struct LumaSides {
-  float free_left_px, free_right_px;  // to the next edges
-  std::array<Primary, 2> colours;     // left and right, under the slide that the image shows
-  bool narrow = false;                // there may be less than two pixels of a surface
-};
-
-struct LumaPlace {
-  float column_px = 0;
-  float slope = 0;  // of the ratio, a pixel
-  float rise = 0;   // from the left level to the right one
-  bool found = false;
-};
-
-/// Ratios of consecutive columns of a line. Whoever made it owns the memory.
-struct LumaView {
-  static constexpr int kMargin = 8;
-  int first;                 // column of the first entry of each
-  const float* light;        // [column][red, green, blue, luma]
-  const float* luma;         // [column]: the last of them again
-  const std::uint8_t* ends;  // [column], with kMargin more of 1 on both sides; 1: the scene changes from the
-                             // column before to the one behind
-};
-
 /// A whole line's; memory is kept from line to line.
 class LumaLine {
  public:
-  LumaView view() const { return {0, light_.data(), luma_.data(), ends_.data() + LumaView::kMargin}; }
+  LumaView view() const {
+    const auto row = [this](std::size_t i) { return ratios_.data() + i * stride_ + LumaView::kMargin; };
+    return {0, row(0), row(1), row(2), row(3), ends_.data() + LumaView::kMargin};
+  }
   /// Of the scene in white light around a column, 0..1, on this line and those beside it; columns within
   /// kLumaReach_px of the picture's edge have none.
   float contrast(int column) const { return contrast_[static_cast<std::size_t>(column)]; }
@@ -52,7 +32,9 @@ class LumaLine {
 
  private:
   friend class LumaPlacer;
-  std::vector<float> light_, luma_, contrast_, luma_contrast_, brightest_, darkest_;
+  std::size_t stride_ = 0;
+  std::vector<float> ratios_;  // rows of a LumaView, stride_ apart
+  std::vector<float> contrast_, luma_contrast_, brightest_, darkest_;
   std::vector<std::uint8_t> ends_;
 };
 
@@ -70,13 +52,13 @@ class LumaPlacer {
   /// `wide_stripes`: stripes are so wide that what is dark over two pixels only is speckle.
   void read_line(const DifferenceImage& image, int line, bool wide_stripes, LumaLine& out) const;
 
-  /// Near `own_px`, kLumaReach_px or more inside the picture, on a line that was read. `share` of what the
-  /// frame shows is the projector's light.
-  LumaPlace place(const LumaView& view, const LumaSides& sides, float share, float own_px) const;
+  /// Where luma has each of `count` boundaries of a line that was read. `share` of what the frame shows is
+  /// the projector's light.
+  void places(const LumaLine& line, float share, const LumaQuery* queries, std::size_t count,
+              LumaPlace* out) const;
 
-  /// The same on any line, of which only the columns around are read.
-  LumaPlace place(const DifferenceImage& image, int line, const LumaSides& sides, float share,
-                  float own_px) const;
+  /// The same for one on any line of 16 columns or more, of which only those around are read.
+  LumaPlace place(const DifferenceImage& image, int line, float share, const LumaQuery& query) const;
 
   /// Standard deviation of a place, from noise.
   float sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const;

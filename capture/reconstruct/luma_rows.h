@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/pattern.h"
+
 namespace relievo {
 
 /// Of one line: the difference's channels and the sum's luma.
@@ -19,13 +21,59 @@ struct WhiteRows {
   const float *above, *here, *below;
 };
 
+/// Rows of ratios: the difference's channels and their luma, each over the sum's.
+struct RatioRows {
+  float *red, *green, *blue, *luma;
+};
+
+/// Ratios of consecutive columns of a line; whoever made them owns the memory. Rows can be read kMargin
+/// entries before their first column and behind their last.
+struct LumaView {
+  static constexpr int kMargin = 8;
+  int first;  // column of the first entry of each
+  const float *red, *green, *blue, *luma;
+  const std::uint8_t*
+      ends;  // 1: the scene changes from the column before to the one behind; all of the margin
+};
+
+struct LumaSides {
+  float free_left_px, free_right_px;  // to the next edges
+  std::array<Primary, 2> colours;     // left and right, under the slide that the image shows
+  bool narrow = false;                // there may be less than two pixels of a surface
+};
+
+/// A boundary near `own_px`, kLumaReach_px or more inside the line.
+struct LumaQuery {
+  float own_px;
+  LumaSides sides;
+};
+
+struct LumaPlace {
+  float column_px = 0;
+  float slope = 0;  // of the ratio, a pixel
+  float rise = 0;   // from the left level to the right one
+  bool found = false;
+};
+
+constexpr int kLumaReach_px = 7;  // columns to each side of a place that it takes
+
+/// Weights of the difference's channels in luma, and how much of what the frame shows is the projector's
+/// light.
+struct LumaLight {
+  std::array<float, 3> weights;
+  float share;
+};
+
 struct LumaKernels {
   const char* name;
 
-  /// `light` is [count][red, green, blue, luma], each over white + `dark`; luma weighs the other three by
-  /// `weights`. `luma` is [count], the last of them again.
+  /// Each of the difference's channels over white + `dark`, and their sum weighed by `weights`.
   void (*ratios)(const LightRows& rows, int count, const std::array<float, 3>& weights, float dark,
-                 float* light, float* luma);
+                 const RatioRows& out);
+
+  /// Where luma has each of `count` boundaries; see luma_place.h.
+  void (*places)(const LumaView& view, const LumaLight& light, const LumaQuery* queries, int count,
+                 LumaPlace* out);
 
   /// ends[x] is 1 where white changes by more than `share` of its sum + `dark` from x - 1 to x + 1: of
   /// columns [0, count), so that white[-1] and white[count] are read.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/reconstructor.h"
 
+#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <utility>
@@ -19,6 +20,7 @@
 namespace relievo {
 namespace {
 
+constexpr Vec3f kNoPoint{0, 0, 0};       // no point has it: all lie in front of the camera
 constexpr std::size_t kSpareFrames = 4;  // a stage's queue and what its neighbours hold
 
 int line_step(const Rig& rig) {
@@ -82,7 +84,6 @@ struct Reconstructor::State {
         white_texture(r.colour_matrix),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
-    worker_vertices.resize(static_cast<std::size_t>(pool.threads()));
   }
 
   Rig rig;
@@ -100,11 +101,6 @@ struct Reconstructor::State {
   std::vector<DecodedBoundary> decoded;
   std::vector<DecodedBoundary> decoded_between;
   LastColumns before;  // white-field: the frame before's
-  struct Vertices {
-    std::vector<GridVertex> list;
-    std::size_t no_point = 0;
-  };
-  std::vector<Vertices> worker_vertices;
   std::vector<GridVertex> vertices;
   std::optional<Frame3D> waiting;
   Image8 last_texture;  // white-field: of the frame before
@@ -139,33 +135,26 @@ Frame3D Reconstructor::State::blank_frame() {
 
 void Reconstructor::State::make_surface(const std::vector<DecodedBoundary>& boundaries, Surface& out) {
   StageClock clock;
-  for (Vertices& part : worker_vertices) {
-    part.list.clear();
-    part.no_point = 0;
-  }
-  pool.for_ranges(static_cast<int>(boundaries.size()), [&](int begin, int end, int worker) {
-    Vertices& part = worker_vertices[static_cast<std::size_t>(worker)];
-    for (int i = begin; i < end; ++i) {
-      const DecodedBoundary& b = boundaries[static_cast<std::size_t>(i)];
+  vertices.resize(boundaries.size());
+  std::atomic<std::size_t> no_point{0};
+  pool.for_ranges(static_cast<int>(boundaries.size()), [&](int begin, int end, int) {
+    std::size_t own_no_point = 0;
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+      const DecodedBoundary& b = boundaries[i];
       const auto position = triangulator.point(b.boundary, b.line, b.column_px);
-      if (!position) {
-        ++part.no_point;
-        continue;
-      }
-      part.list.push_back({{.boundary = static_cast<std::uint16_t>(b.boundary),
-                            .line = static_cast<std::uint16_t>(b.line),
-                            .column_px = b.column_px,
-                            .sigma_px = b.sigma_px},
-                           *position,
-                           b.slope});
+      own_no_point += !position;
+      vertices[i] = {{.boundary = static_cast<std::uint16_t>(b.boundary),
+                      .line = static_cast<std::uint16_t>(b.line),
+                      .column_px = b.column_px,
+                      .sigma_px = b.sigma_px},
+                     position.value_or(kNoPoint),
+                     b.slope};
     }
+    no_point += own_no_point;
   });
-  vertices.clear();
-  for (const Vertices& part : worker_vertices) {
-    vertices.insert(vertices.end(), part.list.begin(), part.list.end());
-    report.filters.no_point += part.no_point;
-  }
-  if (options.decoder != Decoder::kPaper) depths.update(vertices, triangulator);
+  if (no_point > 0) std::erase_if(vertices, [](const GridVertex& v) { return v.position == kNoPoint; });
+  report.filters.no_point += no_point;
+  if (options.decoder != Decoder::kPaper) depths.update(vertices, triangulator, pool);
   report.triangulate_ms += clock.lap_ms();
   surface_builder.build(vertices, triangulator, pool, out, report.filters);
   report.surface_ms += clock.lap_ms();

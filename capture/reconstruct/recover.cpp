@@ -39,14 +39,25 @@ const float* Recovery::row(int line) const {
   return columns_.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
 }
 
-void Recovery::fill(const std::vector<std::int16_t>& boundary, const EdgeImage& edges,
-                    std::vector<float>& grid) const {
-  grid.assign(stride_ * static_cast<std::size_t>(edges.lines + 2 * kMargin), kNone);
-  for (int line = 0; line < edges.lines; ++line) {
-    float* columns = grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
-      if (boundary[e] >= 0) columns[boundary[e]] = edges.edges[e].column_px;
+void Recovery::reset(int boundaries, int lines) {
+  const std::size_t stride = static_cast<std::size_t>(boundaries) + 2 * kMargin;
+  const std::size_t cells = stride * static_cast<std::size_t>(lines + 2 * kMargin);
+  if (boundaries == boundaries_ && columns_.size() == cells) return;
+  boundaries_ = boundaries;
+  stride_ = stride;
+  columns_.assign(cells, kNone);  // what lies around the lines stays so
+  doubted_.assign(cells, kNone);
+}
+
+/// The columns of a line's boundaries, `with_doubted` those of doubted ones as well.
+void Recovery::fill_line(const SequenceResult& result, const EdgeImage& edges, int line, bool with_doubted,
+                         std::vector<float>& grid) const {
+  float* columns = grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+  std::fill_n(columns, boundaries_, kNone);
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const std::int16_t b = result.boundary[e] < 0 && with_doubted ? result.doubted[e] : result.boundary[e];
+    if (b >= 0) columns[b] = edges.edges[e].column_px;
   }
 }
 
@@ -162,22 +173,24 @@ void Recovery::settle_doubts(const RecoveryView& view, const Refiner& refiner, c
 
 void Recovery::recover(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges,
                        SequenceResult& result, WorkerPool& pool, std::vector<RecoveredBoundary>& out) {
-  boundaries_ = static_cast<int>(view.shown_colours.size());
-  stride_ = view.shown_colours.size() + 2 * kMargin;
-  fill(result.boundary, edges, columns_);
+  reset(static_cast<int>(view.shown_colours.size()), edges.lines);
   if (view.other != nullptr) {
-    both_.resize(result.boundary.size());
-    for (std::size_t e = 0; e < both_.size(); ++e)
-      both_[e] = result.boundary[e] >= 0 ? result.boundary[e] : result.doubted[e];
-    fill(both_, edges, doubted_);
-    pool.for_ranges(edges.lines, [&](int begin, int end, int) {
+    pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+      for (int line = begin; line < end; ++line) {
+        fill_line(result, edges, line, false, columns_);
+        fill_line(result, edges, line, true, doubted_);
+      }
+    });
+    pool.for_shares(edges.line_start, [&](int begin, int end, int) {
       for (int line = begin; line < end; ++line) {
         check_line(view, refiner, edges, line, result);
         settle_doubts(view, refiner, edges, line, result);
       }
     });
-    fill(result.boundary, edges, columns_);
   }
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) fill_line(result, edges, line, false, columns_);
+  });
   found_.resize(static_cast<std::size_t>(pool.threads()));
   for (auto& found : found_) found.clear();
   pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {

@@ -49,8 +49,9 @@ class Recovery {
     float column_px;
     float sigma_px;
   };
-  void fill(const std::vector<std::int16_t>& boundary, const EdgeImage& edges,
-            std::vector<float>& grid) const;
+  void reset(int boundaries, int lines);
+  void fill_line(const SequenceResult& result, const EdgeImage& edges, int line, bool with_doubted,
+                 std::vector<float>& grid) const;
   void check_line(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges, int line,
                   SequenceResult& result) const;
   const float* row(int line) const;
@@ -62,9 +63,8 @@ class Recovery {
 
   int boundaries_ = 0;
   std::size_t stride_ = 0;
-  std::vector<std::int16_t> both_;  // one an edge: its boundary, doubted or not
-  std::vector<float> doubted_;      // as columns_, of doubted boundaries and the others
-  std::vector<float> columns_;      // [line][boundary] with a margin: NaN where there is none
+  std::vector<float> doubted_;  // as columns_, of doubted boundaries and the others
+  std::vector<float> columns_;  // [line][boundary] with a margin: NaN where there is none
   std::vector<std::vector<RecoveredBoundary>> found_;  // one a worker
 };
 

@@ -98,10 +98,11 @@ Refiner::Refiner(const std::array<double, 9>& colour_matrix) : placer_(colour_ma
 Refiner::Place Refiner::find(const DifferenceImage& image, int line, float column_px,
                              const Sides& sides) const {
   const int centre = column_of(column_px);
-  if (centre < kLumaReach_px || centre + kLumaReach_px >= image.width) return {column_px, 0, false, false};
-  LumaSides narrow = sides;
-  narrow.narrow = true;
-  const LumaPlace luma = placer_.place(image, line, narrow, share_, column_px);
+  if (centre < kLumaReach_px || centre + kLumaReach_px >= image.width || image.width < 16)
+    return {column_px, 0, false, false};
+  LumaQuery query{column_px, sides};
+  query.sides.narrow = true;
+  const LumaPlace luma = placer_.place(image, line, share_, query);
   if (std::fabs(luma.rise) < kLeastRise) return {column_px, 0, false, false};
   if (!luma.found || luma.slope < kLeastSlope * std::fabs(luma.rise)) return {column_px, 0, false, true};
   const float sigma = placer_.sigma_px(image, line, luma);
@@ -110,9 +111,9 @@ Refiner::Place Refiner::find(const DifferenceImage& image, int line, float colum
   return {luma.column_px, std::sqrt(sigma * sigma + level * level), true, true};
 }
 
-/// Where luma has the boundary of an edge, into `edge`'s contrast and `places_`; what tells how far chroma
-/// draws edges goes to the worker's samples.
-void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaSides& sides,
+/// What is around an edge, into it and `out`; `luma` is where luma has it. What tells how far chroma draws
+/// edges goes to the worker's samples.
+void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
                       int worker, Edge& edge, LumaSeen& out) {
   const int centre = column_of(edge.column_px);
   if (centre + kLumaReach_px < image.width) {
@@ -121,7 +122,6 @@ void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& li
     edge.at_step =
         edge.contrast >= kStepContrast && steepest_at(image.white_line(line), centre, edge.column_px);
   }
-  const LumaPlace luma = placer_.place(light.view(), sides, share_, edge.column_px);
   if (!luma.found) return;
   const float sigma = placer_.sigma_px(image, line, luma);
   const float level = kLevelShare * light.luma_contrast(centre) / luma.slope;
@@ -132,6 +132,35 @@ void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& li
     always_.of(worker).push_back(excess);
   } else if (edge.contrast > kContrasty && luma.slope > kSteep) {
     by_contrast_.of(worker).push_back((excess - level * level) / (edge.contrast * edge.contrast));
+  }
+}
+
+void Refiner::look_at_line(const DifferenceImage& image, int line, const SequenceResult& result,
+                           const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges) {
+  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
+  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
+  scratch.queries.clear();
+  scratch.edges.clear();
+  for (std::uint32_t e = begin; e < end; ++e) {
+    seen_[e].found = false;
+    if (result.boundary[e] < 0) continue;
+    const float own = edges.edges[e].column_px;
+    if (own < kLumaReach_px || own + kLumaReach_px + 1 > static_cast<float>(image.width)) continue;
+    const float left = e > begin ? edges.edges[e - 1].column_px : own - 100;
+    const float right = e + 1 < end ? edges.edges[e + 1].column_px : own + 100;
+    scratch.queries.push_back(
+        {own, {own - left, right - own, colours[static_cast<std::size_t>(result.boundary[e])]}});
+    scratch.edges.push_back(e);
+  }
+  if (scratch.edges.empty()) return;
+  placer_.read_line(image, line, wide_stripes_, scratch.light);
+  scratch.places.resize(scratch.queries.size());
+  placer_.places(scratch.light, share_, scratch.queries.data(), scratch.queries.size(),
+                 scratch.places.data());
+  for (std::size_t i = 0; i < scratch.edges.size(); ++i) {
+    const std::uint32_t e = scratch.edges[i];
+    look_at(image, line, scratch.light, scratch.places[i], worker, edges.edges[e], seen_[e]);
   }
 }
 
@@ -210,27 +239,11 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
   share_ = projected_share(image, result, colours, edges);
   wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   seen_.resize(edges.edges.size());
-  light_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.threads()));
   always_.reset(pool.threads());
   by_contrast_.reset(pool.threads());
-  pool.for_shares(edges.line_start, [&](int begin_line, int end_line, int worker) {
-    LumaLine& light = light_[static_cast<std::size_t>(worker)];
-    for (int line = begin_line; line < end_line; ++line) {
-      const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
-      const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
-      if (begin < end) placer_.read_line(image, line, wide_stripes_, light);
-      for (std::uint32_t e = begin; e < end; ++e) {
-        seen_[e].found = false;
-        if (result.boundary[e] < 0) continue;
-        const float own = edges.edges[e].column_px;
-        if (own < kLumaReach_px || own + kLumaReach_px + 1 > static_cast<float>(image.width)) continue;
-        const float left = e > begin ? edges.edges[e - 1].column_px : own - 100;
-        const float right = e + 1 < end ? edges.edges[e + 1].column_px : own + 100;
-        look_at(image, line, light,
-                {own - left, right - own, colours[static_cast<std::size_t>(result.boundary[e])]}, worker,
-                edges.edges[e], seen_[e]);
-      }
-    }
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) look_at_line(image, line, result, colours, worker, edges);
   });
   const Drawn drawn = colour_drawn();
   pool.for_shares(edges.line_start, [&](int begin_line, int end_line, int) {

@@ -53,16 +53,24 @@ class Refiner {
   };
   float projected_share(const DifferenceImage& image, const SequenceResult& result,
                         const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) const;
-  void look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaSides& sides,
+  struct Scratch {
+    LumaLine light;                    // of one line
+    std::vector<LumaQuery> queries;    // of its edges that luma may place,
+    std::vector<LumaPlace> places;     // where it does,
+    std::vector<std::uint32_t> edges;  // and which they are
+  };
+  void look_at_line(const DifferenceImage& image, int line, const SequenceResult& result,
+                    const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges);
+  void look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
                int worker, Edge& edge, LumaSeen& out);
   Drawn colour_drawn();
   static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);
 
   LumaPlacer placer_;
-  bool wide_stripes_ = false;    // in the last frame, so wide that two dark pixels are speckle
-  float share_ = 1;              // projected_share of the last frame
-  std::vector<LumaLine> light_;  // one a worker
-  std::vector<LumaSeen> seen_;   // one an edge
+  bool wide_stripes_ = false;     // in the last frame, so wide that two dark pixels are speckle
+  float share_ = 1;               // projected_share of the last frame
+  std::vector<Scratch> scratch_;  // one a worker
+  std::vector<LumaSeen> seen_;    // one an edge
   RankedSample always_, by_contrast_;
 };
 

@@ -24,6 +24,42 @@ RELIEVO_BODY void add_rows_body(const std::uint8_t* own, const std::uint8_t* abo
   }
 }
 
+/// |a - b| of every sample, with one more at both ends like its neighbour: to[-1] to to[samples].
+RELIEVO_BODY void differences_body(const std::uint8_t* a, const std::uint8_t* b, int samples,
+                                   std::uint8_t* __restrict to) {
+  for (int i = 0; i < samples; ++i) {
+    const std::uint8_t most = a[i] > b[i] ? a[i] : b[i];
+    const std::uint8_t least = a[i] > b[i] ? b[i] : a[i];
+    to[i] = static_cast<std::uint8_t>(most - least);
+  }
+  to[-1] = to[0];
+  to[samples] = to[samples - 1];
+}
+
+/// Samples [first, samples) of weave_rows(); differences as differences_body() makes them.
+RELIEVO_BODY void weave_body(const WovenRows& rows, const std::uint8_t* d_above, const std::uint8_t* d_below,
+                             int first, int samples, std::uint8_t* out) {
+  constexpr float kSlack = RowKernels::kAlike * RowKernels::kAlike;
+  for (int i = first; i < samples; ++i) {
+    const auto a = static_cast<float>(d_above[i - 1] + d_above[i] + d_above[i + 1]);
+    const auto b = static_cast<float>(d_below[i - 1] + d_below[i] + d_below[i + 1]);
+    const float fa = a * a + kSlack;
+    const float fb = b * b + kSlack;
+    const auto low = static_cast<float>(rows.below[i]);
+    const float other = low + fb / (fa + fb) * (static_cast<float>(rows.above[i]) - low);
+    const float sum = static_cast<float>(rows.own[i]) + other + 0.5F;
+    out[i] = static_cast<std::uint8_t>(static_cast<int>(std::min(std::max(sum, 0.F), 255.F)));
+  }
+}
+
+void weave_portable(const WovenRows& rows, int samples, std::uint8_t* differences, std::uint8_t* out) {
+  std::uint8_t* above = differences + 1;
+  std::uint8_t* below = above + samples + 2;
+  differences_body(rows.own, rows.beyond_above, samples, above);
+  differences_body(rows.own, rows.beyond_below, samples, below);
+  weave_body(rows, above, below, 0, samples, out);
+}
+
 RELIEVO_BODY void combine_fields_body(const std::uint8_t* slide, const std::uint8_t* above,
                                       const std::uint8_t* below, int samples,
                                       std::int16_t* __restrict difference, std::int16_t* __restrict sum) {
@@ -145,6 +181,62 @@ void side_evidence_portable(const float* planes, int width, const SideWindows* w
 
 #if defined(__x86_64__)
 
+#define RELIEVO_AVX2 [[gnu::target("avx2"), gnu::always_inline]] inline
+
+RELIEVO_AVX2 __m128i sixteen_at(const std::uint8_t* p) {
+  return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
+}
+
+/// Sums of three samples in a row, of sixteen.
+RELIEVO_AVX2 __m256i sums_of_three(const std::uint8_t* d) {
+  return _mm256_add_epi16(
+      _mm256_add_epi16(_mm256_cvtepu8_epi16(sixteen_at(d - 1)), _mm256_cvtepu8_epi16(sixteen_at(d))),
+      _mm256_cvtepu8_epi16(sixteen_at(d + 1)));
+}
+
+RELIEVO_AVX2 __m256 floats_of(__m128i eight_bytes) {
+  return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(eight_bytes));
+}
+
+/// Eight samples, as weave_body() makes them.
+RELIEVO_AVX2 __m256i weave_eight(__m128i d_above, __m128i d_below, __m128i own, __m128i above,
+                                 __m128i below) {
+  const __m256 slack = _mm256_set1_ps(RowKernels::kAlike * RowKernels::kAlike);
+  const __m256 a = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(d_above));
+  const __m256 b = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(d_below));
+  const __m256 fa = _mm256_add_ps(_mm256_mul_ps(a, a), slack);
+  const __m256 fb = _mm256_add_ps(_mm256_mul_ps(b, b), slack);
+  const __m256 low = floats_of(below);
+  const __m256 share = _mm256_div_ps(fb, _mm256_add_ps(fa, fb));
+  const __m256 other = _mm256_add_ps(low, _mm256_mul_ps(share, _mm256_sub_ps(floats_of(above), low)));
+  const __m256 sum = _mm256_add_ps(_mm256_add_ps(floats_of(own), other), _mm256_set1_ps(0.5F));
+  return _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(sum, _mm256_setzero_ps()), _mm256_set1_ps(255.F)));
+}
+
+[[gnu::target("avx2")]] void weave_avx2(const WovenRows& rows, int samples, std::uint8_t* differences,
+                                        std::uint8_t* out) {
+  std::uint8_t* above = differences + 1;
+  std::uint8_t* below = above + samples + 2;
+  differences_body(rows.own, rows.beyond_above, samples, above);
+  differences_body(rows.own, rows.beyond_below, samples, below);
+  int i = 0;
+  for (; i + 16 <= samples; i += 16) {
+    const __m256i a = sums_of_three(above + i);
+    const __m256i b = sums_of_three(below + i);
+    const __m128i own = sixteen_at(rows.own + i);
+    const __m128i over = sixteen_at(rows.above + i);
+    const __m128i under = sixteen_at(rows.below + i);
+    const __m256i first = weave_eight(_mm256_castsi256_si128(a), _mm256_castsi256_si128(b), own, over, under);
+    const __m256i second =
+        weave_eight(_mm256_extracti128_si256(a, 1), _mm256_extracti128_si256(b, 1), _mm_srli_si128(own, 8),
+                    _mm_srli_si128(over, 8), _mm_srli_si128(under, 8));
+    const __m256i words = _mm256_permute4x64_epi64(_mm256_packus_epi32(first, second), 0xd8);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(out + i),
+                     _mm_packus_epi16(_mm256_castsi256_si128(words), _mm256_extracti128_si256(words, 1)));
+  }
+  weave_body(rows, above, below, i, samples, out);
+}
+
 /// Both sides at once, the left in the lower half of each register.
 [[gnu::target("avx2"), gnu::always_inline]] inline void one_side_evidence_avx2(const float* planes, int width,
                                                                                const SideWindows& w,
@@ -192,38 +284,38 @@ void side_evidence_portable(const float* planes, int width, const SideWindows* w
 #endif
 
 /// All kernels for one set of instructions, as static functions of a struct.
-#define RELIEVO_KERNELS(set, attributes, side_evidence)                                            \
-  struct set {                                                                                     \
-    attributes static void add_rows(const std::uint8_t* own, const std::uint8_t* above,            \
-                                    const std::uint8_t* below, int samples, std::uint8_t* out) {   \
-      add_rows_body(own, above, below, samples, out);                                              \
-    }                                                                                              \
-    attributes static void combine_fields(const std::uint8_t* slide, const std::uint8_t* above,    \
-                                          const std::uint8_t* below, int samples, FieldRows out) { \
-      combine_fields_body(slide, above, below, samples, out.difference, out.sum);                  \
-    }                                                                                              \
-    attributes static void low_pass(const std::int16_t* above, const std::int16_t* here,           \
-                                    const std::int16_t* below, int samples, std::int16_t* across,  \
-                                    std::int16_t* out) {                                           \
-      low_pass_body(above, here, below, samples, across, out);                                     \
-    }                                                                                              \
-    attributes static void to_planes(FieldRows rows, int width, const PlaneWeights& weights,       \
-                                     PlaneRows out) {                                              \
-      to_planes_body(rows.difference, rows.sum, width, weights, out.planes, out.white);            \
-    }                                                                                              \
-    attributes static void crossings(const float* planes, int width, float least_rise,             \
-                                     std::uint8_t* flags) {                                        \
-      crossings_body(planes, width, least_rise, flags);                                            \
-    }                                                                                              \
-    static RowKernels table(const char* name) {                                                    \
-      return {name, add_rows, combine_fields, low_pass, to_planes, crossings, side_evidence};      \
-    }                                                                                              \
+#define RELIEVO_KERNELS(set, attributes, weave, side_evidence)                                       \
+  struct set {                                                                                       \
+    attributes static void add_rows(const std::uint8_t* own, const std::uint8_t* above,              \
+                                    const std::uint8_t* below, int samples, std::uint8_t* out) {     \
+      add_rows_body(own, above, below, samples, out);                                                \
+    }                                                                                                \
+    attributes static void combine_fields(const std::uint8_t* slide, const std::uint8_t* above,      \
+                                          const std::uint8_t* below, int samples, FieldRows out) {   \
+      combine_fields_body(slide, above, below, samples, out.difference, out.sum);                    \
+    }                                                                                                \
+    attributes static void low_pass(const std::int16_t* above, const std::int16_t* here,             \
+                                    const std::int16_t* below, int samples, std::int16_t* across,    \
+                                    std::int16_t* out) {                                             \
+      low_pass_body(above, here, below, samples, across, out);                                       \
+    }                                                                                                \
+    attributes static void to_planes(FieldRows rows, int width, const PlaneWeights& weights,         \
+                                     PlaneRows out) {                                                \
+      to_planes_body(rows.difference, rows.sum, width, weights, out.planes, out.white);              \
+    }                                                                                                \
+    attributes static void crossings(const float* planes, int width, float least_rise,               \
+                                     std::uint8_t* flags) {                                          \
+      crossings_body(planes, width, least_rise, flags);                                              \
+    }                                                                                                \
+    static RowKernels table(const char* name) {                                                      \
+      return {name, add_rows, weave, combine_fields, low_pass, to_planes, crossings, side_evidence}; \
+    }                                                                                                \
   }
 
-RELIEVO_KERNELS(Portable, , side_evidence_portable);
+RELIEVO_KERNELS(Portable, , weave_portable, side_evidence_portable);
 #if defined(__x86_64__)
 // Without fused multiply-add, whose results differ in the last bit from the reference's.
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], side_evidence_avx2);
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], weave_avx2, side_evidence_avx2);
 #endif
 
 }  // namespace

@@ -41,15 +41,26 @@ struct Sides {
   std::array<float, 4> left, right;
 };
 
+/// A picture's row, those beside it, and those beyond them.
+struct WovenRows {
+  const std::uint8_t *own, *above, *below, *beyond_above, *beyond_below;
+};
+
 /// Every pointer is to a row of its own; none overlap but where said. `samples` is 3 * width.
 struct RowKernels {
   static constexpr float kClearShare = 0.4F;
+  static constexpr float kAlike = 24;  // sum of three samples' differences: rows below it belong together
 
   const char* name;
 
   /// out = own + (above + below) / 2, rounded up, 255 at most. `above` and `below` may be the same.
   void (*add_rows)(const std::uint8_t* own, const std::uint8_t* above, const std::uint8_t* below, int samples,
                    std::uint8_t* out);
+
+  /// out = own + what lies between `above` and `below`, rounded, 255 at most. That is the nearer to the one
+  /// whose row beyond (`beyond_above`, `beyond_below`) differs less from `own`, by the sum of three samples
+  /// in a row; at the ends the last of them counts twice. `differences` is scratch memory of 2 (samples + 2).
+  void (*weave_rows)(const WovenRows& rows, int samples, std::uint8_t* differences, std::uint8_t* out);
 
   /// Difference and sum of a slide's row and the complement's two rows about it, which may be the same.
   void (*combine_fields)(const std::uint8_t* slide, const std::uint8_t* above, const std::uint8_t* below,

@@ -73,13 +73,14 @@ struct SlideDecoder::State {
   EdgeImage edges;
   SequenceResult result, other_result;
   std::vector<RecoveredBoundary> recovered;
+  std::vector<std::uint32_t> decoded_before;  // each line, in the list
 
   bool shows_same_slide() const;
   bool match_paper(SlideOrder tried, Match& out);
   SequenceContext context(SlideOrder tried) const;
   bool match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out);
   void match_in_order(SlideOrder predicted, WorkerPool& pool);
-  void list(std::vector<DecodedBoundary>& out) const;
+  void list(WorkerPool& pool, std::vector<DecodedBoundary>& out);
 };
 
 bool SlideDecoder::State::shows_same_slide() const {
@@ -130,25 +131,41 @@ void SlideDecoder::State::match_in_order(SlideOrder predicted, WorkerPool& pool)
   }
 }
 
-void SlideDecoder::State::list(std::vector<DecodedBoundary>& out) const {
-  out.clear();
+/// Decoded boundaries by line, and behind them what was recovered.
+void SlideDecoder::State::list(WorkerPool& pool, std::vector<DecodedBoundary>& out) {
   const auto& starts = paper ? newer.detection.line_start : edges.line_start;
-  for (std::size_t line = 0; line + 1 < starts.size(); ++line) {
-    for (std::uint32_t i = starts[line]; i < starts[line + 1]; ++i) {
-      const int boundary = paper ? match.boundary[i] : result.boundary[i];
-      if (boundary < 0) continue;
-      if (paper) {
-        const Boundary& b = newer.detection.boundaries[i];
-        out.push_back({boundary, static_cast<int>(line), b.column_px, 0, b.slope});
-      } else {
-        const Edge& e = edges.edges[i];
-        out.push_back({boundary, static_cast<int>(line), e.column_px, e.sigma_px, e.slope});
+  const std::vector<std::int16_t>& found = paper ? match.boundary : result.boundary;
+  decoded_before.resize(starts.size());
+  decoded_before[0] = 0;
+  pool.for_shares(starts, [&](int begin, int end, int) {
+    for (auto line = static_cast<std::size_t>(begin); line < static_cast<std::size_t>(end); ++line) {
+      std::uint32_t decoded = 0;
+      for (std::uint32_t i = starts[line]; i < starts[line + 1]; ++i) decoded += found[i] >= 0;
+      decoded_before[line + 1] = decoded;
+    }
+  });
+  for (std::size_t line = 1; line < starts.size(); ++line) decoded_before[line] += decoded_before[line - 1];
+  out.resize(decoded_before.back() + (paper ? 0 : recovered.size()));
+  pool.for_shares(starts, [&](int begin, int end, int) {
+    DecodedBoundary* next = out.data() + decoded_before[static_cast<std::size_t>(begin)];
+    for (int line = begin; line < end; ++line) {
+      for (std::uint32_t i = starts[static_cast<std::size_t>(line)];
+           i < starts[static_cast<std::size_t>(line) + 1]; ++i) {
+        if (found[i] < 0) continue;
+        if (paper) {
+          const Boundary& b = newer.detection.boundaries[i];
+          *next++ = {found[i], line, b.column_px, 0, b.slope};
+        } else {
+          const Edge& e = edges.edges[i];
+          *next++ = {found[i], line, e.column_px, e.sigma_px, e.slope};
+        }
       }
     }
-  }
+  });
   if (paper) return;
+  DecodedBoundary* next = out.data() + decoded_before.back();
   for (const RecoveredBoundary& r : recovered)
-    out.push_back({r.boundary, r.line, r.column_px, r.sigma_px, r.slope});
+    *next++ = {r.boundary, r.line, r.column_px, r.sigma_px, r.slope};
 }
 
 SlideDecoder::SlideDecoder(const Rig& rig, const Pattern& pattern, const ReconstructOptions& options)
@@ -214,9 +231,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.matched = counts.in_order - counts.unsupported + counts.completed + traced + s.recovered.size();
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
-      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered);
+      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered, pool);
   }
-  s.list(out);
+  s.list(pool, out);
   return true;
 }
 

@@ -35,12 +35,9 @@ void SurfaceBuilder::fill_columns(const std::vector<GridVertex>& vertices) {
 
 /// The median of every fourth, which is as good; 0 where it is not known.
 float SurfaceBuilder::usual_sigma_px(const std::vector<GridVertex>& vertices) {
-  sigmas_px_.clear();
-  for (std::size_t i = 0; i < vertices.size(); i += 4) sigmas_px_.push_back(vertices[i].at.sigma_px);
-  if (sigmas_px_.empty()) return 0;
-  const auto middle = sigmas_px_.begin() + static_cast<std::ptrdiff_t>(sigmas_px_.size() / 2);
-  std::nth_element(sigmas_px_.begin(), middle, sigmas_px_.end());
-  return *middle;
+  sigmas_px_.reset(1);
+  for (std::size_t i = 0; i < vertices.size(); i += 4) sigmas_px_.of(0).push_back(vertices[i].at.sigma_px);
+  return sigmas_px_.median(0);
 }
 
 void SurfaceBuilder::finish(WorkerPool& pool, Surface& out) const {

@@ -12,6 +12,7 @@
 #include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/dense.h"
 #include "capture/reconstruct/depth_sigma.h"
+#include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/surface.h"
 #include "capture/reconstruct/triangulate.h"
 
@@ -46,7 +47,7 @@ class SurfaceBuilder {
   DepthSlope depth_slope_;
   ColumnGrid columns_;
   std::vector<std::int32_t> vertex_;  // [line][boundary]: the better vertex there, or -1
-  std::vector<float> sigmas_px_;
+  RankedSample sigmas_px_;
   std::vector<Hole> holes_;
   GridLinks links_;
   DenseSampler dense_;

@@ -7,13 +7,13 @@
 #include <utility>
 
 #include "capture/pattern/schedule.h"
+#include "capture/reconstruct/rows.h"
 #include "capture/reconstruct/texture.h"
 
 namespace relievo {
 namespace {
 
-constexpr float kAlike = 24;   // grey levels, all channels: rows that differ by less belong together as well
-constexpr int kBeside_px = 3;  // from a boundary to where its sides' colours are pure
+constexpr int kBeside_px = 3;           // from a boundary to where its sides' colours are pure
 constexpr float kLeastStep = 12;        // grey levels of a primary that a boundary must switch
 constexpr std::size_t kLeastSeen = 50;  // boundaries that must tell of a primary
 constexpr std::size_t kEvery = 4;       // boundaries looked at
@@ -50,8 +50,8 @@ RELIEVO_INLINE void weigh(const std::uint8_t* above, const std::uint8_t* below, 
   for (int i = 0; i < samples; ++i) {
     const auto a = static_cast<float>(d_above[i - 1] + d_above[i] + d_above[i + 1]);
     const auto b = static_cast<float>(d_below[i - 1] + d_below[i] + d_below[i + 1]);
-    const float fa = a * a + kAlike * kAlike;
-    const float fb = b * b + kAlike * kAlike;
+    const float fa = a * a + RowKernels::kAlike * RowKernels::kAlike;
+    const float fb = b * b + RowKernels::kAlike * RowKernels::kAlike;
     const auto low = static_cast<float>(below[i]);
     to[i] = low + fb / (fa + fb) * (static_cast<float>(above[i]) - low);
   }
@@ -118,12 +118,39 @@ WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix) {
 /// Median over boundaries of how much less a primary becomes in the slide for what more it becomes in the
 /// complement, where it is switched. An edge of the scene there changes both alike and is as often on one
 /// side.
-void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices) {
-  for (auto& r : ratios_) r.clear();
+void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices,
+                                 WorkerPool& pool) {
+  for (RankedSample& r : ratios_) r.reset(pool.threads());
+  const std::size_t looked_at = (vertices.size() + kEvery - 1) / kEvery;
+  pool.for_ranges(static_cast<int>(looked_at), [&](int begin, int end, int worker) {
+    measure_ratios(frame, vertices, begin, end, worker);
+  });
+  level_ = false;
+  for (std::size_t c = 0; c < 3; ++c) {
+    gains_[c] = 1;
+    if (ratios_[c].size() < kLeastSeen) continue;
+    const float middle = ratios_[c].median(1);
+    if (std::fabs(middle - 1) < kSame) continue;
+    gains_[c] = std::clamp(middle, 1 / kMostGain, kMostGain);
+    level_ = true;
+  }
+  if (!level_) return;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      float sum = 0;
+      for (std::size_t k = 0; k < 3; ++k) sum += inverse_[3 * i + k] * gains_[k] * matrix_[3 * k + j];
+      levelled_[3 * i + j] = sum;
+    }
+  }
+}
+
+/// Of every kEvery-th vertex, [begin, end) of them.
+void WhiteTexture::measure_ratios(const CapturedFrame& frame, const std::vector<GridVertex>& vertices,
+                                  int begin, int end, int worker) {
   const bool interlaced = frame.scan == Scan::kInterlaced;
   const int height = frame.picture.height();
-  for (std::size_t i = 0; i < vertices.size(); i += kEvery) {
-    const GridPoint& at = vertices[i].at;
+  for (int i = begin; i < end; ++i) {
+    const GridPoint& at = vertices[static_cast<std::size_t>(i) * kEvery].at;
     const int x = static_cast<int>(at.column_px + 0.5F);
     const int y = interlaced ? 2 * at.line : at.line;
     if (at.interpolated || x < kBeside_px || x + kBeside_px >= frame.picture.width() || y + 1 >= height)
@@ -143,26 +170,7 @@ void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<G
       const float s = mix(matrix_, c, slide_step.data());
       const float k = mix(matrix_, c, complement_step.data());
       if (std::fabs(s) > kLeastStep && std::fabs(k) > kLeastStep && (s > 0) != (k > 0))
-        ratios_[c].push_back(-s / k);
-    }
-  }
-  level_ = false;
-  for (std::size_t c = 0; c < 3; ++c) {
-    auto& r = ratios_[c];
-    gains_[c] = 1;
-    if (r.size() < kLeastSeen) continue;
-    const auto middle = r.begin() + static_cast<std::ptrdiff_t>(r.size() / 2);
-    std::nth_element(r.begin(), middle, r.end());
-    if (std::fabs(*middle - 1) < kSame) continue;
-    gains_[c] = std::clamp(*middle, 1 / kMostGain, kMostGain);
-    level_ = true;
-  }
-  if (!level_) return;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      float sum = 0;
-      for (std::size_t k = 0; k < 3; ++k) sum += inverse_[3 * i + k] * gains_[k] * matrix_[3 * k + j];
-      levelled_[3 * i + j] = sum;
+        ratios_[c].of(worker).push_back(-s / k);
     }
   }
 }
@@ -195,15 +203,20 @@ void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& sc
   const bool inside = y >= 2 && y + 2 < height;
   const RowView row{own,      above, below, picture.row(inside ? y - 2 : y), picture.row(inside ? y + 2 : y),
                     3 * width};
+  if (!level_) {
+    row_kernels().weave_rows({own, above, below, row.field_above, row.field_below}, 3 * width,
+                             scratch.differences.data(), out.row(y));
+    return;
+  }
   float* other = scratch.other.data();
   loops().split(row, {scratch.above.data() + 1, scratch.below.data() + 1, scratch.own.data(), other});
-  if (level_) level(y % 2 == first_row(frame.field_order, 0) ? other : scratch.own.data(), width);
+  level(y % 2 == first_row(frame.field_order, 0) ? other : scratch.own.data(), width);
   loops().store_sum(scratch.own.data(), other, 3 * width, out.row(y));
 }
 
 void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool,
                         Image8& out) {
-  measure_gains(frame, vertices);
+  measure_gains(frame, vertices, pool);
   const int width = frame.picture.width();
   const int height = frame.picture.height();
   if (height < 2 || (frame.scan == Scan::kProgressive && !level_)) {
@@ -218,6 +231,7 @@ void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex
     s.below.resize(samples + 2);
     s.own.resize(samples);
     s.other.resize(samples);
+    s.differences.resize(2 * (samples + 2));
   }
   pool.for_ranges(height, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];

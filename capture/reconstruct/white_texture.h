@@ -11,6 +11,7 @@
 
 #include "base/image.h"
 #include "base/parallel.h"
+#include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/surface.h"
 #include "capture/source/field_source.h"
 
@@ -35,8 +36,11 @@ class WhiteTexture {
   struct Scratch {
     std::vector<std::int16_t> above, below;  // [3 width + 2]: how much the field's own rows differ
     std::vector<float> own, other;           // [3 width]
+    std::vector<std::uint8_t> differences;   // as weave_rows() asks for
   };
-  void measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices);
+  void measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool);
+  void measure_ratios(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, int begin, int end,
+                      int worker);
   void level(float* row, int width) const;
   void progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
   void interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
@@ -48,7 +52,7 @@ class WhiteTexture {
   std::array<float, 3> gains_{1, 1, 1};
   bool level_ = false;
   std::vector<Scratch> scratch_;
-  std::array<std::vector<float>, 3> ratios_;  // of each primary, at boundaries
+  std::array<RankedSample, 3> ratios_;  // of each primary, at boundaries
 };
 
 }  // namespace relievo

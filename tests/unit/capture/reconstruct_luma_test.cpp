@@ -34,15 +34,15 @@ TEST_P(LumaRows, Ratios) {
   for (const int width : {1, 7, 8, 16, 33, 640}) {
     const auto red = random_row(random, width, -255, 255), green = random_row(random, width, -255, 255),
                blue = random_row(random, width, -255, 255), white = random_row(random, width, 0, 510);
-    std::vector<float> light(4 * red.size()), luma(red.size());
-    kernels().ratios({red.data(), green.data(), blue.data(), white.data()}, width, kWeights, 3, light.data(),
-                     luma.data());
+    std::array<std::vector<float>, 4> out;
+    for (auto& row : out) row.resize(red.size());
+    kernels().ratios({red.data(), green.data(), blue.data(), white.data()}, width, kWeights, 3,
+                     {out[0].data(), out[1].data(), out[2].data(), out[3].data()});
     for (std::size_t x = 0; x < static_cast<std::size_t>(width); ++x) {
       const float unit = 1 / (white[x] + 3);
       const std::array rgb{red[x] * unit, green[x] * unit, blue[x] * unit};
-      for (std::size_t c = 0; c < 3; ++c) ASSERT_EQ(light[4 * x + c], rgb[c]);
-      ASSERT_EQ(luma[x], kWeights[0] * rgb[0] + kWeights[1] * rgb[1] + kWeights[2] * rgb[2]);
-      ASSERT_EQ(light[4 * x + 3], luma[x]);
+      for (std::size_t c = 0; c < 3; ++c) ASSERT_EQ(out[c][x], rgb[c]);
+      ASSERT_EQ(out[3][x], kWeights[0] * rgb[0] + kWeights[1] * rgb[1] + kWeights[2] * rgb[2]);
     }
   }
 }
@@ -96,9 +96,6 @@ TEST_P(LumaRows, ContrastsAreThoseOfEachColumnByItself) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, LumaRows, testing::Range(std::size_t{0}, all_luma_kernels().size()),
-                         [](const auto& test) { return std::string(all_luma_kernels()[test.param].name); });
-
 /// Stripes of random widths on a surface of random brightness with steps, one line, noisy.
 DifferenceImage random_stripes(std::mt19937& random, int width) {
   DifferenceImage out;
@@ -127,29 +124,69 @@ DifferenceImage random_stripes(std::mt19937& random, int width) {
   return out;
 }
 
-TEST(LumaPlacer, ALineReadAsAWholeTellsTheSamePlaces) {
-  std::mt19937 random(11);
-  const LumaPlacer placer({1, 0, 0, 0, 1, 0, 0, 0, 1});
+/// Boundaries all along a line, whatever they are.
+std::vector<LumaQuery> random_queries(std::mt19937& random, int width) {
   std::uniform_int_distribution<int> colour(1, 6);
   std::uniform_real_distribution<float> free(2, 12);
+  std::bernoulli_distribution narrow;
+  std::vector<LumaQuery> out;
+  for (float own = kLumaReach_px; own + kLumaReach_px + 1 <= static_cast<float>(width); own += 0.37F)
+    out.push_back({own,
+                   {free(random),
+                    free(random),
+                    {static_cast<Primary>(colour(random)), static_cast<Primary>(colour(random))},
+                    narrow(random)}});
+  return out;
+}
+
+void expect_equal(const LumaPlace& a, const LumaPlace& b, float own_px) {
+  ASSERT_EQ(a.found, b.found) << own_px;
+  ASSERT_EQ(a.column_px, b.column_px) << own_px;
+  ASSERT_EQ(a.slope, b.slope) << own_px;
+  ASSERT_EQ(a.rise, b.rise) << own_px;
+}
+
+TEST_P(LumaRows, PlacesEqualTheReferences) {
+  const LumaPlacer placer({1, 0, 0, 0, 1, 0, 0, 0, 1});
   int found = 0;
   for (const int width : {16, 17, 40, 200}) {
-    for (int round = 0; round < 30; ++round) {
+    for (int round = 0; round < 50; ++round) {
       const DifferenceImage image = random_stripes(random, width);
       LumaLine line;
       placer.read_line(image, 0, false, line);
-      for (float own = kLumaReach_px; own + kLumaReach_px + 1 <= static_cast<float>(width); own += 0.37F) {
-        const LumaSides sides{free(random),
-                              free(random),
-                              {static_cast<Primary>(colour(random)), static_cast<Primary>(colour(random))},
-                              round % 2 == 0};
-        const LumaPlace whole = placer.place(line.view(), sides, 0.8F, own);
-        const LumaPlace alone = placer.place(image, 0, sides, 0.8F, own);
-        ASSERT_EQ(whole.found, alone.found);
-        ASSERT_EQ(whole.column_px, alone.column_px) << own << " of " << width;
-        ASSERT_EQ(whole.slope, alone.slope);
-        ASSERT_EQ(whole.rise, alone.rise);
-        found += whole.found;
+      const std::vector<LumaQuery> queries = random_queries(random, width);
+      std::vector<LumaPlace> places(queries.size()), expected(queries.size());
+      const LumaLight light{placer.weights(), 0.8F};
+      const int count = static_cast<int>(queries.size());
+      kernels().places(line.view(), light, queries.data(), count, places.data());
+      all_luma_kernels().front().places(line.view(), light, queries.data(), count, expected.data());
+      for (std::size_t i = 0; i < queries.size(); ++i) {
+        expect_equal(places[i], expected[i], queries[i].own_px);
+        found += places[i].found;
+      }
+    }
+  }
+  EXPECT_GT(found, 1000);
+}
+
+INSTANTIATE_TEST_SUITE_P(, LumaRows, testing::Range(std::size_t{0}, all_luma_kernels().size()),
+                         [](const auto& test) { return std::string(all_luma_kernels()[test.param].name); });
+
+TEST(LumaPlacer, ALineReadAsAWholeTellsTheSamePlaces) {
+  std::mt19937 random(11);
+  const LumaPlacer placer({1, 0, 0, 0, 1, 0, 0, 0, 1});
+  int found = 0;
+  for (const int width : {16, 17, 40, 200}) {
+    for (int round = 0; round < 20; ++round) {
+      const DifferenceImage image = random_stripes(random, width);
+      LumaLine line;
+      placer.read_line(image, 0, false, line);
+      const std::vector<LumaQuery> queries = random_queries(random, width);
+      std::vector<LumaPlace> places(queries.size());
+      placer.places(line, 0.8F, queries.data(), queries.size(), places.data());
+      for (std::size_t i = 0; i < queries.size(); ++i) {
+        expect_equal(places[i], placer.place(image, 0, 0.8F, queries[i]), queries[i].own_px);
+        found += places[i].found;
       }
     }
   }
@@ -175,7 +212,7 @@ TEST(LumaPlacer, FindsAStep) {
       for (std::size_t c = 0; c < 3; ++c)
         image.values[c * kWidth + static_cast<std::size_t>(x)] = rgb[c] * (white + kDarkSum);
     }
-    const LumaPlace found = placer.place(image, 0, {9, 9, {1, 3}}, 1, 15.2F);
+    const LumaPlace found = placer.place(image, 0, 1, {15.2F, {9, 9, {1, 3}}});
     ASSERT_TRUE(found.found);
     EXPECT_NEAR(found.column_px, place, 1e-3);
     EXPECT_NEAR(found.slope, 0.587, 1e-3);

@@ -57,6 +57,34 @@ TEST_P(Rows, AddRows) {
   }
 }
 
+TEST_P(Rows, WeaveRows) {
+  for (const int width : kWidths) {
+    const int samples = 3 * width;
+    const auto own = make.row<std::uint8_t>(samples, 0, 255), above = make.row<std::uint8_t>(samples, 0, 255),
+               below = make.row<std::uint8_t>(samples, 0, 255);
+    auto beyond_above = make.row<std::uint8_t>(samples, 0, 255);
+    const auto beyond_below = make.row<std::uint8_t>(samples, 0, 255);
+    for (std::size_t i = 0; i < own.size() / 2; ++i) beyond_above[i] = own[i];  // one surface
+    const WovenRows rows{own.data(), above.data(), below.data(), beyond_above.data(), beyond_below.data()};
+    std::vector<std::uint8_t> scratch(2 * own.size() + 4), out(own.size()), reference(own.size());
+    kernels().weave_rows(rows, samples, scratch.data(), out.data());
+    all_row_kernels().front().weave_rows(rows, samples, scratch.data(), reference.data());
+    ASSERT_EQ(out, reference) << width;
+    for (int i = 0; i < samples; ++i) {
+      double a = 0, b = 0;
+      for (int k = i - 1; k <= i + 1; ++k) {
+        const auto at = static_cast<std::size_t>(std::clamp(k, 0, samples - 1));
+        a += std::abs(own[at] - beyond_above[at]);
+        b += std::abs(own[at] - beyond_below[at]);
+      }
+      const auto at = static_cast<std::size_t>(i);
+      const double share = (b * b + 576) / (a * a + b * b + 2 * 576);
+      const double sum = own[at] + below[at] + share * (above[at] - below[at]);
+      ASSERT_NEAR(out[at], std::min(sum, 255.0), 0.501) << i << " of " << samples;
+    }
+  }
+}
+
 TEST_P(Rows, CombineFields) {
   for (const int width : kWidths) {
     const int samples = 3 * width;

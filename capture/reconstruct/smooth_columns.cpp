@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/smooth_columns.h"
+
+#include <cstdint>
+#include <cstring>
+
+namespace relievo {
+namespace {
+
+// In standard deviations of a column: a straight line fits to within the first (root mean square), a
+// quadratic to within the second (the worst of its lines).
+constexpr float kStraightFit = 1.4F;
+constexpr float kBentFit = 3.F;
+
+// Eight boundaries at once; a processor with narrower registers takes several for them.
+using Eight = float __attribute__((vector_size(32)));
+using EightInts = std::int32_t __attribute__((vector_size(32)));
+
+#define RELIEVO_INLINE [[gnu::always_inline]] inline
+
+RELIEVO_INLINE void load(const float* from, Eight& to) {
+  std::memcpy(&to, from, sizeof to);
+}
+
+/// `worst` becomes |off| where that is greater; a NaN that is there first stays.
+RELIEVO_INLINE void take(const Eight& off, Eight& worst) {
+  const Eight size = off < 0 ? -off : off;
+  worst = worst < size ? size : worst;
+}
+
+/// Missing neighbours are NaN, which no comparison lets through.
+RELIEVO_INLINE void smooth_body(const std::array<const float*, 7>& rows, const float* noises, int count,
+                                float usual_px, float* out) {
+  for (int i = 0; i < count; i += 8) {
+    Eight a, c, d, e, f, g, h, noise;
+    load(rows[0] + i, a);
+    load(rows[1] + i, c);
+    load(rows[2] + i, d);
+    load(rows[3] + i, e);
+    load(rows[4] + i, f);
+    load(rows[5] + i, g);
+    load(rows[6] + i, h);
+    load(noises + i, noise);
+    const Eight usual = Eight{} + usual_px;
+    noise = usual < noise ? noise : usual;
+    const Eight limit = kBentFit * noise;
+
+    const Eight five = (17 * e + 12 * (d + f) - 3 * (c + g)) * (1.F / 35);
+    const Eight slope5 = (2 * (g - c) + (f - d)) * 0.1F;
+    const Eight bend5 = (2 * (c + g) - (d + f) - 2 * e) * (1.F / 14);
+    const Eight off5 = five - e;
+    Eight worst5 = off5 < 0 ? -off5 : off5;
+    take(five - slope5 + bend5 - d, worst5);
+    take(five + slope5 + bend5 - f, worst5);
+    take(five - 2 * slope5 + 4 * bend5 - c, worst5);
+    take(five + 2 * slope5 + 4 * bend5 - g, worst5);
+
+    const Eight seven = (7 * e + 6 * (d + f) + 3 * (c + g) - 2 * (a + h)) * (1.F / 21);
+    const Eight slope7 = (3 * (h - a) + 2 * (g - c) + (f - d)) * (1.F / 28);
+    const Eight bend7 = (5 * (a + h) - 3 * (d + f) - 4 * e) * (1.F / 84);
+    const Eight off7 = seven - e;
+    Eight worst7 = off7 < 0 ? -off7 : off7;
+    take(seven - slope7 + bend7 - d, worst7);
+    take(seven + slope7 + bend7 - f, worst7);
+    take(seven - 2 * slope7 + 4 * bend7 - c, worst7);
+    take(seven + 2 * slope7 + 4 * bend7 - g, worst7);
+    take(seven - 3 * slope7 + 9 * bend7 - a, worst7);
+    take(seven + 3 * slope7 + 9 * bend7 - h, worst7);
+
+    const Eight line7 = (a + c + d + e + f + g + h) * (1.F / 7);
+    const Eight square7 = (a - line7 + 3 * slope7) * (a - line7 + 3 * slope7) +
+                          (c - line7 + 2 * slope7) * (c - line7 + 2 * slope7) +
+                          (d - line7 + slope7) * (d - line7 + slope7) + (e - line7) * (e - line7) +
+                          (f - line7 - slope7) * (f - line7 - slope7) +
+                          (g - line7 - 2 * slope7) * (g - line7 - 2 * slope7) +
+                          (h - line7 - 3 * slope7) * (h - line7 - 3 * slope7);
+    const EightInts straight7 = square7 <= 7 * kStraightFit * kStraightFit * noise * noise;
+    // take() keeps a value where it meets a NaN second, so the values themselves are asked.
+    const EightInts good5 = (worst5 <= limit) & (five == five);
+    const EightInts good7 = (worst7 <= limit) & (seven == seven);
+    const Eight smooth = straight7 ? line7 : good7 ? seven : good5 ? five : e;
+    std::memcpy(out + i, &smooth, sizeof smooth);
+  }
+}
+
+void smooth_portable(const std::array<const float*, 7>& rows, const float* noises, int count, float usual_px,
+                     float* out) {
+  smooth_body(rows, noises, count, usual_px, out);
+}
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void smooth_avx2(const std::array<const float*, 7>& rows, const float* noises,
+                                         int count, float usual_px, float* out) {
+  smooth_body(rows, noises, count, usual_px, out);
+}
+#endif
+
+}  // namespace
+
+const std::vector<Smoother>& smoothers() {
+  static const std::vector<Smoother> all = [] {
+    std::vector<Smoother> out{{"portable", smooth_portable}};
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) out.push_back({"avx2", smooth_avx2});
+#endif
+    return out;
+  }();
+  return all;
+}
+
+}  // namespace relievo
