@@ -235,112 +235,133 @@ alignas(16) constexpr std::array<std::array<std::uint32_t, 4>, 8> kSigns = [] {
   return out;
 }();
 
-/// As place_portable(), channels and sides at once.
-RELIEVO_AVX2 LumaPlace place_avx2(const LumaView& view, const LumaLight& light, const LumaQuery& query) {
+/// What a round of place_portable() looks at.
+struct Round {
+  int middle, left_reach, right_reach;
+  bool operator==(const Round&) const = default;
+};
+RELIEVO_BODY Round round_at(const LumaQuery& query, float place) {
+  return {column_of(place), reach_in(query.sides.free_left_px + (place - query.own_px)),
+          reach_in(query.sides.free_right_px - (place - query.own_px))};
+}
+
+/// A round of place_portable(), channels and sides at once, from `place`. False where no other may follow.
+RELIEVO_AVX2 bool round_avx2(const LumaView& view, const LumaLight& light, const LumaQuery& query,
+                             const Round& round, float place, LumaPlace& out) {
   const LumaSides& sides = query.sides;
   const int centre = column_of(query.own_px);
-  const std::uint8_t* ends = view.ends - view.first;
+  const int middle = round.middle;
   const __m256 sign = _mm256_set1_ps(-0.F);
   const __m128 weights = _mm_setr_ps(light.weights[0], light.weights[1], light.weights[2], 0);
   const __m256 turned = both_sides(reinterpret_cast<const float*>(kSigns[sides.colours[0]].data()),
                                    reinterpret_cast<const float*>(kSigns[sides.colours[1]].data()));
-  LumaPlace out{.column_px = query.own_px};
-  float place = query.own_px;
-  std::array<int, 3> last{};
-  for (int round = 0; round < 2; ++round) {
-    const int middle = column_of(place);
-    const std::array columns{middle, reach_in(sides.free_left_px + (place - query.own_px)),
-                             reach_in(sides.free_right_px - (place - query.own_px))};
-    if (round > 0 && columns == last) break;
-    last = columns;
-    const Plateaus furthest = plateaus(ends, centre, middle, columns[1], columns[2]);
-    if (sides.narrow && std::min(furthest.left, furthest.right) < 2)
-      return place_portable(view, light, query);
-
-    const __m256i away = _mm256_setr_epi32(5, 4, 3, 2, 2, 3, 4, 5);
-    const __m256i limit = _mm256_set_m128i(_mm_set1_epi32(furthest.right), _mm_set1_epi32(furthest.left));
-    const __m256 beyond = _mm256_castsi256_ps(_mm256_cmpgt_epi32(away, limit));
-    const int x = middle - view.first;
-    const auto row = [&](const float* r) __attribute__((target("avx2"), always_inline)) {
-      return _mm256_andnot_ps(beyond, both_sides(r + x - 5, r + x + 2));
-    };
-    const __m256 red = row(view.red);
-    const __m256 green = row(view.green);
-    const __m256 blue = row(view.blue);
-    const __m256 luma = row(view.luma);
-    // Columns of all channels, and those two away first on either side.
-    const __m256 rg_low = _mm256_unpacklo_ps(red, green);
-    const __m256 rg_high = _mm256_unpackhi_ps(red, green);
-    const __m256 bl_low = _mm256_unpacklo_ps(blue, luma);
-    const __m256 bl_high = _mm256_unpackhi_ps(blue, luma);
-    const __m256 c0 = _mm256_shuffle_ps(rg_low, bl_low, 0x44);
-    const __m256 c1 = _mm256_shuffle_ps(rg_low, bl_low, 0xee);
-    const __m256 c2 = _mm256_shuffle_ps(rg_high, bl_high, 0x44);
-    const __m256 c3 = _mm256_shuffle_ps(rg_high, bl_high, 0xee);
-    __m256 sum = _mm256_add_ps(_mm256_blend_ps(c3, c0, 0xf0), _mm256_blend_ps(c2, c1, 0xf0));
-    sum = _mm256_add_ps(sum, _mm256_blend_ps(c1, c2, 0xf0));
-    sum = _mm256_add_ps(sum, _mm256_blend_ps(c0, c3, 0xf0));
-    const __m256i samples =
-        _mm256_max_epi32(_mm256_sub_epi32(limit, _mm256_set1_epi32(1)), _mm256_set1_epi32(1));
-    const __m256 mean = _mm256_div_ps(sum, _mm256_cvtepi32_ps(samples));
-    const __m256 size = _mm256_andnot_ps(sign, mean);
-    const __m128 amplitude = _mm_max_ps(_mm256_castps256_ps128(size), _mm256_extractf128_ps(size, 1));
-    const __m128 parts = _mm_mul_ps(weights, amplitude);
-    const __m256 parts_twice = _mm256_set_m128(parts, parts);
-    const __m256 total = sum_of_three(parts_twice);
-    if (!(_mm256_cvtss_f32(total) > 0)) return out;
-    const __m256 part = _mm256_div_ps(_mm256_mul_ps(parts_twice, _mm256_set1_ps(light.share)),
-                                      _mm256_shuffle_ps(total, total, 0));
-    const __m256 told = sum_of_three(_mm256_xor_ps(part, turned));
-    const __m256 levels_seen = _mm256_shuffle_ps(mean, mean, 0xff);
-    const Levels levels =
-        levels_of({_mm256_cvtss_f32(levels_seen), _mm_cvtss_f32(_mm256_extractf128_ps(levels_seen, 1))},
-                  {_mm256_cvtss_f32(told), _mm_cvtss_f32(_mm256_extractf128_ps(told, 1))}, furthest.left > 1,
-                  furthest.right > 1);
-    const float level = 0.5F * (levels.left + levels.right);
-    const bool rising = levels.right > levels.left;
-    out.rise = levels.right - levels.left;
-    out.found = false;
-
-    const float* around = view.luma + (centre - 4 - view.first);
-    const __m256 a = _mm256_sub_ps(_mm256_loadu_ps(around), _mm256_set1_ps(level));
-    const __m256 b = _mm256_sub_ps(_mm256_loadu_ps(around + 1), _mm256_set1_ps(level));
-    const __m256 zero = _mm256_setzero_ps();
-    const __m256 crosses =
-        _mm256_xor_ps(_mm256_cmp_ps(a, zero, _CMP_GT_OQ), _mm256_cmp_ps(b, zero, _CMP_GT_OQ));
-    const __m256 falls = _mm256_xor_ps(_mm256_cmp_ps(b, a, _CMP_GT_OQ),
-                                       _mm256_castsi256_ps(_mm256_set1_epi32(rising ? -1 : 0)));
-    const __m256 step = _mm256_sub_ps(b, a);
-    const __m256 x_of = _mm256_cvtepi32_ps(
-        _mm256_add_epi32(_mm256_set1_epi32(centre - 4), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)));
-    const __m256 column = _mm256_sub_ps(x_of, _mm256_div_ps(a, step));
-    const __m256 off = _mm256_andnot_ps(sign, _mm256_sub_ps(column, _mm256_set1_ps(place)));
-    const __m256 near = _mm256_cmp_ps(off, _mm256_set1_ps(kFarthest_px), _CMP_LT_OQ);
-    auto lanes =
-        static_cast<unsigned>(_mm256_movemask_ps(_mm256_and_ps(near, _mm256_andnot_ps(falls, crosses))));
-    if (lanes == 0) return out;
-    alignas(32) std::array<float, 8> columns_of, steps, offs;
-    _mm256_store_ps(columns_of.data(), column);
-    _mm256_store_ps(steps.data(), step);
-    auto best = static_cast<std::size_t>(std::countr_zero(lanes));
-    if ((lanes & (lanes - 1)) != 0) {
-      _mm256_store_ps(offs.data(), off);
-      for (lanes &= lanes - 1; lanes != 0; lanes &= lanes - 1) {
-        const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
-        best = offs[lane] < offs[best] ? lane : best;
-      }
-    }
-    out.column_px = columns_of[best];
-    out.slope = std::fabs(steps[best]);
-    out.found = true;
-    place = out.column_px;
+  const Plateaus furthest =
+      plateaus(view.ends - view.first, centre, middle, round.left_reach, round.right_reach);
+  if (sides.narrow && std::min(furthest.left, furthest.right) < 2) {
+    out = place_portable(view, light, query);
+    return false;
   }
-  return out;
+
+  const __m256i away = _mm256_setr_epi32(5, 4, 3, 2, 2, 3, 4, 5);
+  const __m256i limit = _mm256_set_m128i(_mm_set1_epi32(furthest.right), _mm_set1_epi32(furthest.left));
+  const __m256 beyond = _mm256_castsi256_ps(_mm256_cmpgt_epi32(away, limit));
+  const int x = middle - view.first;
+  const auto row = [&](const float* r) __attribute__((target("avx2"), always_inline)) {
+    return _mm256_andnot_ps(beyond, both_sides(r + x - 5, r + x + 2));
+  };
+  const __m256 red = row(view.red);
+  const __m256 green = row(view.green);
+  const __m256 blue = row(view.blue);
+  const __m256 luma = row(view.luma);
+  // Columns of all channels, and those two away first on either side.
+  const __m256 rg_low = _mm256_unpacklo_ps(red, green);
+  const __m256 rg_high = _mm256_unpackhi_ps(red, green);
+  const __m256 bl_low = _mm256_unpacklo_ps(blue, luma);
+  const __m256 bl_high = _mm256_unpackhi_ps(blue, luma);
+  const __m256 c0 = _mm256_shuffle_ps(rg_low, bl_low, 0x44);
+  const __m256 c1 = _mm256_shuffle_ps(rg_low, bl_low, 0xee);
+  const __m256 c2 = _mm256_shuffle_ps(rg_high, bl_high, 0x44);
+  const __m256 c3 = _mm256_shuffle_ps(rg_high, bl_high, 0xee);
+  __m256 sum = _mm256_add_ps(_mm256_blend_ps(c3, c0, 0xf0), _mm256_blend_ps(c2, c1, 0xf0));
+  sum = _mm256_add_ps(sum, _mm256_blend_ps(c1, c2, 0xf0));
+  sum = _mm256_add_ps(sum, _mm256_blend_ps(c0, c3, 0xf0));
+  const __m256i samples =
+      _mm256_max_epi32(_mm256_sub_epi32(limit, _mm256_set1_epi32(1)), _mm256_set1_epi32(1));
+  const __m256 mean = _mm256_div_ps(sum, _mm256_cvtepi32_ps(samples));
+  const __m256 size = _mm256_andnot_ps(sign, mean);
+  const __m128 amplitude = _mm_max_ps(_mm256_castps256_ps128(size), _mm256_extractf128_ps(size, 1));
+  const __m128 parts = _mm_mul_ps(weights, amplitude);
+  const __m256 parts_twice = _mm256_set_m128(parts, parts);
+  const __m256 total = sum_of_three(parts_twice);
+  if (!(_mm256_cvtss_f32(total) > 0)) return false;
+  const __m256 part = _mm256_div_ps(_mm256_mul_ps(parts_twice, _mm256_set1_ps(light.share)),
+                                    _mm256_shuffle_ps(total, total, 0));
+  const __m256 told = sum_of_three(_mm256_xor_ps(part, turned));
+  const __m256 levels_seen = _mm256_shuffle_ps(mean, mean, 0xff);
+  const Levels levels =
+      levels_of({_mm256_cvtss_f32(levels_seen), _mm_cvtss_f32(_mm256_extractf128_ps(levels_seen, 1))},
+                {_mm256_cvtss_f32(told), _mm_cvtss_f32(_mm256_extractf128_ps(told, 1))}, furthest.left > 1,
+                furthest.right > 1);
+  const float level = 0.5F * (levels.left + levels.right);
+  const bool rising = levels.right > levels.left;
+  out.rise = levels.right - levels.left;
+  out.found = false;
+
+  const float* around = view.luma + (centre - 4 - view.first);
+  const __m256 a = _mm256_sub_ps(_mm256_loadu_ps(around), _mm256_set1_ps(level));
+  const __m256 b = _mm256_sub_ps(_mm256_loadu_ps(around + 1), _mm256_set1_ps(level));
+  const __m256 zero = _mm256_setzero_ps();
+  const __m256 crosses =
+      _mm256_xor_ps(_mm256_cmp_ps(a, zero, _CMP_GT_OQ), _mm256_cmp_ps(b, zero, _CMP_GT_OQ));
+  const __m256 falls =
+      _mm256_xor_ps(_mm256_cmp_ps(b, a, _CMP_GT_OQ), _mm256_castsi256_ps(_mm256_set1_epi32(rising ? -1 : 0)));
+  const __m256 step = _mm256_sub_ps(b, a);
+  const __m256 x_of = _mm256_cvtepi32_ps(
+      _mm256_add_epi32(_mm256_set1_epi32(centre - 4), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)));
+  const __m256 column = _mm256_sub_ps(x_of, _mm256_div_ps(a, step));
+  const __m256 off = _mm256_andnot_ps(sign, _mm256_sub_ps(column, _mm256_set1_ps(place)));
+  const __m256 near = _mm256_cmp_ps(off, _mm256_set1_ps(kFarthest_px), _CMP_LT_OQ);
+  auto lanes =
+      static_cast<unsigned>(_mm256_movemask_ps(_mm256_and_ps(near, _mm256_andnot_ps(falls, crosses))));
+  if (lanes == 0) return false;
+  alignas(32) std::array<float, 8> columns_of, steps, offs;
+  _mm256_store_ps(columns_of.data(), column);
+  _mm256_store_ps(steps.data(), step);
+  auto best = static_cast<std::size_t>(std::countr_zero(lanes));
+  if ((lanes & (lanes - 1)) != 0) {
+    _mm256_store_ps(offs.data(), off);
+    for (lanes &= lanes - 1; lanes != 0; lanes &= lanes - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(lanes));
+      best = offs[lane] < offs[best] ? lane : best;
+    }
+  }
+  out.column_px = columns_of[best];
+  out.slope = std::fabs(steps[best]);
+  out.found = true;
+  return true;
 }
 
 [[gnu::target("avx2")]] void places_avx2(const LumaView& view, const LumaLight& light,
                                          const LumaQuery* queries, int count, LumaPlace* out) {
-  for (int i = 0; i < count; ++i) out[i] = place_avx2(view, light, queries[i]);
+  // All first rounds and then all second ones: places next to each other do not wait for one another.
+  constexpr int kBlock = 64;
+  std::array<int, kBlock> again;
+  for (int begin = 0; begin < count; begin += kBlock) {
+    std::size_t more = 0;
+    for (int i = begin; i < std::min(count, begin + kBlock); ++i) {
+      const LumaQuery& query = queries[i];
+      out[i] = {.column_px = query.own_px};
+      const Round first = round_at(query, query.own_px);
+      const bool goes_on = round_avx2(view, light, query, first, query.own_px, out[i]);
+      again[more] = i;
+      more += goes_on & !(round_at(query, out[i].column_px) == first);  // else it would find the same
+    }
+    for (std::size_t k = 0; k < more; ++k) {
+      const int i = again[k];
+      const float place = out[i].column_px;
+      round_avx2(view, light, queries[i], round_at(queries[i], place), place, out[i]);
+    }
+  }
 }
 
 #endif

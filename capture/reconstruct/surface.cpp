@@ -35,7 +35,10 @@ class Grid {
       counts.edge_on += worker.counts.edge_on;
     }
     find_components();
-    counts.small_component = number_what_is_kept(out);
+    counts.small_component = count_what_is_kept(out);
+    for_lines([&](int begin, int end, SurfaceScratch::Worker&) {
+      for (int line = begin; line < end; ++line) number(line);
+    });
     for_lines([&](int begin, int end, SurfaceScratch::Worker&) {
       for (int line = begin; line < end; ++line) {
         write_vertices(line, out);
@@ -70,9 +73,14 @@ class Grid {
   }
 
   /// The better one of each place. Returns how many were not.
-  std::size_t place_vertices() {
+  std::size_t find_places() {
     std::size_t duplicates = 0;
+    if (options_.places != nullptr) {
+      places_ = options_.places->data();
+      return 0;
+    }
     scratch_.vertex.assign(cell(lines_, 0), -1);
+    places_ = scratch_.vertex.data();
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
       const GridPoint& at = vertices_[i].at;
       std::int32_t& slot =
@@ -81,6 +89,11 @@ class Grid {
       if (slot < 0 || better(vertices_[i], vertices_[static_cast<std::size_t>(slot)]))
         slot = static_cast<std::int32_t>(i);
     }
+    return duplicates;
+  }
+
+  std::size_t place_vertices() {
+    const std::size_t duplicates = find_places();
     scratch_.planes.resize(static_cast<std::size_t>(lines_ * kPlanes) * stride_);
     scratch_.normals.resize(3 * cell(lines_, 0));
     scratch_.cells.resize(static_cast<std::size_t>(lines_) * stride_);
@@ -94,7 +107,7 @@ class Grid {
   void fill_row(int line) {
     std::fill_n(plane(line, 0), kPlanes * stride_, std::numeric_limits<float>::quiet_NaN());
     for (int b = 0; b < boundaries_; ++b) {
-      const std::int32_t vertex = scratch_.vertex[cell(line, b)];
+      const std::int32_t vertex = places_[cell(line, b)];
       if (vertex < 0) continue;
       const Vec3f& p = vertices_[static_cast<std::size_t>(vertex)].position;
       for (std::size_t axis = 0; axis < 3; ++axis) plane(line, static_cast<int>(axis))[b] = p[axis];
@@ -167,16 +180,21 @@ class Grid {
   }
 
   /// Which sides of a cell its triangles join: bit c from corner c to the next.
-  static int joined_sides(std::uint8_t bits) {
-    const bool first = bits & cell::kFirstJoins;
-    const bool second = bits & cell::kSecondJoins;
-    if (bits & cell::kTurned) return (first ? 2 | 4 : 0) | (second ? 8 | 1 : 0);
-    return (first ? 1 | 2 : 0) | (second ? 4 | 8 : 0);
-  }
+  static constexpr std::array<std::uint8_t, 32> kJoinedSides = [] {
+    std::array<std::uint8_t, 32> out{};
+    for (std::size_t bits = 0; bits < 32; ++bits) {
+      const bool first = bits & cell::kFirstJoins;
+      const bool second = bits & cell::kSecondJoins;
+      const int turned = (first ? 2 | 4 : 0) | (second ? 8 | 1 : 0);
+      const int straight = (first ? 1 | 2 : 0) | (second ? 4 | 8 : 0);
+      out[bits] = static_cast<std::uint8_t>(bits & cell::kTurned ? turned : straight);
+    }
+    return out;
+  }();
 
   /// Runs of vertices that triangles join along a line, and those that they join across lines.
   void find_components() {
-    auto& run = scratch_.index;
+    std::int32_t* run = scratch_.index.data();
     scratch_.parent.clear();
     scratch_.size.clear();
     for (int line = 0; line < lines_; ++line) {
@@ -184,66 +202,102 @@ class Grid {
       const std::uint8_t* below = cells(line);
       bool on = false;    // joined to the one before
       bool down = false;  // the cell on the left joins this vertex to the one above it
+      std::int32_t now = -1;
+      std::int32_t joined_above = -1;  // the last run above that this one was joined to
+      std::int32_t length = 0;
+      const auto end_run = [&] {
+        if (length > 0) scratch_.size[static_cast<std::size_t>(root(now))] += length;
+        length = 0;
+      };
       for (int b = 0; b < boundaries_; ++b) {
         const std::size_t at = cell(line, b);
-        const int sides_above = above != nullptr ? joined_sides(above[b]) : 0;
-        if (scratch_.vertex[at] < 0) {
+        const int sides_above = above != nullptr ? kJoinedSides[above[b]] : 0;
+        if (places_[at] < 0) {
           run[at] = -1;
         } else {
-          if (on) {
-            run[at] = run[at - 1];
-          } else {
-            run[at] = static_cast<std::int32_t>(scratch_.parent.size());
-            scratch_.parent.push_back(run[at]);
+          if (!on || length == 0) {
+            end_run();
+            now = static_cast<std::int32_t>(scratch_.parent.size());
+            joined_above = -1;
+            scratch_.parent.push_back(now);
             scratch_.size.push_back(0);
           }
-          ++scratch_.size[static_cast<std::size_t>(root(run[at]))];
-          if (down || (sides_above & 1)) join(run[at], run[at - static_cast<std::size_t>(boundaries_)]);
+          run[at] = now;
+          ++length;
+          if (down || (sides_above & 1)) {
+            const std::int32_t other = run[at - static_cast<std::size_t>(boundaries_)];
+            if (other != joined_above) join(now, other);
+            joined_above = other;
+          }
         }
-        on = (joined_sides(below[b]) & 8) || (sides_above & 2);
+        on = (kJoinedSides[below[b]] & 8) || (sides_above & 2);
         down = sides_above & 4;
       }
+      end_run();
     }
   }
 
   /// Each line's place in the output, whose vectors get their sizes. Returns how many vertices are in small
   /// pieces.
-  std::size_t number_what_is_kept(Surface& out) {
-    std::size_t small = 0;
-    std::uint32_t vertices = 0;
-    std::uint32_t triangles = 0;
-    scratch_.vertices_before.clear();
-    scratch_.triangles_before.clear();
-    for (int line = 0; line < lines_; ++line) {
-      scratch_.vertices_before.push_back(vertices);
-      scratch_.triangles_before.push_back(triangles);
-      for (int b = 0; b < boundaries_; ++b) {
-        std::int32_t& index = scratch_.index[cell(line, b)];
-        if (index < 0) continue;
-        if (scratch_.size[static_cast<std::size_t>(root(index))] < options_.least_component) {
-          ++small;
-          index = -1;
-          continue;
-        }
-        index = static_cast<std::int32_t>(vertices++);
-      }
-      // A cell's triangles go with its corners, whose component is one; above, they are numbered already.
-      const std::uint8_t* bits = cells(line);
-      for (int b = 0; b < boundaries_; ++b) {
-        if (!(bits[b] & (cell::kFirst | cell::kSecond))) continue;
-        triangles +=
-            cell_is_kept(line, b) ? ((bits[b] & cell::kFirst) != 0) + ((bits[b] & cell::kSecond) != 0) : 0;
-      }
+  std::size_t count_what_is_kept(Surface& out) {
+    const std::size_t runs = scratch_.parent.size();
+    scratch_.kept.resize(runs);
+    for (std::size_t r = 0; r < runs; ++r) {
+      scratch_.kept[r] = scratch_.size[static_cast<std::size_t>(root(static_cast<std::int32_t>(r)))] >=
+                         options_.least_component;
     }
-    out.positions.resize(vertices);
-    out.normals.resize(vertices);
-    out.grid.resize(vertices);
-    out.triangles.resize(triangles);
+    auto& vertices = scratch_.vertices_before;
+    auto& triangles = scratch_.triangles_before;
+    vertices.resize(static_cast<std::size_t>(lines_) + 1);
+    triangles.resize(static_cast<std::size_t>(lines_) + 1);
+    for (auto& worker : scratch_.workers) worker.small = 0;
+    for_lines([&](int begin, int end, SurfaceScratch::Worker& worker) {
+      for (int line = begin; line < end; ++line) {
+        std::uint32_t kept = 0;
+        std::uint32_t made = 0;
+        const std::uint8_t* bits = cells(line);
+        for (int b = 0; b < boundaries_; ++b) {
+          std::int32_t& run = scratch_.index[cell(line, b)];
+          if (run < 0) continue;
+          if (scratch_.kept[static_cast<std::size_t>(run)] != 0) {
+            ++kept;
+          } else {
+            ++worker.small;
+            run = -1;
+          }
+        }
+        for (int b = 0; b < boundaries_; ++b) {
+          if (!(bits[b] & (cell::kFirst | cell::kSecond))) continue;
+          made +=
+              cell_is_kept(line, b) ? ((bits[b] & cell::kFirst) != 0) + ((bits[b] & cell::kSecond) != 0) : 0;
+        }
+        vertices[static_cast<std::size_t>(line)] = kept;
+        triangles[static_cast<std::size_t>(line)] = made;
+      }
+    });
+    std::size_t small = 0;
+    for (const auto& worker : scratch_.workers) small += worker.small;
+    for (auto* counts : {&vertices, &triangles}) {
+      std::uint32_t before = 0;
+      for (std::uint32_t& count : *counts) before += std::exchange(count, before);
+    }
+    out.positions.resize(vertices.back());
+    out.normals.resize(vertices.back());
+    out.grid.resize(vertices.back());
+    out.triangles.resize(triangles.back());
     return small;
   }
 
+  void number(int line) {
+    auto next = static_cast<std::int32_t>(scratch_.vertices_before[static_cast<std::size_t>(line)]);
+    for (int b = 0; b < boundaries_; ++b) {
+      std::int32_t& index = scratch_.index[cell(line, b)];
+      if (index >= 0) index = next++;
+    }
+  }
+
   /// Of a cell with triangles: whether they are in no small piece. All of them have the upper corner of the
-  /// diagonal, which is numbered before corners 1 and 2.
+  /// diagonal.
   bool cell_is_kept(int line, int b) const {
     const bool turned =
         scratch_.cells[static_cast<std::size_t>(line) * stride_ + static_cast<std::size_t>(b)] &
@@ -257,7 +311,7 @@ class Grid {
     std::size_t to = scratch_.vertices_before[static_cast<std::size_t>(line)];
     for (std::size_t b = 0; b < stride; ++b) {
       if (scratch_.index[cell(line, 0) + b] < 0) continue;
-      const GridVertex& v = vertices_[static_cast<std::size_t>(scratch_.vertex[cell(line, 0) + b])];
+      const GridVertex& v = vertices_[static_cast<std::size_t>(places_[cell(line, 0) + b])];
       out.positions[to] = v.position;
       out.grid[to] = v.at;
       out.normals[to] = {normals[b], normals[stride + b], normals[2 * stride + b]};
@@ -284,6 +338,7 @@ class Grid {
   const std::size_t stride_;
   const SurfaceOptions& options_;
   SurfaceScratch& scratch_;
+  const std::int32_t* places_ = nullptr;  // [line][boundary]: of vertices_, or -1
 };
 
 }  // namespace

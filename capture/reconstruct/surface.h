@@ -37,6 +37,9 @@ struct SurfaceOptions {
   const GridLinks* links = nullptr;
   // Shares the lines; null: the caller's thread does them all.
   WorkerPool* pool = nullptr;
+  // The better vertex of each grid place, [line][boundary], -1 where there is none, where the caller has
+  // found them already; it has counted the duplicates then. Null: they are found, and counted, here.
+  const std::vector<std::int32_t>* places = nullptr;
   // The grid is [line][whole column_px] instead of [line][boundary], and `boundaries` its width.
   bool by_pixel = false;
 };
@@ -55,6 +58,7 @@ struct SurfaceScratch {
     std::vector<float> normals;       // of two rows of cells
     std::vector<std::uint8_t> links;  // of one, padded
     CellCounts counts;
+    std::size_t small = 0;  // vertices in small pieces
   };
   std::vector<std::int32_t> vertex;  // [line][boundary]: in the list, or -1
   std::vector<float> planes;         // [line][x, y, z, x / z, y / z][boundary, padded]
@@ -63,6 +67,7 @@ struct SurfaceScratch {
   std::vector<std::int32_t> index;   // [line][boundary]: in the output, or -1; before that, its run
   std::vector<std::int32_t> parent;  // union-find over runs: vertices that hang together on a line
   std::vector<std::int32_t> size;    // of a root's component
+  std::vector<std::uint8_t> kept;    // of a run: its component is large enough
   std::vector<std::uint32_t> vertices_before, triangles_before;  // of each line, in the output
   std::vector<Worker> workers;
 };

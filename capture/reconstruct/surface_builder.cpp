@@ -20,17 +20,20 @@ SurfaceBuilder::SurfaceBuilder(const Rig& rig, int boundaries, int lines, int li
       options_(options),
       depth_slope_(rig) {}
 
-void SurfaceBuilder::fill_columns(const std::vector<GridVertex>& vertices) {
+std::size_t SurfaceBuilder::fill_columns(const std::vector<GridVertex>& vertices) {
+  std::size_t duplicates = 0;
   columns_.reset(boundaries_, lines_);
   vertex_.assign(static_cast<std::size_t>(boundaries_) * static_cast<std::size_t>(lines_), -1);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const GridPoint& at = vertices[i].at;
     std::int32_t& slot =
         vertex_[static_cast<std::size_t>(at.line) * static_cast<std::size_t>(boundaries_) + at.boundary];
+    duplicates += slot >= 0;
     if (slot >= 0 && !better(vertices[i], vertices[static_cast<std::size_t>(slot)])) continue;
     slot = static_cast<std::int32_t>(i);
     columns_.line(at.line)[at.boundary] = at.column_px;
   }
+  return duplicates;
 }
 
 /// The median of every fourth, which is as good; 0 where it is not known.
@@ -60,12 +63,14 @@ void SurfaceBuilder::finish(WorkerPool& pool, Surface& out) const {
 
 void SurfaceBuilder::build(std::vector<GridVertex>& vertices, const Triangulator& triangulator,
                            WorkerPool& pool, Surface& out, FilterCounts& counts) {
-  fill_columns(vertices);
+  const std::size_t duplicates = fill_columns(vertices);
   const ColumnScale scale{line_step_px_, usual_sigma_px(vertices)};
   fill_holes(options_.fill_holes, scale, columns_, holes_);
   for (const Hole& hole : holes_) {
     const auto position = triangulator.point(hole.boundary, hole.line, hole.column_px);
     if (!position) continue;
+    vertex_[static_cast<std::size_t>(hole.line) * static_cast<std::size_t>(boundaries_) + hole.boundary] =
+        static_cast<std::int32_t>(vertices.size());
     vertices.push_back({{hole.boundary, hole.line, hole.column_px, 0, true}, *position, 0});
     ++counts.filled;
   }
@@ -80,7 +85,9 @@ void SurfaceBuilder::build(std::vector<GridVertex>& vertices, const Triangulator
                          {.least_component = kLeastDenseComponent, .pool = &pool, .by_pixel = true}, scratch_,
                          out);
   } else {
-    made = build_surface(vertices, boundaries_, lines_, {.links = &links_, .pool = &pool}, scratch_, out);
+    made = build_surface(vertices, boundaries_, lines_, {.links = &links_, .pool = &pool, .places = &vertex_},
+                         scratch_, out);
+    made.duplicate = duplicates;
   }
   counts.duplicate += made.duplicate;
   counts.step += made.step;

@@ -37,7 +37,7 @@ class SurfaceBuilder {
              Surface& out, FilterCounts& counts);
 
  private:
-  void fill_columns(const std::vector<GridVertex>& vertices);
+  std::size_t fill_columns(const std::vector<GridVertex>& vertices);
   float usual_sigma_px(const std::vector<GridVertex>& vertices);
   void finish(WorkerPool& pool, Surface& out) const;
 

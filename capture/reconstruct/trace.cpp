@@ -236,7 +236,22 @@ void Tracer::trace_boundary(const DifferenceImage& image, int boundary, const Se
   for (int line = lines_ - 1; line >= 0; --line) visit(line);
 }
 
-void Tracer::insert(SequenceResult& result, EdgeImage& edges) {
+/// A line's edges and those added to it, from left to right.
+void Tracer::merge_line(int line, const SequenceResult& result, const EdgeImage& edges) {
+  const auto at = static_cast<std::size_t>(line);
+  std::uint32_t from = edges.line_start[at];
+  const std::uint32_t last = edges.line_start[at + 1];
+  std::size_t added = merged_.line_start[at] - from;  // on the lines above
+  for (std::uint32_t to = merged_.line_start[at]; to < merged_.line_start[at + 1]; ++to) {
+    const bool take_added = added < added_.size() && added_[added].line == line &&
+                            (from == last || added_[added].edge.column_px < edges.edges[from].column_px);
+    merged_.edges[to] = take_added ? added_[added].edge : edges.edges[from];
+    merged_boundary_[to] = take_added ? added_[added].boundary : result.boundary[from];
+    take_added ? void(++added) : void(++from);
+  }
+}
+
+void Tracer::insert(WorkerPool& pool, SequenceResult& result, EdgeImage& edges) {
   added_.clear();
   for (const Scratch& s : scratch_) added_.insert(added_.end(), s.added.begin(), s.added.end());
   if (added_.empty()) return;
@@ -246,26 +261,17 @@ void Tracer::insert(SequenceResult& result, EdgeImage& edges) {
                                                   : a.boundary < b.boundary;
   });
   merged_.lines = edges.lines;
-  merged_.edges.clear();
-  merged_.line_start.assign(1, 0);
-  merged_boundary_.clear();
-  auto next = added_.begin();
-  for (int line = 0; line < edges.lines; ++line) {
-    const auto take_added = [&] {
-      merged_.edges.push_back(next->edge);
-      merged_boundary_.push_back(next->boundary);
-      ++next;
-    };
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      while (next != added_.end() && next->line == line && next->edge.column_px < edges.edges[e].column_px)
-        take_added();
-      merged_.edges.push_back(edges.edges[e]);
-      merged_boundary_.push_back(result.boundary[e]);
-    }
-    while (next != added_.end() && next->line == line) take_added();
-    merged_.line_start.push_back(static_cast<std::uint32_t>(merged_.edges.size()));
-  }
+  merged_.line_start.assign(edges.line_start.size(), 0);
+  for (const Added& a : added_) ++merged_.line_start[static_cast<std::size_t>(a.line) + 1];
+  for (std::size_t line = 1; line < merged_.line_start.size(); ++line)
+    merged_.line_start[line] += merged_.line_start[line - 1];
+  for (std::size_t line = 0; line < merged_.line_start.size(); ++line)
+    merged_.line_start[line] += edges.line_start[line];
+  merged_.edges.resize(merged_.line_start.back());
+  merged_boundary_.resize(merged_.line_start.back());
+  pool.for_shares(merged_.line_start, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) merge_line(line, result, edges);
+  });
   std::swap(merged_, edges);
   std::swap(merged_boundary_, result.boundary);
 }
@@ -277,16 +283,18 @@ std::size_t Tracer::trace(const DifferenceImage& image, const SequenceDecoder& s
   lines_ = edges.lines;
   const std::size_t cells = static_cast<std::size_t>(boundaries_) * static_cast<std::size_t>(lines_);
   column_.assign(cells, kNone);
-  for (int line = 0; line < lines_; ++line) {
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      if (result.boundary[e] < 0) continue;
-      const std::size_t cell =
-          static_cast<std::size_t>(result.boundary[e]) * static_cast<std::size_t>(lines_) +
-          static_cast<std::size_t>(line);
-      column_[cell] = edges.edges[e].column_px;
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) {
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        if (result.boundary[e] < 0) continue;
+        const std::size_t cell =
+            static_cast<std::size_t>(result.boundary[e]) * static_cast<std::size_t>(lines_) +
+            static_cast<std::size_t>(line);
+        column_[cell] = edges.edges[e].column_px;
+      }
     }
-  }
+  });
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   for (Scratch& s : scratch_) {
     s.added.clear();
@@ -295,7 +303,7 @@ std::size_t Tracer::trace(const DifferenceImage& image, const SequenceDecoder& s
     for (int b = begin; b < end; ++b)
       trace_boundary(image, b, sequence, context, scratch_[static_cast<std::size_t>(worker)]);
   });
-  insert(result, edges);
+  insert(pool, result, edges);
   return added_.size();
 }
 

@@ -39,7 +39,8 @@ class Tracer {
   };
   void trace_boundary(const DifferenceImage& image, int boundary, const SequenceDecoder& sequence,
                       const SequenceContext& context, Scratch& scratch) const;
-  void insert(SequenceResult& result, EdgeImage& edges);
+  void merge_line(int line, const SequenceResult& result, const EdgeImage& edges);
+  void insert(WorkerPool& pool, SequenceResult& result, EdgeImage& edges);
   float spacing(int line, int boundary, int side) const;
 
   int boundaries_ = 0;
