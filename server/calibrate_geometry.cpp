@@ -30,7 +30,7 @@ struct Options {
   std::string pattern;
   Size projector;
   std::string source;
-  ProjectorFlags projector;
+  ProjectorFlags live_projector;
   int live_views = 8;
   std::string out;
   std::string update;
@@ -160,7 +160,7 @@ Status run(const Options& options, StopSignal& stop) {
                                          .views = options.live_views,
                                          .threads = options.threads,
                                          .colour_matrix = code.colour_matrix,
-                                         .projector = options.projector.choice()},
+                                         .projector = options.live_projector.choice()},
                                         *board, stop);
     if (!taken) return taken.error();
     if (stop.stopped()) return {};
@@ -234,7 +234,7 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       ->needs(source)
       ->capture_default_str();
   projector->excludes(source);
-  add_live_projector_options(app, *source, o->projector);
+  add_live_projector_options(app, *source, o->live_projector);
   auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
   auto* update =
       app.add_option("--update", o->update,
