@@ -15,5 +15,7 @@ Command pattern_command();
 Command plan_command();
 Command project_command();
 Command calibrate_command();
+Command devices_command();
+Command capture_command();
 
 }  // namespace relievo

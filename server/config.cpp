@@ -7,7 +7,11 @@
 #include <limits>
 #include <sstream>
 #include <string_view>
+#include <utility>
 #include <vector>
+
+#include "server/camera_flags.h"
+#include "server/size_option.h"
 
 namespace relievo {
 namespace {
@@ -66,6 +70,58 @@ class Reader {
            "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most));
     return std::nullopt;
   }
+  void rate(std::string_view key, double& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value<double>();  // a whole number too
+    if (!value || !(*value >= kLeastRate && *value <= kMostRate))
+      return refuse(*node, key, "must be a number of pictures a second from 0.1 to 1000");
+    out = *value;
+  }
+  void size(std::string_view key, int& width, int& height) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    const auto size = value ? parse_size(*value) : std::nullopt;
+    if (!size) return refuse(*node, key, "must be a size such as \"640x480\", in quotes");
+    width = size->width;
+    height = size->height;
+  }
+  /// A table of names and values, each a number, text in quotes, true or false.
+  void controls(std::string_view key, std::vector<CameraControl>& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const toml::table* table = node->as_table();
+    if (table == nullptr) return refuse(*node, key, "must be a table of controls");
+    // In the order of the lines, since one control may have to be set before another.
+    std::vector<std::pair<toml::source_position, CameraControl>> ordered;
+    for (const auto& [name, value] : *table) {
+      std::string text;
+      if (const auto number = value.value_exact<std::int64_t>())
+        text = std::to_string(*number);
+      else if (const auto flag = value.value_exact<bool>())
+        text = *flag ? "1" : "0";
+      else if (const auto quoted = value.value_exact<std::string>())
+        text = *quoted;
+      else
+        return refuse(value, name.str(), "must be a whole number, true, false, or text in quotes");
+      ordered.push_back({name.source().begin, {std::string(name.str()), text}});
+    }
+    std::stable_sort(ordered.begin(), ordered.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (auto& [at, control] : ordered) out.push_back(std::move(control));
+  }
+  /// What `read` makes of a table within this one.
+  template <typename Read>
+  void table(std::string_view key, const Read& read) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    if (node->as_table() == nullptr)
+      return refuse(*node, key, "must be a table: write [" + std::string(key) + "]");
+    Reader inner(file_, *node->as_table());
+    read(inner);
+    if (const Status done = inner.finish(); !done && !error_) error_ = done.error();
+  }
   void integer(std::string_view key, std::int64_t least, std::int64_t most, int& out) {
     if (const auto value = integer(key, least, most)) out = static_cast<int>(*value);
   }
@@ -94,6 +150,22 @@ class Reader {
   std::vector<std::string_view> known_;  // string literals
   std::optional<Error> error_;
 };
+
+void read_camera(Reader& reader, CameraOptions& camera) {
+  reader.text("rig", camera.rig);
+  reader.text("pattern", camera.pattern);
+  reader.text("input", camera.input);
+  reader.text("standard", camera.standard);
+  reader.text("format", camera.format);
+  reader.size("size", camera.width, camera.height);
+  reader.rate("rate", camera.rate);
+  reader.text("field", camera.field);
+  reader.text("field_order", camera.field_order);
+  reader.flag("odd_pairs", camera.odd_pairs);
+  reader.flag("dmabuf", camera.dmabuf);
+  reader.integer("buffers", kLeastBuffers, kMostBuffers, camera.buffers);
+  reader.controls("controls", camera.controls);
+}
 
 }  // namespace
 
@@ -129,6 +201,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.integer("jpeg_quality", 1, 100, config.jpeg_quality);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
+  reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
   return reader.finish();
 }
 

@@ -9,13 +9,15 @@
 
 #include "base/result.h"
 #include "capture/reconstruct/reconstructor.h"
+#include "capture/source/camera_options.h"
 
 namespace relievo {
 
 struct ServeConfig {
   std::string source = "sim:face";
-  std::string scheme;  // of a simulated source; empty: as the source says
-  std::string stream;  // empty: named after the source
+  std::string scheme;    // of a simulated source; empty: as the source says
+  CameraOptions camera;  // of a camera, in the table [camera]
+  std::string stream;    // empty: named after the source
   int domain = 0;
   std::string interface;               // empty: Cyclone DDS chooses
   std::string web = "127.0.0.1:8080";  // "none": no gateway

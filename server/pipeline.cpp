@@ -149,7 +149,7 @@ class ThreadedPipeline final : public Pipeline {
         if (errors_in_a_row > 0 && last_error.message != next.error().message)
           log_warning(last_error.message);
         last_error = next.error();
-        stats_.lost_in_capture(1);
+        if (!info.live) stats_.lost_in_capture(1);  // a camera counts its own
         set_state(StreamState::kStalled, last_error.message);
         if (++errors_in_a_row >= kMaxSourceErrors) return last_error;
         continue;
@@ -172,6 +172,7 @@ class ThreadedPipeline final : public Pipeline {
         }
       }
       stats_.captured();
+      stats_.lost_in_capture(frame.lost_before);
       ++delivered;
       push(to_reconstruct_, Captured{std::move(frame), capture_time_ns, delivered});
     }
@@ -189,11 +190,12 @@ class ThreadedPipeline final : public Pipeline {
         fail(result.error());
         continue;
       }
-      // The same slide twice tells of a frame that never came, unless it was dropped in the queue above or a
-      // take starts again.
+      // The same slide twice tells of a frame that never came, unless it was dropped in the queue above, the
+      // source has counted it, or a take starts again.
       const auto pass = source_.info().frames;
       const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
-      const bool consecutive = previous && item->ordinal == *previous + 1 && !starts_again;
+      const bool consecutive =
+          previous && item->ordinal == *previous + 1 && !starts_again && item->frame.lost_before == 0;
       if (reconstructor_.report().same_slide && consecutive) stats_.lost_in_capture(1);
       previous = item->ordinal;
       if (!*result) {

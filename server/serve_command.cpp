@@ -14,6 +14,7 @@
 #include "cli/listen_address.h"
 #include "idl/recorder.h"
 #include "idl/transport.h"
+#include "server/camera_flags.h"
 #include "server/commands.h"
 #include "server/config.h"
 #include "server/options.h"
@@ -41,6 +42,13 @@ void say_drops(const ServerStatus& s) {
            " published; dropped: " + std::to_string(s.drops_capture) + " in capture, " +
            std::to_string(s.drops_reconstruct) + " before reconstruction, " + std::to_string(s.drops_encode) +
            " before encoding, " + std::to_string(s.drops_publish) + " before publishing");
+}
+
+void say_camera(const SourceCounts& c) {
+  if (c.damaged_pictures + c.restarts + c.reconnects == 0) return;
+  log_info("camera: " + std::to_string(c.damaged_pictures) + " damaged pictures, " +
+           std::to_string(c.restarts) + " restarts of its driver, unplugged " + std::to_string(c.reconnects) +
+           " times");
 }
 
 /// The server's own recorder: a reader of the stream like any other.
@@ -111,7 +119,9 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   }
   const auto name = with_scheme(config.source, config.scheme);
   if (!name) return name.error();
-  auto source = open_source(*name, {.loop = config.loop || config.source.starts_with("sim:")});
+  if (const Status known = check_rig(config.source, config.camera); !known) return known;
+  auto source =
+      open_source(*name, {.loop = config.loop || config.source.starts_with("sim:"), .camera = config.camera});
   if (!source) return source.error();
   info.source = *name;
   info.started_ns = utc_now_ns();
@@ -157,6 +167,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   stop.clear_on_stop();
   if (gateway) gateway->withdraw(info.stream);
   say_drops((*pipeline)->status());
+  say_camera((*source)->counts());
   const Status recorded = recording.finish((*pipeline)->status().frames_published);
   if (!done || !recorded || stop.stopped()) return done ? recorded : done;
   if ((*pipeline)->status().frames_published == 0) {
@@ -181,6 +192,7 @@ struct Flags {
   std::optional<int> domain, threads, jpeg_quality, draco_speed, fill_holes;
   std::optional<std::uint64_t> frames;
   bool loop = false, fast = false, dense = false;
+  CameraOptions camera;
 };
 
 Status run(const Flags& flags, StopSignal& stop) {
@@ -207,6 +219,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   if (flags.frames) config.frames = flags.frames;
   config.loop = config.loop || flags.loop;
   config.fast = config.fast || flags.fast;
+  config.camera = merged(std::move(config.camera), flags.camera);
   return serve(config, stop);
 }
 
@@ -217,8 +230,10 @@ Command serve_command() {
       "serve", "Capture, reconstruct and stream", [](CLI::App& app) {
         auto f = std::make_shared<Flags>();
         app.add_option("--config", f->config, "TOML file with these settings; flags win")->type_name("FILE");
-        app.add_option("--source", f->source,
-                       "sim:SCENE[,KEY=VALUE...] (simulate --help lists them) or take:DIR (default sim:face)")
+        app.add_option(
+               "--source", f->source,
+               "sim:SCENE[,KEY=VALUE...] (simulate --help lists them), take:DIR or v4l2:DEVICE (default "
+               "sim:face)")
             ->type_name("SOURCE");
         add_scheme_option(app, f->scheme);
         app.add_option("--stream", f->stream, "Stream name (default: the source's)")
@@ -256,11 +271,14 @@ Command serve_command() {
             ->check(CLI::Range(0, 9));
         app.add_flag("--loop", f->loop, "Start a take again at its end");
         app.add_flag("--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");
+        add_rig_flags(app, f->camera);
+        add_camera_flags(app, f->camera);
         app.footer(
             "Examples:\n"
             "  relievo-server serve                                        the simulated face\n"
             "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for every machine around\n"
-            "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n\n" +
+            "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n"
+            "  relievo-server serve --source v4l2:/dev/video0 --rig rig.yaml --control gain=20\n\n" +
             std::string(scheme_help()));
         return [f](StopSignal& stop) { return run(*f, stop); };
       }};

@@ -7,9 +7,8 @@
 #include <optional>
 
 namespace relievo {
-namespace {
 
-std::optional<Size> size_of(const std::string& text) {
+std::optional<Size> parse_size(const std::string& text) {
   const std::size_t by = text.find_first_of("xX");
   if (by == std::string::npos) return std::nullopt;
   const auto number = [&](std::size_t begin, std::size_t end, int& out) {
@@ -22,15 +21,13 @@ std::optional<Size> size_of(const std::string& text) {
   return size;
 }
 
-}  // namespace
-
 CLI::Option* add_size_option(CLI::App& app, const std::string& names, Size& size, const std::string& help) {
   return app
       .add_option_function<std::string>(
-          names, [&size](const std::string& text) { size = size_of(text).value_or(Size{}); }, help)
+          names, [&size](const std::string& text) { size = parse_size(text).value_or(Size{}); }, help)
       ->type_name("WxH")
       ->check([](const std::string& text) {
-        return size_of(text) ? std::string() : text + " is no size such as 1024x768";
+        return parse_size(text) ? std::string() : text + " is no size such as 1024x768";
       });
 }
 

@@ -12,6 +12,7 @@
 #include "base/pattern.h"
 #include "base/result.h"
 #include "base/rig.h"
+#include "capture/source/camera_options.h"
 
 namespace relievo {
 
@@ -25,6 +26,7 @@ struct CapturedFrame {
   FieldOrder field_order = FieldOrder::kTop;
   Image8 picture;     // RGB: the interlaced picture, or the progressive one under the slide
   Image8 complement;  // progressive only: the picture under the complement, or what the scheme has for it
+  std::uint64_t lost_before = 0;  // frames that the source knows it lost between the one before and this one
 
   /// The exposure under the slide: every second row of an interlaced picture, or the whole first picture.
   View8 slide_field() const { return scan == Scan::kInterlaced ? field(0) : picture.view(); }
@@ -45,6 +47,14 @@ struct SourceInfo {
   std::optional<std::uint64_t> frames;  // how many there are in one pass, where the source is finite
 };
 
+/// What went wrong in a camera since it was opened; 0 of other sources.
+struct SourceCounts {
+  std::uint64_t lost_frames = 0;       // by the driver's sequence numbers, damaged ones among them
+  std::uint64_t damaged_pictures = 0;  // that the driver or the decompressor says are not whole
+  std::uint64_t restarts = 0;          // of streaming, after the driver gave up
+  std::uint64_t reconnects = 0;        // after the camera was unplugged
+};
+
 /// Lives on one thread at a time: construct, next() until it ends, destroy. Only request_stop() may be called
 /// from another thread. A source does not pace itself unless it is live; whoever plays it does, by
 /// CapturedFrame::time_ns.
@@ -61,14 +71,18 @@ class FieldSource {
 
   /// Makes a waiting next() return soon, and every later one return nothing. Any thread.
   virtual void request_stop() = 0;
+
+  /// Of the frames so far. The same thread as next().
+  virtual SourceCounts counts() const { return {}; }
 };
 
 struct SourceOptions {
-  bool loop = false;  // start again at the end, times and numbers going on
+  bool loop = false;     // start again at the end, times and numbers going on; a camera has no end
+  CameraOptions camera;  // of "v4l2:DEVICE"
 };
 
-/// Opens "sim:SCENE" or "take:DIR". The error says what is wrong with the name or the source and how to mend
-/// it.
+/// Opens "sim:SCENE", "take:DIR" or "v4l2:DEVICE". The error says what is wrong with the name or the source
+/// and how to mend it.
 Result<std::unique_ptr<FieldSource>> open_source(const std::string& uri, const SourceOptions& options);
 
 }  // namespace relievo

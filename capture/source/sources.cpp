@@ -7,6 +7,7 @@
 #include "capture/source/field_source.h"
 #include "capture/source/sim/sim_source.h"
 #include "capture/source/take_source.h"
+#include "capture/source/v4l2/camera_source.h"
 
 namespace relievo {
 namespace {
@@ -22,6 +23,7 @@ constexpr SourceKind kSources[] = {
     {"sim:sheet", "sim:sheet", open_sheet},
     {"sim:", "sim:SCENE", open_sim},
     {"take:", "take:DIR", open_take},
+    {"v4l2:", "v4l2:DEVICE", v4l2::open_camera},
 };
 
 }  // namespace

@@ -61,9 +61,9 @@ Status write_frame(const fs::path& take, std::uint64_t number, const CapturedFra
   return truth.empty() ? Status{} : write_npy(take_truth(take, number), truth);
 }
 
-}  // namespace
-
-Status write_take(const fs::path& take, SimSource& source, const TakeOptions& options) {
+/// `truth()`: of the frame that the source gave last.
+Status write(const fs::path& take, FieldSource& source, const std::function<const ImageF&()>& truth,
+             const TakeOptions& options) {
   std::error_code code;
   const fs::path target = fs::absolute(take, code).lexically_normal();
   const fs::path whole = target.has_filename() ? target : target.parent_path();  // "take/"
@@ -81,16 +81,18 @@ Status write_take(const fs::path& take, SimSource& source, const TakeOptions& op
   std::string stamps = "frame,time_s\n";
   std::uint64_t written = 0;
   bool with_truth = false;
+  std::int64_t first_ns = 0;
   while (options.frames == 0 || written < options.frames) {
     if (options.stop && *options.stop) return Error{"stopped: nothing was written to " + take.string()};
     Result<std::optional<CapturedFrame>> frame = source.next();
     if (!frame) return frame.error();
     if (!*frame) break;
-    if (Status s = write_frame(partial.path(), written, **frame, source.truth()); !s) return s;
-    with_truth = with_truth || !source.truth().empty();
+    if (written == 0 && source.info().live) first_ns = (*frame)->time_ns;
+    if (Status s = write_frame(partial.path(), written, **frame, truth()); !s) return s;
+    with_truth = with_truth || !truth().empty();
     char line[64];
     std::snprintf(line, sizeof line, "%llu,%.9f\n", static_cast<unsigned long long>(written),
-                  static_cast<double>((*frame)->time_ns) * 1e-9);
+                  static_cast<double>((*frame)->time_ns - first_ns) * 1e-9);
     stamps += line;
     ++written;
     if (options.progress) options.progress(written);
@@ -106,6 +108,19 @@ Status write_take(const fs::path& take, SimSource& source, const TakeOptions& op
     if (Status s = write_text(partial.path() / name, text); !s) return s;
   }
   return partial.rename_to(whole);
+}
+
+}  // namespace
+
+Status write_take(const fs::path& take, FieldSource& source, const TakeOptions& options) {
+  const ImageF none;
+  return write(
+      take, source, [&]() -> const ImageF& { return none; }, options);
+}
+
+Status write_take(const fs::path& take, SimSource& source, const TakeOptions& options) {
+  return write(
+      take, source, [&]() -> const ImageF& { return source.truth(); }, options);
 }
 
 }  // namespace relievo

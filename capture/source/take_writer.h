@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <functional>
 
+#include "base/image.h"
 #include "base/result.h"
+#include "capture/source/field_source.h"
 #include "capture/source/sim/sim_source.h"
 
 namespace relievo {
@@ -18,9 +20,12 @@ struct TakeOptions {
   const std::atomic<bool>* stop = nullptr;  // once true, nothing is left behind and an error returned
 };
 
-/// Writes the frames of `source`, and their truth where it has any, into the new folder `take`. The folder
+/// Writes the frames of `source` into the new folder `take`, times from its first frame on. The folder
 /// appears when it is complete: until then a sibling ".NAME.partial-PID" holds it, which is removed on every
 /// failure. A folder that is there already and is not empty is refused.
+Status write_take(const std::filesystem::path& take, FieldSource& source, const TakeOptions& options);
+
+/// The same, with the truth where the source has any.
 Status write_take(const std::filesystem::path& take, SimSource& source, const TakeOptions& options);
 
 }  // namespace relievo

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <deque>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "base/log.h"
+#include "capture/source/field_source.h"
+#include "capture/source/take_writer.h"
+#include "cli/checks.h"
+#include "cli/progress.h"
+#include "server/camera_flags.h"
+#include "server/commands.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{4} << 30;
+constexpr int kMostErrors = 30;  // in a row
+
+struct Options {
+  std::string source;
+  std::string out;
+  std::uint64_t frames = 0;
+  CameraOptions camera;
+  bool json = false;
+};
+
+/// Frames that are in memory already: writing them takes longer than a camera waits.
+class Captured final : public FieldSource {
+ public:
+  explicit Captured(SourceInfo info) : info_(std::move(info)) {}
+
+  /// False where memory for it is short.
+  bool keep(CapturedFrame&& frame) {
+    bytes_ += frame.picture.size() + frame.complement.size();
+    frames_.push_back(std::move(frame));
+    return bytes_ <= kMostBytes;
+  }
+  std::size_t size() const { return frames_.size(); }
+
+  const SourceInfo& info() const override { return info_; }
+  Result<std::optional<CapturedFrame>> next() override {
+    if (frames_.empty()) return std::optional<CapturedFrame>{};
+    std::optional<CapturedFrame> frame(std::move(frames_.front()));
+    frames_.pop_front();
+    return frame;
+  }
+  void request_stop() override { frames_.clear(); }
+
+ private:
+  const SourceInfo info_;
+  std::deque<CapturedFrame> frames_;
+  std::size_t bytes_ = 0;
+};
+
+/// Until there are as many as wanted, the source ends or it is stopped.
+Status fill(FieldSource& source, const Options& options, Captured& captured) {
+  Progress progress("capture", "frames", options.frames);
+  for (int errors = 0; captured.size() < options.frames;) {
+    auto frame = source.next();
+    if (!frame) {
+      if (++errors == kMostErrors) return frame.error();
+      log_warning(frame.error().message);
+      continue;
+    }
+    if (!*frame) break;
+    errors = 0;
+    if (!captured.keep(*std::move(*frame))) {
+      log_warning("stopped after " + std::to_string(captured.size()) + " frames, which fill 4 GiB of memory");
+      break;
+    }
+    progress.update(captured.size());
+  }
+  progress.finish();
+  return {};
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  if (const Status known = check_rig(options.source, options.camera); !known) return known;
+  auto source = open_source(options.source, {.camera = options.camera});
+  if (!source) return source.error();
+  Captured captured((*source)->info());
+  stop.on_stop([&] { (*source)->request_stop(); });
+  const Status filled = fill(**source, options, captured);
+  stop.clear_on_stop();
+  if (!filled) return filled;
+  const SourceCounts counts = (*source)->counts();
+  source->reset();  // the camera is free while the take is written
+  const std::size_t frames = captured.size();
+  if (frames == 0 && stop.stopped()) return {};
+  if (const Status written = write_take(options.out, captured, {}); !written) return written;
+  if (options.json) {
+    const nlohmann::json json = {{"take", options.out},
+                                 {"frames", frames},
+                                 {"lost_frames", counts.lost_frames},
+                                 {"damaged_pictures", counts.damaged_pictures},
+                                 {"restarts", counts.restarts},
+                                 {"reconnects", counts.reconnects}};
+    std::printf("%s\n", json.dump(2).c_str());
+  } else {
+    std::printf("%zu frames in %s; lost %llu, damaged pictures %llu\n", frames, options.out.c_str(),
+                static_cast<unsigned long long>(counts.lost_frames),
+                static_cast<unsigned long long>(counts.damaged_pictures));
+  }
+  return {};
+}
+
+}  // namespace
+
+Command capture_command() {
+  return {"capture", "Keep what a camera sees as a take", [](CLI::App& app) {
+            auto options = std::make_shared<Options>();
+            app.add_option("--source", options->source, "v4l2:DEVICE, or any other source")
+                ->type_name("SOURCE")
+                ->required();
+            app.add_option("--frames", options->frames, "Frames to keep, in memory until all are there")
+                ->check(whole_number(1, 1'000'000))
+                ->required();
+            app.add_option("--out", options->out, "Take folder to make")->type_name("TAKE")->required();
+            app.add_flag("--json", options->json, "Print the result as JSON");
+            add_rig_flags(app, options->camera);
+            add_camera_flags(app, options->camera);
+            app.footer(
+                "Example:\n"
+                "  relievo-server capture --source v4l2:/dev/video0 --rig rig.yaml --frames 300 --out TAKE");
+            return [options](StopSignal& stop) { return run(*options, stop); };
+          }};
+}
+
+}  // namespace relievo
