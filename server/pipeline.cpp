@@ -13,6 +13,7 @@
 #include "base/log.h"
 #include "base/time.h"
 #include "server/stats.h"
+#include "server/step_watch.h"
 #include "server/working_volume.h"
 
 namespace relievo {
@@ -26,6 +27,8 @@ constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that del
 constexpr double kSilentFrames = 10;  // times a frame's without one: the source has stalled
 constexpr std::int64_t kSilentAtLeast_ns = kNanosecondsPerSecond;
 constexpr std::uint64_t kFramesForASurface = 30;  // far more than any schedule needs
+constexpr std::uint64_t kMixedForASurface =
+    300;  // frames under two slides each: ten seconds of a drifting rig
 
 struct Captured {
   CapturedFrame frame;
@@ -81,7 +84,7 @@ class ThreadedPipeline final : public Pipeline {
     s.drops_publish = to_publish_.drops();
     std::lock_guard lock(mutex_);
     s.state = state_;
-    s.message = message_;
+    s.message = message_.empty() ? step_message_ : message_;
     if (state_ == StreamState::kRunning && asked_ns_ && steady_now_ns() - *asked_ns_ > silence_ns()) {
       s.state = StreamState::kStalled;
       s.message = "The source gives no frames.";
@@ -183,6 +186,7 @@ class ThreadedPipeline final : public Pipeline {
     std::optional<std::uint64_t> previous;
     std::uint64_t without_surface = 0;  // frames, before the first surface
     bool any_surface = false;
+    StepWatch steps(source_.info().rig.frame_rate);
     while (auto item = to_reconstruct_.pop()) {
       const std::int64_t begin = steady_now_ns();
       auto result = reconstructor_.add(item->frame);
@@ -194,6 +198,17 @@ class ThreadedPipeline final : public Pipeline {
       // source has counted it, or a take starts again.
       const auto pass = source_.info().frames;
       const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
+      steps.add(item->frame.time_ns, reconstructor_.report().step);
+      say_step(steps.message());
+      if (reconstructor_.report().step.mixed) {
+        stats_.lost_in_capture(1);
+        // A projector that drifts comes round; a source that can be played again is given up in the end.
+        if (!any_surface && !source_.info().live &&
+            steps.mixed() == std::max(kMixedForASurface, 2 * pass.value_or(0)))
+          fail(Error{source_.info().name + " gave no surface in " + std::to_string(steps.mixed()) +
+                     " frames: " + steps.advice()});
+        continue;
+      }
       const bool consecutive =
           previous && item->ordinal == *previous + 1 && !starts_again && item->frame.lost_before == 0;
       if (reconstructor_.report().same_slide && consecutive) stats_.lost_in_capture(1);
@@ -269,6 +284,14 @@ class ThreadedPipeline final : public Pipeline {
     stop();
   }
 
+  /// Logged when it begins to be said.
+  void say_step(const std::string& message) {
+    std::lock_guard lock(mutex_);
+    if (message == step_message_) return;
+    if (step_message_.empty()) log_warning(message);
+    step_message_ = message;
+  }
+
   void set_state(StreamState state, const std::string& message) {
     std::lock_guard lock(mutex_);
     state_ = state;
@@ -290,6 +313,7 @@ class ThreadedPipeline final : public Pipeline {
   bool stopping_ = false;
   StreamState state_ = StreamState::kStarting;
   std::string message_;
+  std::string step_message_;              // of projector and camera
   std::optional<std::int64_t> asked_ns_;  // the source for a frame that has not come yet
   std::optional<Error> failure_;
 };

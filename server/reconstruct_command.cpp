@@ -16,6 +16,7 @@
 #include "server/commands.h"
 #include "server/options.h"
 #include "server/stats.h"
+#include "server/step_watch.h"
 
 namespace relievo {
 namespace {
@@ -51,12 +52,15 @@ void count(const ReconstructReport& report, double total_ms, Totals& totals) {
   totals.total_ms.add(total_ms);
 }
 
-void print(const Totals& t, const Options& options) {
+void print(const Totals& t, const StepWatch& steps, const Options& options) {
   const double per_frame =
       t.reconstructed > 0 ? static_cast<double>(t.vertices) / static_cast<double>(t.reconstructed) : 0;
   if (options.json) {
     nlohmann::json counts;
     for (const Filter& filter : kFilters) counts[std::string(filter.name)] = t.filters.*filter.count;
+    nlohmann::json step = {{"mixed", steps.mixed()}, {"regrouped", steps.regrouped()}};
+    if (steps.phase()) step["phase"] = *steps.phase();
+    if (const auto drift = steps.drift_per_second()) step["drift_fields_s"] = *drift;
     const nlohmann::json out = {{"frames", t.frames},
                                 {"scheme", to_string(t.scheme)},
                                 {"reconstructed", t.reconstructed},
@@ -64,6 +68,7 @@ void print(const Totals& t, const Options& options) {
                                 {"white", t.white},
                                 {"unreadable", t.unreadable},
                                 {"same_slide", t.same_slide},
+                                {"step", step},
                                 {"vertices_per_frame", per_frame},
                                 {"boundaries", t.boundaries},
                                 {"decoded", t.matched},
@@ -93,6 +98,10 @@ void print(const Totals& t, const Options& options) {
     std::printf("%llu frames showed the slide of the frame before: dropped frames in capture\n",
                 static_cast<unsigned long long>(t.same_slide));
   }
+  if (steps.mixed() > 0) {
+    std::printf("%llu frames dropped for mixed exposures: %s\n",
+                static_cast<unsigned long long>(steps.mixed()), steps.advice().c_str());
+  }
   if (t.reconstructed > 0) print_filters(t.filters, t.reconstructed);
 }
 
@@ -117,6 +126,7 @@ Status run(const Options& options, StopSignal& stop) {
   const bool made = fs::create_directories(options.out, failed);
   if (failed) return Error{"cannot make the folder " + options.out + ": " + failed.message()};
 
+  StepWatch steps((*source)->info().rig.frame_rate);
   Totals totals;
   totals.scheme = (*source)->info().pattern.scheme;
   Error last_error;
@@ -136,6 +146,7 @@ Status run(const Options& options, StopSignal& stop) {
     auto frame = reconstructor->add(**next);
     if (!frame) return frame.error();
     const double ms = milliseconds(steady_now_ns() - begin);
+    steps.add((*next)->time_ns, reconstructor->report().step);
     totals.same_slide += reconstructor->report().same_slide;
     totals.white += reconstructor->report().white;
     progress.update(totals.frames);
@@ -153,13 +164,14 @@ Status run(const Options& options, StopSignal& stop) {
   totals.textures = reconstructor->textures();
   progress.finish();
   if (made && totals.reconstructed == 0) fs::remove(options.out, failed);
-  print(totals, options);
+  print(totals, steps, options);
   if (totals.unreadable > 0) {
     return Error{std::to_string(totals.unreadable) + " of " + std::to_string(totals.frames) +
                  " frames could not be read (the last: " + last_error.message +
                  "); the others are reconstructed"};
   }
   if (totals.reconstructed == 0 && !stop.stopped()) {
+    if (steps.mixed() > 0) return Error{"no frame could be reconstructed: " + steps.advice()};
     return Error{
         "no frame could be reconstructed: the take needs two readable frames under different slides"};
   }

@@ -170,10 +170,10 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   say_camera((*source)->counts());
   const Status recorded = recording.finish((*pipeline)->status().frames_published);
   if (!done || !recorded || stop.stopped()) return done ? recorded : done;
-  if ((*pipeline)->status().frames_published == 0) {
+  if (const ServerStatus ended = (*pipeline)->status(); ended.frames_published == 0) {
     return Error{
-        config.source +
-        " ended before a frame could be published: a surface needs two frames under different slides"};
+        config.source + " ended before a frame could be published: " +
+        (ended.message.empty() ? "a surface needs two frames under different slides" : ended.message)};
   }
   return {};
 }

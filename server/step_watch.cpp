@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/step_watch.h"
+
+#include <algorithm>
+
+namespace relievo {
+namespace {
+
+constexpr std::size_t kLately = 150;    // frames: seconds
+constexpr std::uint64_t kMany = 10;     // % of them: worth a word
+constexpr std::uint64_t kFew = 2;       // % of them: all is well again
+constexpr std::uint64_t kLeast = 15;    // frames before anything is said
+constexpr std::uint64_t kRenewed = 30;  // frames, after which what is said is brought up to date
+
+}  // namespace
+
+StepWatch::StepWatch(double frame_rate) : frame_rate_(frame_rate), lately_(kLately) {}
+
+void StepWatch::add(std::int64_t time_ns, const StepReport& step) {
+  if (step.phase) {
+    phase_ = step.phase;
+    if (step.mixed) mixed_phase_ = step.phase;
+    drift_.add(time_ns, *step.phase);
+  }
+  std::uint8_t& slot = lately_[frames_++ % kLately];
+  mixed_lately_ -= slot;
+  slot = step.mixed ? 1 : 0;
+  mixed_lately_ += slot;
+  mixed_ += slot;
+  regrouped_ += step.regrouped ? 1 : 0;
+  const std::uint64_t seen = std::min<std::uint64_t>(frames_, kLately);
+  const std::uint64_t share = 100 * mixed_lately_ / seen;
+  if (seen >= kLeast && share >= kMany && (message_.empty() || frames_ % kRenewed == 0))
+    message_ = std::to_string(share) + " % of frames are dropped for mixed exposures: " + advice();
+  if (share < kFew) message_.clear();
+}
+
+std::string StepWatch::advice() const {
+  return mixed_phase_ ? step_advice(*mixed_phase_, drift_.per_second(), frame_rate_) : "";
+}
+
+}  // namespace relievo

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// A rig out of step: what is dropped is counted, and a person is told why and what to do.
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "capture/source/field_source.h"
+#include "server/pipeline.h"
+#include "server/step_watch.h"
+#include "tests/unit/server/fakes.h"
+
+namespace relievo {
+namespace {
+
+using namespace test;
+
+constexpr double kRate = 29.97;
+
+StepReport at(float phase, bool mixed) {
+  return {.phase = phase, .mixed = mixed};
+}
+
+TEST(StepWatch, SpeaksOnceManyAreDroppedAndNoMoreWhenFewAre) {
+  StepWatch watch(kRate);
+  std::int64_t frame = 0;
+  const auto add = [&](int count, float phase, bool mixed) {
+    for (int i = 0; i < count; ++i) watch.add(frame++ * 33'366'700, at(phase, mixed));
+  };
+  add(100, 0, false);
+  EXPECT_EQ(watch.message(), "");
+  EXPECT_EQ(watch.advice(), "");
+  add(8, 0.3F, true);
+  EXPECT_EQ(watch.message(), "");
+  add(20, 0.3F, true);
+  EXPECT_NE(watch.message().find("% of frames are dropped for mixed exposures: "), std::string::npos);
+  EXPECT_EQ(watch.mixed(), 28U);
+  add(200, 0, false);
+  EXPECT_EQ(watch.message(), "");
+  EXPECT_NE(watch.advice(), "");
+  EXPECT_EQ(watch.mixed(), 28U);
+}
+
+struct Served {
+  Status done;
+  ServerStatus status;
+};
+
+Served serve(const std::string& more, bool loop = false) {
+  auto source = open_source("sim:plane,width=192,height=144,stripes=30" + more, {.loop = loop});
+  EXPECT_TRUE(source) << source.error().message;
+  CollectingSink sink;
+  PipelineOptions options;
+  options.stream = "test";
+  options.paced = false;
+  options.lossless = true;
+  auto pipeline = Pipeline::create(**source, {&sink}, options);
+  EXPECT_TRUE(pipeline) << pipeline.error().message;
+  Served out{(*pipeline)->run(), {}};
+  out.status = sink.statuses().back();
+  return out;
+}
+
+TEST(ServedOutOfStep, DriftIsCountedAndSaid) {
+  const Served served = serve(",frames=90,phase=0.1,drift=2");
+  ASSERT_TRUE(served.done) << served.done.error().message;
+  EXPECT_EQ(served.status.frames_captured, 90U);
+  EXPECT_GT(served.status.frames_published, 20U);
+  EXPECT_GT(served.status.drops_capture, 30U);
+  EXPECT_LE(served.status.frames_published + served.status.drops_capture, 90U);
+  EXPECT_NE(served.status.message.find("they drift by 2.0"), std::string::npos) << served.status.message;
+}
+
+TEST(ServedOutOfStep, InStepNothingIsSaid) {
+  const Served served = serve(",frames=40");
+  ASSERT_TRUE(served.done) << served.done.error().message;
+  EXPECT_EQ(served.status.drops_capture, 0U);
+  EXPECT_EQ(served.status.message, "");
+}
+
+TEST(ServedOutOfStep, ALoopOfMixedExposuresAloneEndsWithAdvice) {
+  const Served served = serve(",period=12,phase=0.5", true);
+  ASSERT_FALSE(served.done);
+  EXPECT_NE(served.done.error().message.find("exposures "), std::string::npos) << served.done.error().message;
+}
+
+}  // namespace
+}  // namespace relievo
