@@ -4,15 +4,18 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "base/frame3d.h"
+#include "base/pattern.h"
 #include "base/result.h"
+#include "base/rig.h"
 #include "base/stream.h"
 
 namespace relievo {
 
-enum class GeometryCodec : std::uint8_t { kDracoMesh = 1 };
+enum class GeometryCodec : std::uint8_t { kDracoMesh = 1, kGrid = 2, kDracoGrid = 3 };
 enum class TextureCodec : std::uint8_t { kNone = 0, kJpeg = 1 };
 
 /// Metres, camera frame: the box in which positions are quantised. Fixed for a stream, so that a surface does
@@ -32,11 +35,15 @@ struct EncodeOptions {
   TextureCodec texture = TextureCodec::kJpeg;
   int jpeg_quality = 80;  // 1..100
   bool quality = true;    // sigma and interpolation of each vertex, where the surface has them
+  int step_bits = 4;      // 0..8; grid: columns are whole steps of 2^-step_bits pixels
+  int slice_lines = 270;  // 8..16384; grid: lines that are coded together, and lost together
+  int key_interval = 1;   // 1..1000; grid: every so many frames decodes alone, those between build on it
 };
 
 /// What a frame says of itself; read without decoding it.
 struct FrameHeader {
   int version = 0;
+  bool is_key = false;  // decodes without any frame before it
   std::uint64_t number = 0;
   std::int64_t time_ns = 0;
   Volume volume;  // positions were quantised in it; size 0 where there are none
@@ -58,11 +65,11 @@ struct DecodeLimits {
   std::uint32_t texture_pixels = 64'000'000;
 };
 
-/// Fails on a surface outside the limits of the format (the defaults of DecodeLimits; finite numbers; indices
-/// within the vertices) or options out of range. An empty surface is a valid frame. Left out are vertices
-/// outside `volume`, triangles that use a vertex twice, and vertices of no triangle where there are
-/// triangles; texture coordinates are clamped to 0..1. The same frame and options give the same bytes. Any
-/// thread.
+/// Draco alone; see FrameEncoder for grids. Fails on a surface outside the limits of the format (the defaults
+/// of DecodeLimits; finite numbers; indices within the vertices) or options out of range. An empty surface is
+/// a valid frame. Left out are vertices outside `volume`, triangles that use a vertex twice, and vertices of
+/// no triangle where there are triangles; texture coordinates are clamped to 0..1. The same frame and options
+/// give the same bytes. Any thread.
 Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options);
 
 /// Checks the whole layout (sizes, version, no trailing bytes), not the payloads. Any input.
@@ -72,8 +79,57 @@ Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes);
 /// false for what is no frame of a known version. Any input.
 bool is_key_frame(std::span<const std::uint8_t> bytes);
 
-/// Any thread. Any input: hostile bytes give an error, never a crash, a hang or an allocation beyond the
-/// limits. Vertex order is the codec's; `grid` is empty for Draco.
+/// The encoder of one stream: knows its calibration and its last key frame. One thread but where said.
+class FrameEncoder {
+ public:
+  FrameEncoder(const Rig& rig, const Pattern& pattern);
+  FrameEncoder(FrameEncoder&&) noexcept;
+  FrameEncoder& operator=(FrameEncoder&&) noexcept;
+  ~FrameEncoder();
+
+  /// As encode_frame(). A surface that does not lie on the grid of stripes and lines (the dense option's,
+  /// say) is sent as a Draco mesh, whatever the options say.
+  Result<Bytes> encode(const Frame3D& frame, const EncodeOptions& options);
+
+  /// The next frame will be a key frame. Any thread.
+  void request_key_frame();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The decoder of one stream: keeps its last key frame and what its calibration costs to work out. One
+/// thread.
+class FrameDecoder {
+ public:
+  FrameDecoder();
+  FrameDecoder(FrameDecoder&&) noexcept;
+  FrameDecoder& operator=(FrameDecoder&&) noexcept;
+  ~FrameDecoder();
+
+  /// Any input: hostile bytes give an error, never a crash, a hang or an allocation beyond the limits. Vertex
+  /// order is the codec's; `grid` is empty for Draco.
+  Result<Frame3D> decode(std::span<const std::uint8_t> bytes, const DecodeLimits& limits = {});
+
+  /// The same into the memory of a frame that nobody needs any more. Where it fails, `out` holds nothing of
+  /// meaning.
+  Status decode(std::span<const std::uint8_t> bytes, Frame3D& out, const DecodeLimits& limits = {});
+
+  /// Takes in a frame that others may build on and nobody needs to see. Does nothing for one that none builds
+  /// on.
+  Status remember(std::span<const std::uint8_t> bytes, const DecodeLimits& limits = {});
+
+  /// False for a frame that builds on one which was not decoded here, or which is no frame at all.
+  bool can_decode(std::span<const std::uint8_t> bytes) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// A key frame by itself. Slower than a FrameDecoder where the calibration has lens distortion. Any thread,
+/// any input.
 Result<Frame3D> decode_frame(std::span<const std::uint8_t> bytes, const DecodeLimits& limits = {});
 
 }  // namespace relievo

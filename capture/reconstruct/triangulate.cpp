@@ -12,82 +12,7 @@ constexpr int kRayStep = 8;        // columns between ray samples: linear betwee
 constexpr int kSheetSamples = 65;  // over the projector's height and a quarter beyond
 constexpr int kSheetRounds = 4;    // of point -> row -> sheet; each gains about two digits
 
-struct Distorted {
-  double x, y;            // distorted normalised coordinates
-  double xx, xy, yx, yy;  // their derivatives by the undistorted ones
-};
-
-Distorted distort_normalised(const std::array<double, 5>& k, double x, double y) {
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
-  const double slope = k[0] + r2 * (2 * k[1] + r2 * 3 * k[4]);  // d radial / d r2
-  Distorted d{};
-  d.x = x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x);
-  d.y = y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y;
-  d.xx = radial + 2 * x * x * slope + 2 * k[2] * y + 6 * k[3] * x;
-  d.xy = 2 * x * y * slope + 2 * k[2] * x + 2 * k[3] * y;
-  d.yx = d.xy;
-  d.yy = radial + 2 * y * y * slope + 6 * k[2] * y + 2 * k[3] * x;
-  return d;
-}
-
-/// Whether a lens images (x, y): the model does not fold over on the way there from the centre. Beyond a fold
-/// the polynomial may rise again, to places Newton's method finds as readily as the right one.
-bool imaged(const std::array<double, 5>& k, double x, double y) {
-  constexpr int kSteps = 8;
-  for (int i = 1; i <= kSteps; ++i) {
-    const Distorted d = distort_normalised(k, x * i / kSteps, y * i / kSteps);
-    if (!(d.xx * d.yy - d.xy * d.yx > 1e-3)) return false;
-  }
-  return true;
-}
-
-bool has_distortion(const PinholeModel& model) {
-  return std::any_of(model.distortion.begin(), model.distortion.end(), [](double k) { return k != 0; });
-}
-
-/// x/z at which the sheet through projector column `target` (normalised) crosses height y/z = y.
-double sheet_x(const std::array<double, 5>& k, double target, double y) {
-  double x = target;
-  for (int i = 0; i < 20; ++i) {
-    const Distorted d = distort_normalised(k, x, y);
-    if (!(d.xx > 0.05)) return std::numeric_limits<double>::quiet_NaN();  // the model has folded over
-    const double step = (d.x - target) / d.xx;
-    x -= step;
-    if (std::fabs(step) < 1e-12) break;
-  }
-  return imaged(k, x, y) ? x : std::numeric_limits<double>::quiet_NaN();
-}
-
 }  // namespace
-
-std::array<double, 2> distort(const PinholeModel& model, double x, double y) {
-  const Distorted d = distort_normalised(model.distortion, x, y);
-  return {model.fx() * d.x + model.matrix[1] * d.y + model.cx(), model.fy() * d.y + model.cy()};
-}
-
-std::optional<std::array<double, 2>> undistort(const PinholeModel& model, double column_px, double row_px) {
-  const double ty = (row_px - model.cy()) / model.fy();
-  const double tx = (column_px - model.cx() - model.matrix[1] * ty) / model.fx();
-  double x = tx;
-  double y = ty;
-  for (int i = 0; i < 30; ++i) {
-    const Distorted d = distort_normalised(model.distortion, x, y);
-    const double det = d.xx * d.yy - d.xy * d.yx;
-    if (!(det > 1e-3)) return std::nullopt;
-    const double ex = d.x - tx;
-    const double ey = d.y - ty;
-    const double sx = (d.yy * ex - d.xy * ey) / det;
-    const double sy = (d.xx * ey - d.yx * ex) / det;
-    x -= sx;
-    y -= sy;
-    if (std::fabs(sx) + std::fabs(sy) < 1e-12) {
-      if (!imaged(model.distortion, x, y)) return std::nullopt;
-      return std::array{x, y};
-    }
-  }
-  return std::nullopt;
-}
 
 Triangulator::Triangulator(const Rig& rig, const Pattern& pattern, int lines, int line_step_px)
     : rotation_(rig.projector_from_camera_rotation), translation_(rig.projector_from_camera_translation) {
@@ -103,7 +28,7 @@ Triangulator::Triangulator(const Rig& rig, const Pattern& pattern, int lines, in
   }
 
   const PinholeModel& projector = rig.projector;
-  straight_sheets_ = !has_distortion(projector) && projector.matrix[1] == 0;
+  straight_sheets_ = !distorts(projector) && projector.matrix[1] == 0;
   sheet_samples_ = straight_sheets_ ? 1 : kSheetSamples;
   const double top = (0 - projector.cy()) / projector.fy();
   const double bottom = (projector.height - 1 - projector.cy()) / projector.fy();
@@ -116,7 +41,7 @@ Triangulator::Triangulator(const Rig& rig, const Pattern& pattern, int lines, in
     for (int s = 0; s < sheet_samples_; ++s) {
       const double y = sheet_first_ + s * sheet_step_;
       sheets_.push_back(
-          static_cast<float>(straight_sheets_ ? target : sheet_x(projector.distortion, target, y)));
+          static_cast<float>(straight_sheets_ ? target : sheet_at(projector.distortion, target, y)));
     }
   }
 }

@@ -7,18 +7,11 @@
 #include <vector>
 
 #include "base/frame3d.h"
+#include "base/lens.h"
 #include "base/pattern.h"
 #include "base/rig.h"
 
 namespace relievo {
-
-/// Normalised image coordinates (x/z, y/z) of a distorted pixel, by Newton's method on the Brown-Conrady
-/// model. Nothing where the model has no inverse near the pixel (it folds over far outside what was
-/// calibrated).
-std::optional<std::array<double, 2>> undistort(const PinholeModel& model, double column_px, double row_px);
-
-/// Distorted pixel of normalised image coordinates.
-std::array<double, 2> distort(const PinholeModel& model, double x, double y);
 
 /// Precomputed for one rig, pattern and line spacing; immutable, so any number of threads may share it.
 class Triangulator {

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decodes frames off the main thread, one after the other.
 import wasmUrl from 'draco3d/draco_decoder.wasm?url';
-import { DracoDecoder } from './draco';
-import { kTextureJpeg, parseFrame, type Frame } from './frame';
+import { DracoDecoder, type Geometry } from './draco';
+import { kGeometryGrid, kTextureJpeg, parseFrame, type Frame } from './frame';
+import { GridFrames } from './grid';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
-import { decodeVertexQuality } from './quality';
+import { decodeVertexQuality, type VertexQuality } from './quality';
 import { robustExtent, triangleEdges, vertexNormals } from './surface';
 
 const post = (reply: DecodeReply, transfer: Transferable[] = []): void => {
   self.postMessage(reply, { transfer });
 };
 
+const grids = new GridFrames();
 const decoder = load();
 let queue: Promise<void> = decoder.then(
   () => post({ type: 'ready' }),
@@ -45,7 +47,7 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
   const frame = parseFrame(new Uint8Array(request.bytes, request.offset));
   const picture = decodeTexture(frame); // the browser decodes it meanwhile, on a thread of its own
   picture.catch(() => undefined); // awaited below, unless the geometry fails first
-  const geometry = draco.decode(frame);
+  const geometry = decodeGeometry(draco, frame, request.want.quality);
   const { positions } = geometry;
   const normals =
     geometry.normals ?? (request.want.normals ? vertexNormals(positions, geometry.triangles) : null);
@@ -58,14 +60,19 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     normals,
     triangles: geometry.triangles,
     edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
-    quality:
-      request.want.quality && frame.quality.length > 0 && geometry.coordinates !== null
-        ? decodeVertexQuality(frame.quality, geometry.coordinates)
-        : null,
+    quality: geometry.quality,
     texture: await picture,
     extent: robustExtent(positions),
     decodeMs: performance.now() - start,
   };
+}
+
+/** Of a grid the quality is there with the positions; of Draco it is decoded where it is wanted. */
+function decodeGeometry(draco: DracoDecoder, frame: Frame, wantQuality: boolean): Geometry & { quality: VertexQuality | null } {
+  if (frame.geometryCodec === kGeometryGrid) return { normals: null, ...grids.decode(frame) };
+  const geometry = draco.decode(frame);
+  const told = wantQuality && frame.quality.length > 0 && geometry.coordinates !== null;
+  return { ...geometry, quality: told ? decodeVertexQuality(frame.quality, geometry.coordinates!) : null };
 }
 
 async function decodeTexture(frame: Frame): Promise<ImageBitmap | null> {

@@ -15,6 +15,7 @@ export interface FrameHeader {
 
 export interface Frame {
   header: FrameHeader;
+  isKey: boolean; // decodes without any frame before it
   geometryCodec: number;
   geometry: Uint8Array; // views into the bytes given
   textureCodec: number; // 0: none
@@ -23,6 +24,8 @@ export interface Frame {
 }
 
 export const kGeometryDraco = 1;
+export const kGeometryGrid = 2;
+const kGeometryDracoGrid = 3;
 export const kTextureJpeg = 1;
 const kQualityCodec = 1;
 
@@ -41,7 +44,7 @@ export function parseFrame(bytes: Uint8Array): Frame {
   const version = view.getUint8(4);
   if (version !== 1) throw new Error(`frame is of format version ${version}, this viewer knows version 1`);
   const flags = view.getUint8(5);
-  if (flags !== 1) throw new Error(`frame has flags that this viewer does not know (${flags})`);
+  if (flags > 1) throw new Error(`frame has flags that this viewer does not know (${flags})`);
   const headerBytes = view.getUint16(6, true);
   if (headerBytes > bytes.length) throw new Error(`frame is cut short: ${bytes.length} bytes`);
   const header: FrameHeader = {
@@ -58,11 +61,14 @@ export function parseFrame(bytes: Uint8Array): Frame {
   const volumeOk = [...header.volumeMin, header.volumeSize].every(Number.isFinite) && header.volumeSize >= 0;
   if (!volumeOk) throw new Error('frame has a volume that is not finite');
   const sections = readSections(bytes, view, headerBytes);
-  checkCounts(header, sections.geometry.length, sections.texture.length);
-  return { header, ...sections };
+  if (flags === 0 && sections.geometryCodec !== kGeometryGrid) {
+    throw new Error('frame has flags that this viewer does not know (0)');
+  }
+  checkCounts(header, sections.geometryCodec, sections.geometry.length, sections.texture.length);
+  return { header, isKey: flags === 1, ...sections };
 }
 
-function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): Omit<Frame, 'header'> {
+function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): Omit<Frame, 'header' | 'isKey'> {
   const count = view.getUint8(56);
   const entryBytes = view.getUint8(57);
   const tableAt = view.getUint16(58, true);
@@ -109,14 +115,23 @@ function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): O
 }
 
 /** FORMAT.md, "Sizes": what a frame may ask for is bounded by the bytes it brings. */
-function checkCounts(header: FrameHeader, geometryBytes: number, textureBytes: number): void {
+function checkCounts(
+  header: FrameHeader,
+  geometryCodec: number,
+  geometryBytes: number,
+  textureBytes: number,
+): void {
   const { vertices, triangles } = header;
   const pixels = header.textureWidth * header.textureHeight;
   if (vertices > kLimits.vertices) throw new Error(`frame has ${vertices} vertices, more than the limit`);
   if (triangles > kLimits.triangles) throw new Error(`frame has ${triangles} triangles, more than the limit`);
   if (pixels > kLimits.pixels) throw new Error(`frame has ${pixels} texture pixels, more than the limit`);
   const items = triangles > 0 ? triangles : vertices;
-  if ((vertices === 0) !== (geometryBytes === 0) || vertices > 3 * items || items > 8 * geometryBytes) {
+  const isGrid = geometryCodec === kGeometryGrid || geometryCodec === kGeometryDracoGrid;
+  const tooMany = isGrid
+    ? triangles > 2 * vertices || vertices > 256 * geometryBytes
+    : vertices > 3 * items || items > 8 * geometryBytes;
+  if ((vertices === 0) !== (geometryBytes === 0) || tooMany) {
     throw new Error(`frame declares ${vertices} vertices and ${triangles} triangles in ${geometryBytes} bytes`);
   }
   if ((pixels === 0) !== (textureBytes === 0) || pixels > 256 * textureBytes) {

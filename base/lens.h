@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pixels and rays of a lens: the Brown-Conrady model of PinholeModel and its inverse. Pure; any thread.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "base/rig.h"
+
+namespace relievo {
+
+/// Normalised image coordinates (x/z, y/z) of a distorted pixel, by Newton's method on the Brown-Conrady
+/// model. Nothing where the model has no inverse near the pixel (it folds over far outside what was
+/// calibrated).
+std::optional<std::array<double, 2>> undistort(const PinholeModel& model, double column_px, double row_px);
+
+/// Distorted pixel of normalised image coordinates.
+std::array<double, 2> distort(const PinholeModel& model, double x, double y);
+
+/// x/z at which the light sheet through the distorted, normalised projector column `column` crosses height
+/// y/z = y. NaN where the model folds over on the way there.
+double sheet_at(const std::array<double, 5>& distortion, double column, double y);
+
+bool distorts(const PinholeModel& model);
+
+}  // namespace relievo

@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "codec/byte_io.h"
+#include "codec/grid_coder.h"
+#include "codec/grid_fit.h"
+#include "codec/grid_head.h"
+#include "codec/grid_symbols.h"
+
+namespace relievo {
+namespace {
+
+using namespace grid;
+
+template <std::size_t Tables, std::size_t Symbols>
+using Counts = std::array<std::array<std::uint32_t, Symbols>, Tables>;
+
+void put_varint(Bytes& out, std::size_t value) {
+  for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
+  out.push_back(static_cast<std::uint8_t>(value));
+}
+
+}  // namespace
+
+/// A band of lines on its way to bytes: first its symbols and how often each comes, then, with the tables
+/// that all slices share, its streams.
+struct GridEncoder::Slice {
+  int begin = 0, end = 0;
+  rans::Rows control, residuals, sigmas;
+  rans::BitWriter raw;
+  std::uint32_t vertices = 0, triangles = 0;
+  Counts<kControlTables, kCellSymbols> control_counts;
+  Counts<kResidualTables, rans::kMostSymbols> residual_counts;
+  Counts<kSigmaTables, rans::kMostSymbols> sigma_counts;
+  std::vector<std::uint8_t> there[2], key_there, good[2], sizes, contexts;
+  std::vector<std::int32_t> expected, absent;
+  Bytes bytes;
+
+  struct Input {
+    StripeGrid& grid;
+    const StripeGrid* key;
+    const GridModel& model;
+    std::span<const std::uint8_t> tolerance;
+  };
+
+  void start(int first, int last, const StripeGrid& grid);
+  void read(const Input& in);
+  void write(std::span<const rans::EncoderTable> control_tables,
+             std::span<const rans::EncoderTable> residual_tables,
+             std::span<const rans::EncoderTable> sigma_tables);
+
+ private:
+  void put(int table, int symbol) {
+    control.table.push_back(static_cast<std::uint8_t>(table));
+    control.symbol.push_back(static_cast<std::uint8_t>(symbol));
+    ++control_counts[static_cast<std::size_t>(table)][static_cast<std::size_t>(symbol)];
+  }
+  void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
+  void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
+  void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
+  void read_marks(const Input& in, int line, const std::uint8_t* here);
+  void read_columns(const Input& in, int line);
+  void read_sigmas(const Input& in, int line);
+  const std::int32_t* row(const StripeGrid& grid, int line) const {
+    return line < begin ? absent.data() + StripeGrid::kMargin : grid.columns.data() + grid.at(line, 0);
+  }
+};
+
+void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
+  begin = first;
+  end = last;
+  for (rans::Rows* rows : {&control, &residuals, &sigmas}) rows->clear();
+  control.starts.push_back(0);
+  vertices = triangles = 0;
+  for (auto& counts : control_counts) counts.fill(0);
+  for (auto& counts : residual_counts) counts.fill(0);
+  for (auto& counts : sigma_counts) counts.fill(0);
+  const auto size = static_cast<std::size_t>(grid.stride());
+  for (auto* buffer : {&there[0], &there[1], &key_there}) buffer->assign(size, 0);
+  for (auto& buffer : good) buffer.assign(size, 1);
+  sizes.assign(size, kFirstSize);
+  contexts.assign(size, 0);
+  expected.assign(size, 0);
+  absent.assign(size, StripeGrid::kAbsent);
+  const std::size_t most = static_cast<std::size_t>(end - begin) * size;
+  residuals.symbol.reserve(most);
+  residuals.table.reserve(most);
+}
+
+void GridEncoder::Slice::fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const {
+  const std::int32_t* from = grid.columns.data() + grid.at(line, 0);
+  for (int b = 0; b < grid.boundaries; ++b)
+    out[static_cast<std::size_t>(b + StripeGrid::kMargin)] = from[b] != StripeGrid::kAbsent;
+}
+
+void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8_t* above,
+                                     const std::uint8_t* here) {
+  const std::uint8_t* key = nullptr;
+  if (in.key != nullptr) {
+    fill_there(*in.key, line, key_there);
+    key = key_there.data() + StripeGrid::kMargin;
+  }
+  const int boundaries = in.grid.boundaries;
+  for (int b = 0; b < boundaries; b += 8) {
+    const int last = std::min(b + 8, boundaries);
+    const int uniform = last - b == 8 ? uniform_places(here, above, key, b) : -1;
+    if (uniform >= 0) {
+      const bool all = load8(here + b) == static_cast<std::uint64_t>(uniform) * kOnes;
+      put(kBlockTable + uniform, all ? 0 : 1);
+      if (all) continue;
+    }
+    for (int i = b; i < last; ++i) put(place_context(here, above, key, i), here[i]);
+  }
+}
+
+/// Below `line`.
+void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_t* above,
+                                    const std::uint8_t* below) {
+  const std::uint8_t* cells = in.grid.cells.data() + in.grid.at(line, 0);
+  const std::uint8_t* good_above = good[0].data() + StripeGrid::kMargin;
+  std::uint8_t* good_here = good[1].data() + StripeGrid::kMargin;
+  good_here[-1] = 1;
+  const int count = in.grid.boundaries - 1;
+  for (int b = 0; b < count; b += 8) {
+    const int last = std::min(b + 8, count);
+    if (last - b == 8 && good_here[b - 1] != 0 && load8(good_above + b) == kOnes &&
+        load8(above + b) == kOnes && load8(below + b) == kOnes && above[b + 8] != 0 && below[b + 8] != 0) {
+      int both = 0;
+      for (int i = b; i < last; ++i)
+        both += cells[i] == grid_cell::kStraight || cells[i] == grid_cell::kTurned;
+      put(kCellBlockTable, both == 8 ? 0 : 1);
+      if (both == 8) {
+        triangles += 16;
+        std::fill_n(good_here + b, 8, std::uint8_t{1});
+        continue;
+      }
+    }
+    for (int i = b; i < last; ++i) {
+      int lack = 0;
+      const int corners = corners_of(above, below, i, lack);
+      good_here[i] = 0;
+      if (corners < 3) continue;
+      int symbol = 1;
+      if (corners == 3) {
+        symbol = cells[i] != 0 ? 0 : 1;
+      } else if (cells[i] == grid_cell::kStraight || cells[i] == grid_cell::kTurned) {
+        symbol = 0;
+      } else if (cells[i] != 0) {
+        symbol = 2 + std::countr_zero(cells[i]);
+      }
+      triangles += symbol == 1 ? 0U : symbol == 0 && corners == 4 ? 2U : 1U;
+      put(kCellTable + (corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i], symbol);
+      good_here[i] = symbol == 0;
+    }
+  }
+  std::swap(good[0], good[1]);
+}
+
+void GridEncoder::Slice::read_marks(const Input& in, int line, const std::uint8_t* here) {
+  const std::uint8_t* marks = in.grid.interpolated.data() + in.grid.at(line, 0);
+  const std::uint8_t* above = line > begin ? marks - in.grid.stride() : nullptr;
+  for (int b = 0; b < in.grid.boundaries; ++b)
+    if (here[b] != 0) put(kMarkTable + (above != nullptr ? above[b] << 1 : 0) + marks[b - 1], marks[b]);
+}
+
+void GridEncoder::Slice::read_columns(const Input& in, int line) {
+  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
+  std::int32_t* here = in.grid.columns.data() + in.grid.at(line, 0);
+  const std::uint8_t* tolerance = in.tolerance.empty() ? nullptr : in.tolerance.data() + in.grid.at(line, 0);
+  const GridRows rows{.up1 = row(in.grid, line - 1),
+                      .up2 = row(in.grid, line - 2),
+                      .up3 = row(in.grid, line - 3),
+                      .up4 = row(in.grid, line - 4),
+                      .key = in.key != nullptr ? in.key->columns.data() + in.key->at(line, 0) : nullptr,
+                      .key_up = in.key != nullptr ? row(*in.key, line - 1) : nullptr};
+  const int boundaries = in.grid.boundaries;
+  std::int32_t* predicted = expected.data() + StripeGrid::kMargin;
+  std::uint8_t* size = sizes.data() + StripeGrid::kMargin;
+  std::uint8_t* context = contexts.data() + StripeGrid::kMargin;
+  grid_kernels().predict(rows, in.model, boundaries, predicted);
+  grid_kernels().contexts(size, boundaries, context);
+  residuals.starts.push_back(static_cast<std::uint32_t>(residuals.symbol.size()));
+  Last last;
+  for (int b = 0; b < boundaries; ++b) {
+    if (here[b] == kAbsent) continue;
+    int table = context[b];
+    std::int32_t p = predicted[b];
+    if (rows.up1[b] == kAbsent) {
+      table = kAloneTable;
+      p = expected_alone(here, rows.up1, rows.key, b, last, in.model.spacing);
+    }
+    std::int32_t d = here[b] - p;
+    if (tolerance != nullptr && d <= tolerance[b] && d >= -static_cast<std::int32_t>(tolerance[b])) {
+      here[b] = p;
+      d = 0;
+    }
+    last = {here[b], b};
+    size[b] = static_cast<std::uint8_t>(std::min(d < 0 ? -d : d, kLargestSize));
+    const Symbol symbol = symbol_of(zigzag(d));
+    if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
+    residuals.table.push_back(static_cast<std::uint8_t>(table));
+    residuals.symbol.push_back(symbol.symbol);
+    ++residual_counts[static_cast<std::size_t>(table)][symbol.symbol];
+    ++vertices;
+  }
+}
+
+void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
+  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
+  const std::int32_t* here = row(in.grid, line);
+  const std::int32_t* above = row(in.grid, line - 1);
+  const std::int32_t* further = row(in.grid, line - 2);
+  const std::uint8_t* codes = in.grid.sigmas.data() + in.grid.at(line, 0);
+  const std::ptrdiff_t stride = in.grid.stride();
+  sigmas.starts.push_back(static_cast<std::uint32_t>(sigmas.symbol.size()));
+  int last = kFirstSigma;
+  for (int b = 0; b < in.grid.boundaries; ++b) {
+    if (here[b] == kAbsent) continue;
+    int table = kSigmaTables - 1;
+    int p = last;
+    if (above[b] != kAbsent) {
+      p = codes[b - stride];
+      table = further[b] != kAbsent ? std::min(std::abs(p - codes[b - 2 * stride]), kSigmaTables - 2) : 0;
+    }
+    last = codes[b];
+    const Symbol symbol = symbol_of(zigzag(codes[b] - p));
+    if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
+    sigmas.table.push_back(static_cast<std::uint8_t>(table));
+    sigmas.symbol.push_back(symbol.symbol);
+    ++sigma_counts[static_cast<std::size_t>(table)][symbol.symbol];
+  }
+}
+
+void GridEncoder::Slice::read(const Input& in) {
+  // there[0] is the line above; the place at [1] the line itself. Nothing is above a slice.
+  fill_there(in.grid, begin, there[1]);
+  read_places(in, begin, there[0].data() + StripeGrid::kMargin, there[1].data() + StripeGrid::kMargin);
+  for (int line = begin; line < end; ++line) {
+    std::swap(there[0], there[1]);
+    const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
+    std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
+    if (!in.grid.interpolated.empty()) read_marks(in, line, here);
+    if (line + 1 < in.grid.lines) {
+      // The first line of the slice below, too: where cells have corners.
+      fill_there(in.grid, line + 1, there[1]);
+      read_places(in, line + 1, here, below);
+      read_cells(in, line, here, below);
+    }
+    read_columns(in, line);
+    if (!in.grid.sigmas.empty()) read_sigmas(in, line);
+  }
+}
+
+void GridEncoder::Slice::write(std::span<const rans::EncoderTable> control_tables,
+                               std::span<const rans::EncoderTable> residual_tables,
+                               std::span<const rans::EncoderTable> sigma_tables) {
+  Bytes streams;
+  std::array<std::size_t, 3> ends{};
+  rans::encode(control, control_tables, 1, streams);
+  ends[0] = streams.size();
+  rans::encode(residuals, residual_tables, rans::kLanes, streams);
+  ends[1] = streams.size();
+  if (!sigma_tables.empty()) rans::encode(sigmas, sigma_tables, rans::kLanes, streams);
+  ends[2] = streams.size();
+  const Bytes rest = raw.finish();
+  bytes.clear();
+  put_varint(bytes, vertices);
+  put_varint(bytes, triangles);
+  put_varint(bytes, ends[0]);
+  put_varint(bytes, ends[1] - ends[0]);
+  put_varint(bytes, ends[2] - ends[1]);
+  bytes.insert(bytes.end(), streams.begin(), streams.end());
+  bytes.insert(bytes.end(), rest.begin(), rest.end());
+}
+
+GridEncoder::GridEncoder() = default;
+GridEncoder::~GridEncoder() = default;
+GridEncoder::GridEncoder(GridEncoder&&) noexcept = default;
+GridEncoder& GridEncoder::operator=(GridEncoder&&) noexcept = default;
+
+namespace {
+
+template <std::size_t Tables, std::size_t Symbols>
+void add(const Counts<Tables, Symbols>& from, Counts<Tables, Symbols>& to) {
+  for (std::size_t t = 0; t < Tables; ++t)
+    for (std::size_t s = 0; s < Symbols; ++s) to[t][s] += from[t][s];
+}
+
+template <std::size_t Tables, std::size_t Symbols>
+void make_tables(const Counts<Tables, Symbols>& counts, rans::BitWriter& bits,
+                 std::array<rans::EncoderTable, Tables>& tables) {
+  for (std::size_t t = 0; t < Tables; ++t) {
+    const rans::Levels levels = rans::levels_of(counts[t]);
+    rans::write_levels(levels, bits);
+    tables[t].set(levels);
+  }
+}
+
+}  // namespace
+
+Bytes GridEncoder::encode(StripeGrid& grid, const GridCalibration& calibration, const GridKey* key,
+                          std::span<const std::uint8_t> tolerance, float step_mm, const GridCoding& coding) {
+  GridHead head;
+  head.is_key = key == nullptr;
+  head.has_sigmas = !grid.sigmas.empty();
+  head.has_interpolated = !grid.interpolated.empty();
+  head.step_bits = grid.step_bits;
+  head.boundaries = grid.boundaries;
+  head.lines = grid.lines;
+  head.slice_lines = std::min(coding.slice_lines, grid.lines);
+  head.model = fit_model(grid, key != nullptr ? &key->grid : nullptr);
+  head.step_mm = step_mm;
+  head.key = key != nullptr ? key->id : 0;
+  head.calibration = calibration;
+  const int count = (grid.lines + head.slice_lines - 1) / head.slice_lines;
+  slices_.resize(static_cast<std::size_t>(count));
+
+  const auto for_slices = [&](const auto& work) {
+    const auto range = [&](int begin, int end, int) {
+      for (int s = begin; s < end; ++s) work(s, slices_[static_cast<std::size_t>(s)]);
+    };
+    if (coding.pool != nullptr && count > 1) {
+      coding.pool->for_ranges(count, range);
+    } else {
+      range(0, count, 0);
+    }
+  };
+  const Slice::Input in{grid, key != nullptr ? &key->grid : nullptr, head.model, tolerance};
+  for_slices([&](int s, Slice& slice) {
+    slice.start(s * head.slice_lines, std::min((s + 1) * head.slice_lines, grid.lines), grid);
+    slice.read(in);
+  });
+
+  Slice& total = slices_.front();
+  // Tables are of all slices; the first slice's counts become the sums.
+  grid.vertices = total.vertices;
+  grid.triangles = total.triangles;
+  for (std::size_t s = 1; s < slices_.size(); ++s) {
+    add(slices_[s].control_counts, total.control_counts);
+    add(slices_[s].residual_counts, total.residual_counts);
+    add(slices_[s].sigma_counts, total.sigma_counts);
+    grid.vertices += slices_[s].vertices;
+    grid.triangles += slices_[s].triangles;
+  }
+  rans::BitWriter bits;
+  std::array<rans::EncoderTable, kControlTables> control_tables;
+  for (std::size_t t = 0; t < kControlTables; ++t) {
+    const auto& counts = total.control_counts[t];
+    if (t >= kCellTable && t < kCellTable + kCellTables) {
+      const rans::Levels levels = rans::levels_of(counts);
+      rans::write_levels(levels, bits);
+      control_tables[t].set(levels);
+    } else {
+      const rans::BinaryLevel level = rans::binary_level_of(counts[0], counts[1]);
+      rans::write_level(level, bits);
+      control_tables[t].set(level);
+    }
+  }
+  std::array<rans::EncoderTable, kResidualTables> residual_tables;
+  make_tables(total.residual_counts, bits, residual_tables);
+  std::array<rans::EncoderTable, kSigmaTables> sigma_tables;
+  if (head.has_sigmas) make_tables(total.sigma_counts, bits, sigma_tables);
+
+  for_slices([&](int, Slice& slice) {
+    slice.write(control_tables, residual_tables,
+                head.has_sigmas ? std::span<const rans::EncoderTable>(sigma_tables)
+                                : std::span<const rans::EncoderTable>());
+  });
+  Bytes out;
+  write_grid_head(head, bits.finish(), out);
+  for (const Slice& slice : slices_) append(out, static_cast<std::uint32_t>(slice.bytes.size()));
+  for (const Slice& slice : slices_) append_bytes(out, slice.bytes);
+  return out;
+}
+
+}  // namespace relievo

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// From columns back to a surface: each camera ray is met with the light sheet of its boundary (paper 5.4), as
+// the reconstruction did. codec/FORMAT.md, "From the grid to a surface".
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "base/frame3d.h"
+#include "base/result.h"
+#include "codec/stripe_grid.h"
+
+namespace relievo {
+
+/// What can be worked out once for a calibration; lines and boundaries when they are first needed. One
+/// thread.
+class GridPoints {
+ public:
+  explicit GridPoints(const GridCalibration& calibration);
+
+  const GridCalibration& calibration() const { return calibration_; }
+
+  /// Fills positions, texture coordinates, grid, triangles and, where the grid has them, standard deviations
+  /// and marks of interpolation of `out`; its memory is reused. Vertices come by line, then boundary. Fails
+  /// where a ray meets no sheet in front of both camera and projector.
+  Status to_surface(const StripeGrid& grid, Surface& out);
+
+ private:
+  struct Line {  // of one line's vertices
+    std::vector<std::int32_t> boundary;
+    std::vector<float> column, ray_x, ray_y, numerator, a, denominator, z;
+  };
+  bool find_rays(int line, std::size_t count);
+  bool meet_curved_sheets(std::size_t count);
+  bool make_line(const StripeGrid& grid, int line, Surface& out, std::size_t first);
+
+  GridCalibration calibration_;
+  bool straight_rays_, straight_sheets_;
+  int ray_samples_;
+  std::vector<float> rays_x_, rays_y_;  // [line][every kRayStep columns], where the line is known
+  std::vector<std::uint8_t> line_known_;
+  std::vector<float> sheets_;  // [boundary][sample], where the boundary is known
+  std::vector<std::uint8_t> sheet_known_;
+  double sheet_first_ = 0, sheet_step_ = 0;
+  // Of straight sheets: z = numerator / (a x + b y + c).
+  std::vector<float> sheet_numerator_, sheet_a_, sheet_b_, sheet_c_;
+  Line line_;
+  std::vector<std::int32_t> index_[2];
+};
+
+}  // namespace relievo

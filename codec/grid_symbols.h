@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// What encoder and decoder of the stripe grid share: which alphabets there are, and how numbers become
+// symbols. codec/FORMAT.md, "Geometry codec 2", has the same in words.
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include "codec/grid_predict.h"
+#include "codec/rans.h"
+#include "codec/stripe_grid.h"
+
+namespace relievo::grid {
+
+// Alphabets of the control stream, by the numbers of their tables. All but the cells' have two symbols.
+constexpr int kPlaceTables = 32;             // by the places around: left, above, beside those, key
+constexpr int kBlockTable = kPlaceTables;    // eight places as those around, which are: none, there
+constexpr int kCellTable = kBlockTable + 2;  // by corners, and by the cells left and above
+constexpr int kCellTables = 8;
+constexpr int kCellBlockTable = kCellTable + kCellTables;  // eight whole cells
+constexpr int kMarkTable = kCellBlockTable + 1;            // interpolated, by the marks above and left
+constexpr int kControlTables = kMarkTable + 4;
+constexpr int kCellSymbols = 6;
+
+constexpr int kResidualTables = 8;  // by the sizes above; the last where nothing is above
+constexpr int kAloneTable = 7;
+constexpr std::uint8_t kFirstSize = 1;  // what is taken for the sizes above a slice
+constexpr std::int32_t kLargestSize = 60;
+
+constexpr int kSigmaTables = 5;
+constexpr int kFirstSigma = 32;  // code, before the first vertex of a slice
+
+// Residuals: zigzag, one symbol each up to kDirect, then by the number of bits, which follow in the slice's
+// raw bits.
+constexpr std::uint32_t kDirect = 48;
+constexpr std::uint32_t kFirstEscape = 8;
+
+inline std::uint32_t zigzag(std::int32_t d) {
+  return static_cast<std::uint32_t>(d) << 1 ^ static_cast<std::uint32_t>(d >> 31);
+}
+inline std::int32_t unzigzag(std::uint32_t z) {
+  return static_cast<std::int32_t>(z >> 1 ^ (~(z & 1U) + 1U));
+}
+
+/// Of a number below 2^26; the caller writes `count` low bits of `rest`.
+struct Symbol {
+  std::uint8_t symbol;
+  std::uint8_t count;
+  std::uint32_t rest;
+};
+inline Symbol symbol_of(std::uint32_t z) {
+  if (z < kDirect) return {static_cast<std::uint8_t>(z), 0, 0};
+  const std::uint32_t v = z - kDirect + kFirstEscape;
+  const int bits = std::bit_width(v) - 1;
+  return {static_cast<std::uint8_t>(kDirect + static_cast<std::uint32_t>(bits) - 3),
+          static_cast<std::uint8_t>(bits), v - (1U << bits)};
+}
+inline std::uint32_t number_of(std::uint8_t symbol, rans::BitReader& raw) {
+  if (symbol < kDirect) return symbol;
+  const int bits = symbol - static_cast<int>(kDirect) + 3;  // at most 26
+  return (1U << bits) + raw.get(bits) - kFirstEscape + kDirect;
+}
+
+/// Eight places or cells at once, a byte each.
+inline std::uint64_t load8(const std::uint8_t* from) {
+  std::uint64_t value;
+  std::memcpy(&value, from, sizeof value);
+  return value;
+}
+constexpr std::uint64_t kOnes = 0x0101010101010101U;
+
+/// Whether a block of eight places is likely to be all as those around it: which is what it is then, 0 or 1;
+/// -1: not.
+inline int uniform_places(const std::uint8_t* left, const std::uint8_t* above, const std::uint8_t* key,
+                          int b) {
+  const std::uint8_t v = left[b - 1];
+  const std::uint64_t all = v * kOnes;
+  const bool same = load8(above + b) == all && above[b - 1] == v && above[b + 8] == v &&
+                    (key == nullptr || load8(key + b) == all);
+  return same ? v : -1;
+}
+inline int place_context(const std::uint8_t* here, const std::uint8_t* above, const std::uint8_t* key,
+                         int b) {
+  return here[b - 1] | above[b] << 1 | above[b + 1] << 2 | above[b - 1] << 3 |
+         (key != nullptr ? key[b] << 4 : 0);
+}
+
+/// Where no vertex is above: from the key frame, the left or the right above, or else the last one coded.
+struct Last {
+  std::int32_t column = 0;
+  int boundary = 0;
+};
+inline std::int32_t expected_alone(const std::int32_t* here, const std::int32_t* above,
+                                   const std::int32_t* key, int b, const Last& last, std::int32_t spacing) {
+  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
+  if (key != nullptr && key[b] != kAbsent) return key[b];
+  if (here[b - 1] != kAbsent)
+    return here[b - 2] != kAbsent ? 2 * here[b - 1] - here[b - 2] : here[b - 1] + spacing;
+  if (above[b + 1] != kAbsent) return above[b + 1] - spacing;
+  return last.column + (b - last.boundary) * spacing;
+}
+
+/// Of a cell with both triangles; which diagonal they share follows from the columns.
+constexpr std::uint8_t kBoth = 0xff;
+
+/// Cells with three corners or four. `lack`: the corner that is not there, 4: none.
+inline int corners_of(const std::uint8_t* above, const std::uint8_t* below, int b, int& lack) {
+  const int there[4] = {above[b], below[b], below[b + 1], above[b + 1]};
+  const int count = there[0] + there[1] + there[2] + there[3];
+  lack = 4;
+  if (count == 3)
+    for (int c = 0; c < 4; ++c)
+      if (there[c] == 0) lack = c;
+  return count;
+}
+
+}  // namespace relievo::grid

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/rans.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "codec/byte_io.h"
+
+namespace relievo::rans {
+
+void BitWriter::put(std::uint32_t value, int count) {
+  bits_ |= static_cast<std::uint64_t>(value) << held_;
+  held_ += count;
+  while (held_ >= 8) {
+    out_.push_back(static_cast<std::uint8_t>(bits_));
+    bits_ >>= 8;
+    held_ -= 8;
+  }
+}
+
+void BitWriter::put_unary(std::uint32_t value) {
+  for (std::uint32_t i = 0; i < value; ++i) put(1, 1);
+  put(0, 1);
+}
+
+Bytes BitWriter::finish() {
+  if (held_ > 0) out_.push_back(static_cast<std::uint8_t>(bits_));
+  bits_ = 0;
+  held_ = 0;
+  return std::exchange(out_, {});
+}
+
+std::uint32_t BitReader::get(int count) {
+  while (held_ < count) {
+    std::uint64_t next = 0;
+    if (at_ < bytes_.size()) {
+      next = bytes_[at_++];
+    } else {
+      ok_ = false;
+    }
+    bits_ |= next << held_;
+    held_ += 8;
+  }
+  const auto value = static_cast<std::uint32_t>(bits_ & ((std::uint64_t{1} << count) - 1));
+  bits_ >>= count;
+  held_ -= count;
+  return value;
+}
+
+std::uint32_t BitReader::get_unary(std::uint32_t most) {
+  std::uint32_t value = 0;
+  while (get(1) != 0 && ok_) {
+    if (++value > most) {
+      ok_ = false;
+      return 0;
+    }
+  }
+  return value;
+}
+
+Levels levels_of(std::span<const std::uint32_t> counts) {
+  Levels levels{};
+  std::uint64_t total = 0;
+  for (const std::uint32_t c : counts) total += c;
+  for (std::size_t s = 0; s < counts.size(); ++s) {
+    if (counts[s] == 0) continue;
+    const double frequency = static_cast<double>(counts[s]) * kScale / static_cast<double>(total);
+    const int level = 1 + static_cast<int>(std::lround(2 * std::log2(std::max(frequency, 1.0))));
+    levels[s] = static_cast<std::uint8_t>(std::clamp(level, 1, kLargestLevel));
+  }
+  return levels;
+}
+
+void write_levels(const Levels& levels, BitWriter& out) {
+  int count = kMostSymbols;
+  while (count > 0 && levels[static_cast<std::size_t>(count - 1)] == 0) --count;
+  out.put(static_cast<std::uint32_t>(count), 7);
+  int previous = 0;
+  for (int s = 0; s < count; ++s) {
+    const int level = levels[static_cast<std::size_t>(s)];
+    if (s == 0) {
+      out.put(static_cast<std::uint32_t>(level), 5);
+    } else {
+      const int d = level - previous;
+      out.put_unary(static_cast<std::uint32_t>(d >= 0 ? 2 * d : -2 * d - 1));
+    }
+    previous = level;
+  }
+}
+
+Levels read_levels(BitReader& in) {
+  Levels levels{};
+  const auto count = std::min(in.get(7), static_cast<std::uint32_t>(kMostSymbols));
+  int level = 0;
+  for (std::uint32_t s = 0; s < count && in.ok(); ++s) {
+    if (s == 0) {
+      level = static_cast<int>(in.get(5));
+    } else {
+      const auto folded = static_cast<int>(in.get_unary(2 * kLargestLevel));
+      level += (folded & 1) != 0 ? -(folded + 1) / 2 : folded / 2;
+    }
+    levels[s] = static_cast<std::uint8_t>(std::clamp(level, 0, kLargestLevel));
+    level = levels[s];
+  }
+  return levels;
+}
+
+std::array<std::uint16_t, kMostSymbols> frequencies_of(const Levels& levels) {
+  std::array<std::uint32_t, kMostSymbols> weights{};
+  std::uint32_t sum = 0;
+  for (std::size_t s = 0; s < levels.size(); ++s) {
+    if (levels[s] == 0) continue;
+    weights[s] = ((levels[s] & 1) != 0 ? 16U : 23U) << ((levels[s] - 1) / 2);
+    sum += weights[s];
+  }
+  std::array<std::uint16_t, kMostSymbols> frequencies{};
+  if (sum == 0) return frequencies;
+  int left = kScale;
+  for (std::size_t s = 0; s < levels.size(); ++s) {
+    if (weights[s] == 0) continue;
+    // 72 weights of at most 2^15 times 2^11 stay below 2^32.
+    frequencies[s] = static_cast<std::uint16_t>(std::max(weights[s] * kScale / sum, 1U));
+    left -= frequencies[s];
+  }
+  // What rounding left over or took too much goes to or comes from the most frequent, the first of equals.
+  while (left != 0) {
+    auto& most = *std::max_element(frequencies.begin(), frequencies.end());
+    const int change = left > 0 ? left : -std::min(-left, most / 2);
+    most = static_cast<std::uint16_t>(most + change);
+    left -= change;
+  }
+  return frequencies;
+}
+
+BinaryLevel binary_level_of(std::uint32_t first, std::uint32_t second) {
+  BinaryLevel out;
+  out.used = first + second > 0;
+  out.second_is_rare = second <= first;
+  const std::uint32_t rare = std::min(first, second);
+  if (rare == 0) return out;
+  const double frequency = static_cast<double>(rare) * kScale / (static_cast<double>(first) + second);
+  out.level = static_cast<std::uint8_t>(
+      std::clamp(1 + static_cast<int>(std::lround(2 * std::log2(std::max(frequency, 1.0)))), 1, 21));
+  return out;
+}
+
+void write_level(const BinaryLevel& level, BitWriter& out) {
+  out.put(level.used ? 1 : 0, 1);
+  if (!level.used) return;
+  out.put(level.second_is_rare ? 1 : 0, 1);
+  out.put(level.level, 5);
+}
+
+BinaryLevel read_binary_level(BitReader& in) {
+  BinaryLevel out;
+  out.used = in.get(1) != 0;
+  if (!out.used) return out;
+  out.second_is_rare = in.get(1) != 0;
+  out.level = static_cast<std::uint8_t>(std::min(in.get(5), 21U));
+  return out;
+}
+
+std::uint16_t first_frequency(const BinaryLevel& level) {
+  if (!level.used) return 0;
+  const std::uint32_t rare =
+      level.level == 0 ? 0 : (((level.level & 1) != 0 ? 16U : 23U) << ((level.level - 1) / 2)) / 16;
+  return static_cast<std::uint16_t>(level.second_is_rare ? kScale - rare : rare);
+}
+
+namespace {
+
+// The reciprocal turns division by the frequency into a multiplication (Alverson): exact, since states stay
+// below 2^31.
+EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
+  EncoderSymbol e;
+  e.limit = f << (31 - kScaleBits);
+  e.complement = static_cast<std::uint16_t>(kScale - f);
+  if (f < 2) {
+    // x / 1 would need a reciprocal of 2^32: floor(x (2^32 - 1) / 2^32) is x - 1, and the bias mends it.
+    e.reciprocal = ~0U;
+    e.bias = start + kScale - 1;
+  } else {
+    const int shift = std::bit_width(f - 1);
+    e.reciprocal = static_cast<std::uint32_t>(((std::uint64_t{1} << (shift + 31)) + f - 1) / f);
+    e.shift = static_cast<std::uint16_t>(shift - 1);
+    e.bias = start;
+  }
+  return e;
+}
+
+}  // namespace
+
+void EncoderTable::set(const Levels& levels) {
+  const auto frequencies = frequencies_of(levels);
+  std::uint32_t start = 0;
+  for (std::size_t s = 0; s < symbols.size(); ++s) {
+    if (frequencies[s] == 0) continue;
+    symbols[s] = encoder_symbol(start, frequencies[s]);
+    start += frequencies[s];
+  }
+}
+
+void EncoderTable::set(const BinaryLevel& level) {
+  const std::uint32_t first = first_frequency(level);
+  if (first > 0) symbols[0] = encoder_symbol(0, first);
+  if (first < kScale) symbols[1] = encoder_symbol(first, kScale - first);
+}
+
+bool DecoderTable::set(const Levels& levels) {
+  const auto frequencies = frequencies_of(levels);
+  std::uint32_t* slot = slots.data();
+  for (std::size_t s = 0; s < frequencies.size(); ++s) {
+    const std::uint32_t f = frequencies[s];
+    const std::uint32_t first = static_cast<std::uint32_t>(s) | f << 8;
+    for (std::uint32_t i = 0; i < f; ++i) slot[i] = first | i << 20;
+    slot += f;
+  }
+  usable = slot == slots.data() + slots.size();
+  return usable;
+}
+
+namespace {
+
+inline std::uint32_t put(std::uint32_t x, const EncoderSymbol& e, std::uint16_t*& to) {
+  if (x >= e.limit) {
+    *--to = static_cast<std::uint16_t>(x);
+    x >>= 16;
+  }
+  const auto q = static_cast<std::uint32_t>((static_cast<std::uint64_t>(x) * e.reciprocal) >> 32) >> e.shift;
+  return x + e.bias + q * e.complement;
+}
+
+}  // namespace
+
+void encode(const Rows& rows, std::span<const EncoderTable> tables, int lanes, Bytes& out) {
+  std::vector<std::uint16_t> words(rows.symbol.size());  // each symbol writes one at most
+  std::uint16_t* to = words.data() + words.size();
+  std::array<std::uint32_t, kLanes> states;
+  states.fill(kLow);
+  const std::uint32_t mask = static_cast<std::uint32_t>(lanes) - 1;
+  std::size_t end = rows.symbol.size();
+  for (std::size_t r = rows.starts.size(); r-- > 0;) {
+    const std::size_t start = rows.starts[r];
+    for (std::size_t i = end; i-- > start;) {
+      std::uint32_t& x = states[(i - start) & mask];
+      x = put(x, tables[rows.table[i]].symbols[rows.symbol[i]], to);
+    }
+    end = start;
+  }
+  for (int lane = 0; lane < lanes; ++lane) append(out, states[static_cast<std::size_t>(lane)]);
+  const auto bytes = static_cast<std::size_t>(words.data() + words.size() - to) * 2;
+  const std::size_t at = out.size();
+  out.resize(at + bytes);
+  if (bytes > 0) std::memcpy(out.data() + at, to, bytes);
+}
+
+Decoder::Decoder(std::span<const std::uint8_t> stream, int lanes) : lanes_(lanes) {
+  ByteReader reader(stream);
+  for (int lane = 0; lane < lanes; ++lane)
+    states_[static_cast<std::size_t>(lane)] = reader.read<std::uint32_t>();
+  ok_ = reader.ok();
+  if (ok_) words_ = stream.subspan(reader.position());
+}
+
+inline std::uint32_t Decoder::refill(std::uint32_t state) {
+  std::uint16_t word = 0;
+  if (words_.size() - at_ >= 2) {
+    std::memcpy(&word, words_.data() + at_, 2);
+    at_ += 2;
+  } else {
+    ok_ = false;
+  }
+  return state << 16 | word;
+}
+
+std::uint8_t Decoder::one(const DecoderTable& table) {
+  std::uint32_t& x = states_[0];
+  const std::uint32_t slot = table.slots[x & (kScale - 1)];
+  x = (slot >> 8 & 0xfffU) * (x >> kScaleBits) + (slot >> 20);
+  if (x < kLow) x = refill(x);
+  return static_cast<std::uint8_t>(slot);
+}
+
+bool Decoder::one(std::uint16_t first_frequency) {
+  std::uint32_t& x = states_[0];
+  const std::uint32_t slot = x & (kScale - 1);
+  const bool second = slot >= first_frequency;
+  const std::uint32_t f = second ? kScale - first_frequency : first_frequency;
+  x = f * (x >> kScaleBits) + slot - (second ? first_frequency : 0U);
+  if (x < kLow) x = refill(x);
+  return second;
+}
+
+void Decoder::row(std::span<const DecoderTable> tables, const std::uint8_t* table, std::size_t count,
+                  std::uint8_t* symbols) {
+  auto states = states_;
+  if (words_.size() - at_ < 2 * count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint32_t& x = states[i & static_cast<std::size_t>(lanes_ - 1)];
+      const std::uint32_t slot = tables[table[i]].slots[x & (kScale - 1)];
+      x = (slot >> 8 & 0xfffU) * (x >> kScaleBits) + (slot >> 20);
+      if (x < kLow) x = refill(x);
+      symbols[i] = static_cast<std::uint8_t>(slot);
+    }
+    states_ = states;
+    return;
+  }
+  // Words enough for the row, whatever it holds: nothing to check.
+  const std::uint8_t* from = words_.data() + at_;
+  const auto step = [&](std::uint32_t & x, std::size_t i) __attribute__((always_inline)) {
+    const std::uint32_t slot = tables[table[i]].slots[x & (kScale - 1)];
+    x = (slot >> 8 & 0xfffU) * (x >> kScaleBits) + (slot >> 20);
+    std::uint16_t word;
+    std::memcpy(&word, from, 2);
+    const bool low = x < kLow;
+    x = low ? x << 16 | word : x;
+    from += low ? 2 : 0;
+    symbols[i] = static_cast<std::uint8_t>(slot);
+  };
+  std::size_t i = 0;
+  if (lanes_ == kLanes) {
+    std::uint32_t a = states[0], b = states[1], c = states[2], d = states[3];
+    for (; i + kLanes < count; i += kLanes) {
+      step(a, i);
+      step(b, i + 1);
+      step(c, i + 2);
+      step(d, i + 3);
+    }
+    states = {a, b, c, d};
+  }
+  for (; i < count; ++i) step(states[i & static_cast<std::size_t>(lanes_ - 1)], i);
+  at_ = static_cast<std::size_t>(from - words_.data());
+  states_ = states;
+}
+
+bool Decoder::finished() const {
+  if (!ok_ || at_ != words_.size()) return false;
+  for (int lane = 0; lane < lanes_; ++lane)
+    if (states_[static_cast<std::size_t>(lane)] != kLow) return false;
+  return true;
+}
+
+}  // namespace relievo::rans

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// Entropy coding of the stripe grid: asymmetric numeral systems (rANS) over small static alphabets whose
+// frequencies are told in half octaves (codec/FORMAT.md, "Symbols"). States are 31 bits wide, words 16.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/stream.h"
+
+namespace relievo::rans {
+
+inline constexpr int kScaleBits = 11;
+inline constexpr std::uint32_t kScale = 1U << kScaleBits;
+inline constexpr std::uint32_t kLow = 1U << 15;  // states are kLow .. 2^31 - 1
+inline constexpr int kLanes = 4;                 // states that take turns along a row
+inline constexpr int kMostSymbols = 72;          // of an alphabet
+inline constexpr int kLargestLevel = 23;
+
+/// Least significant bit first.
+class BitWriter {
+ public:
+  /// `count` at most 32.
+  void put(std::uint32_t value, int count);
+  void put_unary(std::uint32_t value);  // that many ones, then a zero
+  /// Zero bits fill the last byte. The writer is empty again.
+  Bytes finish();
+
+ private:
+  Bytes out_;
+  std::uint64_t bits_ = 0;
+  int held_ = 0;
+};
+
+/// Of any bytes: behind their end it reads zeros and is no longer ok().
+class BitReader {
+ public:
+  explicit BitReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+  std::uint32_t get(int count);                 // at most 32
+  std::uint32_t get_unary(std::uint32_t most);  // not ok() above `most`
+  bool ok() const { return ok_; }
+  /// The bytes begun so far.
+  std::size_t position() const { return at_; }
+
+ private:
+  std::span<const std::uint8_t> bytes_;
+  std::size_t at_ = 0;
+  std::uint64_t bits_ = 0;
+  int held_ = 0;
+  bool ok_ = true;
+};
+
+/// How often each symbol of an alphabet comes, in half octaves; 0: never.
+using Levels = std::array<std::uint8_t, kMostSymbols>;
+
+/// Levels of counted symbols.
+Levels levels_of(std::span<const std::uint32_t> counts);
+void write_levels(const Levels& levels, BitWriter& out);
+/// Check the reader's ok().
+Levels read_levels(BitReader& in);
+/// Frequencies with the sum kScale; all 0 where no symbol has a level.
+std::array<std::uint16_t, kMostSymbols> frequencies_of(const Levels& levels);
+
+/// Of an alphabet of two: how often the second symbol comes, in half octaves of the rarer of the two.
+struct BinaryLevel {
+  bool used = false;
+  bool second_is_rare = true;
+  std::uint8_t level = 0;  // 0: the rarer one never comes
+};
+BinaryLevel binary_level_of(std::uint32_t first, std::uint32_t second);
+void write_level(const BinaryLevel& level, BitWriter& out);
+BinaryLevel read_binary_level(BitReader& in);
+/// Of the first symbol, of kScale; 0 where the alphabet is not used.
+std::uint16_t first_frequency(const BinaryLevel& level);
+
+/// One symbol as an encoder needs it; see put() in the .cpp.
+struct EncoderSymbol {
+  std::uint32_t limit = 0;
+  std::uint32_t reciprocal = 0, bias = 0;
+  std::uint16_t complement = 0, shift = 0;
+};
+
+struct EncoderTable {
+  void set(const Levels& levels);
+  void set(const BinaryLevel& level);
+  std::array<EncoderSymbol, kMostSymbols> symbols;
+};
+
+struct DecoderTable {
+  /// False where no symbol has a level: then nothing may be decoded with it.
+  bool set(const Levels& levels);
+  bool usable = false;
+  // Low to high: 8 bits of symbol, 12 of its frequency, 12 of the place among the symbol's own.
+  std::array<std::uint32_t, kScale> slots;
+};
+
+/// Rows of symbols, each with the number of its table. The lanes take turns from a row's first symbol on.
+struct Rows {
+  std::vector<std::uint8_t> table, symbol;
+  std::vector<std::uint32_t> starts;  // of each row, rising
+  void clear() {
+    table.clear();
+    symbol.clear();
+    starts.clear();
+  }
+};
+
+/// Appends the coded rows. `lanes` is 1 or kLanes.
+void encode(const Rows& rows, std::span<const EncoderTable> tables, int lanes, Bytes& out);
+
+/// Any bytes: behind their end zeros are read, and finished() is false.
+class Decoder {
+ public:
+  /// The stream must outlive the decoder.
+  Decoder(std::span<const std::uint8_t> stream, int lanes);
+
+  /// One row of `count` symbols. All tables named must be usable.
+  void row(std::span<const DecoderTable> tables, const std::uint8_t* table, std::size_t count,
+           std::uint8_t* symbols);
+  /// The next symbol of a stream with one lane.
+  std::uint8_t one(const DecoderTable& table);
+  /// The same of an alphabet of two.
+  bool one(std::uint16_t first_frequency);
+  /// All was read, and read rightly: the states are back where the encoder began.
+  bool finished() const;
+
+ private:
+  std::uint32_t refill(std::uint32_t state);
+  std::span<const std::uint8_t> words_;
+  std::size_t at_ = 0;
+  bool ok_ = true;
+  int lanes_;
+  std::array<std::uint32_t, kLanes> states_{};
+};
+
+}  // namespace relievo::rans

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/stripe_grid.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+namespace relievo {
+namespace {
+
+constexpr int kLargestCode = 63;
+constexpr float kSmallest_px = 1e-4F;
+constexpr float kStepsPerOctave = 4;
+constexpr float kNearest_share = 0.25F;  // of a depth, that a step may change it by
+
+template <typename T>
+T rounded(const T& values) {
+  T out{};
+  for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<double>(static_cast<float>(values[i]));
+  return out;
+}
+PinholeModel rounded(const PinholeModel& model) {
+  return {model.width, model.height, rounded(model.matrix), rounded(model.distortion)};
+}
+
+/// A place's boundary and line in one number, as GridPoint keeps them.
+std::uint32_t key_of(const GridPoint& at) {
+  return static_cast<std::uint32_t>(at.line) << 16 | at.boundary;
+}
+
+/// Of a triangle whose vertices lie at three corners of one cell: the corner that it lacks. -1: they do not.
+int missing_corner(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t& cell) {
+  const std::uint32_t boundary = std::min({a & 0xffffU, b & 0xffffU, c & 0xffffU});
+  const std::uint32_t line = std::min({a >> 16, b >> 16, c >> 16});
+  cell = line << 16 | boundary;
+  unsigned corners = 0;
+  for (const std::uint32_t key : {a, b, c}) {
+    const std::uint32_t d = key - cell;
+    if ((d & ~0x10001U) != 0) return -1;
+    corners |= 1U << (d >> 15 | (d & 1U));  // line and column of the corner
+  }
+  switch (corners) {  // bits: upper left, upper right, lower left, lower right
+    case 0b1110:
+      return 0;
+    case 0b1011:
+      return 1;
+    case 0b0111:
+      return 2;
+    case 0b1101:
+      return 3;
+    default:
+      return -1;
+  }
+}
+
+}  // namespace
+
+GridCalibration grid_calibration(const Rig& rig, const Pattern& pattern) {
+  GridCalibration out;
+  out.camera = rounded(rig.camera);
+  out.projector = rounded(rig.projector);
+  out.projector_from_camera_rotation = rounded(rig.projector_from_camera_rotation);
+  out.projector_from_camera_translation = rounded(rig.projector_from_camera_translation);
+  out.stripes = pattern.stripes();
+  out.line_step_px = rig.scan == Scan::kInterlaced ? 2 : 1;
+  return out;
+}
+
+bool GridCalibration::operator==(const GridCalibration& other) const {
+  const auto same = [](const PinholeModel& a, const PinholeModel& b) {
+    return a.width == b.width && a.height == b.height && a.matrix == b.matrix && a.distortion == b.distortion;
+  };
+  return same(camera, other.camera) && same(projector, other.projector) && stripes == other.stripes &&
+         line_step_px == other.line_step_px &&
+         projector_from_camera_rotation == other.projector_from_camera_rotation &&
+         projector_from_camera_translation == other.projector_from_camera_translation;
+}
+
+void StripeGrid::reset(int boundaries_, int lines_, int step_bits_) {
+  boundaries = boundaries_;
+  lines = lines_;
+  step_bits = step_bits_;
+  const std::size_t size = at(lines, 0);
+  columns.assign(size, kAbsent);
+  cells.assign(size, 0);
+  sigmas.clear();
+  interpolated.clear();
+  vertices = 0;
+  triangles = 0;
+}
+
+/// By the bits of the number: its octave, and which quarter of it.
+std::uint8_t sigma_px_code(float sigma_px) {
+  if (!(sigma_px > 0)) return 0;
+  constexpr float kEighth = 1.0905077F;  // of an octave: rounds to the nearest
+  const auto bits = std::bit_cast<std::uint32_t>(sigma_px * (kEighth / kSmallest_px));
+  const std::uint32_t part = bits & 0x7fffffU;
+  const auto octave = static_cast<int>(bits >> 23) - 127;
+  const int quarter = (part >= 0x1837f0U) + (part >= 0x3504f3U) + (part >= 0x5744fdU);
+  return static_cast<std::uint8_t>(
+      1 + std::clamp(static_cast<int>(kStepsPerOctave) * octave + quarter, 0, kLargestCode - 1));
+}
+
+float sigma_px_of_code(std::uint8_t code) {
+  return code == 0 ? 0 : kSmallest_px * std::exp2(static_cast<float>(code - 1) / kStepsPerOctave);
+}
+
+Status to_grid(const Surface& surface, const GridCalibration& calibration, int step_bits, bool with_quality,
+               StripeGrid& out) {
+  const std::size_t count = surface.positions.size();
+  if (surface.grid.size() != count)
+    return Error{"surface has no places on the grid of stripes and lines: send it as a mesh"};
+  out.reset(calibration.boundaries(), calibration.lines(), step_bits);
+  if (with_quality && count > 0) {
+    if (!surface.sigmas_m.empty()) out.sigmas.assign(out.columns.size(), 0);
+    if (!surface.interpolated.empty() &&
+        std::ranges::count(surface.interpolated, 0) != std::ssize(surface.interpolated))
+      out.interpolated.assign(out.columns.size(), 0);
+  }
+  const auto steps = static_cast<float>(1 << step_bits);
+  const auto width = static_cast<float>(calibration.camera.width);
+  const auto& t = calibration.projector_from_camera_translation;
+  const double baseline = std::hypot(t[0], t[1], t[2]);
+  // dz/dx is z^2 / (f b) or less.
+  const auto farthest =
+      static_cast<float>(kNearest_share * calibration.camera.fx() * baseline * static_cast<double>(steps));
+  const auto boundaries = static_cast<unsigned>(out.boundaries);
+  const auto lines = static_cast<unsigned>(out.lines);
+  const std::ptrdiff_t stride = out.stride();
+  bool far = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const GridPoint& p = surface.grid[i];
+    if (p.boundary >= boundaries || p.line >= lines || !(p.column_px > -0.5F && p.column_px < width))
+      return Error{"surface has a vertex outside the grid of its calibration"};
+    const std::size_t at = out.at(p.line, p.boundary);
+    if (out.columns[at] != StripeGrid::kAbsent)
+      return Error{"surface has two vertices at one place of the grid: send it as a mesh"};
+    out.columns[at] = static_cast<std::int32_t>(std::floor(p.column_px * steps + 0.5F));
+    far |= !(surface.positions[i][2] < farthest);
+    if (!out.sigmas.empty()) out.sigmas[at] = sigma_px_code(p.sigma_px);
+    if (!out.interpolated.empty()) out.interpolated[at] = surface.interpolated[i] != 0;
+  }
+  out.vertices = static_cast<std::uint32_t>(count);
+  const auto is_far = [&](std::uint32_t v) { return !(surface.positions[v][2] < farthest); };
+  for (const Triangle& triangle : surface.triangles) {
+    if (triangle[0] >= count || triangle[1] >= count || triangle[2] >= count)
+      return Error{"surface has a triangle on a vertex that is not there"};
+    std::uint32_t cell = 0;
+    const int corner = missing_corner(key_of(surface.grid[triangle[0]]), key_of(surface.grid[triangle[1]]),
+                                      key_of(surface.grid[triangle[2]]), cell);
+    if (corner < 0) return Error{"surface has a triangle that is in no cell of the grid: send it as a mesh"};
+    if (far && (is_far(triangle[0]) || is_far(triangle[1]) || is_far(triangle[2]))) continue;
+    std::uint8_t& cells =
+        out.cells[static_cast<std::size_t>((cell >> 16) * stride + (cell & 0xffffU)) + StripeGrid::kMargin];
+    const auto one = static_cast<std::uint8_t>(1U << corner);
+    const auto both = static_cast<std::uint8_t>(cells | one);
+    if (cells != 0 && (both == cells || (both != grid_cell::kStraight && both != grid_cell::kTurned)))
+      return Error{"surface has triangles that overlap: send it as a mesh"};
+    cells = both;
+    ++out.triangles;
+  }
+  if (!far) return {};
+  for (std::uint32_t v = 0; v < count; ++v) {
+    if (!is_far(v)) continue;
+    const std::size_t at = out.at(surface.grid[v].line, surface.grid[v].boundary);
+    out.columns[at] = StripeGrid::kAbsent;
+    if (!out.sigmas.empty()) out.sigmas[at] = 0;
+    if (!out.interpolated.empty()) out.interpolated[at] = 0;
+    --out.vertices;
+  }
+  return {};
+}
+
+}  // namespace relievo

@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: Apache-2.0
+// Geometry codec 2: what is sent comes back, to the step; delta frames build on their key frame and say so
+// where it is missing; every implementation of a kernel gives the same.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <set>
+
+#include "base/parallel.h"
+#include "codec/frame3d_codec.h"
+#include "codec/grid_coder.h"
+#include "codec/grid_points.h"
+#include "codec/grid_predict.h"
+#include "tests/support/make_grid.h"
+
+namespace relievo {
+namespace {
+
+EncodeOptions grid_options(int step_bits = 4) {
+  EncodeOptions options;
+  options.geometry = GeometryCodec::kGrid;
+  options.step_bits = step_bits;
+  return options;
+}
+
+/// A set of triangles that does not mind where each begins.
+std::multiset<std::array<std::uint32_t, 3>> cycles(const std::vector<Triangle>& triangles) {
+  std::multiset<std::array<std::uint32_t, 3>> out;
+  for (Triangle t : triangles) {
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    out.insert(t);
+  }
+  return out;
+}
+
+double area_m2(const Surface& s) {
+  double area = 0;
+  for (const Triangle& t : s.triangles) {
+    std::array<double, 3> u{}, v{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      u[i] = s.positions[t[1]][i] - s.positions[t[0]][i];
+      v[i] = s.positions[t[2]][i] - s.positions[t[0]][i];
+    }
+    area += std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]) / 2;
+  }
+  return area;
+}
+
+/// Every vertex at its place, its column within half a step, its position where the reconstruction's own
+/// triangulation puts that column.
+void expect_same(const test::GridScene& scene, const Surface& sent, const Surface& got, int step_bits) {
+  ASSERT_EQ(got.positions.size(), sent.positions.size());
+  ASSERT_EQ(got.triangles.size(), sent.triangles.size());
+  const Triangulator triangulator(test::grid_rig(scene), test::grid_pattern(scene), scene.height / 2, 2);
+  const float step = 1.F / static_cast<float>(1 << step_bits);
+  for (std::size_t i = 0; i < sent.positions.size(); ++i) {
+    const GridPoint& a = sent.grid[i];
+    const GridPoint& b = got.grid[i];
+    ASSERT_EQ(a.boundary, b.boundary) << i;
+    ASSERT_EQ(a.line, b.line) << i;
+    ASSERT_LE(std::fabs(a.column_px - b.column_px), step / 2 + 1e-4F) << i;
+    const auto point = triangulator.point(b.boundary, b.line, b.column_px);
+    ASSERT_TRUE(point);
+    for (std::size_t k = 0; k < 3; ++k)
+      ASSERT_NEAR((*point)[k], got.positions[i][k], 1e-5 * static_cast<double>((*point)[2])) << i;
+    ASSERT_NEAR(got.texture_coordinates[i][0], (b.column_px + 0.5F) / static_cast<float>(scene.width), 1e-6);
+    ASSERT_NEAR(got.texture_coordinates[i][1], sent.texture_coordinates[i][1], 1e-6);
+  }
+  if (step_bits >= 4) {
+    EXPECT_NEAR(area_m2(got) / area_m2(sent), 1, 0.01);
+  }
+}
+
+struct Case {
+  const char* name;
+  test::GridScene scene;
+  int step_bits = 4;
+  int slice_lines = 270;
+};
+
+class GridRoundTrip : public testing::TestWithParam<Case> {};
+
+TEST_P(GridRoundTrip, KeepsVerticesAndTriangles) {
+  const Case& c = GetParam();
+  const Frame3D frame = test::grid_frame(c.scene);
+  ASSERT_GT(frame.surface.positions.size(), 500U);
+  FrameEncoder encoder(test::grid_rig(c.scene), test::grid_pattern(c.scene));
+  EncodeOptions options = grid_options(c.step_bits);
+  options.slice_lines = c.slice_lines;
+  const auto bytes = encoder.encode(frame, options);
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  const auto header = read_frame_header(*bytes);
+  ASSERT_TRUE(header) << header.error().message;
+  EXPECT_EQ(header->geometry, GeometryCodec::kGrid);
+  EXPECT_TRUE(header->is_key);
+  const auto back = decode_frame(*bytes);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(back->number, frame.number);
+  EXPECT_EQ(back->time_ns, frame.time_ns);
+  expect_same(c.scene, frame.surface, back->surface, c.step_bits);
+  EXPECT_EQ(*encoder.encode(frame, options), *bytes) << "the same frame gives the same bytes";
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, GridRoundTrip,
+                         testing::Values(Case{"plain", {}}, Case{"noisy", {.noise_px = 1}},
+                                         Case{"lenses", {.distorts = true}}, Case{"fine", {}, 8},
+                                         Case{"coarse", {}, 0}, Case{"slices", {}, 4, 16},
+                                         Case{"one_line_over", {}, 4, 239},
+                                         Case{"wide", {.width = 1280, .height = 320, .stripes = 131}, 5},
+                                         Case{"wild", {.noise_px = 30}}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(Grid, TrianglesOfPartsOfCellsAreExact) {
+  // Every cell by itself has all ways to hold triangles.
+  const test::GridScene scene{.stripes = 17, .noise_px = 0};
+  Frame3D frame = test::grid_frame(scene);
+  test::Random random(5);
+  std::vector<Triangle> some;
+  for (const Triangle& t : frame.surface.triangles)
+    if (random.below(3) != 0) some.push_back(t);
+  frame.surface.triangles = some;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  const auto bytes = encoder.encode(frame, grid_options());
+  ASSERT_TRUE(bytes);
+  const auto back = decode_frame(*bytes);
+  ASSERT_TRUE(back) << back.error().message;
+  ASSERT_EQ(back->surface.triangles.size(), some.size());
+  // Cells with one triangle keep it; those with both may turn their diagonal.
+  std::map<std::pair<int, int>, int> cells;
+  const auto cell_of = [&](const Triangle& t) {
+    int line = 1 << 20, boundary = 1 << 20;
+    for (const std::uint32_t v : t) {
+      line = std::min<int>(line, frame.surface.grid[v].line);
+      boundary = std::min<int>(boundary, frame.surface.grid[v].boundary);
+    }
+    return std::pair{line, boundary};
+  };
+  for (const Triangle& t : some) ++cells[cell_of(t)];
+  std::vector<Triangle> single, single_back;
+  for (const Triangle& t : some)
+    if (cells[cell_of(t)] == 1) single.push_back(t);
+  for (const Triangle& t : back->surface.triangles)
+    if (cells[cell_of(t)] == 1) single_back.push_back(t);
+  ASSERT_GT(single.size(), 100U);
+  EXPECT_EQ(cycles(single), cycles(single_back));
+}
+
+TEST(Grid, ReconstructionsOwnTrianglesFaceTheCamera) {
+  const test::GridScene scene;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  const auto back = decode_frame(*encoder.encode(test::grid_frame(scene), grid_options(6)));
+  ASSERT_TRUE(back);
+  for (const Triangle& t : back->surface.triangles) {
+    const GridPoint& a = back->surface.grid[t[0]];
+    const GridPoint& b = back->surface.grid[t[1]];
+    const GridPoint& c = back->surface.grid[t[2]];
+    // x right, y down: counter-clockwise as seen is a negative turn.
+    const int turn =
+        (b.boundary - a.boundary) * (c.line - a.line) - (b.line - a.line) * (c.boundary - a.boundary);
+    ASSERT_LT(turn, 0);
+  }
+}
+
+TEST(Grid, SigmasAndMarksComeBack) {
+  const test::GridScene scene{.quality = true};
+  const Frame3D frame = test::grid_frame(scene);
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  const auto back = decode_frame(*encoder.encode(frame, grid_options()));
+  ASSERT_TRUE(back) << back.error().message;
+  const Surface& got = back->surface;
+  ASSERT_EQ(got.interpolated, frame.surface.interpolated);
+  for (std::size_t i = 0; i < got.grid.size(); ++i) {
+    const float sent = frame.surface.grid[i].sigma_px;
+    ASSERT_LE(std::fabs(got.grid[i].sigma_px - sent), 0.1F * sent) << i;
+    ASSERT_EQ(got.sigmas_m[i] > 0, sent > 0);
+  }
+  // A tenth of a pixel at 1 m is about half a millimetre for this rig.
+  const float z = got.positions[1000][2];
+  const float expected = got.grid[1000].sigma_px * z * z / (820 * 0.2F);
+  EXPECT_NEAR(got.sigmas_m[1000] / expected, 1, 0.35);
+  auto options = grid_options();
+  options.quality = false;
+  EXPECT_TRUE(decode_frame(*encoder.encode(frame, options))->surface.sigmas_m.empty());
+}
+
+TEST(Grid, DeltaFramesBuildOnTheirKeyFrame) {
+  test::GridScene scene;
+  EncodeOptions options = grid_options();
+  options.key_interval = 4;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  std::vector<Bytes> sent;
+  std::vector<Frame3D> frames;
+  for (int i = 0; i < 9; ++i) {
+    scene.seed = static_cast<std::uint64_t>(i + 1);
+    scene.shift_px = 0.7F * static_cast<float>(i);
+    frames.push_back(test::grid_frame(scene));
+    sent.push_back(*encoder.encode(frames.back(), options));
+    EXPECT_EQ(is_key_frame(sent.back()), i % 4 == 0) << i;
+  }
+  FrameDecoder all;
+  FrameDecoder some;  // every third is lost, but no key frame
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    const auto frame = all.decode(sent[i]);
+    ASSERT_TRUE(frame) << frame.error().message;
+    expect_same(scene, frames[i].surface, frame->surface, 4);
+    if (i % 3 == 2) continue;
+    const auto again = some.decode(sent[i]);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->surface.positions, frame->surface.positions);
+  }
+  // Who joins late waits for the next key frame, and can know it.
+  FrameDecoder late;
+  EXPECT_FALSE(late.can_decode(sent[2]));
+  EXPECT_NE(late.decode(sent[2]).error().message.find("key frame"), std::string::npos);
+  EXPECT_FALSE(decode_frame(sent[3]).ok());
+  EXPECT_TRUE(late.can_decode(sent[4]));
+  ASSERT_TRUE(late.decode(sent[4]).ok());
+  EXPECT_TRUE(late.can_decode(sent[5]));
+  EXPECT_FALSE(late.can_decode(sent[2]));
+  ASSERT_TRUE(late.decode(sent[5]).ok());
+  ASSERT_FALSE(late.decode(sent[2]).ok()) << "of another key frame";
+  FrameDecoder seeking;
+  ASSERT_TRUE(seeking.remember(sent[4]).ok());
+  EXPECT_TRUE(seeking.decode(sent[6]).ok());
+}
+
+TEST(Grid, AKeyFrameComesWhenAskedFor) {
+  const test::GridScene scene;
+  EncodeOptions options = grid_options();
+  options.key_interval = 100;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  const Frame3D frame = test::grid_frame(scene);
+  EXPECT_TRUE(is_key_frame(*encoder.encode(frame, options)));
+  const Bytes still = *encoder.encode(frame, options);
+  EXPECT_FALSE(is_key_frame(still));
+  encoder.request_key_frame();
+  const Bytes key = *encoder.encode(frame, options);
+  EXPECT_TRUE(is_key_frame(key));
+  EXPECT_LT(still.size() * 3, key.size()) << "of a surface that stands still nothing is left to say";
+}
+
+TEST(Grid, WhatLiesOnNoGridGoesAsAMesh) {
+  const test::GridScene scene;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  const auto codec_of = [&](const Frame3D& frame) {
+    const auto bytes = encoder.encode(frame, grid_options());
+    EXPECT_TRUE(bytes) << bytes.error().message;
+    EXPECT_TRUE(decode_frame(*bytes).ok());
+    return read_frame_header(*bytes)->geometry;
+  };
+  EXPECT_EQ(codec_of(test::frame(20, 20)), GeometryCodec::kDracoMesh);  // no places
+  Frame3D twice = test::grid_frame(scene);
+  twice.surface.grid[5] = twice.surface.grid[6];
+  EXPECT_EQ(codec_of(twice), GeometryCodec::kDracoMesh);
+  Frame3D across = test::grid_frame(scene);
+  across.surface.triangles.push_back({0, 1, static_cast<std::uint32_t>(across.surface.positions.size() - 1)});
+  EXPECT_EQ(codec_of(across), GeometryCodec::kDracoMesh);
+  EXPECT_EQ(codec_of(Frame3D{}), GeometryCodec::kDracoMesh);
+  EXPECT_EQ(codec_of(test::grid_frame(scene)), GeometryCodec::kGrid);
+}
+
+TEST(Grid, SlicesAreTheSameInParallel) {
+  const test::GridScene scene{.quality = true};
+  const Frame3D frame = test::grid_frame(scene);
+  const auto calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
+  WorkerPool pool(3);
+  StripeGrid one, other;
+  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, one).ok());
+  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, other).ok());
+  GridEncoder encoder;
+  const Bytes serial = encoder.encode(one, calibration, nullptr, {}, 0, {.slice_lines = 20});
+  EXPECT_EQ(encoder.encode(other, calibration, nullptr, {}, 0, {.slice_lines = 20, .pool = &pool}), serial);
+  GridDecoder decoder;
+  StripeGrid a, b;
+  ASSERT_TRUE(decoder.decode(serial, one.vertices, one.triangles, nullptr, a).ok());
+  ASSERT_TRUE(decoder.decode(serial, one.vertices, one.triangles, nullptr, b, &pool).ok());
+  EXPECT_EQ(a.columns, b.columns);
+  EXPECT_EQ(a.cells, b.cells);
+  EXPECT_EQ(a.columns, one.columns);
+}
+
+TEST(Grid, ALostSliceTakesNothingElseWithIt) {
+  const test::GridScene scene;
+  const Frame3D frame = test::grid_frame(scene);
+  const auto calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
+  StripeGrid whole;
+  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, false, whole).ok());
+  GridEncoder encoder;
+  const Bytes bytes = encoder.encode(whole, calibration, nullptr, {}, 0, {.slice_lines = 60});
+  // Cut slice 2 (of 4) out: its size becomes 0.
+  std::vector<std::uint32_t> sizes(4);
+  std::size_t sum = 0, at = bytes.size();
+  for (std::size_t table = 30; table + 16 < bytes.size(); ++table) {
+    std::memcpy(sizes.data(), bytes.data() + table, 16);
+    sum = std::size_t{0} + sizes[0] + sizes[1] + sizes[2] + sizes[3];
+    if (table + 16 + sum == bytes.size()) {
+      at = table;
+      break;
+    }
+  }
+  ASSERT_LT(at, bytes.size());
+  Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(at + 16 + sizes[0] + sizes[1]));
+  cut.insert(cut.end(), bytes.end() - static_cast<std::ptrdiff_t>(sizes[3]), bytes.end());
+  std::fill_n(cut.begin() + static_cast<std::ptrdiff_t>(at + 8), 4, std::uint8_t{0});
+  StripeGrid got;
+  const auto head = GridDecoder().decode(cut, whole.vertices, whole.triangles, nullptr, got);
+  ASSERT_TRUE(head) << head.error().message;
+  std::uint32_t vertices = 0;
+  for (int line = 0; line < whole.lines; ++line) {
+    const bool lost = line >= 120 && line < 180;
+    for (int b = 0; b < whole.boundaries; ++b) {
+      const std::int32_t column = got.columns[got.at(line, b)];
+      EXPECT_EQ(column, lost ? StripeGrid::kAbsent : whole.columns[whole.at(line, b)]);
+      vertices += column != StripeGrid::kAbsent;
+    }
+  }
+  EXPECT_EQ(got.vertices, vertices);
+  Surface surface;
+  ASSERT_TRUE(GridPoints(head->calibration).to_surface(got, surface).ok());
+  EXPECT_EQ(surface.triangles.size(), got.triangles);
+  for (const Triangle& t : surface.triangles)
+    for (const std::uint32_t v : t) ASSERT_LT(v, vertices);
+}
+
+TEST(Grid, KernelsAgree) {
+  test::Random random(3);
+  constexpr int kPlaces = 64;
+  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
+  for (int round = 0; round < 200; ++round) {
+    std::array<std::vector<std::int32_t>, 6> rows;
+    const bool extreme = round % 4 == 0;
+    for (auto& row : rows)
+      for (int i = 0; i < kPlaces; ++i)
+        row.push_back(random.below(6) == 0
+                          ? kAbsent
+                          : static_cast<std::int32_t>(random.below(extreme ? 1U << 22 : 100)));
+    const auto weight = [&] {
+      return static_cast<std::int16_t>(static_cast<int>(random.below(2049)) - 1024);
+    };
+    const GridModel model{weight(), weight(), weight(),
+                          weight(), weight(), static_cast<std::uint16_t>(random.below(4097)),
+                          100};
+    const bool key = round % 2 == 0;
+    const GridRows in{rows[0].data(),
+                      rows[1].data(),
+                      rows[2].data(),
+                      rows[3].data(),
+                      key ? rows[4].data() : nullptr,
+                      key ? rows[5].data() : nullptr};
+    std::vector<std::uint8_t> sizes;
+    for (int i = 0; i < kPlaces + 2; ++i) sizes.push_back(static_cast<std::uint8_t>(random.below(61)));
+    std::vector<std::int32_t> reference(kPlaces), expected(kPlaces);
+    std::vector<std::uint8_t> tables(kPlaces), other(kPlaces);
+    const GridKernels& portable = all_grid_kernels().front();
+    portable.predict(in, model, kPlaces, reference.data());
+    portable.contexts(sizes.data() + 1, kPlaces, tables.data());
+    for (const GridKernels& kernels : all_grid_kernels()) {
+      kernels.predict(in, model, kPlaces, expected.data());
+      kernels.contexts(sizes.data() + 1, kPlaces, other.data());
+      ASSERT_EQ(expected, reference) << kernels.name;
+      ASSERT_EQ(other, tables) << kernels.name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace relievo

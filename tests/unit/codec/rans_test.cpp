@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// Entropy coding: whatever goes in comes out, for likely, unlikely and lone symbols; damage is noticed.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "codec/rans.h"
+#include "tests/support/make_surface.h"
+
+namespace relievo::rans {
+namespace {
+
+TEST(Rans, FrequenciesAddUpWhateverTheLevels) {
+  test::Random random(1);
+  for (int round = 0; round < 300; ++round) {
+    Levels levels{};
+    const std::uint32_t used = 1 + random.below(kMostSymbols);
+    for (std::uint32_t s = 0; s < used; ++s)
+      levels[s] = static_cast<std::uint8_t>(random.below(kLargestLevel + 1));
+    levels[random.below(used)] = static_cast<std::uint8_t>(1 + random.below(kLargestLevel));
+    BitWriter out;
+    write_levels(levels, out);
+    const Bytes bytes = out.finish();
+    BitReader in(bytes);
+    ASSERT_EQ(read_levels(in), levels);
+    ASSERT_TRUE(in.ok());
+    const auto f = frequencies_of(levels);
+    ASSERT_EQ(std::accumulate(f.begin(), f.end(), 0U), kScale);
+    for (std::size_t s = 0; s < f.size(); ++s) ASSERT_EQ(f[s] > 0, levels[s] > 0);
+  }
+}
+
+TEST(Rans, SymbolsComeBackFromAnyTables) {
+  test::Random random(2);
+  for (int round = 0; round < 60; ++round) {
+    const int lanes = round % 2 == 0 ? 1 : kLanes;
+    std::vector<EncoderTable> encoders(3);
+    std::vector<DecoderTable> decoders(3);
+    std::vector<std::vector<std::uint8_t>> alphabets(3);
+    for (std::size_t t = 0; t < 3; ++t) {
+      std::vector<std::uint32_t> counts(kMostSymbols);
+      const std::uint32_t kinds = 1 + random.below(t == 0 ? 1 : kMostSymbols);
+      for (std::uint32_t i = 0; i < kinds; ++i) {
+        const std::uint32_t s = random.below(kMostSymbols);
+        counts[s] += 1 + random.below(1U << random.below(16));
+        alphabets[t].push_back(static_cast<std::uint8_t>(s));
+      }
+      encoders[t].set(levels_of(counts));
+      ASSERT_TRUE(decoders[t].set(levels_of(counts)));
+    }
+    Rows rows;
+    for (std::uint32_t r = 0; r < 20; ++r) {
+      rows.starts.push_back(static_cast<std::uint32_t>(rows.symbol.size()));
+      for (std::uint32_t i = random.below(40); i > 0; --i) {
+        const std::uint32_t t = random.below(3);
+        rows.table.push_back(static_cast<std::uint8_t>(t));
+        rows.symbol.push_back(alphabets[t][random.below(static_cast<std::uint32_t>(alphabets[t].size()))]);
+      }
+    }
+    Bytes bytes;
+    encode(rows, encoders, lanes, bytes);
+    Decoder decoder(bytes, lanes);
+    std::vector<std::uint8_t> got(rows.symbol.size() + 1);
+    for (std::size_t r = 0; r < rows.starts.size(); ++r) {
+      const std::size_t start = rows.starts[r];
+      const std::size_t end = r + 1 < rows.starts.size() ? rows.starts[r + 1] : rows.symbol.size();
+      decoder.row(decoders, rows.table.data() + start, end - start, got.data() + start);
+    }
+    got.pop_back();
+    ASSERT_EQ(got, rows.symbol);
+    EXPECT_TRUE(decoder.finished());
+    if (bytes.size() > 4U * static_cast<unsigned>(lanes)) {
+      bytes.pop_back();
+      Decoder cut(bytes, lanes);
+      for (std::size_t r = 0; r < rows.starts.size(); ++r) {
+        const std::size_t start = rows.starts[r];
+        const std::size_t end = r + 1 < rows.starts.size() ? rows.starts[r + 1] : rows.symbol.size();
+        cut.row(decoders, rows.table.data() + start, end - start, got.data());
+      }
+      EXPECT_FALSE(cut.finished());
+    }
+  }
+}
+
+TEST(Rans, AlphabetsOfTwoKeepTheirOdds) {
+  test::Random random(3);
+  for (const auto& [first, second] : std::vector<std::pair<std::uint32_t, std::uint32_t>>{
+           {5, 0}, {0, 5}, {1, 1}, {1000, 1}, {1, 4000}, {300, 500}}) {
+    const BinaryLevel level = binary_level_of(first, second);
+    BitWriter out;
+    write_level(level, out);
+    const Bytes told = out.finish();
+    BitReader in(told);
+    ASSERT_EQ(first_frequency(read_binary_level(in)), first_frequency(level));
+    std::vector<EncoderTable> table(1);
+    table[0].set(level);
+    Rows rows;
+    rows.starts.push_back(0);
+    for (std::uint32_t i = 0; i < first + second; ++i) {
+      rows.table.push_back(0);
+      rows.symbol.push_back(i % 2 == 0 ? (i / 2 < second) : (second > first ? i / 2 < second : 0));
+    }
+    for (std::uint8_t& s : rows.symbol) s = second == 0 ? 0 : first == 0 ? 1 : s;
+    Bytes bytes;
+    encode(rows, table, 1, bytes);
+    Decoder decoder(bytes, 1);
+    for (const std::uint8_t s : rows.symbol) ASSERT_EQ(decoder.one(first_frequency(level)), s != 0);
+    EXPECT_TRUE(decoder.finished());
+  }
+  EXPECT_FALSE(binary_level_of(0, 0).used);
+}
+
+}  // namespace
+}  // namespace relievo::rans
