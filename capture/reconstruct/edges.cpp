@@ -32,15 +32,16 @@ class Doubts {
                     ? nullptr
                     : image.signal.data() + static_cast<std::size_t>(line / DifferenceImage::kCellLines) *
                                                 static_cast<std::size_t>(image.cells)),
-        strong_(kNoiseOfSign * image.noise + 0.5F),
-        weak_(kNoiseOfSign * image.weak_noise + 0.5F) {}
+        doubts_{kNoiseOfSign * image.noise + 0.5F, kNoiseOfSign * image.weak_noise + 0.5F,
+                kNoiseOfSign * image.noise + 0.5F} {}
   float at(int x) const {
-    return signal_ != nullptr && signal_[x / DifferenceImage::kCellWidth] == Signal::kWeak ? weak_ : strong_;
+    const Signal signal = signal_ == nullptr ? Signal::kStrong : signal_[x / DifferenceImage::kCellWidth];
+    return doubts_[static_cast<std::size_t>(signal)];
   }
 
  private:
   const Signal* signal_;
-  float strong_, weak_;
+  std::array<float, 3> doubts_;  // by signal
 };
 
 SideWindows windows_beside(const Doubts& doubts, int width, const Edge& edge, float column_px) {
@@ -51,8 +52,9 @@ SideWindows windows_beside(const Doubts& doubts, int width, const Edge& edge, fl
   return {left_first, left_last, right_first, right_last, doubts.at(left_first), doubts.at(right_first)};
 }
 
-SideEvidence three_of(const std::array<float, 4>& side) {
-  return {side[0], side[1], side[2]};
+/// The memory as it is: three floats one by one would wait for what was written as eight.
+void copy_three(const std::array<float, 4>& from, SideEvidence& to) {
+  std::memcpy(to.data(), from.data(), sizeof to);
 }
 
 }  // namespace
@@ -61,7 +63,10 @@ EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edg
   const SideWindows windows = windows_beside(Doubts(image, line), image.width, edge, column_px);
   Sides out;
   row_kernels().side_evidence(image.line(line), image.width, &windows, 1, &out);
-  return {three_of(out.left), three_of(out.right)};
+  EvidenceBeside beside;
+  copy_three(out.left, beside.left);
+  copy_three(out.right, beside.right);
+  return beside;
 }
 
 void EdgeSides::look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count,
@@ -145,8 +150,8 @@ void EdgeFinder::make_edges(const DifferenceImage& image, int line, const Found*
   }
   sides.look(image, line, edges, count);
   for (std::size_t i = 0; i < count; ++i) {
-    edges[i].left = three_of(sides[i].left);
-    edges[i].right = three_of(sides[i].right);
+    copy_three(sides[i].left, edges[i].left);
+    copy_three(sides[i].right, edges[i].right);
   }
 }
 

@@ -10,8 +10,7 @@
 namespace relievo {
 namespace {
 
-constexpr float kBreak = 0.12F;      // change of luma over two columns, of its sum, at which a surface ends
-constexpr float kLumaFactor = 1.3F;  // the middle level is itself measured
+constexpr float kBreak = 0.12F;  // change of luma over two columns, of its sum, at which a surface ends
 
 /// Of a column that is not negative; a call of std::lround takes ten times as long.
 int column_of(float column_px) {
@@ -91,12 +90,6 @@ LumaPlace LumaPlacer::place(const DifferenceImage& image, int line, float share,
   kernels.places({first, row(0), row(1), row(2), row(3), ends.data() + kMargin}, {weights_, share}, &query, 1,
                  &out);
   return out;
-}
-
-float LumaPlacer::sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const {
-  const int x = std::clamp(column_of(place.column_px), 0, image.width - 1);
-  const float noise = image.noise_at(line, x) * size_ / (image.white_line(line)[x] + kDarkSum);
-  return kLumaFactor * noise / place.slope;
 }
 
 float contrast_around(const DifferenceImage& image, int line, int column, int around_px, bool wide_stripes) {

@@ -3,6 +3,7 @@
 // which levels it steps between. Difference over sum is the projected light's own, whatever the surface.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -61,9 +62,15 @@ class LumaPlacer {
   LumaPlace place(const DifferenceImage& image, int line, float share, const LumaQuery& query) const;
 
   /// Standard deviation of a place, from noise.
-  float sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const;
+  float sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const {
+    const int x = std::clamp(static_cast<int>(place.column_px + 0.5F), 0, image.width - 1);
+    const float noise = image.noise_at(line, x) * size_ / (image.white_line(line)[x] + kDarkSum);
+    return kLumaFactor * noise / place.slope;
+  }
 
  private:
+  static constexpr float kLumaFactor = 1.3F;  // the middle level is itself measured
+
   std::array<float, 3> weights_;
   std::array<float, 8> ratio_;
   float size_;  // of weights_, the root of the sum of squares

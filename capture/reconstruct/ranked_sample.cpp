@@ -58,10 +58,15 @@ float RankedSample::at(std::size_t rank) {
   };
   std::uint32_t wanted = 0;
   for (std::uint32_t here = in_bucket(0); rank >= here; here = in_bucket(++wanted)) rank -= here;
-  bucket_.clear();
-  for (const auto& part : parts_)
-    for (const float value : part)
-      if (bucket_of(value) == wanted) bucket_.push_back(value);
+  bucket_.resize(size() + 1);
+  std::size_t n = 0;
+  for (const auto& part : parts_) {
+    for (const float value : part) {
+      bucket_[n] = value;
+      n += bucket_of(value) == wanted;
+    }
+  }
+  bucket_.resize(n);
   const auto at_rank = bucket_.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(bucket_.begin(), at_rank, bucket_.end());
   return *at_rank;

@@ -141,14 +141,16 @@ void Reconstructor::State::make_surface(const std::vector<DecodedBoundary>& boun
     std::size_t own_no_point = 0;
     for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
       const DecodedBoundary& b = boundaries[i];
-      const auto position = triangulator.point(b.boundary, b.line, b.column_px);
-      own_no_point += !position;
-      vertices[i] = {{.boundary = static_cast<std::uint16_t>(b.boundary),
-                      .line = static_cast<std::uint16_t>(b.line),
-                      .column_px = b.column_px,
-                      .sigma_px = b.sigma_px},
-                     position.value_or(kNoPoint),
-                     b.slope};
+      GridVertex& v = vertices[i];
+      v.at.boundary = static_cast<std::uint16_t>(b.boundary);
+      v.at.line = static_cast<std::uint16_t>(b.line);
+      v.at.column_px = b.column_px;
+      v.at.sigma_px = b.sigma_px;
+      v.at.interpolated = false;
+      v.slope = b.slope;
+      if (triangulator.find(b.boundary, 0, b.line, b.column_px, v.position)) continue;
+      v.position = kNoPoint;
+      ++own_no_point;
     }
     no_point += own_no_point;
   });

@@ -140,25 +140,28 @@ void Refiner::look_at_line(const DifferenceImage& image, int line, const Sequenc
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
   const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
   Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-  scratch.queries.clear();
-  scratch.edges.clear();
+  scratch.queries.resize(end - begin);
+  scratch.edges.resize(end - begin);
+  std::size_t count = 0;
   for (std::uint32_t e = begin; e < end; ++e) {
     seen_[e].found = false;
     if (result.boundary[e] < 0) continue;
     const float own = edges.edges[e].column_px;
     if (own < kLumaReach_px || own + kLumaReach_px + 1 > static_cast<float>(image.width)) continue;
-    const float left = e > begin ? edges.edges[e - 1].column_px : own - 100;
-    const float right = e + 1 < end ? edges.edges[e + 1].column_px : own + 100;
-    scratch.queries.push_back(
-        {own, {own - left, right - own, colours[static_cast<std::size_t>(result.boundary[e])]}});
-    scratch.edges.push_back(e);
+    // Written where it stays: a copy of what was just written in parts would wait for it.
+    LumaQuery& query = scratch.queries[count];
+    query.own_px = own;
+    query.sides.free_left_px = e > begin ? own - edges.edges[e - 1].column_px : 100;
+    query.sides.free_right_px = e + 1 < end ? edges.edges[e + 1].column_px - own : 100;
+    query.sides.colours = colours[static_cast<std::size_t>(result.boundary[e])];
+    query.sides.narrow = false;
+    scratch.edges[count++] = e;
   }
-  if (scratch.edges.empty()) return;
+  if (count == 0) return;
   placer_.read_line(image, line, wide_stripes_, scratch.light);
-  scratch.places.resize(scratch.queries.size());
-  placer_.places(scratch.light, share_, scratch.queries.data(), scratch.queries.size(),
-                 scratch.places.data());
-  for (std::size_t i = 0; i < scratch.edges.size(); ++i) {
+  scratch.places.resize(count);
+  placer_.places(scratch.light, share_, scratch.queries.data(), count, scratch.places.data());
+  for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t e = scratch.edges[i];
     look_at(image, line, scratch.light, scratch.places[i], worker, edges.edges[e], seen_[e]);
   }

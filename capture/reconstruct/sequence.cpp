@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace relievo {
 namespace {
@@ -55,7 +56,9 @@ struct Displacement {
   float px;
 };
 
-bool alike(const SideEvidence& a, const SideEvidence& b) {
+/// `b` has three numbers or more.
+template <std::size_t N>
+bool alike(const SideEvidence& a, const std::array<float, N>& b) {
   const float dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const float size = std::fabs(a[0]) + std::fabs(a[1]) + std::fabs(a[2]);
   return dot > 0.5F * size;
@@ -72,10 +75,6 @@ Displacement displacement(const DifferenceImage& same, int line, const Edge& edg
     if (matches(-px)) return {true, -px};
   }
   return {false, 0};
-}
-
-SideEvidence three_of(const std::array<float, 4>& side) {
-  return {side[0], side[1], side[2]};
 }
 
 /// Gain from the other slide's frame, where the colours on the two sides agree with it by `left` and `right`.
@@ -121,10 +120,10 @@ EdgeAgreement SequenceDecoder::agreement_of(const Edge& edge, const Beside& besi
 }
 
 /// What an edge is beyond doubt: every channel on both sides in both frames is clear.
-SequenceDecoder::Clear SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside,
-                                                       const Slide& shown) {
-  Clear out{-1, 0, 0};
-  if (!beside.tracked) return out;
+void SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out) {
+  out.boundary = -1;
+  out.own = out.gain = 0;
+  if (!beside.tracked) return;
   std::size_t code = 0;
   float least = kClear;
   std::array<float, 4> agreements{};  // with the colours that the signs tell
@@ -136,11 +135,10 @@ SequenceDecoder::Clear SequenceDecoder::clear_boundary(const Edge& edge, const B
     least = std::min(std::min(least, size[0]), std::min(size[1], size[2]));
     agreements[i++] = (size[0] + size[1] + size[2]) * (1.F / 3);
   }
-  if (least < kClear) return out;
+  if (least < kClear) return;
   out.boundary = shown.by_code[code];
   out.own = agreements[0] + agreements[1];
   out.gain = out.own + (agreements[2] + agreements[3]);
-  return out;
 }
 
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
@@ -163,7 +161,8 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     std::int32_t* boundary = candidates.boundary.data() + own;
     float* gains = candidates.gain.data() + own;
     int& used = candidates.used[static_cast<std::size_t>(e)];
-    const Clear clear = clear_boundary(edge, beside_[index], shown);
+    Clear clear;
+    clear_boundary(edge, beside_[index], shown, clear);
     // Of a clear edge; what a doubtful one shows is asked once its path is known.
     convincing_[index] = clear.own > kLeastOwn && (context.other == nullptr || clear.gain > kLeastGain);
     scratch.clear[static_cast<std::size_t>(e)] = clear.boundary >= 0;
@@ -237,16 +236,13 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   const std::size_t count = edges.line_start[static_cast<std::size_t>(line) + 1] - begin;
   const Edge* of_line = edges.edges.data() + begin;
   Beside* beside = beside_.data() + begin;
-  const auto looked = [&](std::size_t i) {
-    return EvidenceBeside{three_of(scratch.sides[i].left), three_of(scratch.sides[i].right)};
-  };
   scratch.off_px.assign(count, 0);
   bool moved = false;
   if (context.same != nullptr) scratch.sides.look(*context.same, line, of_line, count);
   for (std::size_t i = 0; i < count; ++i) {
     beside[i] = {{}, {}, true};
     if (context.same != nullptr) {
-      const EvidenceBeside there = looked(i);
+      const Sides& there = scratch.sides[i];
       if (!alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {
         beside[i].tracked = false;
         moved = true;
@@ -258,9 +254,8 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   if (context.other == nullptr) return;
   scratch.sides.look(*context.other, line, of_line, count, moved ? scratch.off_px.data() : nullptr);
   for (std::size_t i = 0; i < count; ++i) {
-    const EvidenceBeside there = looked(i);
-    beside[i].left = there.left;
-    beside[i].right = there.right;
+    std::memcpy(beside[i].left.data(), scratch.sides[i].left.data(), sizeof beside[i].left);
+    std::memcpy(beside[i].right.data(), scratch.sides[i].right.data(), sizeof beside[i].right);
   }
 }
 

@@ -101,7 +101,7 @@ class SequenceDecoder {
   void look_beside(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
   static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
-  static Clear clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown);
+  static void clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
   std::int32_t& cell(int line, int boundary);

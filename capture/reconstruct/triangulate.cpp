@@ -63,7 +63,7 @@ double Triangulator::sheet(int boundary, double y) const {
   return samples[i] + (at - i) * (samples[i + 1] - samples[i]);
 }
 
-std::optional<Vec3f> Triangulator::point(int boundary, float beyond, int line, float column_px) const {
+bool Triangulator::find(int boundary, float beyond, int line, float column_px, Vec3f& out) const {
   const auto [rx, ry] = ray(line, column_px);
   const auto& r = rotation_;
   // Direction of the ray in the projector's frame; the point is z * d + translation.
@@ -77,13 +77,14 @@ std::optional<Vec3f> Triangulator::point(int boundary, float beyond, int line, f
     if (beyond != 0) x += beyond * (sheet(boundary + 1, y) - x);
     // On the sheet: X = x Z in the projector's frame.
     const double denominator = dx - x * dz;
-    if (std::fabs(denominator) < 1e-9) return std::nullopt;
+    if (std::fabs(denominator) < 1e-9) return false;
     z = (x * translation_[2] - translation_[0]) / denominator;
     const double depth = z * dz + translation_[2];
-    if (!(z > 0) || !(depth > 0)) return std::nullopt;  // also where ray or sheet is none (NaN)
+    if (!(z > 0) || !(depth > 0)) return false;  // also where ray or sheet is none (NaN)
     y = (z * dy + translation_[1]) / depth;
   }
-  return Vec3f{static_cast<float>(z * rx), static_cast<float>(z * ry), static_cast<float>(z)};
+  out = {static_cast<float>(z * rx), static_cast<float>(z * ry), static_cast<float>(z)};
+  return true;
 }
 
 }  // namespace relievo

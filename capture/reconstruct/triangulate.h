@@ -26,7 +26,14 @@ class Triangulator {
 
   /// The same for a projector column between two boundaries: `beyond` stripes to the right of `boundary`.
   /// `boundary` + 1 must be one too unless `beyond` is 0.
-  std::optional<Vec3f> point(int boundary, float beyond, int line, float column_px) const;
+  std::optional<Vec3f> point(int boundary, float beyond, int line, float column_px) const {
+    Vec3f out;
+    if (!find(boundary, beyond, line, column_px, out)) return std::nullopt;
+    return out;
+  }
+
+  /// As point(), into `out`, which stays as it is where it returns false.
+  bool find(int boundary, float beyond, int line, float column_px, Vec3f& out) const;
 
  private:
   std::array<float, 2> ray(int line, float column_px) const;
