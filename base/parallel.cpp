@@ -25,7 +25,8 @@ void pause_shortly() {
 }
 
 /// Returns when `value` is no longer `old`.
-void wait_for_change(const std::atomic<int>& value, int old) {
+template <typename Int>
+void wait_for_change(const std::atomic<Int>& value, Int old) {
   for (int i = 0; i < kLooks; ++i) {
     if (value.load(std::memory_order_acquire) != old) return;
     pause_shortly();
@@ -37,9 +38,11 @@ void wait_for_change(const std::atomic<int>& value, int old) {
 
 struct WorkerPool::State {
   Task task;
-  std::atomic<int> round{0};    // of tasks; wraps
-  std::atomic<int> pending{0};  // helpers that have not finished this one
-  bool stop = false;            // set before the last round
+  std::atomic<std::uint32_t> round{0};  // of tasks; wraps
+  std::atomic<int> pending{0};          // helpers' ranges that are not done in this one
+  std::unique_ptr<std::atomic<std::uint32_t>[]>
+      claimed;        // of each range: the last round in which somebody took it
+  bool stop = false;  // set before the last round
   int threads = 1;
   std::vector<std::thread> helpers;
 
@@ -58,13 +61,20 @@ struct WorkerPool::State {
     if (begin < end) task.call(task.work, begin, end, worker);
   }
 
+  /// A helper's range of a round, unless somebody has taken it.
+  void try_range(int worker, std::uint32_t now) {
+    std::uint32_t before = now - 1;
+    if (!claimed[static_cast<std::size_t>(worker)].compare_exchange_strong(before, now)) return;
+    run_range(worker);
+    if (pending.fetch_sub(1, std::memory_order_acq_rel) == 1) pending.notify_one();
+  }
+
   void helper(int worker) {
-    for (int seen = 0;;) {
+    for (std::uint32_t seen = 0;;) {
       wait_for_change(round, seen);
       seen = round.load(std::memory_order_acquire);
       if (stop) return;
-      run_range(worker);
-      if (pending.fetch_sub(1, std::memory_order_acq_rel) == 1) pending.notify_one();
+      try_range(worker, seen);
     }
   }
 
@@ -76,6 +86,7 @@ struct WorkerPool::State {
 
 WorkerPool::WorkerPool(int threads) : state_(std::make_unique<State>()) {
   state_->threads = std::max(1, threads);
+  state_->claimed = std::make_unique<std::atomic<std::uint32_t>[]>(static_cast<std::size_t>(state_->threads));
   for (int i = 1; i < state_->threads; ++i) state_->helpers.emplace_back([this, i] { state_->helper(i); });
 }
 
@@ -99,6 +110,9 @@ void WorkerPool::run(const Task& task) {
   s.pending.store(s.threads - 1, std::memory_order_relaxed);
   s.start_round();
   s.run_range(0);
+  // Where other programs keep a helper from starting, its range is not waited for.
+  const std::uint32_t now = s.round.load(std::memory_order_relaxed);
+  for (int i = 1; i < s.threads; ++i) s.try_range(i, now);
   while (const int left = s.pending.load(std::memory_order_acquire)) wait_for_change(s.pending, left);
 }
 

@@ -21,8 +21,8 @@ class WorkerPool {
   int threads() const;
 
   /// Calls work(begin, end, worker) over disjoint ranges that cover [0, count); returns when all are done.
-  /// `worker` in [0, threads()) tells which scratch memory a call may use: range i always goes to worker i,
-  /// so a run repeats exactly. Allocates nothing.
+  /// `worker` in [0, threads()) tells which scratch memory a call may use: range i always has worker i's, on
+  /// whichever thread it runs, so a run repeats exactly. Allocates nothing.
   template <typename Work>
   void for_ranges(int count, const Work& work) {
     run(task_of(work, count, nullptr));

@@ -213,19 +213,31 @@ void ConsistencyCheck::join_to_above(int line) {
   const float* here = row(measured_, line);
   const float* above = row(measured_, line - 1);
   const std::int32_t first = line * boundaries_;
-  for (int b = 0; b < boundaries_; ++b)
-    if (std::fabs(here[b] - above[b]) < kLean_px) join(first + b - boundaries_, first + b);
+  bool joined_before = false;
+  for (int b = 0; b < boundaries_; ++b) {
+    const bool joined = std::fabs(here[b] - above[b]) < kLean_px;
+    // What both lines join to the boundary before is one piece with it already.
+    const bool known_as_one = joined_before && std::fabs(here[b] - here[b - 1]) < kWidest_px &&
+                              std::fabs(above[b] - above[b - 1]) < kWidest_px;
+    if (joined && !known_as_one) join(first + b - boundaries_, first + b);
+    joined_before = joined;
+  }
 }
 
 /// The pieces of surface that lines [begin, end) show: what hangs together along boundaries and lines.
 void ConsistencyCheck::measure_pieces(int begin, int end) {
   for (int line = begin; line < end; ++line) {
     const float* here = row(measured_, line);
-    const std::int32_t first = line * boundaries_;
+    std::int32_t* piece =
+        piece_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
+    std::int32_t* size =
+        size_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
+    std::int32_t start = 0;  // of what hangs together along the line
     for (int b = 0; b < boundaries_; ++b) {
-      piece_[static_cast<std::size_t>(first + b)] = first + b;
-      size_[static_cast<std::size_t>(first + b)] = 1;
-      if (std::fabs(here[b] - here[b - 1]) < kWidest_px) join(first + b - 1, first + b);
+      if (!(std::fabs(here[b] - here[b - 1]) < kWidest_px)) start = b;
+      piece[b] = line * boundaries_ + start;
+      size[b] = 1;
+      size[start] = b - start + 1;
     }
     if (line > begin) join_to_above(line);
   }

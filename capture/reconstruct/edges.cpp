@@ -69,43 +69,94 @@ EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edg
   return beside;
 }
 
-void EdgeSides::look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count,
-                     const float* off_px) {
+void EdgeSides::look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count) {
   windows_.resize(count);
   sides_.resize(count);
   const Doubts doubts(image, line);
-  for (std::size_t i = 0; i < count; ++i) {
-    const float column = off_px == nullptr ? edges[i].column_px : edges[i].column_px + off_px[i];
-    windows_[i] = windows_beside(doubts, image.width, edges[i], column);
-  }
+  for (std::size_t i = 0; i < count; ++i)
+    windows_[i] = windows_beside(doubts, image.width, edges[i], edges[i].column_px);
   row_kernels().side_evidence(image.line(line), image.width, windows_.data(), static_cast<int>(count),
                               sides_.data());
 }
+
+void EdgeSides::look_again(const DifferenceImage& image, int line, const Edge* edges, const float* off_px) {
+  const Doubts doubts(image, line);
+  for (std::size_t i = 0; i < windows_.size(); ++i) {
+    SideWindows& w = windows_[i];
+    if (off_px[i] != 0) {
+      w = windows_beside(doubts, image.width, edges[i], edges[i].column_px + off_px[i]);
+    } else {
+      w.left_doubt = doubts.at(w.left_first);
+      w.right_doubt = doubts.at(w.right_first);
+    }
+  }
+  row_kernels().side_evidence(image.line(line), image.width, windows_.data(),
+                              static_cast<int>(windows_.size()), sides_.data());
+}
+
+/// Puts what lies close together into one edge, weighed by the slopes, as crossings come from left to right.
+class EdgeFinder::Gatherer {
+ public:
+  Gatherer(const DifferenceImage& image, int line, Found* found)
+      : image_(image), line_(line), begin_(found), next_(found) {}
+
+  void take(float column_px, float slope) {
+    const float off = column_px - first_;
+    if (!(off < kMerge_px)) {
+      finish();
+      first_ = column_px;
+    }
+    // A crossing's variance goes with 1 / slope^2, which is the weight of the mean.
+    const float w = slope * slope;
+    weight_ += w;
+    sum_ += w * (column_px - first_);
+  }
+  /// Of edges.
+  std::uint32_t finish() {
+    if (weight_ > 0) {
+      *next_++ = {first_ + sum_ / weight_, std::sqrt(weight_),
+                  image_.noise_at(line_, static_cast<int>(first_))};
+    }
+    weight_ = sum_ = 0;
+    return static_cast<std::uint32_t>(next_ - begin_);
+  }
+
+ private:
+  const DifferenceImage& image_;
+  int line_;
+  Found *begin_, *next_;
+  float first_ = -2 * kMerge_px;  // of the edge's crossings
+  float weight_ = 0, sum_ = 0;
+};
 
 std::uint32_t EdgeFinder::crossings_of_line(const DifferenceImage& image, int line, Scratch& scratch,
                                             Found* found) {
   const int width = image.width;
   const float threshold = std::max(kLeastRise, kNoiseFactor * image.noise);
   const float weak_threshold = std::max(kLeastRise, kNoiseFactor * image.weak_noise);
-  auto& crossings = scratch.crossings;
-  crossings.clear();
-  scratch.flags.assign(static_cast<std::size_t>(width + 8),
-                       0);  // so that the last ones are read at once, too
+  scratch.flags.resize(static_cast<std::size_t>(width + 8));
+  std::fill(scratch.flags.end() - 8, scratch.flags.end(), std::uint8_t{0});  // the last ones are read at once
   row_kernels().crossings(image.line(line), width, weak_threshold, scratch.flags.data());
+  const float* planes = image.line(line);
+  Gatherer gatherer(image, line, found);
   const auto take = [&](int x, unsigned flags) {
-    const std::size_t first_here = crossings.size();
-    const bool weak = image.signal_at(line, x) == Signal::kWeak;
+    const float least = image.signal_at(line, x) == Signal::kWeak ? 0 : threshold;
+    std::array<float, 3> column, slope;
+    std::size_t count = 0;
     for (; flags != 0; flags &= flags - 1) {
-      const float* d = image.line(line) + std::countr_zero(flags) * width;
-      if (!weak && std::fabs(d[x + 2] - d[x - 1]) < threshold) continue;
-      const float step = d[x + 1] - d[x];
-      const Crossing here{static_cast<float>(x) - d[x] / step, std::fabs(step)};
-      std::size_t place = crossings.size();
-      crossings.push_back(here);
-      for (; place > first_here && here.column_px < crossings[place - 1].column_px; --place)
-        crossings[place] = crossings[place - 1];
-      crossings[place] = here;
+      const float* d = planes + std::countr_zero(flags) * width + x;
+      if (std::fabs(d[2] - d[-1]) < least) continue;
+      const float step = d[1] - d[0];
+      const float here = static_cast<float>(x) - d[0] / step;
+      std::size_t place = count++;
+      for (; place > 0 && here < column[place - 1]; --place) {
+        column[place] = column[place - 1];
+        slope[place] = slope[place - 1];
+      }
+      column[place] = here;
+      slope[place] = std::fabs(step);
     }
+    for (std::size_t i = 0; i < count; ++i) gatherer.take(column[i], slope[i]);
   };
   for (int x = 0; x < width; x += 8) {  // most columns have none
     std::uint64_t eight = 0;
@@ -116,21 +167,7 @@ std::uint32_t EdgeFinder::crossings_of_line(const DifferenceImage& image, int li
       eight &= ~(std::uint64_t{0xff} << (8 * k));
     }
   }
-
-  Found* next = found;
-  for (std::size_t i = 0; i < crossings.size();) {
-    // A crossing's variance goes with 1 / slope^2, which is the weight of the mean.
-    float weight = 0;
-    float sum = 0;
-    const float first = crossings[i].column_px;
-    for (; i < crossings.size() && crossings[i].column_px - first < kMerge_px; ++i) {
-      const float w = crossings[i].slope * crossings[i].slope;
-      weight += w;
-      sum += w * (crossings[i].column_px - first);
-    }
-    *next++ = {first + sum / weight, std::sqrt(weight), image.noise_at(line, static_cast<int>(first))};
-  }
-  return static_cast<std::uint32_t>(next - found);
+  return gatherer.finish();
 }
 
 void EdgeFinder::make_edges(const DifferenceImage& image, int line, const Found* found, std::size_t count,

@@ -51,9 +51,10 @@ EvidenceBeside evidence_beside(const DifferenceImage& image, int line, const Edg
 /// The same for many edges of a line at once. Keeps its scratch memory. One thread.
 class EdgeSides {
  public:
-  /// Looks beside `count` edges, at their own columns plus `off_px` (one an edge; null: none).
-  void look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count,
-            const float* off_px = nullptr);
+  /// Looks beside `count` edges.
+  void look(const DifferenceImage& image, int line, const Edge* edges, std::size_t count);
+  /// Looks beside the same edges again, in another image, `off_px` (one an edge) from their columns.
+  void look_again(const DifferenceImage& image, int line, const Edge* edges, const float* off_px);
   /// Of the edges looked at last.
   const Sides& operator[](std::size_t i) const { return sides_[i]; }
 
@@ -70,10 +71,7 @@ class EdgeFinder {
   void find(const DifferenceImage& image, WorkerPool& pool, EdgeImage& out);
 
  private:
-  struct Crossing {
-    float column_px;
-    float slope;
-  };
+  class Gatherer;
   struct Found {
     float column_px;
     float slope;
@@ -81,7 +79,6 @@ class EdgeFinder {
   };
   struct Scratch {
     std::vector<std::uint8_t> flags;
-    std::vector<Crossing> crossings;
     EdgeSides sides;
   };
   Found* found_on(int line) { return found_.data() + static_cast<std::size_t>(line) * most_on_line_; }

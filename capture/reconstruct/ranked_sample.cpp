@@ -15,6 +15,10 @@ std::int32_t key_of(float value) {
   return bits ^ ((bits >> 31) & 0x7fffffff);
 }
 
+float value_of(std::int32_t key) {
+  return std::bit_cast<float>(key ^ ((key >> 31) & 0x7fffffff));
+}
+
 }  // namespace
 
 std::size_t RankedSample::size() const {
@@ -24,52 +28,55 @@ std::size_t RankedSample::size() const {
 }
 
 float RankedSample::at(std::size_t rank) {
+  keys_.resize(size());
   std::int32_t least = INT32_MAX;
   std::int32_t most = INT32_MIN;
+  std::int32_t* to = keys_.data();
   for (const auto& part : parts_) {
-    for (const float value : part) {
-      const std::int32_t key = key_of(value);
+    const float* from = part.data();
+    const std::size_t count = part.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int32_t key = key_of(from[i]);
+      to[i] = key;
       least = key < least ? key : least;
       most = key > most ? key : most;
     }
+    to += count;
   }
   // Keys grow with the logarithm of values, so that a few that are far off do not crowd the others.
   const std::uint32_t range = static_cast<std::uint32_t>(most) - static_cast<std::uint32_t>(least);
   const int shift =
       std::max(0, static_cast<int>(std::bit_width(range)) - static_cast<int>(std::bit_width(kBuckets - 1)));
-  const auto bucket_of = [&](float value) {
-    return (static_cast<std::uint32_t>(key_of(value)) - static_cast<std::uint32_t>(least)) >> shift;
-  };
-  // Four sets of counts, since values next to each other are often alike and one count would wait for itself.
-  counts_.assign(4 * kBuckets, 0);
+  const std::size_t count = keys_.size();
+  bucket_of_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    bucket_of_[i] = static_cast<std::uint16_t>(
+        (static_cast<std::uint32_t>(keys_[i]) - static_cast<std::uint32_t>(least)) >> shift);
+  }
+  // Two sets of counts, since values next to each other are often alike and one count would wait for itself.
+  counts_.assign(2 * kBuckets, 0);
   std::uint32_t* counts = counts_.data();
-  for (const auto& part : parts_) {
-    std::size_t i = 0;
-    for (; i + 4 <= part.size(); i += 4) {
-      ++counts[bucket_of(part[i])];
-      ++counts[kBuckets + bucket_of(part[i + 1])];
-      ++counts[2 * kBuckets + bucket_of(part[i + 2])];
-      ++counts[3 * kBuckets + bucket_of(part[i + 3])];
-    }
-    for (; i < part.size(); ++i) ++counts[bucket_of(part[i])];
+  const std::uint16_t* bucket_of = bucket_of_.data();
+  for (std::size_t i = 0; i + 1 < count; i += 2) {
+    ++counts[bucket_of[i]];
+    ++counts[kBuckets + bucket_of[i + 1]];
   }
-  const auto in_bucket = [&](std::uint32_t b) {
-    return counts[b] + counts[kBuckets + b] + counts[2 * kBuckets + b] + counts[3 * kBuckets + b];
-  };
+  if (count % 2 != 0) ++counts[bucket_of[count - 1]];
   std::uint32_t wanted = 0;
-  for (std::uint32_t here = in_bucket(0); rank >= here; here = in_bucket(++wanted)) rank -= here;
-  bucket_.resize(size() + 1);
-  std::size_t n = 0;
-  for (const auto& part : parts_) {
-    for (const float value : part) {
-      bucket_[n] = value;
-      n += bucket_of(value) == wanted;
-    }
+  for (std::uint32_t here = counts[0] + counts[kBuckets]; rank >= here;
+       here = counts[wanted] + counts[kBuckets + wanted]) {
+    rank -= here;
+    ++wanted;
   }
-  bucket_.resize(n);
-  const auto at_rank = bucket_.begin() + static_cast<std::ptrdiff_t>(rank);
-  std::nth_element(bucket_.begin(), at_rank, bucket_.end());
-  return *at_rank;
+  // The wanted bucket's keys move to the front.
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    keys_[n] = keys_[i];
+    n += bucket_of[i] == wanted;
+  }
+  const auto at_rank = keys_.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(keys_.begin(), at_rank, keys_.begin() + static_cast<std::ptrdiff_t>(n));
+  return value_of(*at_rank);
 }
 
 }  // namespace relievo

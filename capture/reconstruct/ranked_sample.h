@@ -28,8 +28,9 @@ class RankedSample {
 
  private:
   std::vector<std::vector<float>> parts_;
-  std::vector<std::uint32_t> counts_;  // of buckets of values
-  std::vector<float> bucket_;
+  std::vector<std::int32_t> keys_;        // of all values
+  std::vector<std::uint16_t> bucket_of_;  // each of them is in
+  std::vector<std::uint32_t> counts_;     // of buckets of values
 };
 
 }  // namespace relievo

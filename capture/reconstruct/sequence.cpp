@@ -42,10 +42,13 @@ float agreement(Primary colour, const SideEvidence& e) {
          (1.F / 3);
 }
 
-/// Of every primary.
+/// Of every primary; its complement's is the opposite.
 PerPrimary agreements(const SideEvidence& e) {
   PerPrimary out;
-  for (std::size_t c = 0; c < 8; ++c) out[c] = agreement(static_cast<Primary>(c), e);
+  for (std::size_t c = 4; c < 8; ++c) {
+    out[c] = agreement(static_cast<Primary>(c), e);
+    out[7 - c] = -out[c];
+  }
   return out;
 }
 
@@ -237,7 +240,6 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   const Edge* of_line = edges.edges.data() + begin;
   Beside* beside = beside_.data() + begin;
   scratch.off_px.assign(count, 0);
-  bool moved = false;
   if (context.same != nullptr) scratch.sides.look(*context.same, line, of_line, count);
   for (std::size_t i = 0; i < count; ++i) {
     beside[i] = {{}, {}, true};
@@ -245,14 +247,17 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
       const Sides& there = scratch.sides[i];
       if (!alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {
         beside[i].tracked = false;
-        moved = true;
         scratch.off_px[i] = context.other_share * displacement(*context.same, line, of_line[i]).px;
       }
     }
     out.still[begin + i] = beside[i].tracked;
   }
   if (context.other == nullptr) return;
-  scratch.sides.look(*context.other, line, of_line, count, moved ? scratch.off_px.data() : nullptr);
+  if (context.same != nullptr) {
+    scratch.sides.look_again(*context.other, line, of_line, scratch.off_px.data());
+  } else {
+    scratch.sides.look(*context.other, line, of_line, count);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     std::memcpy(beside[i].left.data(), scratch.sides[i].left.data(), sizeof beside[i].left);
     std::memcpy(beside[i].right.data(), scratch.sides[i].right.data(), sizeof beside[i].right);
