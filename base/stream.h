@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,6 +53,16 @@ inline std::string_view to_string(StreamState state) {
   return "unknown";
 }
 
+/// A projector and a camera that are, or are not, in step (docs/RIG.md).
+struct StepStatus {
+  std::uint64_t mixed = 0;      // frames dropped because their exposures were under two slides each
+  std::uint64_t regrouped = 0;  // frames made of one's second and the next one's first exposure
+  std::optional<double> phase;  // 0..2, in exposures: 0 in step, 0.3 three tenths under the next slide
+  std::optional<double> drift_fields_s;  // fields a second that the projector gains
+
+  bool operator==(const StepStatus&) const = default;
+};
+
 /// Running counts of one stream, published about once a second.
 struct ServerStatus {
   std::string stream;
@@ -69,6 +80,7 @@ struct ServerStatus {
   double encode_ms = 0;
   double latency_ms = 0;  // capture to publish
   FilterCounts filters;   // since the start
+  StepStatus step;        // its mixed frames are among drops_capture
 };
 
 /// True where `name` may name a stream: [A-Za-z0-9_.-]{1,64}, not starting with a dot.

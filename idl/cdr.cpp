@@ -259,6 +259,13 @@ Result<ServerStatus> read_status_cdr(std::span<const std::uint8_t> cdr) {
       const auto value = in.get<std::uint64_t>();
       if (i < kFilters.size()) status.filters.*kFilters[i].count = value;
     }
+    if (!in.more()) return;  // of a server that did not look
+    status.step.mixed = in.get<std::uint64_t>();
+    status.step.regrouped = in.get<std::uint64_t>();
+    for (std::optional<double>* value : {&status.step.phase, &status.step.drift_fields_s}) {
+      const auto length = in.get<std::uint32_t>();
+      for (std::uint32_t i = 0; i < length && in.ok(); ++i) *value = in.number();
+    }
   });
   if (!in.ok()) return truncated("status");
   if (auto bad = bad_stream(status.stream)) return *bad;

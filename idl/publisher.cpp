@@ -127,6 +127,17 @@ class DdsPublisher final : public Publisher {
     for (std::size_t i = 0; i < kFilters.size(); ++i) filters[i] = status.filters.*kFilters[i].count;
     sample.filters._length = sample.filters._maximum = static_cast<std::uint32_t>(filters.size());
     sample.filters._buffer = filters.data();
+    sample.mixed = status.step.mixed;
+    sample.regrouped = status.step.regrouped;
+    const auto none_or_one = [](auto& sequence, const std::optional<double>& value, double& memory) {
+      memory = value.value_or(0);
+      sequence._length = sequence._maximum = value ? 1 : 0;
+      sequence._buffer = &memory;
+    };
+    double phase = 0;
+    double drift = 0;
+    none_or_one(sample.phase, status.step.phase, phase);
+    none_or_one(sample.drift, status.step.drift_fields_s, drift);
     return written(dds_write(writer(Topic::kStatus), &sample), Topic::kStatus);
   }
 

@@ -85,6 +85,7 @@ class ThreadedPipeline final : public Pipeline {
     std::lock_guard lock(mutex_);
     s.state = state_;
     s.message = message_.empty() ? step_message_ : message_;
+    s.step = step_;
     if (state_ == StreamState::kRunning && asked_ns_ && steady_now_ns() - *asked_ns_ > silence_ns()) {
       s.state = StreamState::kStalled;
       s.message = "The source gives no frames.";
@@ -199,13 +200,13 @@ class ThreadedPipeline final : public Pipeline {
       const auto pass = source_.info().frames;
       const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
       steps.add(item->frame.time_ns, reconstructor_.report().step);
-      say_step(steps.message());
+      say_step(steps);
       if (reconstructor_.report().step.mixed) {
         stats_.lost_in_capture(1);
         // A projector that drifts comes round; a source that can be played again is given up in the end.
         if (!any_surface && !source_.info().live &&
-            steps.mixed() == std::max(kMixedForASurface, 2 * pass.value_or(0)))
-          fail(Error{source_.info().name + " gave no surface in " + std::to_string(steps.mixed()) +
+            steps.status().mixed == std::max(kMixedForASurface, 2 * pass.value_or(0)))
+          fail(Error{source_.info().name + " gave no surface in " + std::to_string(steps.status().mixed) +
                      " frames: " + steps.advice()});
         continue;
       }
@@ -285,11 +286,12 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   /// Logged when it begins to be said.
-  void say_step(const std::string& message) {
+  void say_step(const StepWatch& steps) {
     std::lock_guard lock(mutex_);
-    if (message == step_message_) return;
-    if (step_message_.empty()) log_warning(message);
-    step_message_ = message;
+    step_ = steps.status();
+    if (steps.message() == step_message_) return;
+    if (step_message_.empty()) log_warning(steps.message());
+    step_message_ = steps.message();
   }
 
   void set_state(StreamState state, const std::string& message) {
@@ -313,6 +315,7 @@ class ThreadedPipeline final : public Pipeline {
   bool stopping_ = false;
   StreamState state_ = StreamState::kStarting;
   std::string message_;
+  StepStatus step_;
   std::string step_message_;              // of projector and camera
   std::optional<std::int64_t> asked_ns_;  // the source for a frame that has not come yet
   std::optional<Error> failure_;

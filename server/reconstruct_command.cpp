@@ -58,9 +58,10 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
   if (options.json) {
     nlohmann::json counts;
     for (const Filter& filter : kFilters) counts[std::string(filter.name)] = t.filters.*filter.count;
-    nlohmann::json step = {{"mixed", steps.mixed()}, {"regrouped", steps.regrouped()}};
-    if (steps.phase()) step["phase"] = *steps.phase();
-    if (const auto drift = steps.drift_per_second()) step["drift_fields_s"] = *drift;
+    const StepStatus& s = steps.status();
+    nlohmann::json step = {{"mixed", s.mixed}, {"regrouped", s.regrouped}};
+    if (s.phase) step["phase"] = *s.phase;
+    if (s.drift_fields_s) step["drift_fields_s"] = *s.drift_fields_s;
     const nlohmann::json out = {{"frames", t.frames},
                                 {"scheme", to_string(t.scheme)},
                                 {"reconstructed", t.reconstructed},
@@ -98,9 +99,9 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
     std::printf("%llu frames showed the slide of the frame before: dropped frames in capture\n",
                 static_cast<unsigned long long>(t.same_slide));
   }
-  if (steps.mixed() > 0) {
+  if (steps.status().mixed > 0) {
     std::printf("%llu frames dropped for mixed exposures: %s\n",
-                static_cast<unsigned long long>(steps.mixed()), steps.advice().c_str());
+                static_cast<unsigned long long>(steps.status().mixed), steps.advice().c_str());
   }
   if (t.reconstructed > 0) print_filters(t.filters, t.reconstructed);
 }
@@ -171,7 +172,7 @@ Status run(const Options& options, StopSignal& stop) {
                  "); the others are reconstructed"};
   }
   if (totals.reconstructed == 0 && !stop.stopped()) {
-    if (steps.mixed() > 0) return Error{"no frame could be reconstructed: " + steps.advice()};
+    if (steps.status().mixed > 0) return Error{"no frame could be reconstructed: " + steps.advice()};
     return Error{
         "no frame could be reconstructed: the take needs two readable frames under different slides"};
   }

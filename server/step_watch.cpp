@@ -18,7 +18,7 @@ StepWatch::StepWatch(double frame_rate) : frame_rate_(frame_rate), lately_(kLate
 
 void StepWatch::add(std::int64_t time_ns, const StepReport& step) {
   if (step.phase) {
-    phase_ = step.phase;
+    status_.phase = *step.phase;
     if (step.mixed) mixed_phase_ = step.phase;
     drift_.add(time_ns, *step.phase);
   }
@@ -26,10 +26,11 @@ void StepWatch::add(std::int64_t time_ns, const StepReport& step) {
   mixed_lately_ -= slot;
   slot = step.mixed ? 1 : 0;
   mixed_lately_ += slot;
-  mixed_ += slot;
-  regrouped_ += step.regrouped ? 1 : 0;
+  status_.mixed += slot;
+  status_.regrouped += step.regrouped ? 1 : 0;
   const std::uint64_t seen = std::min<std::uint64_t>(frames_, kLately);
   const std::uint64_t share = 100 * mixed_lately_ / seen;
+  if (frames_ % kLeast == 0) status_.drift_fields_s = drift_.per_second();
   if (seen >= kLeast && share >= kMany && (message_.empty() || frames_ % kRenewed == 0))
     message_ = std::to_string(share) + " % of frames are dropped for mixed exposures: " + advice();
   if (share < kFew) message_.clear();

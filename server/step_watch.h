@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/stream.h"
 #include "capture/reconstruct/step_keeping.h"
 
 namespace relievo {
@@ -20,24 +21,19 @@ class StepWatch {
 
   /// For a person: how many frames are dropped and what to do. Empty while few are.
   const std::string& message() const { return message_; }
-  std::uint64_t mixed() const { return mixed_; }
-  std::uint64_t regrouped() const { return regrouped_; }
-  /// See StepDrift.
-  std::optional<double> drift_per_second() const { return drift_.per_second(); }
-  std::optional<float> phase() const { return phase_; }
+  /// Counts so far, the last phase known and the drift (StepDrift).
+  const StepStatus& status() const { return status_; }
   /// What to do, whether or not much is dropped. Empty where nothing ever was.
   std::string advice() const;
 
  private:
   double frame_rate_;
   StepDrift drift_;
-  std::optional<float> phase_;        // the last one
   std::optional<float> mixed_phase_;  // the last one of a mixed frame
   std::vector<std::uint8_t> lately_;  // ring, 1: mixed
   std::uint64_t frames_ = 0;
   std::uint64_t mixed_lately_ = 0;
-  std::uint64_t mixed_ = 0;
-  std::uint64_t regrouped_ = 0;
+  StepStatus status_;
   std::string message_;
 };
 

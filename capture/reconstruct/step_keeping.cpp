@@ -108,16 +108,27 @@ const CapturedFrame* StepKeeper::read(const CapturedFrame& frame) {
     phase_.reset();
   }
 
+  report_.mixed = phase_ && std::fabs(towards_whole(*phase_)) > kMixed;
+  if (report_.mixed) {
+    settled_ = false;
+    keep_second(frame);  // the next frame may be the first of a field's delay
+    return nullptr;
+  }
   const bool late = phase_ ? std::lround(*phase_) % 2 == 1 : late_;
+  // A drift passes through mixed exposures; what jumps may be one frame's error, from motion about a lost
+  // frame.
+  if (late != late_ && settled_) {
+    settled_ = false;
+    keep_second(frame);
+    return nullptr;
+  }
+  settled_ = report_.phase.has_value();
   report_.restarted = late != late_;
   late_ = late;
-  report_.mixed = phase_ && std::fabs(towards_whole(*phase_)) > kMixed;
-  const CapturedFrame* out = &frame;
-  if (late_) {
-    out = report_.mixed ? nullptr : regroup(frame);
-    keep_second(frame);
-  }
-  return report_.mixed ? nullptr : out;
+  if (!late_) return &frame;
+  const CapturedFrame* out = regroup(frame);
+  keep_second(frame);
+  return out;
 }
 
 void StepKeeper::keep_second(const CapturedFrame& frame) {

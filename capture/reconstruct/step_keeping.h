@@ -54,6 +54,7 @@ class StepKeeper {
   std::optional<float> phase_;  // the last one known
   int unknown_ = 0;             // frames since
   bool late_ = false;           // by an exposure: frames are regrouped
+  bool settled_ = false;        // the last frame was known to be so
   Image8 second_;               // interlaced: the last picture; progressive: its second one
   std::optional<std::int64_t> second_time_ns_;
   CapturedFrame made_;

@@ -42,6 +42,12 @@ Json rig_json(const StreamInfo& info) {
 Json status_json(const ServerStatus& status) {
   Json filters;
   for (const Filter& filter : kFilters) filters[std::string(filter.name)] = status.filters.*filter.count;
+  Json step = {{"mixed", status.step.mixed},
+               {"regrouped", status.step.regrouped},
+               {"phase", nullptr},
+               {"drift_fields_s", nullptr}};
+  if (status.step.phase) step["phase"] = *status.step.phase;
+  if (status.step.drift_fields_s) step["drift_fields_s"] = *status.step.drift_fields_s;
   return {{"time_ns", status.time_ns},
           {"state", to_string(status.state)},
           {"message", status.message},
@@ -55,7 +61,8 @@ Json status_json(const ServerStatus& status) {
           {"reconstruct_ms", status.reconstruct_ms},
           {"encode_ms", status.encode_ms},
           {"latency_ms", status.latency_ms},
-          {"filters", filters}};
+          {"filters", filters},
+          {"step", step}};
 }
 
 void put_u64(std::uint8_t* at, std::uint64_t value) {
@@ -245,6 +252,23 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
                  static_cast<double>(s.status->filters.*filter.count));
     }
   }
+  per_status("relievo_stream_mixed_total", "counter",
+             "Frames dropped because each exposure was under two slides; among the drops in capture.",
+             [](T s) { return s.step.mixed; });
+  per_status("relievo_stream_regrouped_total", "counter",
+             "Frames made of one's second and the next one's first exposure.",
+             [](T s) { return s.step.regrouped; });
+  const auto per_step = [&](const char* name, const char* help, std::optional<double> StepStatus::*value) {
+    out.family(name, "gauge", help);
+    for (const auto& s : streams) {
+      if (s.status && s.status->step.*value)
+        out.sample("{stream=" + label(s.info.stream) + "}", *(s.status->step.*value));
+    }
+  };
+  per_step("relievo_stream_step_phase", "Of the exposures in the slides' time, 0 to 2; 0 is in step.",
+           &StepStatus::phase);
+  per_step("relievo_stream_step_drift", "Fields a second that the projector gains on the camera.",
+           &StepStatus::drift_fields_s);
   out.family("relievo_stream_state", "gauge", "1 for the state the stream is in.");
   for (const auto& s : streams) {
     if (!s.status) continue;

@@ -33,11 +33,11 @@ TEST(StepWatch, SpeaksOnceManyAreDroppedAndNoMoreWhenFewAre) {
   EXPECT_EQ(watch.message(), "");
   add(20, 0.3F, true);
   EXPECT_NE(watch.message().find("% of frames are dropped for mixed exposures: "), std::string::npos);
-  EXPECT_EQ(watch.mixed(), 28U);
+  EXPECT_EQ(watch.status().mixed, 28U);
   add(200, 0, false);
   EXPECT_EQ(watch.message(), "");
   EXPECT_NE(watch.advice(), "");
-  EXPECT_EQ(watch.mixed(), 28U);
+  EXPECT_EQ(watch.status().mixed, 28U);
 }
 
 struct Served {
@@ -67,6 +67,12 @@ TEST(ServedOutOfStep, DriftIsCountedAndSaid) {
   EXPECT_GT(served.status.frames_published, 20U);
   EXPECT_GT(served.status.drops_capture, 30U);
   EXPECT_LE(served.status.frames_published + served.status.drops_capture, 90U);
+  EXPECT_GT(served.status.step.mixed, 30U);
+  EXPECT_LE(served.status.step.mixed, served.status.drops_capture);
+  EXPECT_GT(served.status.step.regrouped, 5U);
+  ASSERT_TRUE(served.status.step.phase);
+  ASSERT_TRUE(served.status.step.drift_fields_s);
+  EXPECT_NEAR(*served.status.step.drift_fields_s, 2, 0.1);
   EXPECT_NE(served.status.message.find("they drift by 2.0"), std::string::npos) << served.status.message;
 }
 

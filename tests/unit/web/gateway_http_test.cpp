@@ -75,12 +75,17 @@ TEST_F(GatewayHttp, MetricsCount) {
   status.state = StreamState::kRunning;
   status.drops_encode = 7;
   status.filters.small_component = 12;
+  status.step = {.mixed = 4, .regrouped = 2, .phase = 0.25, .drift_fields_s = -1.5};
   status.latency_ms = 40;
   gateway->publish(status);
   EXPECT_EQ(metric("relievo_gateway_frames_total{stream=\"face\"}"), 3);
   EXPECT_EQ(metric("relievo_gateway_clients"), 0);
   EXPECT_EQ(metric("relievo_stream_drops_total{stream=\"face\",place=\"encode\"}"), 7);
   EXPECT_EQ(metric("relievo_stream_filters_total{stream=\"face\",filter=\"small_component\"}"), 12);
+  EXPECT_EQ(metric("relievo_stream_mixed_total{stream=\"face\"}"), 4);
+  EXPECT_EQ(metric("relievo_stream_regrouped_total{stream=\"face\"}"), 2);
+  EXPECT_EQ(metric("relievo_stream_step_phase{stream=\"face\"}"), 0.25);
+  EXPECT_EQ(metric("relievo_stream_step_drift{stream=\"face\"}"), -1.5);
   EXPECT_EQ(metric("relievo_stream_state{stream=\"face\",state=\"running\"}"), 1);
   EXPECT_EQ(metric("relievo_stream_state{stream=\"face\",state=\"ended\"}"), 0);
   EXPECT_DOUBLE_EQ(metric("relievo_stream_latency_seconds{stream=\"face\"}"), 0.04);
