@@ -46,7 +46,7 @@ class DdsClient final : public ChainClient {
  private:
   void decode(const FrameMessage& frame) {
     const std::int64_t begin = steady_now_ns();
-    const auto decoded = decode_frame(*frame.data);
+    const auto decoded = decoder_.decode(*frame.data);
     const std::int64_t end = steady_now_ns();
     const std::int64_t now = utc_now_ns();
     if (!decoded && status_) status_ = decoded.error();
@@ -56,6 +56,7 @@ class DdsClient final : public ChainClient {
     ++received_;
   }
 
+  FrameDecoder decoder_;
   std::vector<Seen> seen_;
   std::atomic<std::uint64_t> received_{0};
   std::atomic<std::uint64_t> lost_{0};

@@ -15,6 +15,7 @@
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
+#include "codec/geometry_profile.h"
 #include "idl/transport.h"
 #include "server/config.h"
 #include "server/options.h"
@@ -52,6 +53,9 @@ EncodeOptions encode_options() {
   const ServeConfig serve;  // as `serve` does by default
   EncodeOptions encode;
   encode.jpeg_quality = serve.jpeg_quality;
+  set_geometry_profile(serve.geometry, encode);
+  encode.step_bits = serve.step_bits;
+  encode.key_interval = serve.key_interval;
   encode.draco_speed = serve.draco_speed;
   return encode;
 }
@@ -63,6 +67,8 @@ struct Serial {
 };
 
 Result<Serial> run_serially(const FrameLoop& frames, const Options& options, StopSignal& stop) {
+  FrameEncoder encoder(frames.info().rig, frames.info().pattern);
+  FrameDecoder decoder;
   Serial serial;
   auto reconstructor =
       Reconstructor::create(frames.info().rig, frames.info().pattern, reconstruct_options(options));
@@ -74,10 +80,10 @@ Result<Serial> run_serially(const FrameLoop& frames, const Options& options, Sto
     const std::int64_t reconstructed = steady_now_ns();
     if (!frame) return frame.error();
     if (!*frame) continue;
-    const auto bytes = encode_frame(**frame, encode_options());
+    const auto bytes = encoder.encode(**frame, encode_options());
     const std::int64_t encoded = steady_now_ns();
     if (!bytes) return bytes.error();
-    const auto decoded = decode_frame(*bytes);
+    const auto decoded = decoder.decode(*bytes);
     const std::int64_t end = steady_now_ns();
     if (!decoded) return decoded.error();
     if (n < 4) continue;  // memory is being allocated

@@ -12,6 +12,7 @@
 #include "bench/suites.h"
 #include "bench/surface_error.h"
 #include "codec/draco_mesh.h"
+#include "codec/frame3d_codec.h"
 #include "server/options.h"
 #include "server/pipeline.h"
 #include "server/working_volume.h"
@@ -29,9 +30,10 @@ struct Options {
 
 /// How a stream would code this surface: its box, and the bits that the pipeline's resolution takes in it.
 struct Job {
-  const Surface& surface;
+  const Frame3D& frame;
   Volume volume;
   int pipeline_bits;
+  const Surface& surface = frame.surface;
 };
 
 struct Coded {
@@ -100,9 +102,43 @@ Codec draco(int speed, int bits) {
       [](const Coded& coded) { return decode_draco(coded.bytes, coded.vertices, coded.triangles); }};
 }
 
+/// Frames without texture, as a stream's encoder and decoder make and read them, one after the other.
+Codec grid(const std::string& name, const SourceInfo& source, const EncodeOptions& options) {
+  auto encoder = std::make_shared<FrameEncoder>(source.rig, source.pattern);
+  auto decoder = std::make_shared<FrameDecoder>();
+  return {name, [options](const Job&) { return options.step_bits; },
+          [encoder, options](const Job& job) -> Result<Coded> {
+            auto bytes = encoder->encode(job.frame, options);
+            if (!bytes) return bytes.error();
+            const auto header = read_frame_header(*bytes);
+            if (!header) return header.error();
+            if (header->geometry != options.geometry)
+              return Error{"the surface does not lie on the grid of stripes and lines"};
+            return Coded{std::move(*bytes), header->vertices, header->triangles};
+          },
+          [decoder](const Coded& coded) -> Result<Surface> {
+            auto frame = decoder->decode(coded.bytes);
+            if (!frame) return frame.error();
+            return std::move(frame->surface);
+          }};
+}
+
 /// A codec is a row here.
-std::vector<Codec> codecs() {
+std::vector<Codec> codecs(const SourceInfo& source) {
   std::vector<Codec> all{raw()};
+  EncodeOptions options;
+  options.geometry = GeometryCodec::kGrid;
+  options.texture = TextureCodec::kNone;
+  options.quality = false;
+  all.push_back(grid("grid-1/16px", source, options));
+  options.step_bits = 6;
+  all.push_back(grid("grid-1/64px", source, options));
+  options.step_bits = 4;
+  options.key_interval = 10;
+  all.push_back(grid("grid-1/16px-delta", source, options));
+  options.key_interval = 1;
+  options.quality = true;
+  all.push_back(grid("grid-1/16px-sigma", source, options));
   for (const int bits : {12, 0})
     for (const int speed : {0, 4, 5, 7, 9}) all.push_back(draco(speed, bits));
   return all;
@@ -147,13 +183,13 @@ Status run(const Options& options, StopSignal& stop) {
   WorkingVolume volume{Volume{}};
   for (const Frame3D& frame : **frames) {
     const Volume& box = volume.fit(frame.surface.positions);
-    jobs.push_back({frame.surface, box, volume.bits(PipelineOptions{}.depth_resolution)});
+    jobs.push_back({frame, box, volume.bits(PipelineOptions{}.depth_resolution)});
     vertices.push_back(static_cast<double>(frame.surface.positions.size()));
     triangles.push_back(static_cast<double>(frame.surface.triangles.size()));
   }
 
   // Round by round, so that whatever else the machine does meets all codecs alike.
-  const std::vector<Codec> all = codecs();
+  const std::vector<Codec> all = codecs((*loop)->info());
   std::vector<Samples> samples(all.size());
   Samples warm_up;
   for (int round = 0; round < options.rounds; ++round) {

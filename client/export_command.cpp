@@ -85,18 +85,25 @@ std::string file_name(std::uint64_t number, const char* extension) {
 struct Exported {
   std::uint64_t written = 0;
   std::uint64_t unreadable = 0;
+  std::uint64_t waiting = 0;  // for the key frame they build on
   std::string first_problem;
   bool stopped = false;
 };
 
-Status export_frame(const Options& options, const RawSample& sample, Exported& exported) {
+Status export_frame(const Options& options, const RawSample& sample, FrameDecoder& decoder,
+                    Exported& exported) {
   const auto unreadable = [&](const Error& error) {
     if (exported.unreadable++ == 0) exported.first_problem = error.message;
     return Status();
   };
   const auto view = read_frame_cdr(sample.cdr);
   if (!view) return unreadable(view.error());
-  const auto frame = decode_frame(view->data);
+  if (read_frame_header(view->data) && !decoder.can_decode(view->data)) {
+    if (exported.waiting++ == 0)
+      log_warning("the recording begins between key frames: frames before the first one cannot be shown");
+    return {};
+  }
+  const auto frame = decoder.decode(view->data);
   if (!frame) return unreadable(frame.error());
   std::error_code error;  // made with the first frame, so that a failure leaves no empty folder
   if (exported.written == 0) std::filesystem::create_directories(options.folder, error);
@@ -109,8 +116,15 @@ Status export_frame(const Options& options, const RawSample& sample, Exported& e
   return {};
 }
 
+/// Frames before the range may be what those in it build on.
+void remember(const RawSample& sample, FrameDecoder& decoder) {
+  const auto view = read_frame_cdr(sample.cdr);
+  if (view && is_key_frame(view->data)) (void)decoder.remember(view->data);
+}
+
 Result<Exported> export_frames(const Options& options, RecordedStream& recorded, StopSignal& stop) {
   Exported exported;
+  FrameDecoder decoder;
   const std::uint64_t there = recorded.frames();
   const std::uint64_t beyond = std::min(there, options.range.last == std::numeric_limits<std::uint64_t>::max()
                                                    ? there
@@ -123,8 +137,11 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
     if ((*sample)->topic != Topic::kFrame) continue;
     const double time_s = seconds((*sample)->receive_time_ns - recorded.summary().start_ns);
     if (time_s > options.to_s) break;
-    if (position++ < options.range.first || time_s < options.from_s) continue;
-    if (auto status = export_frame(options, **sample, exported); !status) return status.error();
+    if (position++ < options.range.first || time_s < options.from_s) {
+      remember(**sample, decoder);
+      continue;
+    }
+    if (auto status = export_frame(options, **sample, decoder, exported); !status) return status.error();
     progress.update(exported.written);
     exported.stopped = stop.stopped();
     if (exported.stopped) break;

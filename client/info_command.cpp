@@ -49,7 +49,8 @@ struct FrameTotals {
 };
 
 std::string codec_name(GeometryCodec codec) {
-  return codec == GeometryCodec::kDracoMesh ? "draco-mesh" : std::to_string(static_cast<int>(codec));
+  if (codec == GeometryCodec::kDracoMesh) return "draco-mesh";
+  return codec == GeometryCodec::kGrid ? "grid" : std::to_string(static_cast<int>(codec));
 }
 std::string codec_name(TextureCodec codec) {
   if (codec == TextureCodec::kNone) return "none";

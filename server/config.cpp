@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/geometry_profile.h"
 #include "server/camera_flags.h"
 #include "server/size_option.h"
 
@@ -51,6 +52,15 @@ class Reader {
     const auto value = node->value_exact<std::string>();
     if (!value || !scheme_named(*value))
       return refuse(*node, key, "must be " + scheme_names() + " in quotes");
+    out = *value;
+  }
+  void geometry(std::string_view key, std::string& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    EncodeOptions unused;
+    if (!value || !set_geometry_profile(*value, unused))
+      return refuse(*node, key, "must be " + geometry_profile_names() + " in quotes");
     out = *value;
   }
   void flag(std::string_view key, bool& out) {
@@ -200,6 +210,9 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.integer("jpeg_quality", 1, 100, config.jpeg_quality);
+  reader.geometry("geometry", config.geometry);
+  reader.integer("step_bits", 0, 8, config.step_bits);
+  reader.integer("key_interval", 1, 1000, config.key_interval);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
   reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
   return reader.finish();

@@ -29,6 +29,9 @@ struct ServeConfig {
   Decoder decoder = ReconstructOptions{}.decoder;
   SurfaceBuilderOptions surface;
   int jpeg_quality = 80;
+  std::string geometry = "grid";  // a name of codec/geometry_profile.h
+  int step_bits = 6;
+  int key_interval = 1;
   int draco_speed = 4;
 };
 

@@ -48,6 +48,7 @@ class ThreadedPipeline final : public Pipeline {
         sinks_(std::move(sinks)),
         options_(options),
         reconstructor_(std::move(reconstructor)),
+        encoder_(source.info().rig, source.info().pattern),
         volume_(options.encode.volume) {}
 
   Status run() override {
@@ -237,7 +238,7 @@ class ThreadedPipeline final : public Pipeline {
       EncodeOptions encode = options_.encode;
       encode.volume = volume_.fit(item->frame.surface.positions);
       if (const int bits = volume_.bits(options_.depth_resolution); bits > 0) encode.position_bits = bits;
-      auto bytes = encode_frame(item->frame, encode);
+      auto bytes = encoder_.encode(item->frame, encode);
       if (!bytes) {
         fail(bytes.error());
         continue;
@@ -304,6 +305,7 @@ class ThreadedPipeline final : public Pipeline {
   std::vector<FrameSink*> sinks_;
   const PipelineOptions options_;
   Reconstructor reconstructor_;
+  FrameEncoder encoder_;
   WorkingVolume volume_;
   BoundedQueue<Captured> to_reconstruct_{kQueueFrames};
   BoundedQueue<Reconstructed> to_encode_{kQueueFrames};

@@ -12,6 +12,7 @@
 #include "capture/source/field_source.h"
 #include "cli/checks.h"
 #include "cli/listen_address.h"
+#include "codec/geometry_profile.h"
 #include "idl/recorder.h"
 #include "idl/transport.h"
 #include "server/camera_flags.h"
@@ -154,6 +155,9 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   options.reconstruct.decoder = config.decoder;
   options.reconstruct.surface = config.surface;
   options.encode.jpeg_quality = config.jpeg_quality;
+  set_geometry_profile(config.geometry, options.encode);
+  options.encode.step_bits = config.step_bits;
+  options.encode.key_interval = config.key_interval;
   options.encode.draco_speed = config.draco_speed;
   auto pipeline = Pipeline::create(**source, sinks, options);
   if (!pipeline) return pipeline.error();
@@ -187,9 +191,9 @@ std::string stream_name(const std::string& name) {
 /// Flags as given; what is not given leaves the file's or the default value.
 struct Flags {
   std::optional<std::string> config, source, stream, interface, web, record;
-  std::optional<std::string> decoder;
+  std::optional<std::string> decoder, geometry;
   std::string scheme;
-  std::optional<int> domain, threads, jpeg_quality, draco_speed, fill_holes;
+  std::optional<int> domain, threads, jpeg_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<std::uint64_t> frames;
   bool loop = false, fast = false, dense = false;
   CameraOptions camera;
@@ -213,6 +217,9 @@ Status run(const Flags& flags, StopSignal& stop) {
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
   set(flags.jpeg_quality, config.jpeg_quality);
+  set(flags.geometry, config.geometry);
+  set(flags.step_bits, config.step_bits);
+  set(flags.key_interval, config.key_interval);
   set(flags.draco_speed, config.draco_speed);
   set(flags.fill_holes, config.surface.fill_holes);
   config.surface.dense = config.surface.dense || flags.dense;
@@ -266,8 +273,23 @@ Command serve_command() {
             ->check(CLI::Range(1, 64));
         app.add_option("--jpeg-quality", f->jpeg_quality, "Quality of the texture (default 80)")
             ->check(CLI::Range(1, 100));
-        app.add_option("--draco-speed", f->draco_speed,
-                       "Of the surface's coding: 0 smallest, 9 fastest (default 4)")
+        app.add_option("--geometry", f->geometry,
+                       "How the surface is sent: grid (default: small, for relievo's own receivers) or "
+                       "draco-mesh (for any)")
+            ->check([](const std::string& name) {
+              EncodeOptions unused;
+              return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
+            })
+            ->type_name("NAME");
+        app.add_option("--step-bits", f->step_bits,
+                       "Of grid: columns are sent in steps of 1/2^N pixel (default 6: 1/64)")
+            ->check(CLI::Range(0, 8))
+            ->type_name("N");
+        app.add_option("--key-interval", f->key_interval,
+                       "Of grid: every Nth frame decodes alone, the others build on it (default 1: all do)")
+            ->check(CLI::Range(1, 1000))
+            ->type_name("N");
+        app.add_option("--draco-speed", f->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest (default 4)")
             ->check(CLI::Range(0, 9));
         app.add_flag("--loop", f->loop, "Start a take again at its end");
         app.add_flag("--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");

@@ -90,6 +90,15 @@ TEST(Bench, Codec) {
   ASSERT_TRUE(report.is_object());
   expect_spread(report["vertices"], 3, "vertices");
   const Json& raw = row(report, "raw-float32");
+  for (const char* name : {"grid-1/16px", "grid-1/16px-delta", "grid-1/16px-sigma", "grid-1/64px"}) {
+    const Json& r = row(report, name);
+    ASSERT_TRUE(r.is_object());
+    for (const char* key : {"bytes", "bits_per_vertex", "encode_ms", "decode_ms", "rms_mm", "max_mm"})
+      expect_spread(r[key], 6, std::string(name) + " " + key);
+    EXPECT_LT(3.5 * r["bytes"]["max"].get<double>(), row(report, "draco-mesh-s5-12bit")["bytes"]["min"])
+        << name;
+    EXPECT_GT(r["rms_mm"]["max"], 0) << name;
+  }
   EXPECT_EQ(raw["max_mm"]["max"], 0);
   for (const std::string bits : {"12bit", "pipeline"}) {
     for (const std::string speed : {"0", "4", "5", "7", "9"}) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grids that no encoder wrote: cut, mutated, and with sizes that lie. Replayed mutations with a fixed seed;
-// the fuzz target of the same decoder is tests/fuzz/grid_fuzz.cpp.
+// Grids that no encoder wrote: cut, mutated with a fixed seed, and with sizes that lie.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -42,6 +42,9 @@ threads = 3
 decoder = "paper"
 jpeg_quality = 91
 draco_speed = 4
+geometry = "draco-mesh"
+step_bits = 5
+key_interval = 15
 dense = true
 fill_holes = 3
 )");
@@ -59,6 +62,9 @@ fill_holes = 3
   EXPECT_EQ(r.config.decoder, Decoder::kPaper);
   EXPECT_EQ(r.config.jpeg_quality, 91);
   EXPECT_EQ(r.config.draco_speed, 4);
+  EXPECT_EQ(r.config.geometry, "draco-mesh");
+  EXPECT_EQ(r.config.step_bits, 5);
+  EXPECT_EQ(r.config.key_interval, 15);
   EXPECT_TRUE(r.config.surface.dense);
   EXPECT_EQ(r.config.surface.fill_holes, 3);
 }
@@ -123,6 +129,9 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"holes_over", "fill_holes = 17", "fill_holes must be a whole number from 0 to 16"},
         Wrong{"speed_over", "draco_speed = 10", "draco_speed must be a whole number from 0 to 9"},
         Wrong{"speed_huge", "draco_speed = 4294967297", "draco_speed must be a whole number"},
+        Wrong{"geometry_unknown", "geometry = \"mesh\"", "geometry must be grid or draco-mesh in quotes"},
+        Wrong{"steps_over", "step_bits = 9", "step_bits must be a whole number from 0 to 8"},
+        Wrong{"keys_none", "key_interval = 0", "key_interval must be a whole number from 1 to 1000"},
         Wrong{"unknown", "quality = 80", "quality is no setting; there are: source stream"},
         Wrong{"part_of_a_name", "jpeg = 80", "jpeg is no setting"},
         Wrong{"two_names", "\"loop fast\" = true", "loop fast is no setting"},
