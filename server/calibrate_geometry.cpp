@@ -230,7 +230,7 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
                      "Take the views from a live source first, into the folder of views: a board held "
                      "still at one pose after another, under the stripes along columns and rows");
   app.add_option("--views", o->live_views, "Views to take from --source")
-      ->check(CLI::Range(1, 1000))
+      ->check(CLI::Range(3, 1000))
       ->needs(source)
       ->capture_default_str();
   projector->excludes(source);

@@ -57,7 +57,7 @@ class Calibrate(unittest.TestCase):
 
     def test_geometry_projects_both_axes_while_views_are_taken(self):
         views = self.folder / "views"
-        child = self.start("geometry", views, "--source", "sim:board,period=20000,width=320,height=240,stripes=40",
+        child = self.start("geometry", views, "--source", "sim:board,period=10000,width=320,height=240,stripes=40",
                            "--project", "--views", "1000", "--board", "chessboard:9x7:25mm", "--out",
                            self.folder / "rig.yaml")
         slides = self.slides()
