@@ -41,7 +41,7 @@ inline constexpr std::array<Filter, 14> kFilters{{
     {"edge_on", "triangles not made, since they are seen edge-on", &FilterCounts::edge_on},
     {"small_component", "points left out in pieces too small to be a surface",
      &FilterCounts::small_component},
-    {"recovered", "boundaries found beside a depth step from their surface and luma",
+    {"recovered", "boundaries found by their surface and luma, or by the frame before",
      &FilterCounts::recovered},
 }};
 

@@ -30,6 +30,9 @@ constexpr int kRowReach_px = 4;         // columns compared with the lines above
 constexpr float kRowStep = 0.12F;       // difference, of the sum, that is another surface's
 constexpr float kRowNoise = 3.F;        // grey levels more: noise
 constexpr float kStepNear_px = 1.2F;
+constexpr float kSharpContrast = 0.08F;  // from which on a low-pass would draw luma's place
+constexpr float kSharpLevelShare = 0.1F;
+constexpr float kSharpNoise = 1.63F;  // of luma without the low-pass along the line, by that with it
 
 /// Of a column that is not negative; a call of std::lround takes ten times as long.
 int column_of(float column_px) {
@@ -114,7 +117,7 @@ Refiner::Place Refiner::find(const DifferenceImage& image, int line, float colum
 /// What is around an edge, into it and `out`; `luma` is where luma has it. What tells how far chroma draws
 /// edges goes to the worker's samples.
 void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
-                      int worker, Edge& edge, LumaSeen& out) {
+                      bool sharp, int worker, Edge& edge, LumaSeen& out) {
   const int centre = column_of(edge.column_px);
   if (centre + kLumaReach_px < image.width) {
     edge.contrast = light.contrast(centre);
@@ -123,8 +126,8 @@ void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& li
         edge.contrast >= kStepContrast && steepest_at(image.white_line(line), centre, edge.column_px);
   }
   if (!luma.found) return;
-  const float sigma = placer_.sigma_px(image, line, luma);
-  const float level = kLevelShare * light.luma_contrast(centre) / luma.slope;
+  const float sigma = placer_.sigma_px(image, line, luma) * (sharp ? kSharpNoise : 1.F);
+  const float level = (sharp ? kSharpLevelShare : kLevelShare) * light.luma_contrast(centre) / luma.slope;
   out = {luma.column_px, sigma, level, true};
   const float apart = luma.column_px - edge.column_px;
   const float excess = apart * apart - sigma * sigma - edge.sigma_px * edge.sigma_px;
@@ -133,6 +136,22 @@ void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& li
   } else if (edge.contrast > kContrasty && luma.slope > kSteep) {
     by_contrast_.of(worker).push_back((excess - level * level) / (edge.contrast * edge.contrast));
   }
+}
+
+/// As LumaPlacer::places(), by luma without a low-pass along the line.
+void Refiner::place_sharply(int line, const LumaLine& light, int width, const LumaQuery& query,
+                            LumaPlace& out) const {
+  constexpr int kColumns = 2 * kLumaReach_px + 2;
+  constexpr int kMargin = LumaView::kMargin;
+  const int first = column_of(query.own_px) - kLumaReach_px - 1;
+  std::array<float, kColumns + 2 * kMargin> ratios{};
+  const int from = std::max(0, first - kMargin);
+  const int to = std::min(width, first + kColumns + kMargin);
+  sharp_->ratio(line, from, to - from, kDarkSum, ratios.data() + (from - first + kMargin));
+  const LumaView all = light.view();
+  luma_kernels().places({first, all.red + first, all.green + first, all.blue + first, ratios.data() + kMargin,
+                         all.ends + first},
+                        {placer_.weights(), share_}, &query, 1, &out);
 }
 
 void Refiner::look_at_line(const DifferenceImage& image, int line, const SequenceResult& result,
@@ -163,7 +182,13 @@ void Refiner::look_at_line(const DifferenceImage& image, int line, const Sequenc
   placer_.places(scratch.light, share_, scratch.queries.data(), count, scratch.places.data());
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t e = scratch.edges[i];
-    look_at(image, line, scratch.light, scratch.places[i], worker, edges.edges[e], seen_[e]);
+    const int centre = column_of(edges.edges[e].column_px);
+    // What moves leaves stripes in the fields' sum, and the scene only seems to have contrast.
+    const bool sharp = sharp_ != nullptr && !wide_stripes_ && result.still[e] != 0 &&
+                       centre + kLumaReach_px < image.width &&
+                       scratch.light.contrast(centre) > kSharpContrast;
+    if (sharp) place_sharply(line, scratch.light, image.width, scratch.queries[i], scratch.places[i]);
+    look_at(image, line, scratch.light, scratch.places[i], sharp, worker, edges.edges[e], seen_[e]);
   }
 }
 
@@ -238,7 +263,9 @@ Refiner::Drawn Refiner::colour_drawn() {
 }
 
 void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
-                     const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges) {
+                     const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges,
+                     const SharpLuma* sharp) {
+  sharp_ = sharp;
   share_ = projected_share(image, result, colours, edges);
   wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   seen_.resize(edges.edges.size());

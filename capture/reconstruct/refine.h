@@ -13,6 +13,7 @@
 #include "capture/reconstruct/luma_place.h"
 #include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/sequence.h"
+#include "capture/reconstruct/sharp_luma.h"
 
 namespace relievo {
 
@@ -27,9 +28,10 @@ class Refiner {
 
   /// Moves the columns of the decoded edges and sets their standard deviations and contrasts. `colours` are
   /// those on both sides of each boundary, under the slide that `image` shows; `slide` is the field under
-  /// that slide itself, a row a line.
+  /// that slide itself, a row a line. `sharp`, of the same frame, places edges where the scene has contrast.
   void refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
-              const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges);
+              const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges,
+              const SharpLuma* sharp = nullptr);
 
   using Sides = LumaSides;
   struct Place {
@@ -61,16 +63,19 @@ class Refiner {
   };
   void look_at_line(const DifferenceImage& image, int line, const SequenceResult& result,
                     const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges);
+  void place_sharply(int line, const LumaLine& light, int width, const LumaQuery& query,
+                     LumaPlace& out) const;
   void look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
-               int worker, Edge& edge, LumaSeen& out);
+               bool sharp, int worker, Edge& edge, LumaSeen& out);
   Drawn colour_drawn();
   static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);
 
   LumaPlacer placer_;
-  bool wide_stripes_ = false;     // in the last frame, so wide that two dark pixels are speckle
-  float share_ = 1;               // projected_share of the last frame
-  std::vector<Scratch> scratch_;  // one a worker
-  std::vector<LumaSeen> seen_;    // one an edge
+  bool wide_stripes_ = false;         // in the last frame, so wide that two dark pixels are speckle
+  float share_ = 1;                   // projected_share of the last frame
+  const SharpLuma* sharp_ = nullptr;  // of the frame being refined
+  std::vector<Scratch> scratch_;      // one a worker
+  std::vector<LumaSeen> seen_;        // one an edge
   RankedSample always_, by_contrast_;
 };
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "capture/reconstruct/consistency.h"
+#include "capture/reconstruct/continuity.h"
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
@@ -12,6 +13,7 @@
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/sequence.h"
+#include "capture/reconstruct/sharp_luma.h"
 #include "capture/reconstruct/trace.h"
 #include "capture/reconstruct/weak_signal.h"
 
@@ -40,6 +42,8 @@ struct SlideDecoder::State {
         differencer(rig.colour_matrix),
         sequence(p),
         refiner(rig.colour_matrix),
+        continuity(p.boundaries(),
+                   rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
         instant(p.boundaries(),
                 rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height,
                 1e9 / rig.frame_rate) {}
@@ -56,6 +60,7 @@ struct SlideDecoder::State {
   Refiner refiner;
   ConsistencyCheck consistency;
   Recovery recovery;
+  Continuity continuity;
   InstantFilter instant;
 
   Observation newer;
@@ -214,7 +219,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const std::size_t traced =
         s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
     report.filters.traced = traced;
-    s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges);
+    const SharpLuma sharp(pair);
+    s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
+                     &sharp);
     const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
     const SequenceCounts& counts = s.result.counts;
     report.filters.unsupported = counts.unsupported;
@@ -228,7 +235,13 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
                         .other_colours = s.sequence.shown_colours(other(s.order))},
                        s.refiner, s.edges, s.result, pool, s.recovered);
     report.filters.recovered = s.recovered.size();
-    report.matched = counts.in_order - counts.unsupported + counts.completed + traced + s.recovered.size();
+    if (s.pattern.slides == 2) {
+      const ContinuityCounts by_before = s.continuity.check(s.recovered, pool, s.result, s.edges);
+      report.filters.rejected += by_before.rejected;
+      report.filters.recovered += by_before.carried;
+    }
+    report.matched =
+        counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered, pool);

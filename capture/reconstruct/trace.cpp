@@ -246,6 +246,8 @@ void Tracer::merge_line(int line, const SequenceResult& result, const EdgeImage&
     const bool take_added = added < added_.size() && added_[added].line == line &&
                             (from == last || added_[added].edge.column_px < edges.edges[from].column_px);
     merged_.edges[to] = take_added ? added_[added].edge : edges.edges[from];
+    // Of added ones it is not known.
+    merged_still_[to] = take_added || result.still.empty() ? std::uint8_t{0} : result.still[from];
     merged_boundary_[to] = take_added ? added_[added].boundary : result.boundary[from];
     take_added ? void(++added) : void(++from);
   }
@@ -269,11 +271,13 @@ void Tracer::insert(WorkerPool& pool, SequenceResult& result, EdgeImage& edges) 
     merged_.line_start[line] += edges.line_start[line];
   merged_.edges.resize(merged_.line_start.back());
   merged_boundary_.resize(merged_.line_start.back());
+  merged_still_.resize(merged_.line_start.back());
   pool.for_shares(merged_.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) merge_line(line, result, edges);
   });
   std::swap(merged_, edges);
   std::swap(merged_boundary_, result.boundary);
+  std::swap(merged_still_, result.still);
 }
 
 std::size_t Tracer::trace(const DifferenceImage& image, const SequenceDecoder& sequence,

@@ -50,6 +50,7 @@ class Tracer {
   std::vector<Added> added_;
   EdgeImage merged_;
   std::vector<std::int16_t> merged_boundary_;
+  std::vector<std::uint8_t> merged_still_;
 };
 
 }  // namespace relievo

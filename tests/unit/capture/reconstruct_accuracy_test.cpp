@@ -222,8 +222,8 @@ TEST_P(Motion, OneMetreASecondDecodes) {
 
 INSTANTIATE_TEST_SUITE_P(Directions, Motion,
                          ::testing::Values(Direction{"AlongX", {1, 0, 0}, 0.9, 0.002},
-                                           Direction{"Away", {0, 0, 1}, 0.7, 0.002},
-                                           Direction{"Towards", {0, 0, -1}, 0.5, 0.02}),
+                                           Direction{"Away", {0, 0, 1}, 0.8, 0.002},
+                                           Direction{"Towards", {0, 0, -1}, 0.7, 0.02}),
                          [](const auto& direction) { return std::string(direction.param.name); });
 
 }  // namespace
