@@ -23,6 +23,8 @@ void FrameAssembler::count(std::uint32_t sequence) {
     const bool shared = step == 0 && format_.layout == FieldLayout::kAlternate;
     if (!shared && (step == 0 || step > UINT32_MAX / 2)) step = 1;
     position_ += step;
+  } else {
+    position_ = sequence;  // not 0: even numbers stay even, whichever came first
   }
   last_sequence_ = sequence;
 }

@@ -54,7 +54,7 @@ class FrameAssembler {
 
   // Since the stream began.
   std::optional<std::uint32_t> last_sequence_;
-  std::uint64_t position_ = 0;              // the sequence number from 0 on, never wrapping
+  std::uint64_t position_ = 0;              // the sequence number, never wrapping
   std::optional<std::uint64_t> last_done_;  // index of the frame that was complete last
 
   CapturedFrame frame_;                 // under way

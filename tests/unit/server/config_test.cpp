@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "server/camera_flags.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo {
@@ -67,6 +68,58 @@ fill_holes = 3
   EXPECT_EQ(r.config.key_interval, 15);
   EXPECT_TRUE(r.config.surface.dense);
   EXPECT_EQ(r.config.surface.fill_holes, 3);
+}
+
+TEST(Config, ACamerasTable) {
+  const Read r = read(R"(source = "v4l2:/dev/video0"
+[camera]
+rig = "rig.yaml"
+pattern = "stripes.yaml"
+input = "S-Video"
+standard = "NTSC-M"
+format = "UYVY"
+size = "720x480"
+rate = 29.97
+field = "alternate"
+field_order = "top"
+odd_pairs = true
+dmabuf = true
+buffers = 4
+[camera.controls]
+white_balance_automatic = false
+exposure_auto = "manual_mode"
+exposure = 100
+)");
+  ASSERT_TRUE(r.status) << r.status.error().message;
+  const CameraOptions& c = r.config.camera;
+  EXPECT_EQ(c.rig, "rig.yaml");
+  EXPECT_EQ(c.pattern, "stripes.yaml");
+  EXPECT_EQ(c.input, "S-Video");
+  EXPECT_EQ(c.standard, "NTSC-M");
+  EXPECT_EQ(c.format, "UYVY");
+  EXPECT_EQ(c.width, 720);
+  EXPECT_EQ(c.height, 480);
+  EXPECT_EQ(c.rate, 29.97);
+  EXPECT_EQ(c.field, "alternate");
+  EXPECT_EQ(c.field_order, "top");
+  EXPECT_TRUE(c.odd_pairs);
+  EXPECT_TRUE(c.dmabuf);
+  EXPECT_EQ(c.buffers, 4);
+  ASSERT_EQ(c.controls.size(), 3u);  // in the order of the lines
+  EXPECT_EQ(c.controls[0].name + "=" + c.controls[0].value, "white_balance_automatic=0");
+  EXPECT_EQ(c.controls[1].name + "=" + c.controls[1].value, "exposure_auto=manual_mode");
+  EXPECT_EQ(c.controls[2].name + "=" + c.controls[2].value, "exposure=100");
+}
+
+TEST(Config, FlagsOfACameraWin) {
+  CameraOptions file{.format = "YUYV", .rate = 30, .controls = {{"gain", "1"}}};
+  const CameraOptions flags{.rate = 60, .dmabuf = true, .controls = {{"gain", "2"}}};
+  const CameraOptions both = merged(file, flags);
+  EXPECT_EQ(both.format, "YUYV");
+  EXPECT_EQ(both.rate, 60);
+  EXPECT_TRUE(both.dmabuf);
+  ASSERT_EQ(both.controls.size(), 2u);
+  EXPECT_EQ(both.controls[1].value, "2");  // set last
 }
 
 TEST(Config, WhatIsNotNamedStays) {
@@ -138,6 +191,14 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"names_and_gap", "\"loop  fast\" = true", "loop  fast is no setting"},
         Wrong{"no_name", "\"\" = true", "is no setting"},
         Wrong{"table", "[source]", "source must be a string"},
+        Wrong{"camera_text", "camera = \"v4l2\"", "camera must be a table: write [camera]"},
+        Wrong{"camera_unknown", "camera = {zoom = 3}", "zoom is no setting; there are: rig pattern input"},
+        Wrong{"camera_size", "camera = {size = \"big\"}", "size must be a size such as \"640x480\""},
+        Wrong{"camera_rate", "camera = {rate = -1}", "rate must be a number of pictures a second from 0.1"},
+        Wrong{"camera_buffers", "camera = {buffers = 1}", "buffers must be a whole number from 2 to 32"},
+        Wrong{"camera_control", "camera = {controls = {gain = 1.5}}",
+              "gain must be a whole number, true, false"},
+        Wrong{"camera_controls", "camera = {controls = 7}", "controls must be a table of controls"},
         Wrong{"unknown_table", "[server]", "server is no setting"}),
     [](const auto& wrong) { return wrong.param.name; });
 
