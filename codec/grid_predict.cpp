@@ -28,7 +28,9 @@ RELIEVO_INLINE void predict_body(const GridRows& rows, const GridModel& model, i
     const std::int32_t change = rows.up1[b] - rows.key_up[b];
     const std::int32_t d = rows.key[b] - expected[b];
     const bool near = change <= limit && change >= -limit && d <= limit && d >= -limit;
-    const std::int32_t more = (model.key * d + model.key_change * change + 128) >> 8;
+    // Of absent places the products would overflow.
+    const std::int32_t more =
+        (model.key * (near ? d : 0) + model.key_change * (near ? change : 0) + 128) >> 8;
     expected[b] += near ? more : 0;
   }
 }
