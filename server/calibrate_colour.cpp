@@ -12,6 +12,7 @@
 #include "capture/calibrate/rig_part.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
+#include "server/camera_flags.h"
 
 namespace relievo {
 namespace {
@@ -21,6 +22,7 @@ constexpr const char* kChannels[] = {"red", "green", "blue"};
 struct Options {
   std::string captures;
   std::string source;
+  CameraOptions camera;
   ProjectorFlags projector;
   std::string out;
   std::string update;
@@ -129,9 +131,11 @@ Status run(const Options& options, StopSignal& stop) {
     before = *part;
   }
   if (!options.source.empty()) {
-    const Status taken = take_colour_captures(
-        {.source = options.source, .folder = options.captures, .projector = options.projector.choice()},
-        stop);
+    const Status taken = take_colour_captures({.source = options.source,
+                                               .camera = options.camera,
+                                               .folder = options.captures,
+                                               .projector = options.projector.choice()},
+                                              stop);
     if (!taken) return taken.error();
     if (stop.stopped()) return {};
   }
@@ -179,6 +183,7 @@ std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
   app.add_option("--roi", o->roi, "The target, where it should not be looked for: X,Y,WIDTH,HEIGHT")
       ->delimiter(',')
       ->expected(4);
+  add_camera_flags(app, o->camera);
   app.add_flag("--json", o->json, "Print the report as JSON");
   app.final_callback([out, update] {
     if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");

@@ -17,6 +17,7 @@
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
 #include "server/calibrate_views.h"
+#include "server/camera_flags.h"
 #include "server/size_option.h"
 
 namespace relievo {
@@ -30,6 +31,7 @@ struct Options {
   std::string pattern;
   Size projector;
   std::string source;
+  CameraOptions camera;
   ProjectorFlags live_projector;
   int live_views = 8;
   std::string out;
@@ -155,7 +157,12 @@ Status run(const Options& options, StopSignal& stop) {
   ViewCode code{.stripes = {}, .projector = options.projector};
   if (before.colour_matrix) code.colour_matrix = *before.colour_matrix;
   if (!options.source.empty()) {
+    CameraOptions camera = options.camera;
+    if (options.pattern != "gray") camera.pattern = options.pattern;
+    camera.projector_width = options.projector.width;
+    camera.projector_height = options.projector.height;
     const auto taken = take_board_views({.source = options.source,
+                                         .camera = camera,
                                          .folder = options.views,
                                          .views = options.live_views,
                                          .threads = options.threads,
@@ -224,7 +231,8 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       "--pattern", o->pattern,
       "What was projected: gray, or the pattern.yaml of stripes (default: the one in the folder of "
       "views, else gray)");
-  auto* projector = add_size_option(app, "--projector", o->projector, "The projector's size in pixels");
+  auto* projector = add_size_option(app, "--projector", o->projector,
+                                    "The projector's size in pixels, unless --source knows it");
   auto* source =
       app.add_option("--source", o->source,
                      "Take the views from a live source first, into the folder of views: a board held "
@@ -233,7 +241,6 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       ->check(CLI::Range(3, 1000))
       ->needs(source)
       ->capture_default_str();
-  projector->excludes(source);
   add_live_projector_options(app, *source, o->live_projector);
   auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
   auto* update =
@@ -252,6 +259,7 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
   app.add_option("--threads", o->threads, "Threads; any number gives the same result")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  add_camera_flags(app, o->camera);
   app.add_flag("--json", o->json, "Print the report as JSON");
   app.final_callback([out, update, projector, source] {
     if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");

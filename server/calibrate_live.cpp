@@ -130,9 +130,17 @@ class ViewTaker {
 }  // namespace
 
 Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& board, StopSignal& stop) {
-  auto source = open_source(options.source, {});
+  auto source = open_source(options.source, {.camera = options.camera});
   if (!source) return source.error();
   const SourceInfo info = (*source)->info();
+  if (info.pattern.stripes() == 0) {
+    return Error{
+        options.source +
+        " does not say what is projected: name it with --pattern pattern.yaml, as `pattern` writes it"};
+  }
+  if (info.rig.projector.width == 0) {
+    return Error{options.source + " does not know the projector: give its size with --projector"};
+  }
   if (const Status made = make_folder(options.folder); !made) return made.error();
   const fs::path pattern = fs::path(options.folder) / "pattern.yaml";
   std::error_code ignored;
@@ -182,7 +190,7 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
 }
 
 Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
-  auto source = open_source(options.source, {});
+  auto source = open_source(options.source, {.camera = options.camera});
   if (!source) return source.error();
   if (const Status made = make_folder(options.folder); !made) return made;
   Progress progress("calibrate", "frames");

@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "capture/calibrate/board.h"
+#include "capture/source/camera_options.h"
 #include "capture/source/field_source.h"
 #include "cli/stop_signal.h"
 #include "server/live_projector.h"
@@ -17,6 +18,8 @@ namespace relievo {
 
 struct LiveOptions {
   std::string source;  // as for serve --source
+  CameraOptions
+      camera;  // of a source that is one; for views without rig, with the pattern and the projector's size
   std::string folder;  // made where it is missing; views in it are kept
   int views = 8;       // to take
   int threads = 2;
