@@ -18,7 +18,7 @@ const Error kDamaged{"grid is damaged"};
 constexpr std::int32_t kMostPixels = 1 << 14;
 
 struct Tables {
-  std::array<std::uint16_t, kControlTables> first{};  // frequency of the first of two symbols; 0: not used
+  std::array<std::uint16_t, kControlTables> first{};  // frequency of the first of two symbols
   std::array<rans::DecoderTable, kCellTables> cells;
   std::array<rans::DecoderTable, kResidualTables> residuals;
   std::array<rans::DecoderTable, kSigmaTables> sigmas;
@@ -99,7 +99,7 @@ struct GridDecoder::Scratch {
   bool decode(const Input& in, int begin, int end, const SliceHead& slice);
 
  private:
-  bool read_places(const Input& in, int line, const std::uint8_t* above, std::uint8_t* here,
+  void read_places(const Input& in, int line, const std::uint8_t* above, std::uint8_t* here,
                    rans::Decoder& control);
   bool read_cells(const Input& in, int line, const std::uint8_t* above, rans::Decoder& control);
   bool read_marks(const Input& in, int line, bool first, const std::uint8_t* here, rans::Decoder& control);
@@ -111,7 +111,7 @@ struct GridDecoder::Scratch {
   }
 };
 
-bool GridDecoder::Scratch::read_places(const Input& in, int line, const std::uint8_t* above,
+void GridDecoder::Scratch::read_places(const Input& in, int line, const std::uint8_t* above,
                                        std::uint8_t* here, rans::Decoder& control) {
   const std::uint8_t* key = nullptr;
   const int boundaries = in.grid.boundaries;
@@ -125,9 +125,7 @@ bool GridDecoder::Scratch::read_places(const Input& in, int line, const std::uin
     const int last = std::min(b + 8, boundaries);
     const int uniform = last - b == 8 ? uniform_places(here, above, key, b) : -1;
     if (uniform >= 0) {
-      const std::uint16_t first = in.tables.first[static_cast<std::size_t>(kBlockTable + uniform)];
-      if (first == 0) return false;
-      if (!control.one(first)) {
+      if (!control.one(in.tables.first[static_cast<std::size_t>(kBlockTable + uniform)])) {
         std::fill_n(here + b, 8, static_cast<std::uint8_t>(uniform));
         continue;
       }
@@ -135,7 +133,6 @@ bool GridDecoder::Scratch::read_places(const Input& in, int line, const std::uin
     for (int i = b; i < last; ++i)
       here[i] = control.one(in.tables.first[static_cast<std::size_t>(place_context(here, above, key, i))]);
   }
-  return true;
 }
 
 bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint8_t* above,
@@ -296,12 +293,12 @@ bool GridDecoder::Scratch::decode(const Input& in, int begin, int end, const Sli
   const auto row_there = [&](int line) {
     return there.data() + static_cast<std::size_t>(line - begin + 1) * stride + StripeGrid::kMargin;
   };
-  if (!read_places(in, begin, row_there(begin - 1), row_there(begin), control)) return false;
+  read_places(in, begin, row_there(begin - 1), row_there(begin), control);
   for (int line = begin; line < end; ++line) {
     const std::uint8_t* here = row_there(line);
     if (in.head.has_interpolated && !read_marks(in, line, line == begin, here, control)) return false;
     if (line + 1 < grid.lines) {
-      if (!read_places(in, line + 1, here, row_there(line + 1), control)) return false;
+      read_places(in, line + 1, here, row_there(line + 1), control);
       if (!read_cells(in, line, here, control)) return false;
     }
     if (!read_columns(in, line, begin, here, residuals, raw)) return false;

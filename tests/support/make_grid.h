@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/frame3d.h"
@@ -114,6 +115,40 @@ inline Frame3D grid_frame(const GridScene& scene) {
       }
     }
   }
+  return frame;
+}
+
+/// Takes the vertices of which `gone` says so out of a frame, and the triangles on them.
+template <typename Gone>
+void drop_vertices(Frame3D& frame, const Gone& gone) {
+  Surface& s = frame.surface;
+  std::vector<std::uint32_t> now(s.grid.size());
+  std::uint32_t kept = 0;
+  for (std::size_t i = 0; i < now.size(); ++i) now[i] = gone(s.grid[i]) ? ~0U : kept++;
+  const auto keep = [&](auto& values) {
+    if (values.empty()) return;
+    for (std::size_t i = 0; i < now.size(); ++i)
+      if (now[i] != ~0U) values[now[i]] = values[i];
+    values.resize(kept);
+  };
+  keep(s.positions);
+  keep(s.normals);
+  keep(s.texture_coordinates);
+  keep(s.grid);
+  keep(s.sigmas_m);
+  keep(s.interpolated);
+  std::vector<Triangle> triangles;
+  for (const Triangle& t : s.triangles) {
+    const Triangle moved = {now[t[0]], now[t[1]], now[t[2]]};
+    if (moved[0] != ~0U && moved[1] != ~0U && moved[2] != ~0U) triangles.push_back(moved);
+  }
+  s.triangles = std::move(triangles);
+}
+
+/// Eight places in a row are never as those around them, where those are all there.
+inline Frame3D never_alike_frame(const GridScene& scene) {
+  Frame3D frame = grid_frame(scene);
+  drop_vertices(frame, [](const GridPoint& p) { return p.line % 2 == 1 && p.boundary % 8 == 4; });
   return frame;
 }
 

@@ -148,6 +148,40 @@ TEST(Grid, TrianglesOfPartsOfCellsAreExact) {
   EXPECT_EQ(cycles(single), cycles(single_back));
 }
 
+/// A symbol of two that never comes, beside one that does: such a table is used all the same.
+TEST(Grid, BlocksThatNeverAreAsThoseAroundThemDecode) {
+  for (const int stripes : {20, 30, 45}) {
+    const test::GridScene scene{.stripes = stripes, .noise_px = 0};
+    const Frame3D frame = test::never_alike_frame(scene);
+    FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+    const auto back = decode_frame(*encoder.encode(frame, grid_options()));
+    ASSERT_TRUE(back) << stripes << ": " << back.error().message;
+    expect_same(scene, frame.surface, back->surface, 4);
+  }
+}
+
+/// As reconstructions of small pictures are: of any shape, with holes anywhere.
+TEST(Grid, SurfacesWithHolesAnywhereDecode) {
+  test::Random random(11);
+  for (int round = 0; round < 60; ++round) {
+    const test::GridScene scene{.width = 160,
+                                .height = 120,
+                                .stripes = 4 + static_cast<int>(random.below(40)),
+                                .seed = static_cast<std::uint64_t>(round + 1),
+                                .quality = round % 2 == 1};
+    Frame3D frame = test::grid_frame(scene);
+    const auto holes = static_cast<std::uint32_t>(random.below(12));
+    const int from = static_cast<int>(random.below(40)), to = from + static_cast<int>(random.below(60));
+    test::drop_vertices(
+        frame, [&](const GridPoint& p) { return random.below(12) < holes || p.line < from || p.line > to; });
+    FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+    const auto back = decode_frame(*encoder.encode(frame, grid_options()));
+    ASSERT_TRUE(back) << round << ": " << back.error().message;
+    ASSERT_EQ(back->surface.positions.size(), frame.surface.positions.size()) << round;
+    ASSERT_EQ(back->surface.triangles.size(), frame.surface.triangles.size()) << round;
+  }
+}
+
 TEST(Grid, ReconstructionsOwnTrianglesFaceTheCamera) {
   const test::GridScene scene;
   FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));

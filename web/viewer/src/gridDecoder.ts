@@ -200,9 +200,7 @@ class Slice {
           for (let i = b; i < last && uniform; ++i) uniform = (keys[keyAt + i] === kAbsent ? 0 : 1) === v;
         }
         if (uniform) {
-          const first = all.first[kBlockTable + v]!;
-          if (first === 0) throw damaged();
-          if (control.two(first) === 0) {
+          if (control.two(all.first[kBlockTable + v]!) === 0) {
             there.fill(v, here + b, here + last);
             continue;
           }
