@@ -5,39 +5,25 @@ simulated camera is watched.
 
 usage: calibrate_test.py RELIEVO_SERVER
 """
-import pathlib
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
 import cv2
 import numpy as np
 
-from screen import Screen
+from screen import ScreenTest
 
 SERVER = sys.argv.pop(1)
 WIDTH, HEIGHT = 1024, 768  # of the simulated rig's projector
 PATIENCE_S = 300
 
 
-class Calibrate(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.screen = Screen(folder.name, WIDTH, HEIGHT)
-        self.addCleanup(self.screen.close)
-
-    def start(self, *arguments):
-        child = subprocess.Popen([SERVER, "calibrate", *map(str, arguments)], env=self.screen.environment(),
-                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(child.stdout.close)
-        self.addCleanup(child.stderr.close)
-        self.addCleanup(lambda: child.poll() is None and child.kill())
-        return child
+class Calibrate(ScreenTest):
+    COMMAND = [SERVER, "calibrate"]
+    SIZE = (WIDTH, HEIGHT)
 
     def expect_each_on_screen(self, child, pictures):
         """In any order: the screen is looked at now and then."""

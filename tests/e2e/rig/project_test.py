@@ -7,39 +7,25 @@ usage: project_test.py RELIEVO_SERVER
 """
 import json
 import os
-import pathlib
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
 import cv2
 import numpy as np
 
-from screen import Screen
+from screen import ScreenTest
 
 SERVER = sys.argv.pop(1)
 WIDTH, HEIGHT = 400, 300
 PATIENCE_S = 120
 
 
-class Project(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.screen = Screen(folder.name, WIDTH, HEIGHT)
-        self.addCleanup(self.screen.close)
-
-    def start(self, *arguments):
-        child = subprocess.Popen([SERVER, "project", *map(str, arguments)], env=self.screen.environment(),
-                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(child.stdout.close)
-        self.addCleanup(child.stderr.close)
-        self.addCleanup(lambda: child.poll() is None and child.kill())
-        return child
+class Project(ScreenTest):
+    COMMAND = [SERVER, "project"]
+    SIZE = (WIDTH, HEIGHT)
 
     def run_to_end(self, *arguments):
         child = self.start(*arguments)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A virtual screen whose frame buffer can be read."""
+"""A virtual screen whose frame buffer can be read, and the tests of a command that draws on one."""
 import os
 import pathlib
 import struct
 import subprocess
+import tempfile
+import unittest
 
 import numpy as np
 
@@ -39,3 +41,24 @@ class Screen:
     def close(self):
         self.process.terminate()
         self.process.wait()
+
+
+class ScreenTest(unittest.TestCase):
+    """Runs COMMAND, a list, on a screen of SIZE with a folder of its own; no process is left behind."""
+    COMMAND = []
+    SIZE = (400, 300)
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.screen = Screen(folder.name, *self.SIZE)
+        self.addCleanup(self.screen.close)
+
+    def start(self, *arguments):
+        child = subprocess.Popen([*self.COMMAND, *map(str, arguments)], env=self.screen.environment(),
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.stdout.close)
+        self.addCleanup(child.stderr.close)
+        self.addCleanup(lambda: child.poll() is None and child.kill())
+        return child
