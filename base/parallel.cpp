@@ -41,8 +41,9 @@ struct WorkerPool::State {
   std::atomic<std::uint32_t> round{0};  // of tasks; wraps
   std::atomic<int> pending{0};          // helpers' ranges that are not done in this one
   std::unique_ptr<std::atomic<std::uint32_t>[]>
-      claimed;        // of each range: the last round in which somebody took it
-  bool stop = false;  // set before the last round
+      claimed;  // of each range: the last round in which somebody took it
+  std::atomic<bool> stop{
+      false};  // set before the last round; a helper that was late for one looks at any time
   int threads = 1;
   std::vector<std::thread> helpers;
 

@@ -16,7 +16,8 @@ constexpr int kSheetSamples = 65;  // over the projector's height and a quarter 
 constexpr int kSheetRounds = 4;    // of point -> height -> sheet; each gains about two digits
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-#if defined(__x86_64__)
+// ThreadSanitizer's runtime is not there yet when the loader chooses a clone.
+#if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
 #define RELIEVO_WIDE [[gnu::target_clones("avx2", "default")]]
 #else
 #define RELIEVO_WIDE
