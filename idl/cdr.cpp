@@ -167,6 +167,10 @@ Rig read_rig(Cursor& in, bool& possible) {
     rig.projector_from_camera_rotation = in.doubles<9>();
     rig.projector_from_camera_translation = in.doubles<3>();
     rig.colour_matrix = in.doubles<9>();
+    if (!in.more()) return;  // of a server that knew only the top field first
+    const auto order = in.get<std::uint32_t>();
+    possible = possible && order <= 1;
+    rig.field_order = order == 0 ? FieldOrder::kTop : FieldOrder::kBottom;
   });
   return rig;
 }
@@ -192,6 +196,10 @@ Pattern read_pattern(Cursor& in, bool& possible) {
     pattern.slides = static_cast<int>(slides);
     pattern.palette.assign(palette.begin(), palette.end());
     for (const auto v : stripes) pattern.sequence.push_back(static_cast<int>(v));
+    if (!in.more()) return;  // of a server that knew only complementary stripes
+    const auto scheme = in.get<std::uint32_t>();
+    possible = scheme <= static_cast<std::uint32_t>(Scheme::kOneSlide);
+    if (possible) pattern.scheme = static_cast<Scheme>(scheme);
   });
   return pattern;
 }

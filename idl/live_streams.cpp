@@ -30,7 +30,7 @@ Result<bool> take_live_info(std::int32_t reader, const std::string& stream) {
 }  // namespace
 
 Status check_name_is_free(const Domain& domain, const std::string& stream, std::chrono::milliseconds wait) {
-  auto group = create_group(domain.participant(), false, stream);
+  auto group = create_group(domain.participant(), Role::kWatcher, false, stream);
   if (!group) return group.error();
   auto reader = create_reader(domain.participant(), group->get(), Topic::kInfo);
   if (!reader) return reader.error();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -44,7 +45,23 @@ relievo_Rig to_dds(const Rig& rig) {
   std::copy(rig.projector_from_camera_translation.begin(), rig.projector_from_camera_translation.end(),
             out.projector_from_camera_translation);
   std::copy(rig.colour_matrix.begin(), rig.colour_matrix.end(), out.colour_matrix);
+  out.field_order =
+      rig.field_order == FieldOrder::kTop ? relievo_FIELD_ORDER_TOP : relievo_FIELD_ORDER_BOTTOM;
   return out;
+}
+
+relievo_Scheme to_dds(Scheme scheme) {
+  switch (scheme) {
+    case Scheme::kComplementary:
+      return relievo_SCHEME_COMPLEMENTARY;
+    case Scheme::kWhiteField:
+      return relievo_SCHEME_WHITE_FIELD;
+    case Scheme::kWhiteFrame:
+      return relievo_SCHEME_WHITE_FRAME;
+    case Scheme::kOneSlide:
+      return relievo_SCHEME_ONE_SLIDE;
+  }
+  return relievo_SCHEME_COMPLEMENTARY;
 }
 
 relievo_StreamState to_dds(StreamState state) {
@@ -68,7 +85,8 @@ Status written(dds_return_t code, Topic topic) {
 
 class DdsPublisher final : public Publisher {
  public:
-  static Result<std::unique_ptr<Publisher>> open(const DomainOptions& options, const StreamInfo& info) {
+  static Result<std::unique_ptr<Publisher>> open(const DomainOptions& options, const StreamInfo& info,
+                                                 std::function<void()> key_frame_wanted) {
     if (!valid_stream_name(info.stream)) {
       return Error{"'" + info.stream +
                    "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.', no dot first"};
@@ -81,7 +99,7 @@ class DdsPublisher final : public Publisher {
     publisher->stream_ = info.stream;
     publisher->domain_ = std::move(domain).value();
     const std::int32_t participant = publisher->domain_->participant();
-    auto group = create_group(participant, true, info.stream);
+    auto group = create_group(participant, Role::kServer, true, info.stream);
     if (!group) return group.error();
     publisher->group_ = std::move(group).value();
     for (const Topic topic : kTopics) {
@@ -90,6 +108,9 @@ class DdsPublisher final : public Publisher {
       publisher->writers_[static_cast<std::size_t>(topic)] = std::move(writer).value();
     }
     if (auto status = publisher->publish(info); !status) return status.error();
+    if (key_frame_wanted) {
+      if (auto status = publisher->listen(std::move(key_frame_wanted)); !status) return status.error();
+    }
     return std::unique_ptr<Publisher>(std::move(publisher));
   }
 
@@ -147,7 +168,51 @@ class DdsPublisher final : public Publisher {
     return static_cast<int>(status.current_count);
   }
 
+  ~DdsPublisher() override {
+    // Waits for a call in progress; `wanted_` outlives it.
+    dds_set_listener(requests_.get(), nullptr);
+    dds_set_listener(writer(Topic::kFrame), nullptr);
+  }
+
  private:
+  struct ListenerDeleter {
+    void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
+  };
+
+  Status listen(std::function<void()> key_frame_wanted) {
+    wanted_ = std::move(key_frame_wanted);
+    const std::int32_t participant = domain_->participant();
+    auto group = create_group(participant, Role::kServer, false, stream_);
+    if (!group) return group.error();
+    request_group_ = std::move(group).value();
+    auto reader = create_request_reader(participant, request_group_.get());
+    if (!reader) return reader.error();
+    requests_ = std::move(reader).value();
+    const std::unique_ptr<dds_listener_t, ListenerDeleter> listener(dds_create_listener(this));
+    dds_lset_publication_matched(listener.get(),
+                                 [](auto, const dds_publication_matched_status_t status, void* self) {
+                                   if (status.current_count_change > 0)
+                                     static_cast<DdsPublisher*>(self)->wanted_();
+                                 });
+    dds_lset_data_available(listener.get(), [](const dds_entity_t, void* self) {
+      static_cast<DdsPublisher*>(self)->take_requests();
+    });
+    dds_set_listener(requests_.get(), listener.get());
+    dds_set_listener(writer(Topic::kFrame), listener.get());
+    return {};
+  }
+
+  void take_requests() const {
+    void* sample = nullptr;  // lent by Cyclone
+    dds_sample_info_t info;
+    while (dds_take(requests_.get(), &sample, &info, 1, 1) == 1) {
+      const auto* request = static_cast<const relievo_KeyFrameRequest*>(sample);
+      const bool ours = info.valid_data && request->stream == stream_;
+      dds_return_loan(requests_.get(), &sample, 1);
+      if (ours) wanted_();
+    }
+  }
+
   Status publish(const StreamInfo& info) {
     std::vector<std::uint32_t> stripes(info.pattern.sequence.begin(), info.pattern.sequence.end());
     relievo_StreamInfo sample{};
@@ -161,6 +226,7 @@ class DdsPublisher final : public Publisher {
     sample.pattern.stripes._maximum = sample.pattern.stripes._length =
         static_cast<std::uint32_t>(stripes.size());
     sample.pattern.stripes._buffer = stripes.data();
+    sample.pattern.scheme = to_dds(info.pattern.scheme);
     return written(dds_write(writer(Topic::kInfo), &sample), Topic::kInfo);
   }
 
@@ -170,12 +236,16 @@ class DdsPublisher final : public Publisher {
   std::shared_ptr<Domain> domain_;
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
+  Entity request_group_;
+  Entity requests_;
+  std::function<void()> wanted_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Publisher>> Publisher::create(const DomainOptions& domain, const StreamInfo& info) {
-  return DdsPublisher::open(domain, info);
+Result<std::unique_ptr<Publisher>> Publisher::create(const DomainOptions& domain, const StreamInfo& info,
+                                                     std::function<void()> key_frame_wanted) {
+  return DdsPublisher::open(domain, info, std::move(key_frame_wanted));
 }
 
 }  // namespace relievo

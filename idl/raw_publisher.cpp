@@ -98,7 +98,7 @@ class DdsRawPublisher final : public RawPublisher {
     publisher->stream_ = stream;
     publisher->domain_ = std::move(domain).value();
     const std::int32_t participant = publisher->domain_->participant();
-    auto group = create_group(participant, true, stream);
+    auto group = create_group(participant, Role::kServer, true, stream);
     if (!group) return group.error();
     publisher->group_ = std::move(group).value();
     for (const Topic topic : kTopics) {

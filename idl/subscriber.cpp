@@ -15,6 +15,7 @@
 #include "idl/domain.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
+#include "relievo.h"
 
 namespace relievo {
 namespace {
@@ -79,6 +80,12 @@ class DdsSubscriber final : public Subscriber {
     thread_.join();
   }
 
+  void request_key_frame(const std::string& stream) override {
+    relievo_KeyFrameRequest request{};
+    request.stream = const_cast<char*>(stream.c_str());  // only read
+    if (requests_.get() != 0) dds_write(requests_.get(), &request);
+  }
+
  private:
   Status start(std::shared_ptr<Domain> domain, const std::string& stream, Callbacks callbacks) {
     domain_ = std::move(domain);
@@ -90,7 +97,7 @@ class DdsSubscriber final : public Subscriber {
       entity = std::move(made).value();
       return {};
     };
-    if (auto s = keep(create_group(participant, false, stream), group_); !s) return s;
+    if (auto s = keep(create_group(participant, Role::kWatcher, false, stream), group_); !s) return s;
     if (auto s = keep(take_entity(dds_create_waitset(participant), "waitset"), waitset_); !s) return s;
     if (auto s = keep(take_entity(dds_create_guardcondition(participant), "condition"), stop_); !s) return s;
     dds_waitset_attach(waitset_.get(), stop_.get(), 0);
@@ -104,6 +111,11 @@ class DdsSubscriber final : public Subscriber {
         return s;
       }
       dds_waitset_attach(waitset_.get(), conditions_[i].get(), 0);
+    }
+    if (wants_frames()) {
+      if (auto s = keep(create_group(participant, Role::kWatcher, true, stream), request_group_); !s)
+        return s;
+      if (auto s = keep(create_request_writer(participant, request_group_.get()), requests_); !s) return s;
     }
     thread_ = std::thread([this] { run(); });
     return {};
@@ -264,6 +276,8 @@ class DdsSubscriber final : public Subscriber {
   Entity group_;
   std::array<Entity, kTopics.size()> readers_;
   std::array<Entity, kTopics.size()> conditions_;
+  Entity request_group_;
+  Entity requests_;
   Entity stop_;
   Entity waitset_;
   std::thread thread_;

@@ -49,10 +49,27 @@ Qos common_qos(Topic topic) {
   return qos;
 }
 
+Result<Entity> create_topic(std::int32_t participant, const dds_topic_descriptor_t& type,
+                            const std::string& name) {
+  return take_entity(dds_create_topic(participant, &type, name.c_str(), nullptr, nullptr), "topic " + name);
+}
+
 Result<Entity> create_topic(std::int32_t participant, Topic topic) {
-  return take_entity(
-      dds_create_topic(participant, row(topic).type, topic_type(topic).topic_name.c_str(), nullptr, nullptr),
-      "topic " + topic_type(topic).topic_name);
+  return create_topic(participant, *row(topic).type, topic_type(topic).topic_name);
+}
+
+constexpr const char* kRequestTopic = "relievo/key_frame_request";
+
+// Only the last one counts, and one that nobody heard is worth nothing later.
+Qos request_qos() {
+  Qos qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking_ns);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+  dds_qset_resource_limits(qos.get(), DDS_LENGTH_UNLIMITED, kMaxStreams, DDS_LENGTH_UNLIMITED);
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
+  dds_qset_data_representation(qos.get(), 1, &representation);
+  return qos;
 }
 
 }  // namespace
@@ -66,10 +83,10 @@ const TopicType& topic_type(Topic topic) {
   return types[static_cast<std::size_t>(topic)];
 }
 
-Result<Entity> create_group(std::int32_t participant, bool writing, const std::string& stream) {
+Result<Entity> create_group(std::int32_t participant, Role role, bool writing, const std::string& stream) {
   Qos qos(dds_create_qos());
   const char* partitions[] = {stream.c_str(), ""};
-  if (writing) {
+  if (role == Role::kServer) {
     dds_qset_partition(qos.get(), 2, partitions);
   } else if (!stream.empty()) {
     dds_qset_partition(qos.get(), 1, partitions);
@@ -102,6 +119,20 @@ Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic
   dds_qset_resource_limits(qos.get(), DDS_LENGTH_UNLIMITED, kMaxStreams, DDS_LENGTH_UNLIMITED);
   return take_entity(dds_create_reader(group, dds_topic->get(), qos.get(), nullptr),
                      "reader of " + topic_type(topic).topic_name);
+}
+
+Result<Entity> create_request_writer(std::int32_t participant, std::int32_t group) {
+  auto topic = create_topic(participant, relievo_KeyFrameRequest_desc, kRequestTopic);
+  if (!topic) return topic.error();
+  return take_entity(dds_create_writer(group, topic->get(), request_qos().get(), nullptr),
+                     std::string("writer of ") + kRequestTopic);
+}
+
+Result<Entity> create_request_reader(std::int32_t participant, std::int32_t group) {
+  auto topic = create_topic(participant, relievo_KeyFrameRequest_desc, kRequestTopic);
+  if (!topic) return topic.error();
+  return take_entity(dds_create_reader(group, topic->get(), request_qos().get(), nullptr),
+                     std::string("reader of ") + kRequestTopic);
 }
 
 }  // namespace relievo

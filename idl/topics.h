@@ -14,15 +14,24 @@
 
 namespace relievo {
 
+/// What a stream's server writes: the topics that are subscribed to, recorded and played.
 constexpr std::array<Topic, 3> kTopics = {Topic::kInfo, Topic::kFrame, Topic::kStatus};
 
-/// A publisher or subscriber entity for one stream: writers offer their stream's name and the unnamed
-/// partition; readers of one stream ask for its name, so that no other stream's data travels to them.
-Result<Entity> create_group(std::int32_t participant, bool writing, const std::string& stream);
+/// Who speaks of a stream: its server, or whoever watches it.
+enum class Role { kServer, kWatcher };
+
+/// A DDS publisher (`writing`) or subscriber for one stream, or for all where the name is empty. Servers are
+/// in the partition of their stream's name and in the unnamed one; watchers of one stream in its name's, so
+/// that no other stream's data travels to them, watchers of all in the unnamed one.
+Result<Entity> create_group(std::int32_t participant, Role role, bool writing, const std::string& stream);
 
 /// A writer or reader of `topic` in `group`, with the table's QoS. The DDS topic is made as needed and lives
 /// with the participant.
 Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic);
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic);
+
+/// The same for requests of key frames, which watchers write and servers read.
+Result<Entity> create_request_writer(std::int32_t participant, std::int32_t group);
+Result<Entity> create_request_reader(std::int32_t participant, std::int32_t group);
 
 }  // namespace relievo

@@ -44,8 +44,10 @@ const TopicType& topic_type(Topic topic);
 class Publisher {
  public:
   /// Publishes `info` for late joiners at once. Fails where another live writer in the domain has that stream
-  /// name.
-  static Result<std::unique_ptr<Publisher>> create(const DomainOptions& domain, const StreamInfo& info);
+  /// name. `key_frame_wanted`, where given, is called when a reader of the frames joined or asked for one: on
+  /// a thread of DDS, so it must return at once and not call back; never after the destructor has returned.
+  static Result<std::unique_ptr<Publisher>> create(const DomainOptions& domain, const StreamInfo& info,
+                                                   std::function<void()> key_frame_wanted = {});
   virtual ~Publisher() = default;
 
   /// Serialises and sends on the caller's thread and keeps nothing of the argument. Never waits for a reader;
@@ -86,6 +88,10 @@ class Subscriber {
   static Result<std::unique_ptr<Subscriber>> create(const DomainOptions& domain, const std::string& stream,
                                                     Callbacks callbacks);
   virtual ~Subscriber() = default;
+
+  /// Asks the server of `stream`, which must be one that this reads, for a frame that decodes alone: for who
+  /// lost one that others build on. (Who joins gets one unasked.) Any thread; callbacks may call it.
+  virtual void request_key_frame(const std::string& stream) = 0;
 };
 
 }  // namespace relievo

@@ -121,6 +121,45 @@ TEST(Cdr, SurvivesRandomDamage) {
   }
 }
 
+// As a server of the first version wrote it, whose rig ends behind the colour matrix and whose pattern behind
+// the stripes; with `appended`, as one of today does.
+CdrWriter description(std::vector<std::uint32_t> appended) {
+  const auto pinhole = [](CdrWriter& w) {
+    w.put<std::uint32_t>(2 * 4 + 14 * 8).put<std::uint32_t>(640).put<std::uint32_t>(480);
+    for (int i = 0; i < 14; ++i) w.put<double>(i);
+  };
+  CdrWriter w;
+  w.text("face").text("sim").put<std::int64_t>(9);
+  const std::uint32_t more = appended.empty() ? 0 : 4;
+  w.put<std::uint32_t>(4 + 8 + 2 * (4 + 2 * 4 + 14 * 8) + (9 + 3 + 9) * 8 + more);
+  w.put<std::uint32_t>(0).put(29.97);
+  pinhole(w);
+  pinhole(w);
+  for (int i = 0; i < 21; ++i) w.put<double>(i);
+  if (more > 0) w.put(appended[0]);
+  w.put<std::uint32_t>(3 * 4 + 4 + 4 + 2 * 4 + more).put<std::uint32_t>(4).put<std::uint32_t>(2);
+  w.octets({1, 2, 4, 7}).put<std::uint32_t>(2).put<std::uint32_t>(0).put<std::uint32_t>(15);
+  if (more > 0) w.put(appended[1]);
+  return w;
+}
+
+TEST(Cdr, ReadsADescriptionOfTheFirstVersion) {
+  const auto info = read_info_cdr(description({}).finish());
+  ASSERT_TRUE(info.ok()) << info.error().message;
+  EXPECT_EQ(info->rig.field_order, FieldOrder::kTop);
+  EXPECT_EQ(info->pattern.scheme, Scheme::kComplementary);
+  EXPECT_EQ(info->pattern.sequence, (std::vector<int>{0, 15}));
+}
+
+TEST(Cdr, ReadsFieldOrderAndScheme) {
+  const auto info = read_info_cdr(description({1, 2}).finish());
+  ASSERT_TRUE(info.ok()) << info.error().message;
+  EXPECT_EQ(info->rig.field_order, FieldOrder::kBottom);
+  EXPECT_EQ(info->pattern.scheme, Scheme::kWhiteFrame);
+  EXPECT_FALSE(read_info_cdr(description({2, 0}).finish()).ok());
+  EXPECT_FALSE(read_info_cdr(description({0, 4}).finish()).ok());
+}
+
 TEST(Cdr, SchemaIsTheWholeIdl) {
   using testing::HasSubstr;
   EXPECT_EQ(topic_type(Topic::kFrame).type_name, "relievo::Frame");

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 
@@ -107,7 +108,9 @@ bool wait_for_readers(const AnyPublisher& publisher, int count) {
 }
 
 TEST(Transport, DescriptionAndStatusReachALateJoiner) {
-  const StreamInfo info = test::example_info("late");
+  StreamInfo info = test::example_info("late");
+  info.rig.field_order = FieldOrder::kBottom;
+  info.pattern.scheme = Scheme::kWhiteFrame;
   auto publisher = expect_made(Publisher::create(kDomain, info));
   ASSERT_TRUE(publisher);
   ServerStatus status;
@@ -182,6 +185,31 @@ TEST(Transport, GapInTheSequenceIsReportedOnce) {
   }
   ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 6; }));
   EXPECT_THAT(inbox.now().lost, testing::ElementsAre(testing::Pair("gap", 3u)));
+}
+
+TEST(Transport, AKeyFrameIsWantedByWhoJoinsAndByWhoAsks) {
+  std::atomic<int> wanted = 0;
+  std::atomic<int> wanted_of_other = 0;
+  auto publisher = expect_made(Publisher::create(kDomain, test::example_info("keys"), [&] { ++wanted; }));
+  auto other =
+      expect_made(Publisher::create(kDomain, test::example_info("other"), [&] { ++wanted_of_other; }));
+  Inbox inbox;
+  auto one = expect_made(Subscriber::create(kDomain, "keys", inbox.callbacks()));
+  ASSERT_TRUE(publisher && other && one);
+  EXPECT_TRUE(test::eventually([&] { return wanted == 1; })) << "nobody told that a reader joined";
+
+  // Asked until heard: the first requests are lost while DDS matches their writer.
+  EXPECT_TRUE(test::eventually([&] {
+    one->request_key_frame("keys");
+    return wanted >= 2;
+  }));
+  EXPECT_EQ(wanted_of_other, 0);
+  auto all = expect_made(Subscriber::create(kDomain, "", inbox.callbacks()));
+  ASSERT_TRUE(all && test::eventually([&] { return wanted_of_other == 1; }));
+  EXPECT_TRUE(test::eventually([&] {
+    all->request_key_frame("other");
+    return wanted_of_other >= 2;
+  }));
 }
 
 TEST(Transport, StreamsAreToldApart) {
