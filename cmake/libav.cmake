@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: Apache-2.0
+# FFmpeg's libraries as relievo_avcodec and relievo_avformat, where they are wanted and installed. Debian's are built with
+# GPL parts (libx264): programs linked with them may be passed on under the GPL's terms alone, without them under Apache's.
+include_guard(GLOBAL)
+option(RELIEVO_VIDEO "H.264, and slides as video, through FFmpeg's libraries where they are installed" ON)
+find_path(LIBAV_INCLUDE_DIR libavcodec/avcodec.h)
+find_library(LIBAVCODEC avcodec)
+find_library(LIBAVUTIL avutil)
+if(RELIEVO_VIDEO AND LIBAV_INCLUDE_DIR AND LIBAVCODEC AND LIBAVUTIL)
+  add_library(relievo_avcodec INTERFACE)
+  target_include_directories(relievo_avcodec SYSTEM INTERFACE ${LIBAV_INCLUDE_DIR})
+  target_link_libraries(relievo_avcodec INTERFACE ${LIBAVCODEC} ${LIBAVUTIL})
+endif()
+find_path(LIBAVFORMAT_INCLUDE_DIR libavformat/avformat.h)
+find_library(LIBAVFORMAT avformat)
+if(TARGET relievo_avcodec AND LIBAVFORMAT_INCLUDE_DIR AND LIBAVFORMAT)
+  add_library(relievo_avformat INTERFACE)
+  target_include_directories(relievo_avformat SYSTEM INTERFACE ${LIBAVFORMAT_INCLUDE_DIR})
+  target_link_libraries(relievo_avformat INTERFACE ${LIBAVFORMAT} relievo_avcodec)
+endif()

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+// H.264 there and back, in each format, and what is no such stream.
+#include "codec/video_coder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+namespace relievo {
+namespace {
+
+/// A soft pattern that moves one pixel to the right with each picture.
+struct Film {
+  VideoFormat format;
+  std::vector<std::vector<std::uint16_t>> planes;
+  std::vector<std::vector<std::uint8_t>> bytes;
+
+  int width(std::size_t plane) const { return plane == 0 ? format.width : format.width / 2; }
+  int height(std::size_t plane) const { return plane == 0 ? format.height : format.height / 2; }
+  int peak() const { return (1 << format.bits) - 1; }
+
+  VideoView picture(int number) {
+    const std::size_t count = format.sampling == VideoSampling::kLuma ? 1 : 3;
+    planes.assign(count, {});
+    bytes.assign(count, {});
+    VideoView view;
+    for (std::size_t p = 0; p < count; ++p) {
+      for (int y = 0; y < height(p); ++y)
+        for (int x = 0; x < width(p); ++x) {
+          const double phase = static_cast<double>(p) + 0.1 * (x - number) + 0.07 * y;
+          planes[p].push_back(
+              static_cast<std::uint16_t>(std::lround(peak() * (0.5 + 0.49 * std::sin(phase)))));
+        }
+      const std::size_t sample = format.bits > 8 ? 2 : 1;
+      bytes[p].resize(planes[p].size() * sample);
+      for (std::size_t i = 0; i < planes[p].size(); ++i)
+        std::memcpy(&bytes[p][i * sample], &planes[p][i], sample);
+      view.planes[p] = bytes[p].data();
+      view.stride_bytes[p] = static_cast<std::ptrdiff_t>(sample) * width(p);
+    }
+    return view;
+  }
+
+  /// Root mean square difference to the last picture, in parts of the range.
+  double error(const VideoView& view) const {
+    double squares = 0;
+    double count = 0;
+    for (std::size_t p = 0; p < planes.size(); ++p)
+      for (int y = 0; y < height(p); ++y)
+        for (int x = 0; x < width(p); ++x) {
+          std::uint16_t sample = 0;
+          const std::size_t size = format.bits > 8 ? 2 : 1;
+          std::memcpy(&sample, view.planes[p] + y * view.stride_bytes[p] + x * static_cast<int>(size), size);
+          const double d =
+              static_cast<double>(sample) - planes[p][static_cast<std::size_t>(y * width(p) + x)];
+          squares += d * d;
+          ++count;
+        }
+    return std::sqrt(squares / count) / peak();
+  }
+};
+
+VideoEncoder encoder_of(const VideoFormat& format) {
+  auto encoder = VideoEncoder::create(format);
+  EXPECT_TRUE(encoder.ok()) << encoder.error().message;
+  return std::move(*encoder);
+}
+VideoDecoder decoder() {
+  auto made = VideoDecoder::create();
+  EXPECT_TRUE(made.ok()) << made.error().message;
+  return std::move(*made);
+}
+
+const VideoFormat kColour{.width = 80, .height = 50};
+
+class VideoFormats : public testing::TestWithParam<VideoFormat> {};
+
+TEST_P(VideoFormats, PicturesComeBackAtOnceAndInOrder) {
+  Film film{GetParam()};
+  VideoEncoder encoder = encoder_of(film.format);
+  VideoDecoder decode = decoder();
+  for (int number = 0; number < 12; ++number) {
+    Bytes unit;
+    const auto key = encoder.encode(film.picture(number), {.rate_factor = 15, .key = number == 7}, unit);
+    ASSERT_TRUE(key.ok()) << key.error().message;
+    EXPECT_EQ(*key, number == 0 || number == 7);
+    const auto said = check_access_unit(unit, film.format);
+    ASSERT_TRUE(said.ok()) << said.error().message;
+    EXPECT_EQ(*said, *key);
+    const auto view = decode.decode(unit, film.format);
+    ASSERT_TRUE(view.ok()) << view.error().message;
+    EXPECT_LT(film.error(*view), 0.02) << number;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Some, VideoFormats,
+                         testing::Values(VideoFormat{80, 50}, VideoFormat{64, 48, VideoSampling::k420, 10},
+                                         VideoFormat{81, 47, VideoSampling::kLuma},
+                                         VideoFormat{90, 61, VideoSampling::kLuma, 10}),
+                         [](const auto& test) {
+                           return std::string(test.param.sampling == VideoSampling::kLuma ? "luma"
+                                                                                          : "colour") +
+                                  std::to_string(test.param.bits);
+                         });
+
+TEST(VideoCoder, TenBitsTellMoreThanEight) {
+  double errors[2] = {};
+  for (const int i : {0, 1}) {
+    Film film{{.width = 96, .height = 64, .sampling = VideoSampling::kLuma, .bits = i == 0 ? 8 : 10}};
+    VideoEncoder encoder = encoder_of(film.format);
+    VideoDecoder decode = decoder();
+    Bytes unit;
+    ASSERT_TRUE(encoder.encode(film.picture(0), {.rate_factor = 1}, unit).ok());
+    const auto view = decode.decode(unit, film.format);
+    ASSERT_TRUE(view.ok());
+    errors[i] = film.error(*view);
+  }
+  EXPECT_LT(errors[1], 0.8 * errors[0]);
+}
+
+TEST(VideoCoder, TheRateFactorCountsFromPictureToPicture) {
+  Film film{kColour};
+  VideoEncoder encoder = encoder_of(kColour);
+  Bytes fine;
+  Bytes coarse;
+  ASSERT_TRUE(encoder.encode(film.picture(0), {.rate_factor = 10, .key = true}, fine).ok());
+  ASSERT_TRUE(encoder.encode(film.picture(0), {.rate_factor = 40, .key = true}, coarse).ok());
+  EXPECT_LT(2 * coarse.size(), fine.size());
+}
+
+TEST(VideoCoder, TheSamePicturesGiveTheSameBytes) {
+  Bytes all[2];
+  for (Bytes& bytes : all) {
+    Film film{kColour};
+    VideoEncoder encoder = encoder_of(kColour);
+    for (int number = 0; number < 4; ++number)
+      ASSERT_TRUE(encoder.encode(film.picture(number), {}, bytes).ok());
+  }
+  EXPECT_EQ(all[0], all[1]);
+}
+
+TEST(VideoCoder, APictureIsNotDecodedWithoutTheOneItBuildsOn) {
+  Film film{kColour};
+  VideoEncoder encoder = encoder_of(kColour);
+  Bytes key;
+  Bytes next;
+  ASSERT_TRUE(encoder.encode(film.picture(0), {}, key).ok());
+  ASSERT_TRUE(encoder.encode(film.picture(1), {}, next).ok());
+  VideoDecoder decode = decoder();
+  EXPECT_FALSE(decode.decode(next, kColour).ok());
+  EXPECT_TRUE(decode.decode(key, kColour).ok());
+  EXPECT_FALSE(decode.decode({}, kColour).ok());
+  EXPECT_TRUE(decode.decode(next, kColour).ok()) << "what is refused before the decoder does not hurt it";
+}
+
+TEST(VideoCoder, PicturesOfAnotherFormatAreRefusedBeforeTheyAreDecoded) {
+  Film film{kColour};
+  VideoEncoder encoder = encoder_of(kColour);
+  Bytes unit;
+  ASSERT_TRUE(encoder.encode(film.picture(0), {}, unit).ok());
+  VideoDecoder decode = decoder();
+  for (const VideoFormat& other :
+       {VideoFormat{78, 50}, VideoFormat{80, 48}, VideoFormat{80, 50, VideoSampling::kLuma},
+        VideoFormat{80, 50, VideoSampling::k420, 10}, VideoFormat{160, 100}})
+    EXPECT_FALSE(decode.decode(unit, other).ok());
+  EXPECT_TRUE(decode.decode(unit, kColour).ok());
+}
+
+TEST(VideoCoder, WhatIsNoFormatIsRefused) {
+  for (const VideoFormat& format :
+       {VideoFormat{0, 0}, VideoFormat{14, 64}, VideoFormat{81, 50}, VideoFormat{80, 51},
+        VideoFormat{8194, 16}, VideoFormat{8192, 8192}, VideoFormat{80, 50, VideoSampling::k420, 9}})
+    EXPECT_FALSE(VideoEncoder::create(format).ok());
+}
+
+TEST(VideoUnit, TwoPicturesInOneAreRefused) {
+  Film film{kColour};
+  VideoEncoder encoder = encoder_of(kColour);
+  Bytes units;
+  ASSERT_TRUE(encoder.encode(film.picture(0), {}, units).ok());
+  ASSERT_TRUE(check_access_unit(units, kColour).ok());
+  ASSERT_TRUE(encoder.encode(film.picture(1), {}, units).ok());
+  EXPECT_FALSE(check_access_unit(units, kColour).ok());
+}
+
+TEST(VideoUnit, ZerosMayFollow) {
+  Film film{kColour};
+  VideoEncoder encoder = encoder_of(kColour);
+  VideoDecoder decode = decoder();
+  Bytes unit;
+  ASSERT_TRUE(encoder.encode(film.picture(0), {}, unit).ok());
+  unit.resize(unit.size() + 1000);
+  EXPECT_TRUE(decode.decode(unit, kColour).ok());
+}
+
+/// Every byte of key and delta picture changed in turn: refused or a picture, and the next key picture is
+/// one.
+TEST(VideoCoderHostile, DamageNeverBreaksTheDecoder) {
+  Film film{kColour};
+  VideoEncoder encoder = encoder_of(kColour);
+  Bytes key;
+  Bytes next;
+  ASSERT_TRUE(encoder.encode(film.picture(0), {}, key).ok());
+  ASSERT_TRUE(encoder.encode(film.picture(1), {}, next).ok());
+  VideoDecoder decode = decoder();
+  int refused = 0;
+  for (std::size_t at = 0; at < key.size() + next.size(); ++at) {
+    for (const int change : {0x01, 0x80, 0xff}) {
+      Bytes bad_key = key;
+      Bytes bad_next = next;
+      std::uint8_t& byte = at < key.size() ? bad_key[at] : bad_next[at - key.size()];
+      byte = static_cast<std::uint8_t>(byte ^ change);
+      if (!decode.decode(bad_key, kColour) || !decode.decode(bad_next, kColour)) ++refused;
+      const auto again = decode.decode(key, kColour);
+      ASSERT_TRUE(again.ok()) << again.error().message << " after a change at " << at;
+    }
+  }
+  EXPECT_GT(refused, 100);
+  for (std::size_t size = 0; size < key.size(); ++size)
+    if (!decode.decode(std::span(key).first(size), kColour)) ++refused;
+  EXPECT_TRUE(decode.decode(key, kColour).ok());
+}
+
+}  // namespace
+}  // namespace relievo
