@@ -3,7 +3,12 @@
 
 #include <atomic>
 #include <cmath>
+#include <filesystem>
+#include <string_view>
 
+#include "capture/source/npy.h"
+#include "capture/source/sim/sim_source.h"
+#include "capture/source/take_files.h"
 #include "cli/progress.h"
 
 namespace relievo::bench {
@@ -43,11 +48,29 @@ class LoopSource final : public FieldSource {
   std::atomic<bool> stopped_{false};
 };
 
+constexpr std::string_view kSim = "sim:", kTake = "take:";
+
+Result<std::unique_ptr<FieldSource>> open(const std::string& uri, bool with_truth) {
+  if (!with_truth || !uri.starts_with(kSim)) return open_source(uri, {});
+  auto sim = make_sim(uri.substr(kSim.size()), {.truth = true});
+  if (!sim) return sim.error();
+  return std::unique_ptr<FieldSource>(*std::move(sim));
+}
+
+/// Empty where there is none.
+Result<ImageF> truth_of_take(const std::string& uri, std::uint64_t number) {
+  if (!uri.starts_with(kTake)) return ImageF();
+  const auto file = take_truth(uri.substr(kTake.size()), number);
+  return std::filesystem::exists(file) ? read_npy(file) : ImageF();
+}
+
 }  // namespace
 
-Result<std::optional<FrameLoop>> FrameLoop::load(const std::string& uri, int count, StopSignal& stop) {
-  auto source = open_source(uri, {});
+Result<std::optional<FrameLoop>> FrameLoop::load(const std::string& uri, int count, StopSignal& stop,
+                                                 const Options& options) {
+  auto source = open(uri, options.truth);
   if (!source) return source.error();
+  const auto* sim = options.truth ? dynamic_cast<const SimSource*>(source->get()) : nullptr;
   FrameLoop loop;
   loop.info_ = (*source)->info();
   Progress progress("load", "frames", static_cast<std::uint64_t>(count));
@@ -57,6 +80,14 @@ Result<std::optional<FrameLoop>> FrameLoop::load(const std::string& uri, int cou
     if (!next) return next.error();
     if (!*next) break;
     loop.frames_.push_back(**std::move(next));
+    const std::uint64_t number = loop.frames_.back().number;
+    if (sim != nullptr) {
+      loop.truths_.emplace(number, sim->truth().clone());
+    } else if (options.truth) {
+      auto truth = truth_of_take(uri, number);
+      if (!truth) return truth.error();
+      if (!truth->empty()) loop.truths_.emplace(number, *std::move(truth));
+    }
     progress.update(loop.frames_.size());
     if ((loop.frames_.size() + 1) * loop.frame_bytes() > kMaxBytes) break;
   }
@@ -73,6 +104,11 @@ const CapturedFrame& FrameLoop::at(std::uint64_t n) const {
   const std::uint64_t last = frames_.size() - 1;
   const std::uint64_t phase = n % (2 * last);
   return frames_[phase <= last ? phase : 2 * last - phase];
+}
+
+const ImageF* FrameLoop::truth(std::uint64_t number) const {
+  const auto found = truths_.find(number);
+  return found != truths_.end() ? &found->second : nullptr;
 }
 
 std::unique_ptr<FieldSource> FrameLoop::play() const {

@@ -5,71 +5,58 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include "base/lens.h"
 
 namespace relievo::bench {
 namespace {
 
-constexpr int kCells = 512;  // a side; a cell is as wide as the search reaches
-constexpr float kReach = 1.0F / kCells;
+constexpr std::int64_t kNowhere = -1;
 
-/// Vertices by the cell of the texture that they lie in.
-class TextureCells {
- public:
-  explicit TextureCells(const std::vector<Vec2f>& coordinates)
-      : coordinates_(coordinates), start_(kCells * kCells + 1), vertices_(coordinates.size()) {
-    for (const Vec2f& c : coordinates) ++start_[cell(index(c[0]), index(c[1])) + 1];
-    for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
-    std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
-    for (std::uint32_t v = 0; v < coordinates.size(); ++v)
-      vertices_[next[cell(index(coordinates[v][0]), index(coordinates[v][1]))]++] = v;
-  }
+std::int64_t place(std::int64_t line, std::int64_t boundary, const Pattern& pattern) {
+  return line * pattern.boundaries() + boundary;
+}
 
-  /// The nearest vertex within kReach, -1: none.
-  std::int64_t nearest(const Vec2f& at) const {
-    std::int64_t best = -1;
-    float best_distance = kReach * kReach;
-    const int x = index(at[0]);
-    const int y = index(at[1]);
-    for (int cy = std::max(0, y - 1); cy <= std::min(kCells - 1, y + 1); ++cy) {
-      for (int cx = std::max(0, x - 1); cx <= std::min(kCells - 1, x + 1); ++cx) {
-        for (std::uint32_t i = start_[cell(cx, cy)]; i < start_[cell(cx, cy) + 1]; ++i) {
-          const Vec2f& c = coordinates_[vertices_[i]];
-          const float distance = (c[0] - at[0]) * (c[0] - at[0]) + (c[1] - at[1]) * (c[1] - at[1]);
-          if (distance > best_distance) continue;
-          best_distance = distance;
-          best = vertices_[i];
-        }
-      }
-    }
-    return best;
-  }
-
- private:
-  static int index(float coordinate) {
-    return std::clamp(static_cast<int>(coordinate * kCells), 0, kCells - 1);
-  }
-  static std::size_t cell(int x, int y) {
-    return static_cast<std::size_t>(y) * kCells + static_cast<std::size_t>(x);
-  }
-
-  const std::vector<Vec2f>& coordinates_;
-  std::vector<std::uint32_t> start_;
-  std::vector<std::uint32_t> vertices_;
-};
+/// Line and boundary of a point of the surface as one number. kNowhere where camera or projector do not see
+/// it.
+std::int64_t place_of(const Vec3f& p, const Rig& rig, const Pattern& pattern) {
+  const auto& r = rig.projector_from_camera_rotation;
+  const auto& t = rig.projector_from_camera_translation;
+  const double x = p[0], y = p[1], z = p[2];
+  const double qx = r[0] * x + r[1] * y + r[2] * z + t[0];
+  const double qy = r[3] * x + r[4] * y + r[5] * z + t[1];
+  const double qz = r[6] * x + r[7] * y + r[8] * z + t[2];
+  if (!(z > 0 && qz > 0)) return kNowhere;
+  const double row = distort(rig.camera, x / z, y / z)[1];
+  const double column = distort(rig.projector, qx / qz, qy / qz)[0];
+  const long line = std::lround(row / (rig.scan == Scan::kInterlaced ? 2 : 1));
+  const long boundary = std::lround((column + 0.5) * pattern.stripes() / rig.projector.width) - 1;
+  if (line < 0 || line >= rig.camera.height || boundary < 0 || boundary >= pattern.boundaries())
+    return kNowhere;
+  return place(line, boundary, pattern);
+}
 
 }  // namespace
 
-Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decoded) {
-  for (const Surface* surface : {&encoded, &decoded}) {
-    if (surface->texture_coordinates.size() != surface->positions.size() || surface->positions.empty())
-      return Error{"a surface without vertices or texture coordinates cannot be compared"};
+Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decoded, const Rig& rig,
+                                   const Pattern& pattern) {
+  if (encoded.positions.empty() || decoded.positions.empty() ||
+      encoded.grid.size() != encoded.positions.size())
+    return Error{"a surface without vertices or without a grid cannot be compared"};
+  std::vector<std::int64_t> vertex_at(static_cast<std::size_t>(place(rig.camera.height, 0, pattern)),
+                                      kNowhere);
+  for (std::size_t v = 0; v < encoded.grid.size(); ++v) {
+    const std::int64_t at = place(encoded.grid[v].line, encoded.grid[v].boundary, pattern);
+    if (at < std::ssize(vertex_at)) vertex_at[static_cast<std::size_t>(at)] = static_cast<std::int64_t>(v);
   }
-  const TextureCells cells(encoded.texture_coordinates);
   SurfaceError error;
   double squares = 0;
   for (std::size_t i = 0; i < decoded.positions.size(); ++i) {
-    const std::int64_t match = cells.nearest(decoded.texture_coordinates[i]);
-    if (match < 0) return Error{"vertex " + std::to_string(i) + " that was decoded was never encoded"};
+    const std::int64_t at = place_of(decoded.positions[i], rig, pattern);
+    const std::int64_t match = at != kNowhere ? vertex_at[static_cast<std::size_t>(at)] : kNowhere;
+    if (match == kNowhere)
+      return Error{"vertex " + std::to_string(i) + " that was decoded was never encoded"};
     const Vec3f& a = encoded.positions[static_cast<std::size_t>(match)];
     const Vec3f& b = decoded.positions[i];
     double square = 0;

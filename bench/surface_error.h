@@ -3,7 +3,9 @@
 #pragma once
 
 #include "base/frame3d.h"
+#include "base/pattern.h"
 #include "base/result.h"
+#include "base/rig.h"
 
 namespace relievo::bench {
 
@@ -12,9 +14,11 @@ struct SurfaceError {
   double max_m = 0;
 };
 
-/// Over the decoded vertices: the distance to the encoded vertex that it is, which is the one nearest in the
-/// texture, since codecs may permute and leave out vertices. Both need texture coordinates. Fails where a
-/// vertex has no counterpart within two pixels of a 1024 pixel texture: it was never encoded.
-Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decoded);
+/// Over the decoded vertices: the distance to the encoded vertex that it is, which is the one at its place on
+/// the grid of stripes and lines, since codecs may permute and leave out vertices. The place of a decoded
+/// vertex is where its position is seen and lit, whatever its codec says; `encoded` must have its grid. Fails
+/// where nothing was encoded at a decoded vertex's place.
+Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decoded, const Rig& rig,
+                                   const Pattern& pattern);
 
 }  // namespace relievo::bench

@@ -6,6 +6,7 @@
 
 #include "bench/report.h"
 #include "bench/surface_error.h"
+#include "tests/support/make_grid.h"
 
 namespace relievo::bench {
 namespace {
@@ -31,51 +32,62 @@ TEST(Spread, OfOneAndOfNone) {
   EXPECT_EQ(spread_of({}).n, 0U);
 }
 
-/// A wall of 20 x 20 vertices, 1 cm apart.
-Surface wall() {
-  Surface surface;
-  for (int y = 0; y < 20; ++y) {
-    for (int x = 0; x < 20; ++x) {
-      surface.positions.push_back({0.01F * static_cast<float>(x), 0.01F * static_cast<float>(y), 1});
-      surface.texture_coordinates.push_back({static_cast<float>(x) / 19, static_cast<float>(y) / 19});
-    }
-  }
-  return surface;
-}
+const test::GridScene kScene;
+const Rig kRig = test::grid_rig(kScene);
+const Pattern kPattern = test::grid_pattern(kScene);
 
 TEST(SurfaceError, OfTheSameSurfaceIsNone) {
-  const auto error = surface_error(wall(), wall());
-  ASSERT_TRUE(error);
+  const Surface surface = test::grid_frame(kScene).surface;
+  const auto error = surface_error(surface, surface, kRig, kPattern);
+  ASSERT_TRUE(error) << error.error().message;
   EXPECT_EQ(error->rms_m, 0);
   EXPECT_EQ(error->max_m, 0);
 }
 
 TEST(SurfaceError, PermutedThinnedAndMoved) {
-  // Every second vertex, last first; one of them 3 cm nearer, where another encoded vertex is nearer in
-  // space.
-  const Surface encoded = wall();
+  // Every second vertex, last first; one of them moved along its ray by less than a stripe.
+  const Surface encoded = test::grid_frame(kScene).surface;
   Surface decoded;
-  for (std::size_t i = encoded.positions.size(); i-- > 0;) {
-    if (i % 2 != 0) continue;
-    decoded.positions.push_back(encoded.positions[i]);
-    Vec2f coordinate = encoded.texture_coordinates[i];
-    coordinate[0] = std::round(coordinate[0] * 4095) / 4095;  // as a codec quantises them
-    decoded.texture_coordinates.push_back(coordinate);
-  }
-  decoded.positions[7][0] += 0.03F;
-  const auto error = surface_error(encoded, decoded);
+  for (std::size_t i = encoded.positions.size(); i-- > 0;)
+    if (i % 2 == 0) decoded.positions.push_back(encoded.positions[i]);
+  Vec3f& moved = decoded.positions[7];
+  const double length = std::hypot(moved[0], moved[1], moved[2]);
+  for (float& x : moved) x *= 1 + static_cast<float>(0.002 / length);
+  const auto error = surface_error(encoded, decoded, kRig, kPattern);
   ASSERT_TRUE(error) << error.error().message;
-  EXPECT_NEAR(error->max_m, 0.03, 1e-6);
-  EXPECT_NEAR(error->rms_m, 0.03 / std::sqrt(200), 1e-6);
+  EXPECT_NEAR(error->max_m, 0.002, 1e-6);
+  EXPECT_NEAR(error->rms_m, 0.002 / std::sqrt(static_cast<double>(decoded.positions.size())), 1e-6);
+}
+
+TEST(SurfaceError, VerticesThatShareAPlaceInTheTextureAreNotMixedUp) {
+  // At a depth step two boundaries are seen at one column of a line. Their texture coordinates cannot tell
+  // them apart.
+  Surface encoded = test::grid_frame(kScene).surface;
+  std::size_t a = 0;
+  while (encoded.grid[a + 1].line != encoded.grid[a].line ||
+         encoded.grid[a].boundary + 1 != encoded.grid[a + 1].boundary)
+    ++a;
+  const Triangulator triangulator(kRig, kPattern, kScene.height / 2, 2);
+  encoded.grid[a].column_px = encoded.grid[a + 1].column_px;
+  encoded.positions[a] =
+      *triangulator.point(encoded.grid[a].boundary, encoded.grid[a].line, encoded.grid[a].column_px);
+  encoded.texture_coordinates[a] = encoded.texture_coordinates[a + 1];
+  const auto error = surface_error(encoded, encoded, kRig, kPattern);
+  ASSERT_TRUE(error) << error.error().message;
+  EXPECT_EQ(error->max_m, 0);
 }
 
 TEST(SurfaceError, AVertexThatWasNeverEncodedIsNoMatch) {
-  Surface decoded = wall();
-  decoded.texture_coordinates[5] = {0.5F / 19, 0.5F / 19};
-  EXPECT_FALSE(surface_error(wall(), decoded));
-  decoded = wall();
-  decoded.texture_coordinates.clear();
-  EXPECT_FALSE(surface_error(wall(), decoded));
+  const Surface encoded = test::grid_frame(kScene).surface;
+  Surface decoded = test::grid_frame(kScene).surface;
+  Surface thinned = test::grid_frame(kScene).surface;
+  thinned.positions.erase(thinned.positions.begin() + 5);
+  thinned.grid.erase(thinned.grid.begin() + 5);
+  EXPECT_FALSE(surface_error(thinned, decoded, kRig, kPattern));
+  decoded.positions[5] = {0, 0, -1};
+  EXPECT_FALSE(surface_error(encoded, decoded, kRig, kPattern));
+  thinned.grid.clear();
+  EXPECT_FALSE(surface_error(thinned, encoded, kRig, kPattern));
 }
 
 }  // namespace
