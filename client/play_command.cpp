@@ -12,6 +12,7 @@
 #include "client/options.h"
 #include "client/player.h"
 #include "client/recorded_stream.h"
+#include "client/time_range.h"
 
 namespace relievo {
 namespace {
@@ -25,6 +26,7 @@ struct Options {
   PlayOptions play;
   bool once = false;
   int readers = -1;  // below 0: wait for one, briefly
+  std::shared_ptr<RangeOptions> range;
   bool json = false;
 };
 
@@ -50,6 +52,10 @@ Status run(const Options& options, StopSignal& stop) {
   if (!recorded) return recorded.error();
   auto info = recorded->find_info();
   if (!info) return info.error();
+  const auto range = find_range(*options.range, *recorded);
+  if (!range) return range.error().in(options.file);
+  PlayOptions play_options = options.play;
+  play_options.range = *range;
   auto publisher = RawPublisher::create(*options.domain, recorded->stream());
   if (!publisher) return publisher.error();
   Bytes current_info;
@@ -64,8 +70,8 @@ Status run(const Options& options, StopSignal& stop) {
   wait_for_readers(options, **publisher, stop);
 
   std::uint64_t frames = 0, refused = 0;
-  Progress progress("play", "frames", options.play.loop ? 0 : recorded->frames());
-  const Status played = play(*recorded, options.play, stop, [&](const RawSample& sample) -> Status {
+  Progress progress("play", "frames", options.play.loop ? 0 : range->frames);
+  const Status played = play(*recorded, play_options, stop, [&](const RawSample& sample) -> Status {
     if (sample.topic == Topic::kInfo && sample.cdr == current_info) return {};
     if (auto status = (*publisher)->publish(sample); !status) {
       if (++refused == 1) log_warning(status.error().message + " (skipped; further ones silently)");
@@ -109,8 +115,12 @@ Command play_command() {
             app.add_option("--wait-readers", options->readers,
                            "Start when this many readers are there (default: one, but wait a second at most)")
                 ->check(whole_number(0, 1000));
+            options->range = add_range_options(app);
             app.add_flag("--json", options->json, "Print the result as JSON");
-            app.footer("Example:\n  relievo play face.mcap --loop --speed 0.5");
+            app.footer(
+                "Examples:\n"
+                "  relievo play face.mcap --loop --speed 0.5\n"
+                "  relievo play face.mcap --from 60 --to 75.5");
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <optional>
 
 #include "base/time.h"
+#include "idl/cdr.h"
 
 namespace relievo {
 namespace {
@@ -13,14 +15,30 @@ namespace {
 // A longer pause in a recording (the stream was gone meanwhile) is shortened to this.
 constexpr std::int64_t kLongestPause_ns = 5 * kNanosecondsPerSecond;
 
+TimeRange range_of(const PlayOptions& options, const RecordedStream& recorded) {
+  return options.range.value_or(
+      TimeRange{.from_ns = recorded.summary().start_ns, .to_ns = std::numeric_limits<std::int64_t>::max()});
+}
+
+/// Of samples that are not played: frames may build on the last key frame, none on others.
+bool needed_before(const RawSample& sample) {
+  return sample.topic == Topic::kInfo || (sample.topic == Topic::kFrame && holds_key_frame(sample.cdr));
+}
+
 Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
                  const std::function<Status(const RawSample&)>& publish) {
+  const TimeRange range = range_of(options, recorded);
   std::int64_t due_ns = steady_now_ns();
   std::optional<std::int64_t> last_ns;
   for (;;) {
     auto sample = recorded.next();
     if (!sample) return sample.error();
-    if (!*sample) return {};
+    if (!*sample || (*sample)->receive_time_ns > range.to_ns) return {};
+    if ((*sample)->receive_time_ns < range.from_ns) {
+      if (!needed_before(**sample)) continue;
+      if (auto status = publish(**sample); !status) return status;
+      continue;
+    }
     const std::int64_t time_ns = (*sample)->receive_time_ns;
     const std::int64_t step_ns =
         std::clamp<std::int64_t>(time_ns - last_ns.value_or(time_ns), 0, kLongestPause_ns);
@@ -36,7 +54,7 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
 Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
             const std::function<Status(const RawSample&)>& publish) {
   do {
-    if (auto status = recorded.rewind(); !status) return status;
+    if (auto status = recorded.seek(range_of(options, recorded).from_ns); !status) return status;
     const std::int64_t start_ns = steady_now_ns();
     if (auto status = play_once(recorded, options, stop, publish); !status) return status;
     // A recording of a single moment must not loop as fast as the machine can.

@@ -4,20 +4,24 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 
 #include "base/result.h"
 #include "cli/stop_signal.h"
 #include "client/recorded_stream.h"
+#include "client/time_range.h"
 
 namespace relievo {
 
 struct PlayOptions {
-  double speed = 1;   // 2: twice as fast
-  bool loop = false;  // from the start again at the end, until stopped
+  double speed = 1;                     // 2: twice as fast
+  bool loop = false;                    // from the start again at the end, until stopped
+  std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none
 };
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or
-/// until stopped. An error of `publish` ends it. One thread.
+/// until stopped. An error of `publish` ends it. Where the range starts between key frames, the one before it
+/// comes first, at once, since what follows builds on it. One thread.
 Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
             const std::function<Status(const RawSample&)>& publish);
 

@@ -95,6 +95,27 @@ Status RecordedStream::rewind() {
   return reader_->seek(summary().start_ns);
 }
 
+Result<std::vector<std::int64_t>> RecordedStream::frame_times() {
+  std::vector<std::int64_t> out;
+  for (std::size_t i = 0; i < topics_.size(); ++i) {
+    if (topics_[i] != Topic::kFrame) continue;
+    auto times = reader_->times(static_cast<std::uint16_t>(i));
+    if (!times) return times.error();
+    out.insert(out.end(), times->begin(), times->end());
+  }
+  std::ranges::sort(out);
+  return out;
+}
+
+Status RecordedStream::seek(std::int64_t time_ns) {
+  static_assert(RecordingReader::kHeadBytes >= kFrameStartBytes);
+  const auto key_ns =
+      reader_->find_last(time_ns, [&](std::uint16_t channel, std::span<const std::uint8_t> head) {
+        return topics_[channel] == Topic::kFrame && holds_key_frame(head);
+      });
+  return reader_->seek(key_ns.value_or(time_ns));
+}
+
 Result<std::optional<RawSample>> RecordedStream::find_info() {
   std::optional<RawSample> info;
   for (const RecordingAttachment& attachment : summary().attachments) {

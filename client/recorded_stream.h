@@ -32,6 +32,11 @@ class RecordedStream {
   Result<std::optional<RawSample>> next();
   /// The next next() returns the first sample again.
   Status rewind();
+  /// The times of all frames, in order, from the file's index; those of damaged parts may be among them.
+  Result<std::vector<std::int64_t>> frame_times();
+  /// The next next() returns the last key frame at or before this time, or where there is none the first
+  /// sample at or after it: what comes then can be decoded from `time_ns` on.
+  Status seek(std::int64_t time_ns);
   /// Damaged parts skipped since opening.
   std::uint64_t damaged() const { return damaged_; }
 

@@ -107,6 +107,17 @@ class RecordingReader {
   virtual Result<std::optional<RecordedMessage>> next() = 0;
   /// The next next() returns the first message at or after this log time.
   virtual Status seek(std::int64_t log_time_ns) = 0;
+
+  /// The log times of a channel's messages, in order: through the index, so that no message is read. Messages
+  /// of damaged chunks are among them where an index names them.
+  virtual Result<std::vector<std::int64_t>> times(std::uint16_t channel) = 0;
+
+  /// Says of a message by its first bytes, kHeadBytes of them or all there are, whether it is the one.
+  using Wanted = std::function<bool(std::uint16_t channel, std::span<const std::uint8_t> head)>;
+  static constexpr std::size_t kHeadBytes = 256;
+  /// The log time of the last message at or before this one that is wanted; nothing where there is none.
+  /// Reads the heads of messages alone, from there backwards, and checks no CRC: that is for next().
+  virtual std::optional<std::int64_t> find_last(std::int64_t log_time_ns, const Wanted& wanted) = 0;
 };
 
 }  // namespace relievo

@@ -6,6 +6,8 @@
 #include <queue>
 #include <utility>
 
+#include "codec/byte_io.h"
+#include "codec/mcap_message_index.h"
 #include "codec/mcap_scan.h"
 #include "codec/recording.h"
 
@@ -13,6 +15,8 @@ namespace relievo {
 namespace {
 
 constexpr std::uint64_t kMaxLoadedBytes = 2 * mcap::kMaxChunkBytes;  // of chunks that overlap in time
+constexpr std::uint64_t kMessageHeadBytes = 2 + 4 + 8 + 8;           // channel, sequence, two times
+constexpr std::uint64_t kLeastMessageBytes = mcap::kRecordHeaderBytes + kMessageHeadBytes;
 
 std::int64_t to_ns(std::uint64_t time) {
   return static_cast<std::int64_t>(std::min<std::uint64_t>(time, std::numeric_limits<std::int64_t>::max()));
@@ -27,6 +31,8 @@ class Reader final : public RecordingReader {
     if (!contents) return contents.error();
     contents_ = std::move(*contents);
     std::ranges::stable_sort(contents_.chunks, {}, &mcap::ChunkIndex::start_time);
+    for (const mcap::ChunkIndex& chunk : contents_.chunks)
+      ends_by_.push_back(std::max(chunk.end_time, ends_by_.empty() ? 0 : ends_by_.back()));
     for (const auto& [id, schema] : contents_.schemas)
       summary_.schemas.push_back({schema.name, schema.encoding, schema.data});
     channel_at_.assign(std::size_t{1} << 16, kNoChannel);
@@ -86,6 +92,42 @@ class Reader final : public RecordingReader {
     return {};
   }
 
+  Result<std::vector<std::int64_t>> times(std::uint16_t channel) override {
+    std::vector<std::int64_t> out;
+    std::uint64_t listed = 0;
+    for (const mcap::ChunkIndex& chunk : contents_.chunks) {
+      const auto places = mcap::read_message_places(*file_, chunk);
+      if (!places) continue;  // next() says so
+      listed += places->size();
+      if (listed > file_->size() / kLeastMessageBytes)
+        return Error{file_->name() + ": its index lists more messages than it can hold; `relievo recover` " +
+                     "writes a sound copy"};
+      for (const mcap::MessagePlace& place : *places)
+        if (channel_at_[place.channel_id] == channel) out.push_back(to_ns(place.log_time));
+    }
+    std::ranges::sort(out);
+    return out;
+  }
+
+  std::optional<std::int64_t> find_last(std::int64_t log_time_ns, const Wanted& wanted) override {
+    if (log_time_ns < 0) return std::nullopt;
+    const auto latest = static_cast<std::uint64_t>(log_time_ns);
+    std::optional<std::uint64_t> found;
+    for (std::size_t i = contents_.chunks.size(); i-- > 0;) {
+      if (found && ends_by_[i] <= *found) break;  // neither this chunk nor any before it reaches further
+      const mcap::ChunkIndex& chunk = contents_.chunks[i];
+      if (chunk.start_time > latest) continue;
+      const auto places = mcap::read_message_places(*file_, chunk);
+      if (!places) continue;
+      for (auto place = places->rbegin(); place != places->rend(); ++place) {
+        if (place->log_time > latest) continue;
+        if (found && place->log_time <= *found) break;
+        if (is_wanted(*place, wanted)) found = place->log_time;
+      }
+    }
+    return found ? std::optional(to_ns(*found)) : std::nullopt;
+  }
+
  private:
   static constexpr std::int32_t kNoChannel = -1;
 
@@ -131,6 +173,24 @@ class Reader final : public RecordingReader {
     return {};
   }
 
+  bool is_wanted(const mcap::MessagePlace& place, const Wanted& wanted) const {
+    if (place.offset >= file_->size() || channel_at_[place.channel_id] == kNoChannel) return false;
+    const auto head = file_->read(
+        place.offset, std::min<std::uint64_t>(kLeastMessageBytes + kHeadBytes, file_->size() - place.offset));
+    if (!head || head->size() < kLeastMessageBytes) return false;
+    ByteReader reader(*head);
+    const auto op = static_cast<mcap::Op>(reader.read<std::uint8_t>());
+    const auto length = reader.read<std::uint64_t>();
+    const auto message = mcap::read_message(std::span(*head).subspan(reader.position()));
+    if (op != mcap::Op::kMessage || length < kMessageHeadBytes || !message ||
+        message->first.channel_id != place.channel_id || message->first.log_time != place.log_time)
+      return false;
+    const auto data = message->second;
+    return wanted(static_cast<std::uint16_t>(channel_at_[place.channel_id]),
+                  data.first(static_cast<std::size_t>(
+                      std::min<std::uint64_t>(data.size(), length - kMessageHeadBytes))));
+  }
+
   std::uint64_t loaded_bytes() {
     std::erase_if(loaded_, [](const auto& records) { return records.expired(); });
     std::uint64_t sum = 0;
@@ -169,6 +229,7 @@ class Reader final : public RecordingReader {
   const std::unique_ptr<mcap::File> file_;
   mcap::Contents contents_;
   RecordingSummary summary_;
+  std::vector<std::uint64_t> ends_by_;    // the latest message of each chunk and all before it
   std::vector<std::int32_t> channel_at_;  // index into summary_.channels of each id in the file
 
   std::uint64_t from_ = 0;      // log time that was sought

@@ -10,6 +10,9 @@
 #include <optional>
 #include <utility>
 
+#include "codec/byte_io.h"
+#include "codec/frame3d_codec.h"
+
 namespace relievo {
 namespace {
 
@@ -76,6 +79,11 @@ class Cursor {
       if ((c >= 0 && c < 0x20) || c == 0x7f) c = '?';  // it may end on a terminal
     }
     return clean;
+  }
+
+  /// What is there from here on.
+  std::span<const std::uint8_t> rest() const {
+    return ok_ ? body_.subspan(at_) : std::span<const std::uint8_t>();
   }
 
   std::vector<std::uint32_t> numbers(std::size_t max) {
@@ -221,6 +229,37 @@ Result<FrameView> read_frame_cdr(std::span<const std::uint8_t> cdr) {
   if (!in.ok()) return truncated("frame");
   if (auto bad = bad_stream(frame.stream)) return *bad;
   return frame;
+}
+
+bool holds_key_frame(std::span<const std::uint8_t> start_of_cdr) {
+  if (bad_encapsulation(start_of_cdr)) return false;
+  Cursor in(start_of_cdr.subspan(kEncapsulationBytes));
+  in.get<std::uint32_t>();  // the struct's length, which reaches beyond the start
+  in.text();
+  for (int i = 0; i < 4; ++i) in.get<std::uint64_t>();  // numbers and times
+  in.get<std::uint32_t>();                              // the frame's length
+  return is_key_frame(in.rest());
+}
+
+Bytes write_frame_cdr(const FrameView& frame) {
+  Bytes out{0, kDelimitedCdr2LittleEndian, 0, 0};
+  append(out, std::uint32_t{0});  // the struct's length, set below
+  append(out, static_cast<std::uint32_t>(frame.stream.size() + 1));
+  out.insert(out.end(), frame.stream.begin(), frame.stream.end());
+  out.push_back(0);
+  const auto pad = [&] { out.resize((out.size() + 3) / 4 * 4); };
+  pad();
+  append(out, frame.sequence);
+  append(out, frame.number);
+  append(out, frame.capture_time_ns);
+  append(out, frame.publish_time_ns);
+  append(out, static_cast<std::uint32_t>(frame.data.size()));
+  append_bytes(out, frame.data);
+  put(out, kEncapsulationBytes, static_cast<std::uint32_t>(out.size() - kEncapsulationBytes - 4));
+  const std::size_t unpadded = out.size();
+  pad();
+  out[3] = static_cast<std::uint8_t>(out.size() - unpadded);  // how much of it is padding
+  return out;
 }
 
 Result<StreamInfo> read_info_cdr(std::span<const std::uint8_t> cdr) {

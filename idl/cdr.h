@@ -26,6 +26,14 @@ struct FrameView {
 /// newer writer appended are skipped; stream names, enumerations, sizes and numbers are checked for being
 /// possible at all (the pattern's code itself is checked by whoever decodes with it).
 Result<FrameView> read_frame_cdr(std::span<const std::uint8_t> cdr);
+/// Whether a relievo::Frame holds a frame that decodes without others. Looks at its first kFrameStartBytes
+/// alone, and needs no more. Any input.
+bool holds_key_frame(std::span<const std::uint8_t> start_of_cdr);
+inline constexpr std::size_t kFrameStartBytes = 256;
+
+/// The bytes that a Publisher sends for this frame.
+Bytes write_frame_cdr(const FrameView& frame);
+
 Result<StreamInfo> read_info_cdr(std::span<const std::uint8_t> cdr);
 Result<ServerStatus> read_status_cdr(std::span<const std::uint8_t> cdr);
 

@@ -5,7 +5,6 @@
 
 #include "base/log.h"
 #include "base/time.h"
-#include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -19,11 +18,6 @@ std::uint32_t sequence_of(const RawSample& sample) {
   if (sample.topic != Topic::kFrame) return 0;
   const auto frame = read_frame_cdr(sample.cdr);
   return frame ? static_cast<std::uint32_t>(frame->sequence) : 0;
-}
-
-bool decodes_alone(const RawSample& sample) {
-  const auto frame = read_frame_cdr(sample.cdr);
-  return frame && is_key_frame(frame->data);
 }
 
 }  // namespace
@@ -156,7 +150,7 @@ bool Recorder::segment_ends_before(const RawSample& sample) const {
   const std::uint64_t bytes = writer_->size();
   const double duration_s = seconds(sample.receive_time_ns - segment_ns_);
   return segments_.is_full(bytes, duration_s) &&
-         (decodes_alone(sample) || segments_.is_full(bytes / 2, duration_s / 2));
+         (holds_key_frame(sample.cdr) || segments_.is_full(bytes / 2, duration_s / 2));
 }
 
 /// Each file can be read without the others: it begins with the stream's description.

@@ -293,6 +293,12 @@ TEST(RecordPlay, FramesAreDescribedAndExported) {
       EXPECT_EQ(head, start);
     }
   }
+  const auto played = test::run(on_loopback({"play", file, "--frames", "2:4", "--speed", "10", "--json"}));
+  ASSERT_EQ(played.status, 0) << played.err;
+  EXPECT_EQ(nlohmann::json::parse(played.out)["frames"], 3);
+  const auto later = test::run(on_loopback({"play", file, "--from", "2030-01-01T00:00:00Z"}));
+  EXPECT_EQ(later.status, 1);
+  EXPECT_THAT(later.err, HasSubstr("it holds 12 frames in"));
   const auto late = test::run({program("relievo"), "export", file, "--out", folder / "x", "--from", "99"});
   EXPECT_EQ(late.status, 1);
   EXPECT_THAT(late.err, HasSubstr("no frame in that range"));

@@ -95,6 +95,61 @@ TEST(Recording, SeekGoesToAnyMessage) {
   EXPECT_EQ((*reader->next())->sequence, 0u);
 }
 
+TEST(Recording, TimesComeFromTheIndexOrTheMessages) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  const Bytes whole = read_file(folder / "a.mcap");
+  write_file(folder / "cut.mcap", std::span(whole).first(whole.size() - 8));
+  std::vector<std::int64_t> status, frames;
+  for (int i = 0; i < 23; ++i) (i % 4 == 3 ? status : frames).push_back(kStart_ns + i * kStep_ns);
+  for (const char* name : {"a.mcap", "cut.mcap"}) {
+    const auto reader = open(folder / name);
+    EXPECT_EQ(*reader->times(0), frames) << name;
+    EXPECT_EQ(*reader->times(1), status) << name;
+    EXPECT_TRUE(reader->times(7)->empty()) << name;
+  }
+}
+
+TEST(Recording, TheLastMessageThatIsWantedIsFoundByItsFirstBytes) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 43, 600);
+  const Bytes whole = read_file(folder / "a.mcap");
+  write_file(folder / "cut.mcap", std::span(whole).first(whole.size() - 8));
+  const auto time = [](int i) { return kStart_ns + i * kStep_ns; };
+  for (const char* name : {"a.mcap", "cut.mcap"}) {
+    const auto reader = open(folder / name);
+    const auto only = [&](int wanted) {
+      return [&, wanted](std::uint16_t channel, std::span<const std::uint8_t> head) {
+        EXPECT_EQ(head.size(), RecordingReader::kHeadBytes);
+        const Bytes data = payload(wanted, 600);
+        return channel == 0 && std::equal(head.begin(), head.end(), data.begin());
+      };
+    };
+    for (const int i : {0, 4, 14, 41})
+      for (const int later : {i, i + 1, 42}) EXPECT_EQ(reader->find_last(time(later), only(i)), time(i));
+    EXPECT_EQ(reader->find_last(time(14) - 1, only(14)), std::nullopt) << "later than asked for";
+    EXPECT_EQ(reader->find_last(time(42), only(7)), std::nullopt) << "on the other channel";
+    EXPECT_EQ(reader->find_last(-1, only(0)), std::nullopt);
+    const auto any = [](std::uint16_t, std::span<const std::uint8_t>) { return true; };
+    EXPECT_EQ(reader->find_last(time(30) + 1, any), time(30));
+    EXPECT_EQ(reader->find_last(time(300), any), time(42));
+  }
+}
+
+/// Chunks need not follow one another in time.
+TEST(Recording, TheLastMessageIsFoundAmongChunksThatOverlap) {
+  test::TempFolder folder;
+  {
+    auto writer = create(folder / "a.mcap", {.chunk_ns = 100 * kStep_ns, .chunk_bytes = 60});
+    writer->add_channel(schema(), channel("t")).ok();
+    for (const int i : {0, 9, 1, 2, 8, 3, 5, 4, 7, 6}) writer->write(message(0, i, 10)).ok();
+  }
+  const auto reader = open(folder / "a.mcap");
+  const auto any = [](std::uint16_t, std::span<const std::uint8_t>) { return true; };
+  for (int i = 0; i < 10; ++i)
+    EXPECT_EQ(reader->find_last(kStart_ns + i * kStep_ns, any), kStart_ns + i * kStep_ns);
+}
+
 TEST(Recording, ChunksAreBoundedInTimeAndSize) {
   test::TempFolder folder;
   auto writer = create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns, .chunk_bytes = 500});
@@ -223,6 +278,13 @@ TEST(RecordingFault, ADamagedAttachmentIsLeftOutAndNamed) {
   EXPECT_EQ(read_all(*reader).messages.size(), 6u);
 }
 
+/// Whatever the index says, and whether it is believed, is withstood.
+void look_around(RecordingReader& reader) {
+  static_cast<void>(reader.times(0).ok());
+  const auto none = [](std::uint16_t, std::span<const std::uint8_t>) { return false; };
+  EXPECT_EQ(reader.find_last(kStart_ns + 8 * kStep_ns, none), std::nullopt);
+}
+
 TEST(RecordingFault, EveryFlippedByteIsWithstood) {
   test::TempFolder folder;
   write_sample(folder / "a.mcap", 11, 20);
@@ -237,6 +299,7 @@ TEST(RecordingFault, EveryFlippedByteIsWithstood) {
     const ReadBack back = read_all(**reader);
     ASSERT_LT(back.errors.size(), 100u) << at;
     for (const auto& m : back.messages) wrong += m.data != payload(static_cast<int>(m.sequence), 20);
+    look_around(**reader);
   }
   EXPECT_EQ(wrong, 0u) << "messages that were changed but not reported";
 }
@@ -261,6 +324,7 @@ TEST(RecordingFault, AnIndexThatLiesIsWithstood) {
       ASSERT_LT(read_all(**reader).errors.size(), 100u) << at;
       ASSERT_TRUE((*reader)->seek(kStart_ns + 5 * kStep_ns).ok());
       static_cast<void>((*reader)->next().ok());
+      look_around(**reader);
     }
   }
   rusage usage{};

@@ -77,6 +77,28 @@ TEST(Cdr, ReadsAFrame) {
   EXPECT_EQ(Bytes(view->data.begin(), view->data.end()), (Bytes{1, 2, 3, 4, 5}));
 }
 
+/// The start of a frame of version 1 (codec/FORMAT.md).
+CdrWriter frame_of_3d_video(std::uint8_t flags) {
+  Bytes data{'R', 'L', 'V', 'F', 1, flags};
+  data.resize(5000);
+  CdrWriter w;
+  w.text(std::string(64, 'n')).put<std::uint64_t>(7).put<std::uint64_t>(15);
+  return w.put<std::int64_t>(100).put<std::int64_t>(200).octets(data);
+}
+
+TEST(Cdr, TellsAKeyFrameByItsStart) {
+  const Bytes key = frame_of_3d_video(1).finish();
+  const Bytes delta = frame_of_3d_video(0).finish();
+  EXPECT_TRUE(holds_key_frame(key));
+  EXPECT_TRUE(holds_key_frame(std::span(key).first(kFrameStartBytes)));
+  EXPECT_FALSE(holds_key_frame(delta));
+  EXPECT_FALSE(holds_key_frame(frame().finish())) << "no frame of 3D video";
+  for (std::size_t size = 0; size < kFrameStartBytes; ++size) {
+    const Bytes part(key.begin(), key.begin() + static_cast<std::ptrdiff_t>(size));  // exact, for asan
+    EXPECT_TRUE(!holds_key_frame(part) || size > 64 + 64);
+  }
+}
+
 TEST(Cdr, SkipsWhatANewerWriterAppended) {
   EXPECT_TRUE(read_frame_cdr(frame().put<std::uint64_t>(1).text("more").finish()).ok());
 }
@@ -116,6 +138,7 @@ TEST(Cdr, SurvivesRandomDamage) {
     Bytes bad = good;
     for (int n = 0; n < 3; ++n) bad[random() % bad.size()] = static_cast<std::uint8_t>(random());
     (void)read_frame_cdr(bad).ok();
+    (void)holds_key_frame(bad);
     (void)read_info_cdr(bad).ok();
     (void)read_status_cdr(bad).ok();
   }

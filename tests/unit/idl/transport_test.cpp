@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Real DDS on the loopback interface.
 #include "idl/transport.h"
+#include "idl/cdr.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -341,6 +342,10 @@ TEST(Transport, RawSamplesAreReplayedByteForByte) {
     }
     ASSERT_TRUE(inbox.wait([&](auto& r) { return r.raw.size() == 5; }));
     recorded = inbox.now().raw;
+    for (const RawSample& sample : recorded) {
+      if (sample.topic != Topic::kFrame) continue;
+      EXPECT_EQ(write_frame_cdr(*read_frame_cdr(sample.cdr)), sample.cdr) << "as DDS itself writes it";
+    }
     EXPECT_EQ(recorded[0].stream, "tape");
     EXPECT_GT(recorded[0].source_time_ns, 0);
   }

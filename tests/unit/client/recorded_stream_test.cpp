@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parts of recordings: real frames, of which only some decode without others.
+#include "client/recorded_stream.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/time.h"
+#include "client/player.h"
+#include "client/time_range.h"
+#include "codec/frame3d_codec.h"
+#include "idl/cdr.h"
+#include "tests/support/make_grid.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
+constexpr std::int64_t kStep_ns = 100'000'000;
+constexpr int kFrames = 40;
+constexpr int kKeyInterval = 15;  // key frames: 0, 15, 30
+
+std::int64_t time_of(int frame) {
+  return kStart_ns + frame * kStep_ns;
+}
+
+/// Small surfaces as a stream's encoder makes them, frame i at time_of(i).
+void write_recording(const std::filesystem::path& file) {
+  const test::GridScene scene{.width = 160, .height = 96, .stripes = 20};
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  const EncodeOptions options{
+      .geometry = GeometryCodec::kGrid, .texture = TextureCodec::kNone, .key_interval = kKeyInterval};
+  auto writer = RecordingWriter::create(file, {});
+  ASSERT_TRUE(writer.ok());
+  const TopicType& type = topic_type(Topic::kFrame);
+  const auto channel = (*writer)->add_channel({type.type_name, "omgidl", type.idl},
+                                              {type.topic_name, "cdr", type.type_name, {{"stream", "s"}}});
+  ASSERT_TRUE(channel.ok());
+  for (int i = 0; i < kFrames; ++i) {
+    Frame3D frame = test::grid_frame(scene);
+    frame.number = static_cast<std::uint64_t>(i);
+    const auto data = encoder.encode(frame, options);
+    ASSERT_TRUE(data.ok());
+    ASSERT_EQ(is_key_frame(*data), i % kKeyInterval == 0);
+    const auto number = static_cast<std::uint64_t>(i);
+    ASSERT_TRUE((*writer)
+                    ->write({*channel, static_cast<std::uint32_t>(i), time_of(i), time_of(i),
+                             write_frame_cdr({"s", number, number, time_of(i), time_of(i), *data})})
+                    .ok());
+  }
+  ASSERT_TRUE((*writer)->finish().ok());
+}
+
+class RecordedStreamTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_recording(file_);
+    auto opened = RecordedStream::open(file_, "");
+    ASSERT_TRUE(opened.ok()) << opened.error().message;
+    stream_.emplace(std::move(*opened));
+  }
+  std::uint64_t next_number() {
+    const auto sample = stream_->next();
+    return sample.ok() && *sample ? read_frame_cdr((*sample)->cdr)->number : 9999;
+  }
+  Result<TimeRange> range(const RangeOptions& options) { return find_range(options, *stream_); }
+
+  const test::TempFolder folder_;
+  const std::filesystem::path file_ = folder_ / "a.mcap";
+  std::optional<RecordedStream> stream_;
+};
+
+TEST_F(RecordedStreamTest, SeeksToTheKeyFrameThatATimeNeeds) {
+  const std::pair<std::int64_t, std::uint64_t> cases[] = {
+      {time_of(0), 0},       {time_of(14), 0},  {time_of(15) - 1, 0}, {time_of(15), 15},
+      {time_of(29) + 5, 15}, {time_of(39), 30}, {time_of(1000), 30},  {kStart_ns - 1, 0}};
+  for (const auto& [time_ns, expected] : cases) {
+    ASSERT_TRUE(stream_->seek(time_ns).ok());
+    EXPECT_EQ(next_number(), expected) << time_ns - kStart_ns;
+    EXPECT_EQ(next_number(), expected + 1);
+  }
+}
+
+TEST_F(RecordedStreamTest, FrameTimesAreThoseOfAllFrames) {
+  const auto times = stream_->frame_times();
+  ASSERT_TRUE(times.ok());
+  ASSERT_EQ(times->size(), kFrames);
+  EXPECT_EQ(times->front(), time_of(0));
+  EXPECT_EQ(times->back(), time_of(kFrames - 1));
+}
+
+TEST_F(RecordedStreamTest, RangesAreTimesOrPositionsOrBoth) {
+  EXPECT_EQ(range({})->frames, kFrames);
+  EXPECT_EQ(range({.from = "1.2", .to = "1.5"})->frames, 4u);
+  EXPECT_EQ(range({.from = "1.200000001"})->frames, 27u) << "a nanosecond later";
+  EXPECT_EQ(range({.from = "2023-11-14T22:13:21.25Z"})->from_ns, kStart_ns + 1'250'000'000);
+  EXPECT_EQ(range({.to = "2023-11-14T22:13:21"})->frames, 11u);
+  EXPECT_EQ(range({.frames = "20:29"})->frames, 10u);
+  EXPECT_EQ(range({.frames = "20:29"})->from_ns, time_of(20));
+  EXPECT_EQ(range({.frames = "39"})->frames, 1u);
+  EXPECT_EQ(range({.frames = ":3"})->frames, 4u);
+  EXPECT_EQ(range({.frames = "35:1000"})->frames, 5u);
+  EXPECT_EQ(range({.from = "2.5", .frames = "20:29"})->frames, 5u);
+  for (const RangeOptions& none :
+       {RangeOptions{.from = "4"}, RangeOptions{.from = "2", .to = "1"}, RangeOptions{.frames = "40:"},
+        RangeOptions{.from = "3", .frames = ":9"}}) {
+    const auto refused = range(none);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_THAT(refused.error().message, HasSubstr("40 frames in 3.90 s"));
+  }
+}
+
+TEST(RecordedTime, WhatIsNoTimeIsRefused) {
+  for (const char* text :
+       {"", "-1", "1e3", "1:2", "nan", "12345678901", "1.0000000001", "2026-01-02", "2026-13-02T00:00:00Z",
+        "2026-01-02T03:04:99Z", "2026-01-02T03:04:05Zulu", "1969-01-01T00:00:00Z"})
+    EXPECT_FALSE(parse_recorded_time_ns(text, 0).ok()) << text;
+  EXPECT_EQ(*parse_recorded_time_ns("12.5", 7), 12'500'000'007);
+}
+
+TEST_F(RecordedStreamTest, PlayingFromBetweenKeyFramesSendsTheOneBefore) {
+  const auto part = range({.frames = "33:36"});
+  ASSERT_TRUE(part.ok());
+  StopSignal stop;
+  std::vector<std::uint64_t> played;
+  FrameDecoder decoder;
+  const Status done = play(*stream_, {.speed = 100, .range = *part}, stop, [&](const RawSample& sample) {
+    const auto frame = read_frame_cdr(sample.cdr);
+    played.push_back(frame->number);
+    EXPECT_TRUE(decoder.decode(frame->data).ok());
+    return Status();
+  });
+  EXPECT_TRUE(done.ok());
+  EXPECT_THAT(played, ElementsAre(30, 33, 34, 35, 36));
+}
+
+}  // namespace
+}  // namespace relievo
