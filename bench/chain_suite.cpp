@@ -52,7 +52,7 @@ ReconstructOptions reconstruct_options(const Options& options) {
 EncodeOptions encode_options() {
   const ServeConfig serve;  // as `serve` does by default
   EncodeOptions encode;
-  encode.jpeg_quality = serve.jpeg_quality;
+  encode.texture_quality = serve.jpeg_quality;
   set_geometry_profile(serve.geometry, encode);
   encode.step_bits = serve.step_bits;
   encode.key_interval = serve.key_interval;

@@ -44,6 +44,13 @@ void put(Bytes& out, std::size_t at, T value) {
   std::memcpy(out.data() + at, &value, sizeof(T));
 }
 
+/// FNV-1a, 32 bits: the ids by which sections name those they build on.
+inline std::uint32_t fnv1a(std::span<const std::uint8_t> bytes) {
+  std::uint32_t hash = 2166136261U;
+  for (const std::uint8_t byte : bytes) hash = (hash ^ byte) * 16777619U;
+  return hash;
+}
+
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/export.h"
 
-#include <png.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -12,6 +10,7 @@
 #include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/surface_check.h"
+#include "codec/texture_png.h"
 
 namespace relievo {
 namespace {
@@ -134,24 +133,10 @@ Status write_obj(const std::filesystem::path& path, const Frame3D& frame) {
 }
 
 Status write_png(const std::filesystem::path& path, View8 picture) {
-  if (picture.empty() || (picture.channels != 1 && picture.channels != 3))
-    return Error{"cannot write " + path.string() + ": the picture is empty or neither RGB nor grey"};
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  header.width = static_cast<png_uint_32>(picture.width);
-  header.height = static_cast<png_uint_32>(picture.height);
-  header.format = picture.channels == 3 ? PNG_FORMAT_RGB : PNG_FORMAT_GRAY;
-  const auto stride = static_cast<png_int_32>(picture.stride);
-  png_alloc_size_t size = 0;
   Bytes out;
-  if (png_image_write_to_memory(&header, nullptr, &size, 0, picture.data, stride, nullptr) != 0) {
-    out.resize(size);
-    if (png_image_write_to_memory(&header, out.data(), &size, 0, picture.data, stride, nullptr) != 0) {
-      out.resize(size);
-      return write_whole_file(path, out);
-    }
-  }
-  return Error{"cannot write " + path.string() + ": " + header.message};
+  if (auto status = append_png(picture, PngEffort::kSmall, out); !status)
+    return status.error().in("cannot write " + path.string());
+  return write_whole_file(path, out);
 }
 
 }  // namespace relievo

@@ -13,8 +13,8 @@
 #include "codec/frame_layout.h"
 #include "codec/grid_coder.h"
 #include "codec/grid_points.h"
-#include "codec/jpeg_texture.h"
 #include "codec/surface_check.h"
+#include "codec/texture_codec.h"
 #include "codec/vertex_quality.h"
 
 namespace relievo {
@@ -31,13 +31,14 @@ Status check(const char* name, int value, int low, int high) {
 Status check_options(const EncodeOptions& options) {
   if (options.geometry != GeometryCodec::kDracoMesh && options.geometry != GeometryCodec::kGrid)
     return Error{"unknown geometry codec"};
-  if (options.texture != TextureCodec::kNone && options.texture != TextureCodec::kJpeg)
+  if (options.texture != TextureCodec::kNone && !make_texture_encoder(options.texture))
     return Error{"unknown texture codec"};
   for (const Status& status :
        {check("position_bits", options.position_bits, 8, 20),
         check("texture_coordinate_bits", options.texture_coordinate_bits, 8, 16),
         options.normal_bits == 0 ? Status() : check("normal_bits", options.normal_bits, 4, 16),
-        check("draco_speed", options.draco_speed, 0, 9), check("jpeg_quality", options.jpeg_quality, 1, 100),
+        check("draco_speed", options.draco_speed, 0, 9),
+        check("texture_quality", options.texture_quality, 1, 100),
         check("step_bits", options.step_bits, 0, 8), check("slice_lines", options.slice_lines, 8, 16384),
         check("key_interval", options.key_interval, 1, 1000)})
     if (!status) return status;
@@ -58,20 +59,35 @@ Status check_frame(const Frame3D& frame, const EncodeOptions& options) {
   return check_limits(kFormatLimits, frame.surface.positions.size(), frame.surface.triangles.size(), pixels);
 }
 
-/// Completes a frame whose header says all of its geometry.
-Result<Bytes> with_texture(const Frame3D& frame, const EncodeOptions& options, FrameHeader header,
-                           std::span<const std::uint8_t> geometry, std::span<const std::uint8_t> quality) {
+bool sends_texture(const Frame3D& frame, const EncodeOptions& options) {
+  return options.texture != TextureCodec::kNone && !frame.texture.empty();
+}
+
+/// A frame's sections, and whether each needs none of a frame before.
+struct Coded {
+  FrameHeader header;  // what it says of the geometry
+  bool geometry_is_key = true;
+  Bytes geometry, quality;
+};
+
+/// Completes a frame; `texture` is of the codec that the options name, and may be null where none is sent.
+Result<Bytes> with_texture(const Frame3D& frame, const EncodeOptions& options, TextureEncoder* texture,
+                           bool key, const Coded& coded) {
+  FrameHeader header = coded.header;
   header.number = frame.number;
   header.time_ns = frame.time_ns;
   header.texture = options.texture;
-  Bytes texture;
-  if (options.texture != TextureCodec::kNone && !frame.texture.empty()) {
+  header.is_key = coded.geometry_is_key;
+  Bytes section;
+  if (sends_texture(frame, options)) {
     header.texture_width = static_cast<std::uint32_t>(frame.texture.width());
     header.texture_height = static_cast<std::uint32_t>(frame.texture.height());
-    if (auto status = append_jpeg(frame.texture.view(), options.jpeg_quality, texture); !status)
-      return status.error();
+    const auto alone =
+        texture->encode(frame.texture.view(), {.quality = options.texture_quality, .key = key}, section);
+    if (!alone) return alone.error();
+    header.is_key = header.is_key && *alone;
   }
-  return write_frame(header, {geometry, texture, quality});
+  return write_frame(header, {coded.geometry, section, coded.quality});
 }
 
 /// What a step of the column is in depth, millimetres, at the middle one of some vertices.
@@ -87,25 +103,30 @@ float step_mm(const Surface& surface, const GridCalibration& calibration, int st
   return static_cast<float>(1000 * z * z / (calibration.camera.fx() * baseline) / (1 << step_bits));
 }
 
+Result<Coded> encode_mesh(const Frame3D& frame, const EncodeOptions& options) {
+  auto geometry = encode_draco(frame.surface, options);
+  if (!geometry) return geometry.error();
+  Coded coded;
+  if (options.quality && !frame.surface.texture_coordinates.empty() &&
+      geometry->vertices >= geometry->sent.size())
+    coded.quality = encode_vertex_quality(frame.surface, geometry->sent, options.texture_coordinate_bits);
+  coded.header.geometry = GeometryCodec::kDracoMesh;
+  coded.header.volume = geometry->volume;
+  coded.header.vertices = geometry->vertices;
+  coded.header.triangles = geometry->triangles;
+  coded.geometry = std::move(geometry->bytes);
+  return coded;
+}
+
 }  // namespace
 
 Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
   if (auto status = check_frame(frame, options); !status) return status.error();
   if (options.geometry != GeometryCodec::kDracoMesh)
     return Error{"a grid needs its calibration: encode it with a FrameEncoder"};
-  const auto geometry = encode_draco(frame.surface, options);
-  if (!geometry) return geometry.error();
-  Bytes quality;
-  if (options.quality && !frame.surface.texture_coordinates.empty() &&
-      geometry->vertices >= geometry->sent.size())
-    quality = encode_vertex_quality(frame.surface, geometry->sent, options.texture_coordinate_bits);
-  FrameHeader header;
-  header.is_key = true;
-  header.geometry = GeometryCodec::kDracoMesh;
-  header.volume = geometry->volume;
-  header.vertices = geometry->vertices;
-  header.triangles = geometry->triangles;
-  return with_texture(frame, options, header, geometry->bytes, quality);
+  const auto coded = encode_mesh(frame, options);
+  if (!coded) return coded.error();
+  return with_texture(frame, options, make_texture_encoder(options.texture).get(), true, *coded);
 }
 
 struct FrameEncoder::State {
@@ -113,8 +134,49 @@ struct FrameEncoder::State {
   GridEncoder encoder;
   StripeGrid grid;
   GridKey key;
-  int since_key = -1;  // frames; -1: there is none to build on
+  bool has_key = false;  // a grid to build on
+  std::unique_ptr<TextureEncoder> texture;
+  TextureCodec texture_codec = TextureCodec::kNone;
+  int since_key = -1;  // frames; -1: there was none
   std::atomic<bool> key_asked{false};
+
+  /// The surface as a grid, which `grid` already is.
+  Coded encode_grid(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
+    Coded coded;
+    coded.geometry_is_key = want_key || !has_key || key.grid.step_bits != options.step_bits;
+    coded.geometry = encoder.encode(grid, calibration, coded.geometry_is_key ? nullptr : &key, {},
+                                    step_mm(frame.surface, calibration, options.step_bits),
+                                    {.slice_lines = options.slice_lines});
+    // Nothing may be smaller than FORMAT.md allows.
+    const std::uint64_t places =
+        static_cast<std::uint64_t>(grid.boundaries) * static_cast<std::uint64_t>(grid.lines);
+    coded.geometry.resize(
+        std::max<std::size_t>({coded.geometry.size(), grid.vertices / kMostGridVerticesPerByte + 1,
+                               places / kMostPlacesPerByte + 1}));
+    coded.header.geometry = GeometryCodec::kGrid;
+    coded.header.vertices = grid.vertices;
+    coded.header.triangles = grid.triangles;
+    if (grid.vertices == 0) {  // all too far away: there is nothing to build on either
+      coded.geometry.clear();
+      coded.geometry_is_key = true;
+      has_key = false;
+    } else if (coded.geometry_is_key) {
+      has_key = options.key_interval > 1;
+      key.id = grid_id(coded.geometry);
+      std::swap(key.grid, grid);
+    }
+    return coded;
+  }
+
+  Result<Coded> encode_geometry(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
+    const bool is_grid = options.geometry == GeometryCodec::kGrid && !frame.surface.positions.empty() &&
+                         to_grid(frame.surface, calibration, options.step_bits, options.quality, grid);
+    if (is_grid) return encode_grid(frame, options, want_key);
+    has_key = false;
+    EncodeOptions mesh = options;
+    mesh.geometry = GeometryCodec::kDracoMesh;
+    return encode_mesh(frame, mesh);
+  }
 };
 
 FrameEncoder::FrameEncoder(const Rig& rig, const Pattern& pattern) : state_(std::make_unique<State>()) {
@@ -130,44 +192,22 @@ void FrameEncoder::request_key_frame() {
 
 Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& options) {
   State& s = *state_;
-  EncodeOptions mesh = options;
-  mesh.geometry = GeometryCodec::kDracoMesh;
-  if (options.geometry == GeometryCodec::kDracoMesh) return encode_frame(frame, mesh);
   if (auto status = check_frame(frame, options); !status) return status.error();
   if (auto status = check_surface(frame.surface); !status) return status.error();
-  if (frame.surface.positions.empty() ||
-      !to_grid(frame.surface, s.calibration, options.step_bits, options.quality, s.grid)) {
-    s.since_key = -1;
-    return encode_frame(frame, mesh);
-  }
   const bool asked = s.key_asked.exchange(false);
-  const bool is_key = asked || s.since_key < 0 || s.since_key + 1 >= options.key_interval ||
-                      s.key.grid.step_bits != options.step_bits;
-  Bytes geometry = s.encoder.encode(s.grid, s.calibration, is_key ? nullptr : &s.key, {},
-                                    step_mm(frame.surface, s.calibration, options.step_bits),
-                                    {.slice_lines = options.slice_lines});
-  // Nothing may be smaller than FORMAT.md allows.
-  const std::uint64_t places =
-      static_cast<std::uint64_t>(s.grid.boundaries) * static_cast<std::uint64_t>(s.grid.lines);
-  geometry.resize(std::max<std::size_t>(
-      {geometry.size(), s.grid.vertices / kMostGridVerticesPerByte + 1, places / kMostPlacesPerByte + 1}));
-  FrameHeader header;
-  header.is_key = is_key;
-  header.geometry = GeometryCodec::kGrid;
-  header.vertices = s.grid.vertices;
-  header.triangles = s.grid.triangles;
-  s.since_key = is_key ? 0 : s.since_key + 1;
-  if (is_key && options.key_interval > 1) {
-    s.key.id = grid_id(geometry);
-    std::swap(s.key.grid, s.grid);
-  } else if (is_key) {
-    s.since_key = -1;
+  const bool other_texture = s.texture_codec != options.texture;
+  if (other_texture) s.texture = make_texture_encoder(options.texture);
+  s.texture_codec = options.texture;
+  const bool want_key = asked || other_texture || s.since_key < 0 || s.since_key + 1 >= options.key_interval;
+  const auto coded = s.encode_geometry(frame, options, want_key);
+  if (!coded) return coded.error();
+  auto bytes = with_texture(frame, options, s.texture.get(), want_key, *coded);
+  if (!bytes) {
+    s.since_key = -1;  // what receivers would have to build on never reached them
+    return bytes;
   }
-  if (header.vertices == 0) {  // all too far away: there is nothing to build on either
-    geometry.clear();
-    s.since_key = -1;
-  }
-  return with_texture(frame, options, header, geometry, {});
+  s.since_key = is_key_frame(*bytes) ? 0 : s.since_key + 1;
+  return bytes;
 }
 
 Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes) {
@@ -176,19 +216,45 @@ Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes) {
   return layout->header;
 }
 
+namespace {
+
+/// Of a frame with a grid that is not empty.
+bool has_grid(const FrameHeader& header) {
+  return header.geometry == GeometryCodec::kGrid && header.vertices > 0;
+}
+
+/// A key frame is one whose sections all need none of a frame before.
+Status check_key(const FrameLayout& layout) {
+  const FrameHeader& header = layout.header;
+  bool geometry_is_key = true;
+  if (has_grid(header)) {
+    const auto head = read_grid_head(layout.sections.geometry);
+    if (!head) return head.error();
+    geometry_is_key = head->is_key;
+  }
+  const bool is_key = geometry_is_key && (layout.sections.texture.empty() ||
+                                          texture_is_key(header.texture, layout.sections.texture));
+  // Writers of before called an empty grid between key frames none.
+  if (is_key != header.is_key && (header.is_key || header.vertices > 0))
+    return Error{"frame and its sections do not agree whether this is a key frame"};
+  return {};
+}
+
+}  // namespace
+
 struct FrameDecoder::State {
   GridDecoder decoder;
   StripeGrid grid;  // of the last delta frame
   GridKey key;
   bool has_key = false;
   std::optional<GridPoints> points;
+  std::unique_ptr<TextureDecoder> texture;
+  TextureCodec texture_codec = TextureCodec::kNone;
 
   /// The grid it decodes to, of which the key is kept.
   Result<const StripeGrid*> decode_grid(std::span<const std::uint8_t> coded, const FrameHeader& header) {
     const auto head = read_grid_head(coded);
     if (!head) return head.error();
-    if (head->is_key != header.is_key)
-      return Error{"frame and grid do not agree whether this is a key frame"};
     if (head->is_key) has_key = false;
     StripeGrid& to = head->is_key ? key.grid : grid;
     const auto done = decoder.decode(coded, header.vertices, header.triangles, has_key ? &key : nullptr, to);
@@ -200,6 +266,36 @@ struct FrameDecoder::State {
     }
     return &to;
   }
+
+  Status decode_geometry(const FrameLayout& layout, Surface& out) {
+    const FrameHeader& header = layout.header;
+    if (header.vertices == 0) {
+      out = {};
+      return {};
+    }
+    if (has_grid(header)) {
+      const auto to = decode_grid(layout.sections.geometry, header);
+      if (!to) return to.error();
+      return points->to_surface(**to, out);
+    }
+    auto surface = decode_draco(layout.sections.geometry, header.vertices, header.triangles);
+    if (!surface) return surface.error();
+    out = std::move(*surface);
+    return layout.sections.quality.empty() ? Status() : decode_vertex_quality(layout.sections.quality, out);
+  }
+
+  /// The decoder of that codec, with what it has decoded. Null: it is not known.
+  TextureDecoder* texture_decoder(TextureCodec codec) {
+    if (!texture || texture_codec != codec) texture = make_texture_decoder(codec);
+    texture_codec = codec;
+    return texture.get();
+  }
+
+  bool can_decode_texture(const FrameLayout& layout) const {
+    const auto section = layout.sections.texture;
+    if (section.empty() || texture_is_key(layout.header.texture, section)) return true;
+    return texture && texture_codec == layout.header.texture && texture->can_decode(section);
+  }
 };
 
 FrameDecoder::FrameDecoder() : state_(std::make_unique<State>()) {}
@@ -210,19 +306,26 @@ FrameDecoder::~FrameDecoder() = default;
 bool FrameDecoder::can_decode(std::span<const std::uint8_t> bytes) const {
   if (is_key_frame(bytes)) return true;
   const auto layout = read_frame_layout(bytes);
-  if (!layout || !state_->has_key) return false;
+  if (!layout || !state_->can_decode_texture(*layout)) return false;
+  if (!has_grid(layout->header)) return true;
   const auto head = read_grid_head(layout->sections.geometry);
-  return head && head->key == state_->key.id;
+  return head && (head->is_key || (state_->has_key && head->key == state_->key.id));
 }
 
 Status FrameDecoder::remember(std::span<const std::uint8_t> bytes, const DecodeLimits& limits) {
   const auto layout = read_frame_layout(bytes);
   if (!layout) return layout.error();
   const FrameHeader& header = layout->header;
-  if (!header.is_key || header.geometry != GeometryCodec::kGrid || header.vertices == 0) return {};
-  if (auto status = check_limits(limits, header.vertices, header.triangles, 0); !status) return status;
-  const auto grid = state_->decode_grid(layout->sections.geometry, header);
-  return grid ? Status() : Status(grid.error());
+  if (auto status = check_limits(limits, header.vertices, header.triangles, texture_pixels(header)); !status)
+    return status;
+  if (auto status = check_key(*layout); !status) return status;
+  if (has_grid(header) && read_grid_head(layout->sections.geometry)->is_key) {
+    const auto grid = state_->decode_grid(layout->sections.geometry, header);
+    if (!grid) return grid.error();
+  }
+  TextureDecoder* texture = state_->texture_decoder(header.texture);
+  if (layout->sections.texture.empty() || texture == nullptr) return {};
+  return texture->remember(layout->sections.texture, header.texture_width, header.texture_height);
 }
 
 Result<Frame3D> FrameDecoder::decode(std::span<const std::uint8_t> bytes, const DecodeLimits& limits) {
@@ -239,34 +342,21 @@ Status FrameDecoder::decode(std::span<const std::uint8_t> bytes, Frame3D& frame,
   if (header.geometry != GeometryCodec::kDracoMesh && header.geometry != GeometryCodec::kGrid)
     return Error{"frame has geometry of codec " + std::to_string(static_cast<int>(header.geometry)) +
                  " that this version does not know: update relievo"};
-  if (header.texture != TextureCodec::kNone && header.texture != TextureCodec::kJpeg)
-    return Error{"frame has a texture of codec " + std::to_string(static_cast<int>(header.texture)) +
+  TextureDecoder* texture = state_->texture_decoder(header.texture);
+  if (header.texture != TextureCodec::kNone && texture == nullptr)
+    return Error{"frame has a texture of codec " + texture_codec_name(header.texture) +
                  " that this version does not know: update relievo"};
   if (auto status = check_limits(limits, header.vertices, header.triangles, texture_pixels(header)); !status)
     return status;
+  if (auto status = check_key(*layout); !status) return status;
   frame.number = header.number;
   frame.time_ns = header.time_ns;
-  if (header.vertices == 0) {
-    frame.surface = {};
-  } else if (header.geometry == GeometryCodec::kGrid) {
-    const auto grid = state_->decode_grid(sections.geometry, header);
-    if (!grid) return grid.error();
-    if (auto status = state_->points->to_surface(**grid, frame.surface); !status) return status;
-  } else {
-    auto surface = decode_draco(sections.geometry, header.vertices, header.triangles);
-    if (!surface) return surface.error();
-    frame.surface = std::move(*surface);
-    if (!sections.quality.empty())
-      if (auto status = decode_vertex_quality(sections.quality, frame.surface); !status) return status;
-  }
+  if (auto status = state_->decode_geometry(*layout, frame.surface); !status) return status;
   if (header.texture == TextureCodec::kNone) {
     frame.texture = {};
-  } else {
-    auto texture = decode_jpeg(sections.texture, header.texture_width, header.texture_height);
-    if (!texture) return texture.error();
-    frame.texture = std::move(*texture);
+    return {};
   }
-  return {};
+  return texture->decode(sections.texture, header.texture_width, header.texture_height, frame.texture);
 }
 
 Result<Frame3D> decode_frame(std::span<const std::uint8_t> bytes, const DecodeLimits& limits) {

@@ -16,7 +16,7 @@
 namespace relievo {
 
 enum class GeometryCodec : std::uint8_t { kDracoMesh = 1, kGrid = 2, kDracoGrid = 3 };
-enum class TextureCodec : std::uint8_t { kNone = 0, kJpeg = 1 };
+enum class TextureCodec : std::uint8_t { kNone = 0, kJpeg = 1, kWebp = 2, kPng = 3, kH264 = 4 };
 
 /// Metres, camera frame: the box in which positions are quantised. Fixed for a stream, so that a surface does
 /// not shimmer with its own bounding box.
@@ -33,11 +33,11 @@ struct EncodeOptions {
   int draco_speed = 5;               // 0 smallest .. 9 fastest
   Volume volume;                     // size 0: each frame's own bounding box
   TextureCodec texture = TextureCodec::kJpeg;
-  int jpeg_quality = 80;  // 1..100
-  bool quality = true;    // sigma and interpolation of each vertex, where the surface has them
-  int step_bits = 4;      // 0..8; grid: columns are whole steps of 2^-step_bits pixels
-  int slice_lines = 270;  // 8..16384; grid: lines that are coded together, and lost together
-  int key_interval = 1;   // 1..1000; grid: every so many frames decodes alone, those between build on it
+  int texture_quality = 80;  // 1..100: about the error of a JPEG of that quality
+  bool quality = true;       // sigma and interpolation of each vertex, where the surface has them
+  int step_bits = 4;         // 0..8; grid: columns are whole steps of 2^-step_bits pixels
+  int slice_lines = 270;     // 8..16384; grid: lines that are coded together, and lost together
+  int key_interval = 1;  // 1..1000; grid and H.264: every so many frames decodes alone, those between do not
 };
 
 /// What a frame says of itself; read without decoding it.
@@ -65,11 +65,11 @@ struct DecodeLimits {
   std::uint32_t texture_pixels = 64'000'000;
 };
 
-/// Draco alone; see FrameEncoder for grids. Fails on a surface outside the limits of the format (the defaults
-/// of DecodeLimits; finite numbers; indices within the vertices) or options out of range. An empty surface is
-/// a valid frame. Left out are vertices outside `volume`, triangles that use a vertex twice, and vertices of
-/// no triangle where there are triangles; texture coordinates are clamped to 0..1. The same frame and options
-/// give the same bytes. Any thread.
+/// Draco alone; see FrameEncoder for grids, and for pictures that build on each other. Fails on a surface
+/// outside the limits of the format (the defaults of DecodeLimits; finite numbers; indices within the
+/// vertices) or options out of range. An empty surface is a valid frame. Left out are vertices outside
+/// `volume`, triangles that use a vertex twice, and vertices of no triangle where there are triangles;
+/// texture coordinates are clamped to 0..1. The same frame and options give the same bytes. Any thread.
 Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options);
 
 /// Checks the whole layout (sizes, version, no trailing bytes), not the payloads. Any input.
@@ -79,7 +79,8 @@ Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes);
 /// false for what is no frame of a known version. Any input.
 bool is_key_frame(std::span<const std::uint8_t> bytes);
 
-/// The encoder of one stream: knows its calibration and its last key frame. One thread but where said.
+/// The encoder of one stream: knows its calibration, its last key frame and its last texture. One thread but
+/// where said.
 class FrameEncoder {
  public:
   FrameEncoder(const Rig& rig, const Pattern& pattern);
@@ -99,8 +100,8 @@ class FrameEncoder {
   std::unique_ptr<State> state_;
 };
 
-/// The decoder of one stream: keeps its last key frame and what its calibration costs to work out. One
-/// thread.
+/// The decoder of one stream: keeps its last key frame, its last texture and what its calibration costs to
+/// work out. One thread.
 class FrameDecoder {
  public:
   FrameDecoder();

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "codec/byte_io.h"
+#include "codec/texture_codec.h"
 
 namespace relievo {
 namespace {
@@ -22,7 +23,6 @@ constexpr std::uint8_t kTextureSection = 2;
 constexpr std::uint8_t kQualitySection = 4;
 constexpr std::uint8_t kQualityCodec = 1;
 constexpr std::uint16_t kRequired = 0x0001;
-constexpr std::uint64_t kMaxPixelsPerByte = 256;  // of a sequential JPEG: 64 pixels take 2 bits at least
 constexpr std::uint64_t kMaxItemsPerByte = 8;
 
 /// The table of sections and the places of those that this version knows; others are stepped over.
@@ -88,7 +88,8 @@ Status check_counts(const FrameHeader& header) {
                  std::to_string(header.triangles) + " triangles, more than its " +
                  std::to_string(header.geometry_bytes) + " bytes of geometry can hold"};
   const std::uint64_t pixels = texture_pixels(header);
-  if ((pixels == 0) != (header.texture_bytes == 0) || pixels > kMaxPixelsPerByte * header.texture_bytes)
+  if ((pixels == 0) != (header.texture_bytes == 0) ||
+      pixels > most_texture_pixels_per_byte(header.texture) * header.texture_bytes)
     return Error{"frame declares a texture of " + std::to_string(header.texture_width) + "x" +
                  std::to_string(header.texture_height) + " in " + std::to_string(header.texture_bytes) +
                  " bytes"};
@@ -156,7 +157,7 @@ Result<FrameLayout> read_frame_layout(std::span<const std::uint8_t> bytes) {
           read_sections(bytes, bytes.subspan(table_at, table_bytes), entry_bytes, header_bytes, layout);
       !status)
     return status.error();
-  if (!header.is_key && header.geometry != GeometryCodec::kGrid)
+  if (!header.is_key && header.geometry != GeometryCodec::kGrid && header.texture != TextureCodec::kH264)
     return Error{"frame has flags that this version does not know (0): update relievo"};
   if (auto status = check_counts(header); !status) return status.error();
   return layout;

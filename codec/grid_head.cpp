@@ -150,9 +150,7 @@ Result<GridHead> read_grid_head(std::span<const std::uint8_t> coded) {
 }
 
 GridId grid_id(std::span<const std::uint8_t> coded) {
-  std::uint32_t hash = 2166136261U;
-  for (const std::uint8_t byte : coded) hash = (hash ^ byte) * 16777619U;
-  return hash;
+  return fnv1a(coded);
 }
 
 }  // namespace relievo

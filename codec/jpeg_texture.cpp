@@ -33,6 +33,31 @@ std::uint8_t frame_marker(std::span<const std::uint8_t> bytes) {
   return 0;
 }
 
+Result<Image8> decode(tjhandle handle, std::span<const std::uint8_t> bytes, std::uint32_t width,
+                      std::uint32_t height) {
+  const std::uint8_t kind = frame_marker(bytes);
+  if (kind != 0xc0 && kind != 0xc1)
+    return Error{"texture is not a sequential JPEG, the only kind the format allows"};
+  int found_width = 0;
+  int found_height = 0;
+  int sampling = 0;
+  int space = 0;
+  if (tjDecompressHeader3(handle, bytes.data(), bytes.size(), &found_width, &found_height, &sampling,
+                          &space) != 0)
+    return turbojpeg_error("decoded", handle);
+  if (static_cast<std::uint32_t>(found_width) != width || static_cast<std::uint32_t>(found_height) != height)
+    return Error{"texture is " + std::to_string(found_width) + "x" + std::to_string(found_height) +
+                 ", but the frame declares " + std::to_string(width) + "x" + std::to_string(height)};
+  if (space != TJCS_YCbCr && space != TJCS_GRAY)
+    return Error{"texture is a JPEG in a colour space that the format does not allow"};
+  Image8 picture(found_width, found_height, 3);
+  if (tjDecompress2(handle, bytes.data(), bytes.size(), picture.data(), found_width,
+                    static_cast<int>(picture.stride()), found_height, TJPF_RGB,
+                    TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS) != 0)
+    return turbojpeg_error("decoded", handle);
+  return picture;
+}
+
 }  // namespace
 
 Status append_jpeg(View8 picture, int quality, Bytes& out) {
@@ -60,28 +85,11 @@ Status append_jpeg(View8 picture, int quality, Bytes& out) {
 }
 
 Result<Image8> decode_jpeg(std::span<const std::uint8_t> bytes, std::uint32_t width, std::uint32_t height) {
-  thread_local const Handle handle(tjInitDecompress());
+  thread_local Handle handle;
+  if (!handle) handle.reset(tjInitDecompress());
   if (!handle) return turbojpeg_error("decoded", nullptr);
-  const std::uint8_t kind = frame_marker(bytes);
-  if (kind != 0xc0 && kind != 0xc1)
-    return Error{"texture is not a sequential JPEG, the only kind the format allows"};
-  int found_width = 0;
-  int found_height = 0;
-  int sampling = 0;
-  int space = 0;
-  if (tjDecompressHeader3(handle.get(), bytes.data(), bytes.size(), &found_width, &found_height, &sampling,
-                          &space) != 0)
-    return turbojpeg_error("decoded", handle.get());
-  if (static_cast<std::uint32_t>(found_width) != width || static_cast<std::uint32_t>(found_height) != height)
-    return Error{"texture is " + std::to_string(found_width) + "x" + std::to_string(found_height) +
-                 ", but the frame declares " + std::to_string(width) + "x" + std::to_string(height)};
-  if (space != TJCS_YCbCr && space != TJCS_GRAY)
-    return Error{"texture is a JPEG in a colour space that the format does not allow"};
-  Image8 picture(found_width, found_height, 3);
-  if (tjDecompress2(handle.get(), bytes.data(), bytes.size(), picture.data(), found_width,
-                    static_cast<int>(picture.stride()), found_height, TJPF_RGB,
-                    TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS) != 0)
-    return turbojpeg_error("decoded", handle.get());
+  auto picture = decode(handle.get(), bytes, width, height);
+  if (!picture) handle.reset();  // it may go on where a damaged one ended (libjpeg-turbo 2.1.5)
   return picture;
 }
 

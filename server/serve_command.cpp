@@ -154,7 +154,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   options.reconstruct.threads = config.threads;
   options.reconstruct.decoder = config.decoder;
   options.reconstruct.surface = config.surface;
-  options.encode.jpeg_quality = config.jpeg_quality;
+  options.encode.texture_quality = config.jpeg_quality;
   set_geometry_profile(config.geometry, options.encode);
   options.encode.step_bits = config.step_bits;
   options.encode.key_interval = config.key_interval;

@@ -121,7 +121,7 @@ TEST(FrameCodec, TextureComesBackAsItWas) {
   Frame3D frame;
   frame.texture = test::picture(101, 57);
   EncodeOptions options;
-  options.jpeg_quality = 95;
+  options.texture_quality = 95;
   const Frame3D back = decoded(frame, options);
   ASSERT_EQ(back.texture.width(), 101);
   ASSERT_EQ(back.texture.height(), 57);
@@ -254,7 +254,7 @@ TEST(FrameCodec, RefusesOptionsOutOfRange) {
   EXPECT_TRUE(refuses([](EncodeOptions& o) { o.normal_bits = 1; }));
   EXPECT_TRUE(refuses([](EncodeOptions& o) { o.draco_speed = 10; }));
   EXPECT_TRUE(refuses([](EncodeOptions& o) { o.draco_speed = -1; }));
-  EXPECT_TRUE(refuses([](EncodeOptions& o) { o.jpeg_quality = 0; }));
+  EXPECT_TRUE(refuses([](EncodeOptions& o) { o.texture_quality = 0; }));
   EXPECT_TRUE(refuses([](EncodeOptions& o) { o.volume.size_m = -1; }));
   EXPECT_TRUE(refuses([](EncodeOptions& o) { o.geometry = static_cast<GeometryCodec>(9); }));
 }
