@@ -49,17 +49,6 @@ ReconstructOptions reconstruct_options(const Options& options) {
   return {.decoder = options.decoder, .threads = options.threads};
 }
 
-EncodeOptions encode_options() {
-  const ServeConfig serve;  // as `serve` does by default
-  EncodeOptions encode;
-  encode.texture_quality = serve.jpeg_quality;
-  set_geometry_profile(serve.geometry, encode);
-  encode.step_bits = serve.step_bits;
-  encode.key_interval = serve.key_interval;
-  encode.draco_speed = serve.draco_speed;
-  return encode;
-}
-
 /// The reference: the same frames through the same stages on one thread, nothing waiting for anything. No
 /// latency can be less.
 struct Serial {
@@ -80,7 +69,7 @@ Result<Serial> run_serially(const FrameLoop& frames, const Options& options, Sto
     const std::int64_t reconstructed = steady_now_ns();
     if (!frame) return frame.error();
     if (!*frame) continue;
-    const auto bytes = encoder.encode(**frame, encode_options());
+    const auto bytes = encoder.encode(**frame, encode_options(ServeConfig{}));  // as `serve` by default
     const std::int64_t encoded = steady_now_ns();
     if (!bytes) return bytes.error();
     const auto decoded = decoder.decode(*bytes);
@@ -171,7 +160,7 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
   pipeline_options.frames =
       options.frames > 0 ? options.frames : static_cast<std::uint64_t>(std::ceil(options.seconds * rate));
   pipeline_options.reconstruct = reconstruct_options(options);
-  pipeline_options.encode = encode_options();
+  pipeline_options.encode = encode_options(ServeConfig{});
   auto pipeline = Pipeline::create(*source, {&noting, dds.get(), web.get()}, pipeline_options);
   if (!pipeline) return pipeline.error();
 

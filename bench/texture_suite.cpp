@@ -2,15 +2,13 @@
 // Texture codecs on the same pictures: size, time, error. The table of rows is below.
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <functional>
 #include <memory>
-#include <opencv2/imgcodecs.hpp>
 
 #include "base/time.h"
 #include "bench/frames.h"
 #include "bench/report.h"
 #include "bench/suites.h"
-#include "codec/jpeg_texture.h"
+#include "codec/texture_codec.h"
 
 namespace relievo::bench {
 namespace {
@@ -24,55 +22,20 @@ struct Options {
 
 struct Codec {
   std::string name;
-  std::function<Result<Bytes>(const Image8&)> encode;
-  std::function<Result<Image8>(const Bytes&, const Image8& like)> decode;  // of `like` the size alone
+  TextureCodec codec;
+  int quality;
 };
 
-Codec jpeg(int quality) {
-  return {"jpeg-q" + std::to_string(quality),
-          [quality](const Image8& picture) -> Result<Bytes> {
-            Bytes bytes;
-            if (const Status done = append_jpeg(picture.view(), quality, bytes); !done) return done.error();
-            return bytes;
-          },
-          [](const Bytes& bytes, const Image8& like) {
-            return decode_jpeg(bytes, static_cast<std::uint32_t>(like.width()),
-                               static_cast<std::uint32_t>(like.height()));
-          }};
-}
-
-/// The reference: lossless. Red and blue change places on the way, which costs a PNG nothing.
-Codec png() {
-  return {"png",
-          [](const Image8& picture) -> Result<Bytes> {
-            try {
-              // OpenCV has no matrix of constant memory; imencode only reads.
-              const cv::Mat mat(picture.height(), picture.width(), CV_8UC(picture.channels()),
-                                const_cast<std::uint8_t*>(picture.data()));
-              Bytes bytes;
-              if (cv::imencode(".png", mat, bytes)) return bytes;
-            } catch (const cv::Exception& e) {
-              return Error{std::string("cannot encode a PNG: ") + e.what()};
-            }
-            return Error{"cannot encode a PNG"};
-          },
-          [](const Bytes& bytes, const Image8& like) -> Result<Image8> {
-            try {
-              Image8 picture(like.width(), like.height(), like.channels());
-              cv::Mat mat(picture.height(), picture.width(), CV_8UC(picture.channels()), picture.data());
-              cv::imdecode(bytes, cv::IMREAD_UNCHANGED, &mat);
-              if (mat.data == picture.data()) return picture;
-            } catch (const cv::Exception& e) {
-              return Error{std::string("cannot decode a PNG: ") + e.what()};
-            }
-            return Error{"a PNG decoded to another size than it was encoded from"};
-          }};
-}
-
-/// A codec is a row here.
+/// A codec is a row here; H.264 only where this build has it.
 std::vector<Codec> codecs() {
-  std::vector<Codec> all{png()};
-  for (const int quality : {60, 75, 80, 90, 95}) all.push_back(jpeg(quality));
+  std::vector<Codec> all{{"png", TextureCodec::kPng, 80}};
+  for (const int quality : {60, 75, 80, 90, 95})
+    all.push_back({"jpeg-q" + std::to_string(quality), TextureCodec::kJpeg, quality});
+  for (const int quality : {60, 80, 90})
+    all.push_back({"webp-q" + std::to_string(quality), TextureCodec::kWebp, quality});
+  if (!check_texture_codec(TextureCodec::kH264)) return all;
+  for (const int quality : {40, 60, 70, 80, 90})
+    all.push_back({"h264-q" + std::to_string(quality), TextureCodec::kH264, quality});
   return all;
 }
 
@@ -87,32 +50,49 @@ double mean_square_error(const Image8& a, const Image8& b) {
 }
 
 struct Samples {
-  std::vector<double> bytes, bits_a_pixel, encode_ms, decode_ms, psnr_db;
+  std::vector<double> bytes, key_bytes, bits_a_pixel, encode_ms, decode_ms, psnr_db;
   bool lossless = true;
 };
 
-Status measure(const Codec& codec, const Image8& picture, Samples& samples) {
-  const std::int64_t begin = steady_now_ns();
-  const auto bytes = codec.encode(picture);
-  const std::int64_t encoded = steady_now_ns();
-  if (!bytes) return bytes.error().in(codec.name);
-  const std::int64_t decode_begin = steady_now_ns();
-  const auto decoded = codec.decode(*bytes, picture);
-  const std::int64_t end = steady_now_ns();
-  if (!decoded) return decoded.error().in(codec.name);
-  if (decoded->size() != picture.size()) return Error{codec.name + ": the picture came back in another size"};
-  samples.bytes.push_back(static_cast<double>(bytes->size()));
-  samples.bits_a_pixel.push_back(8 * static_cast<double>(bytes->size()) /
-                                 (static_cast<double>(picture.width()) * picture.height()));
-  samples.encode_ms.push_back(milliseconds(encoded - begin));
-  samples.decode_ms.push_back(milliseconds(end - decode_begin));
-  const double error = mean_square_error(picture, *decoded);
-  if (error > 0) {
-    samples.lossless = false;
-    samples.psnr_db.push_back(10 * std::log10(255.0 * 255.0 / error));
+/// The pictures of one round: a stream, since pictures may build on each other.
+class Stream {
+ public:
+  explicit Stream(const Codec& codec)
+      : codec_(codec),
+        encoder_(make_texture_encoder(codec.codec)),
+        decoder_(make_texture_decoder(codec.codec)) {}
+
+  Status add(const Image8& picture, Samples& samples) {
+    Bytes section;
+    const std::int64_t begin = steady_now_ns();
+    const auto alone = encoder_->encode(picture.view(), {.quality = codec_.quality}, section);
+    const std::int64_t encoded = steady_now_ns();
+    if (!alone) return alone.error().in(codec_.name);
+    const std::int64_t decode_begin = steady_now_ns();
+    const Status decoded = decoder_->decode(section, static_cast<std::uint32_t>(picture.width()),
+                                            static_cast<std::uint32_t>(picture.height()), decoded_);
+    const std::int64_t end = steady_now_ns();
+    if (!decoded) return decoded.error().in(codec_.name);
+    const bool is_video_key = *alone && codec_.codec == TextureCodec::kH264;
+    (is_video_key ? samples.key_bytes : samples.bytes).push_back(static_cast<double>(section.size()));
+    samples.bits_a_pixel.push_back(8 * static_cast<double>(section.size()) /
+                                   (static_cast<double>(picture.width()) * picture.height()));
+    samples.encode_ms.push_back(milliseconds(encoded - begin));
+    samples.decode_ms.push_back(milliseconds(end - decode_begin));
+    const double error = mean_square_error(picture, decoded_);
+    if (error > 0) {
+      samples.lossless = false;
+      samples.psnr_db.push_back(10 * std::log10(255.0 * 255.0 / error));
+    }
+    return {};
   }
-  return {};
-}
+
+ private:
+  const Codec& codec_;
+  std::unique_ptr<TextureEncoder> encoder_;
+  std::unique_ptr<TextureDecoder> decoder_;
+  Image8 decoded_;
+};
 
 Status run(const Options& options, StopSignal& stop) {
   const auto loop = FrameLoop::load(options.source, options.frames + 1, stop);
@@ -125,13 +105,14 @@ Status run(const Options& options, StopSignal& stop) {
   // Round by round, so that whatever else the machine does meets all codecs alike.
   const std::vector<Codec> all = codecs();
   std::vector<Samples> samples(all.size());
-  Samples warm_up;
   for (int round = 0; round < options.rounds; ++round) {
     for (std::size_t c = 0; c < all.size(); ++c) {
-      if (const Status done = measure(all[c], (*frames)->front().texture, warm_up); !done) return done;
+      Samples warm_up;
+      if (const Status done = Stream(all[c]).add((*frames)->front().texture, warm_up); !done) return done;
+      Stream stream(all[c]);
       for (const Frame3D& frame : **frames) {
         if (stop.stopped()) return {};
-        if (const Status done = measure(all[c], frame.texture, samples[c]); !done) return done;
+        if (const Status done = stream.add(frame.texture, samples[c]); !done) return done;
       }
     }
   }
@@ -140,8 +121,12 @@ Status run(const Options& options, StopSignal& stop) {
     const Samples& of = samples[c];
     // No number where nothing was lost: it would be infinite.
     const Value psnr = of.psnr_db.empty() ? Value() : Value(spread_of(of.psnr_db));
+    const Value key = of.key_bytes.empty() ? Value() : Value(spread_of(of.key_bytes));
+    const Value bytes =
+        of.bytes.empty() ? key : Value(spread_of(of.bytes));  // of one picture: the key picture's
     rows.push_back({all[c].name,
-                    {{"bytes", spread_of(of.bytes)},
+                    {{"bytes", bytes},
+                     {"key_bytes", key},
                      {"bits_per_pixel", spread_of(of.bits_a_pixel)},
                      {"encode_ms", spread_of(of.encode_ms)},
                      {"decode_ms", spread_of(of.decode_ms)},
@@ -157,7 +142,9 @@ Status run(const Options& options, StopSignal& stop) {
                       {"height", static_cast<double>(picture.height())}},
          .figures = {{"raw_bytes", static_cast<double>(picture.size())}},
          .rows = std::move(rows),
-         .notes = {"Reference: png, lossless. PSNR over all samples of red, green and blue."}},
+         .notes = {"Reference: png, lossless. PSNR over all samples of red, green and blue.",
+                   "h264: the first picture of a round is a key picture (key_bytes), bytes are those of the "
+                   "others."}},
         options.json);
   return {};
 }

@@ -16,6 +16,7 @@
 #include "client/options.h"
 #include "client/recorded_stream.h"
 #include "codec/frame3d_codec.h"
+#include "codec/texture_codec.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -52,10 +53,6 @@ std::string codec_name(GeometryCodec codec) {
   if (codec == GeometryCodec::kDracoMesh) return "draco-mesh";
   return codec == GeometryCodec::kGrid ? "grid" : std::to_string(static_cast<int>(codec));
 }
-std::string codec_name(TextureCodec codec) {
-  if (codec == TextureCodec::kNone) return "none";
-  return codec == TextureCodec::kJpeg ? "jpeg" : std::to_string(static_cast<int>(codec));
-}
 
 void add_frame(FrameTotals& totals, std::uint64_t sequence, std::int64_t publish_time_ns,
                std::span<const std::uint8_t> data) {
@@ -76,7 +73,7 @@ void add_frame(FrameTotals& totals, std::uint64_t sequence, std::int64_t publish
   totals.vertices += header->vertices;
   totals.triangles += header->triangles;
   totals.geometry_codecs.insert(codec_name(header->geometry));
-  totals.texture_codecs.insert(codec_name(header->texture));
+  totals.texture_codecs.insert(texture_codec_name(header->texture));
   totals.texture_width = header->texture_width;
   totals.texture_height = header->texture_height;
 }

@@ -88,6 +88,15 @@ std::unique_ptr<TextureDecoder> make_texture_decoder(TextureCodec codec) {
   return std::make_unique<StillDecoder>(*row->still);
 }
 
+Status check_texture_codec(TextureCodec codec) {
+  const auto encoder = make_texture_encoder(codec);
+  if (!encoder) return Error{"there is no texture codec " + texture_codec_name(codec)};
+  const Image8 picture(16, 16, 3);
+  Bytes unused;
+  const auto alone = encoder->encode(picture.view(), {}, unused);
+  return alone ? Status() : Status(alone.error());
+}
+
 bool texture_is_key(TextureCodec codec, std::span<const std::uint8_t> section) {
   return codec != TextureCodec::kH264 || h264_texture_is_key(section);
 }

@@ -48,6 +48,9 @@ class TextureDecoder {
 std::unique_ptr<TextureEncoder> make_texture_encoder(TextureCodec codec);
 std::unique_ptr<TextureDecoder> make_texture_decoder(TextureCodec codec);
 
+/// Fails where this build or machine cannot encode it, saying why: better known before a stream begins.
+Status check_texture_codec(TextureCodec codec);
+
 /// Whether a section of this codec needs none before it. Looks at its first bytes alone.
 bool texture_is_key(TextureCodec codec, std::span<const std::uint8_t> section);
 

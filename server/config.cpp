@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "codec/geometry_profile.h"
+#include "codec/texture_codec.h"
 #include "server/camera_flags.h"
 #include "server/size_option.h"
 
@@ -62,6 +63,14 @@ class Reader {
     if (!value || !set_geometry_profile(*value, unused))
       return refuse(*node, key, "must be " + geometry_profile_names() + " in quotes");
     out = *value;
+  }
+  void texture(std::string_view key, TextureCodec& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    const auto codec = value ? texture_codec_named(*value) : std::nullopt;
+    if (!codec) return refuse(*node, key, "must be " + texture_codec_names() + " in quotes");
+    out = *codec;
   }
   void flag(std::string_view key, bool& out) {
     if (const toml::node* node = take(key)) {
@@ -179,6 +188,19 @@ void read_camera(Reader& reader, CameraOptions& camera) {
 
 }  // namespace
 
+EncodeOptions encode_options(const ServeConfig& config) {
+  constexpr int kVideoInterval = 30;  // a second: what a late joiner waits at most
+  EncodeOptions options;
+  set_geometry_profile(config.geometry, options);
+  options.step_bits = config.step_bits;
+  options.draco_speed = config.draco_speed;
+  options.texture = config.texture;
+  options.texture_quality = config.texture_quality;
+  options.key_interval =
+      config.key_interval.value_or(config.texture == TextureCodec::kH264 ? kVideoInterval : 1);
+  return options;
+}
+
 Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   std::ifstream in(file);
   std::error_code ignored;
@@ -209,10 +231,12 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.scheme("scheme", config.scheme);
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
-  reader.integer("jpeg_quality", 1, 100, config.jpeg_quality);
+  reader.texture("texture", config.texture);
+  reader.integer("texture_quality", 1, 100, config.texture_quality);
   reader.geometry("geometry", config.geometry);
   reader.integer("step_bits", 0, 8, config.step_bits);
-  reader.integer("key_interval", 1, 1000, config.key_interval);
+  if (const auto frames = reader.integer("key_interval", 1, 1000))
+    config.key_interval = static_cast<int>(*frames);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
   reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
   return reader.finish();

@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/camera_options.h"
+#include "codec/frame3d_codec.h"
 
 namespace relievo {
 
@@ -28,12 +29,16 @@ struct ServeConfig {
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
   SurfaceBuilderOptions surface;
-  int jpeg_quality = 80;
+  TextureCodec texture = TextureCodec::kJpeg;
+  int texture_quality = 80;
   std::string geometry = "grid";  // a name of codec/geometry_profile.h
   int step_bits = 6;
-  int key_interval = 1;
+  std::optional<int> key_interval;  // not said: every frame a key frame, but of H.264 every 30th
   int draco_speed = 4;
 };
+
+/// How its frames are encoded.
+EncodeOptions encode_options(const ServeConfig& config);
 
 /// Sets the fields that `file` names. Errors say file, line and what is wrong: an unknown key, a wrong type,
 /// a value out of range.

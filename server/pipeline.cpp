@@ -249,7 +249,9 @@ class ThreadedPipeline final : public Pipeline {
       reconstructor_.recycle(std::move(item->frame));
       message.capture_time_ns = item->capture_time_ns;
       message.data = std::make_shared<const Bytes>(*std::move(bytes));
+      const std::uint64_t dropped = to_publish_.drops();
       push(to_publish_, std::move(message));
+      if (to_publish_.drops() > dropped) encoder_.request_key_frame();  // later frames may build on that one
     }
   }
 

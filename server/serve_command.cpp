@@ -13,6 +13,7 @@
 #include "cli/checks.h"
 #include "cli/listen_address.h"
 #include "codec/geometry_profile.h"
+#include "codec/texture_codec.h"
 #include "idl/recorder.h"
 #include "idl/transport.h"
 #include "server/camera_flags.h"
@@ -104,6 +105,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
     return Error{"'" + info.stream +
                  "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.'"};
   }
+  if (const Status usable = check_texture_codec(config.texture); !usable) return usable.error();
   std::optional<ListenAddress> web;
   if (config.web != "none") {
     auto address = parse_listen_address(config.web);
@@ -154,11 +156,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   options.reconstruct.threads = config.threads;
   options.reconstruct.decoder = config.decoder;
   options.reconstruct.surface = config.surface;
-  options.encode.texture_quality = config.jpeg_quality;
-  set_geometry_profile(config.geometry, options.encode);
-  options.encode.step_bits = config.step_bits;
-  options.encode.key_interval = config.key_interval;
-  options.encode.draco_speed = config.draco_speed;
+  options.encode = encode_options(config);
   auto pipeline = Pipeline::create(**source, sinks, options);
   if (!pipeline) return pipeline.error();
 
@@ -191,9 +189,9 @@ std::string stream_name(const std::string& name) {
 /// Flags as given; what is not given leaves the file's or the default value.
 struct Flags {
   std::optional<std::string> config, source, stream, interface, web, record;
-  std::optional<std::string> decoder, geometry;
+  std::optional<std::string> decoder, geometry, texture;
   std::string scheme;
-  std::optional<int> domain, threads, jpeg_quality, draco_speed, step_bits, key_interval, fill_holes;
+  std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<std::uint64_t> frames;
   bool loop = false, fast = false, dense = false;
   CameraOptions camera;
@@ -216,7 +214,8 @@ Status run(const Flags& flags, StopSignal& stop) {
   set(flags.threads, config.threads);
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
-  set(flags.jpeg_quality, config.jpeg_quality);
+  if (flags.texture) config.texture = texture_codec_named(*flags.texture).value_or(config.texture);
+  set(flags.texture_quality, config.texture_quality);
   set(flags.geometry, config.geometry);
   set(flags.step_bits, config.step_bits);
   set(flags.key_interval, config.key_interval);
@@ -271,8 +270,18 @@ Command serve_command() {
             ->type_name("N");
         app.add_option("--threads", f->threads, "Threads that reconstruct (default 1)")
             ->check(CLI::Range(1, 64));
-        app.add_option("--jpeg-quality", f->jpeg_quality, "Quality of the texture (default 80)")
-            ->check(CLI::Range(1, 100));
+        app.add_option("--texture", f->texture,
+                       "How the texture is sent: jpeg (default: any receiver), webp (smaller, slower), png "
+                       "(lossless) or "
+                       "h264 (smallest; browsers show it on https and localhost alone)")
+            ->check([](const std::string& name) {
+              return texture_codec_named(name) ? "" : "give " + texture_codec_names();
+            })
+            ->type_name("NAME");
+        app.add_option("--texture-quality", f->texture_quality,
+                       "1 to 100, of png without effect (default 80: about 37 dB)")
+            ->check(CLI::Range(1, 100))
+            ->type_name("N");
         app.add_option("--geometry", f->geometry,
                        "How the surface is sent: grid (default: small, for relievo's own receivers) or "
                        "draco-mesh (for any)")
@@ -286,7 +295,9 @@ Command serve_command() {
             ->check(CLI::Range(0, 8))
             ->type_name("N");
         app.add_option("--key-interval", f->key_interval,
-                       "Of grid: every Nth frame decodes alone, the others build on it (default 1: all do)")
+                       "Of grid and h264: every Nth frame decodes alone, the others need frames before "
+                       "(default 1: all do; with "
+                       "h264 30)")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         app.add_option("--draco-speed", f->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest (default 4)")
@@ -300,6 +311,7 @@ Command serve_command() {
             "  relievo-server serve                                        the simulated face\n"
             "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for every machine around\n"
             "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n"
+            "  relievo-server serve --source sim:walk --texture h264 --step-bits 4   less than 4 Mbit/s\n"
             "  relievo-server serve --source v4l2:/dev/video0 --rig rig.yaml --control gain=20\n\n" +
             std::string(scheme_help()));
         return [f](StopSignal& stop) { return run(*f, stop); };

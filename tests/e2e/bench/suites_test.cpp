@@ -139,6 +139,14 @@ TEST(Bench, Texture) {
     bytes = r["bytes"]["median"];
     psnr = r["psnr_db"]["median"];
   }
+  const Json& webp = row(report, "webp-q80");
+  EXPECT_LT(webp["bytes"]["median"], row(report, "jpeg-q80")["bytes"]["median"]);
+  const Json& video = row(report, "h264-q80");
+  if (!video.is_object()) GTEST_SKIP() << "this build has no H.264";
+  expect_spread(video["key_bytes"], 2, "key pictures, one a round");
+  expect_spread(video["bytes"], 4, "the others");
+  EXPECT_LT(video["bytes"]["median"], video["key_bytes"]["median"]);
+  EXPECT_GT(video["psnr_db"]["min"], 30);
 }
 
 TEST(Bench, Chain) {

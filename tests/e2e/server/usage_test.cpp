@@ -15,7 +15,7 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
       {"serve", "--frames", "many"},
       {"serve", "--domain", "231"},
       {"serve", "--threads", "0"},
-      {"serve", "--jpeg-quality", "101"},
+      {"serve", "--texture-quality", "101"},
       {"serve", "--draco-speed", "10"},
       {"serve", "--source"},
       {"serve", "left-over"},

@@ -41,7 +41,8 @@ loop = true
 fast = true
 threads = 3
 decoder = "paper"
-jpeg_quality = 91
+texture = "webp"
+texture_quality = 91
 draco_speed = 4
 geometry = "draco-mesh"
 step_bits = 5
@@ -61,7 +62,8 @@ fill_holes = 3
   EXPECT_TRUE(r.config.fast);
   EXPECT_EQ(r.config.threads, 3);
   EXPECT_EQ(r.config.decoder, Decoder::kPaper);
-  EXPECT_EQ(r.config.jpeg_quality, 91);
+  EXPECT_EQ(r.config.texture, TextureCodec::kWebp);
+  EXPECT_EQ(r.config.texture_quality, 91);
   EXPECT_EQ(r.config.draco_speed, 4);
   EXPECT_EQ(r.config.geometry, "draco-mesh");
   EXPECT_EQ(r.config.step_bits, 5);
@@ -177,8 +179,8 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\" or \"paper\""},
         Wrong{"threads_none", "threads = 0", "threads must be a whole number from 1 to 64"},
         Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},
-        Wrong{"quality_none", "jpeg_quality = 0", "jpeg_quality must be a whole number from 1 to 100"},
-        Wrong{"quality_over", "jpeg_quality = 101", "jpeg_quality must be a whole number"},
+        Wrong{"quality_none", "texture_quality = 0", "texture_quality must be a whole number from 1 to 100"},
+        Wrong{"quality_over", "texture_quality = 101", "texture_quality must be a whole number"},
         Wrong{"holes_over", "fill_holes = 17", "fill_holes must be a whole number from 0 to 16"},
         Wrong{"speed_over", "draco_speed = 10", "draco_speed must be a whole number from 0 to 9"},
         Wrong{"speed_huge", "draco_speed = 4294967297", "draco_speed must be a whole number"},
@@ -186,7 +188,8 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"steps_over", "step_bits = 9", "step_bits must be a whole number from 0 to 8"},
         Wrong{"keys_none", "key_interval = 0", "key_interval must be a whole number from 1 to 1000"},
         Wrong{"unknown", "quality = 80", "quality is no setting; there are: source stream"},
-        Wrong{"part_of_a_name", "jpeg = 80", "jpeg is no setting"},
+        Wrong{"texture_unknown", "texture = \"gif\"", "texture must be jpeg, webp, png or h264"},
+        Wrong{"part_of_a_name", "quality = 80", "quality is no setting"},
         Wrong{"two_names", "\"loop fast\" = true", "loop fast is no setting"},
         Wrong{"names_and_gap", "\"loop  fast\" = true", "loop  fast is no setting"},
         Wrong{"no_name", "\"\" = true", "is no setting"},
