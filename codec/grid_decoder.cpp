@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cstdlib>
+#include <cstring>
 #include <string>
 
 #include "codec/grid_coder.h"
@@ -83,7 +84,7 @@ bool read_slice_head(std::span<const std::uint8_t> in, SliceHead& out) {
 
 /// A slice on its way to lines of the grid.
 struct GridDecoder::Scratch {
-  std::vector<std::uint8_t> there, key_there, good[2], sizes, contexts, tables, symbols;
+  std::vector<std::uint8_t> there, key_there, good[2], sizes, contexts, kinds, tables, symbols, placed;
   std::vector<std::int32_t> expected, absent;
   std::vector<int> places;
   std::uint32_t vertices = 0, triangles = 0;
@@ -145,8 +146,7 @@ bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint
   const int count = in.grid.boundaries - 1;
   for (int b = 0; b < count; b += 8) {
     const int last = std::min(b + 8, count);
-    if (last - b == 8 && good_here[b - 1] != 0 && load8(good_above + b) == kOnes &&
-        load8(above + b) == kOnes && load8(below + b) == kOnes && above[b + 8] != 0 && below[b + 8] != 0) {
+    if (last - b == 8 && uniform_cells(good_here, good_above, above, below, b)) {
       if (!control.one(in.tables.first[kCellBlockTable])) {
         std::fill_n(cells + b, 8, kBoth);
         std::fill_n(good_here + b, 8, std::uint8_t{1});
@@ -191,7 +191,6 @@ bool GridDecoder::Scratch::read_marks(const Input& in, int line, bool first, con
 
 bool GridDecoder::Scratch::read_columns(const Input& in, int line, int begin, const std::uint8_t* here,
                                         rans::Decoder& residuals, rans::BitReader& raw) {
-  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
   const GridModel& model = in.head.model;
   const GridRows rows{.up1 = row(in.grid, line - 1, begin),
                       .up2 = row(in.grid, line - 2, begin),
@@ -203,39 +202,66 @@ bool GridDecoder::Scratch::read_columns(const Input& in, int line, int begin, co
   std::int32_t* columns = in.grid.columns.data() + in.grid.at(line, 0);
   std::int32_t* predicted = expected.data() + StripeGrid::kMargin;
   std::uint8_t* size = sizes.data() + StripeGrid::kMargin;
-  std::uint8_t* context = contexts.data() + StripeGrid::kMargin;
-  grid_kernels().predict(rows, model, boundaries, predicted);
-  grid_kernels().contexts(size, boundaries, context);
-  // Which vertices are there, and the tables of their residuals.
+  const GridKernels& kernels = grid_kernels();
+  kernels.predict(rows, model, boundaries, predicted);
+  kernels.contexts(size, rows.up1, boundaries, contexts.data());
+  // The tables of the residuals of those that are there.
   std::size_t count = 0;
-  std::uint32_t used = 0;
-  for (int b = 0; b < boundaries; ++b) {
-    const std::uint8_t table = rows.up1[b] == kAbsent ? kAloneTable : context[b];
-    places[count] = b;
-    tables[count] = table;
-    used |= static_cast<std::uint32_t>(here[b]) << table;
-    count += here[b];
+  for (int b = 0; b < boundaries; b += 8) {
+    if (load8(here + b) == kOnes) {
+      std::memcpy(tables.data() + count, contexts.data() + b, 8);
+      count += 8;
+      continue;
+    }
+    for (int i = b; i < b + 8; ++i) {  // behind the last boundary there are no vertices
+      tables[count] = contexts[static_cast<std::size_t>(i)];
+      count += here[i];
+    }
   }
-  for (std::size_t t = 0; t < kResidualTables; ++t)
-    if ((used >> t & 1U) != 0 && !in.tables.residuals[t].usable) return false;
   residuals.row(in.tables.residuals, tables.data(), count, symbols.data());
+  // Back to their places.
+  std::size_t next = 0;
+  for (int b = 0; b < boundaries; b += 8) {
+    if (load8(here + b) == kOnes) {
+      std::memcpy(placed.data() + b, symbols.data() + next, 8);
+      next += 8;
+      continue;
+    }
+    for (int i = b; i < b + 8; ++i) {
+      placed[static_cast<std::size_t>(i)] = symbols[next];
+      next += here[i];
+    }
+  }
   const std::int32_t most = kMostPixels << in.grid.step_bits;
-  bool fair = true;
-  Last last;
-  for (std::size_t i = 0; i < count; ++i) {
-    const int b = places[i];
-    const std::int32_t d = unzigzag(number_of(symbols[i], raw));
-    const std::int32_t p = tables[i] == kAloneTable
-                               ? expected_alone(columns, rows.up1, rows.key, b, last, model.spacing)
-                               : predicted[b];
-    const std::int32_t column = p + d;
-    fair = fair && column >= -most && column <= most;
-    columns[b] = fair ? column : 0;
-    last = {columns[b], b};
-    size[b] = static_cast<std::uint8_t>(std::min(d < 0 ? -d : d, kLargestSize));
+  if (!kernels.columns({.there = here,
+                        .symbols = placed.data(),
+                        .tables = contexts.data(),
+                        .expected = predicted,
+                        .columns = columns,
+                        .sizes = size,
+                        .kinds = kinds.data()},
+                       most, boundaries))
+    return false;
+  // Those that the kernel leaves, one after the other.
+  for (int b = 0; b < boundaries; b += 8) {
+    if ((load8(kinds.data() + b) & kByItself * kOnes) == 0) continue;
+    for (int i = b; i < b + 8; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (kinds[at] != kByItself) continue;
+      if (placed[at] >= rans::kMostSymbols) return false;  // of a table that is not there
+      const std::int32_t d = unzigzag(number_of(placed[at], raw));
+      const std::int32_t p =
+          contexts[at] == kAloneTable
+              ? expected_alone(columns, rows.up1, rows.key, i, last_before(columns, i), model.spacing)
+              : predicted[i];
+      const std::int32_t column = p + d;
+      if (column < -most || column > most) return false;
+      columns[i] = column;
+      size[i] = static_cast<std::uint8_t>(std::min(d < 0 ? -d : d, kLargestSize));
+    }
   }
   vertices += static_cast<std::uint32_t>(count);
-  return fair;
+  return true;
 }
 
 bool GridDecoder::Scratch::read_sigmas(const Input& in, int line, int begin, rans::Decoder& sigmas,
@@ -281,8 +307,10 @@ bool GridDecoder::Scratch::decode(const Input& in, int begin, int end, const Sli
   for (auto& buffer : good) buffer.assign(stride, 1);
   sizes.assign(stride, kFirstSize);
   contexts.assign(stride, 0);
+  kinds.assign(stride, 0);
   tables.resize(stride);
-  symbols.resize(stride);
+  symbols.assign(stride, 0);
+  placed.assign(stride, 0);
   expected.assign(stride, 0);
   absent.assign(stride, StripeGrid::kAbsent);
   places.resize(stride);
@@ -316,21 +344,6 @@ GridDecoder::GridDecoder(GridDecoder&&) noexcept = default;
 GridDecoder& GridDecoder::operator=(GridDecoder&&) noexcept = default;
 
 namespace {
-
-/// Cells with both triangles get their diagonal.
-void choose_diagonals(StripeGrid& grid, std::int32_t spacing) {
-  const int stride = grid.stride();
-  for (int line = 0; line + 1 < grid.lines; ++line) {
-    const std::int32_t* __restrict above = grid.columns.data() + grid.at(line, 0);
-    const std::int32_t* __restrict below = above + stride;
-    std::uint8_t* __restrict cells = grid.cells.data() + grid.at(line, 0);
-    for (int b = 0; b + 1 < grid.boundaries; ++b) {
-      const bool straight = straight_diagonal(above[b], below[b], below[b + 1], above[b + 1], spacing);
-      const std::uint8_t both = straight ? grid_cell::kStraight : grid_cell::kTurned;
-      cells[b] = cells[b] == kBoth ? both : cells[b];
-    }
-  }
-}
 
 /// Triangles on vertices of a lost slice, which is below `line`.
 std::uint32_t drop_cells(StripeGrid& grid, int line) {
@@ -411,7 +424,11 @@ Result<GridHead> GridDecoder::decode(std::span<const std::uint8_t> coded, std::u
     if (s > 0 && layout->slices[s].empty())
       out.triangles -= drop_cells(out, static_cast<int>(s) * head.slice_lines - 1);
   }
-  choose_diagonals(out, head.model.spacing);
+  for (int line = 0; line + 1 < out.lines; ++line) {
+    const std::int32_t* above = out.columns.data() + out.at(line, 0);
+    grid_kernels().diagonals(above, above + out.stride(), head.model.spacing, out.boundaries - 1,
+                             out.cells.data() + out.at(line, 0));
+  }
   return head;
 }
 

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <optional>
 
 #include "codec/byte_io.h"
 #include "codec/grid_coder.h"
@@ -14,8 +16,9 @@ namespace {
 
 using namespace grid;
 
-template <std::size_t Tables, std::size_t Symbols>
-using Counts = std::array<std::array<std::uint32_t, Symbols>, Tables>;
+/// How often each symbol comes, by its code.
+template <std::size_t Tables>
+using Counts = std::array<std::uint32_t, Tables * rans::kMostSymbols>;
 
 void put_varint(Bytes& out, std::size_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
@@ -31,10 +34,11 @@ struct GridEncoder::Slice {
   rans::Rows control, residuals, sigmas;
   rans::BitWriter raw;
   std::uint32_t vertices = 0, triangles = 0;
-  Counts<kControlTables, kCellSymbols> control_counts;
-  Counts<kResidualTables, rans::kMostSymbols> residual_counts;
-  Counts<kSigmaTables, rans::kMostSymbols> sigma_counts;
-  std::vector<std::uint8_t> there[2], key_there, good[2], sizes, contexts;
+  Counts<kControlTables> control_counts;
+  Counts<kResidualTables> residual_counts;
+  Counts<kSigmaTables> sigma_counts;
+  std::vector<std::uint8_t> there[2], key_there, good[2], sizes, contexts, kinds;
+  std::vector<std::uint16_t> line_codes;
   std::vector<std::int32_t> expected, absent;
   Bytes bytes;
 
@@ -47,21 +51,18 @@ struct GridEncoder::Slice {
 
   void start(int first, int last, const StripeGrid& grid);
   void read(const Input& in);
-  void write(std::span<const rans::EncoderTable> control_tables,
-             std::span<const rans::EncoderTable> residual_tables,
-             std::span<const rans::EncoderTable> sigma_tables);
+  /// `sigma_tables` null: without sigmas.
+  void write(const rans::EncoderTables& control_tables, const rans::EncoderTables& residual_tables,
+             const rans::EncoderTables* sigma_tables);
 
  private:
-  void put(int table, int symbol) {
-    control.table.push_back(static_cast<std::uint8_t>(table));
-    control.symbol.push_back(static_cast<std::uint8_t>(symbol));
-    ++control_counts[static_cast<std::size_t>(table)][static_cast<std::size_t>(symbol)];
-  }
+  void put(int table, int symbol) { control.codes.push_back(rans::code_of(table, symbol)); }
   void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
   void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
   void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
   void read_marks(const Input& in, int line, const std::uint8_t* here);
   void read_columns(const Input& in, int line);
+  void read_alone(const Input& in, int line, const GridRows& rows, int b, std::uint16_t*& to);
   void read_sigmas(const Input& in, int line);
   const std::int32_t* row(const StripeGrid& grid, int line) const {
     return line < begin ? absent.data() + StripeGrid::kMargin : grid.columns.data() + grid.at(line, 0);
@@ -74,19 +75,18 @@ void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
   for (rans::Rows* rows : {&control, &residuals, &sigmas}) rows->clear();
   control.starts.push_back(0);
   vertices = triangles = 0;
-  for (auto& counts : control_counts) counts.fill(0);
-  for (auto& counts : residual_counts) counts.fill(0);
-  for (auto& counts : sigma_counts) counts.fill(0);
+  control_counts.fill(0);
+  residual_counts.fill(0);
+  sigma_counts.fill(0);
   const auto size = static_cast<std::size_t>(grid.stride());
   for (auto* buffer : {&there[0], &there[1], &key_there}) buffer->assign(size, 0);
   for (auto& buffer : good) buffer.assign(size, 1);
   sizes.assign(size, kFirstSize);
   contexts.assign(size, 0);
+  kinds.assign(size, 0);
+  line_codes.assign(size, 0);
   expected.assign(size, 0);
   absent.assign(size, StripeGrid::kAbsent);
-  const std::size_t most = static_cast<std::size_t>(end - begin) * size;
-  residuals.symbol.reserve(most);
-  residuals.table.reserve(most);
 }
 
 void GridEncoder::Slice::fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const {
@@ -125,13 +125,12 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
   const int count = in.grid.boundaries - 1;
   for (int b = 0; b < count; b += 8) {
     const int last = std::min(b + 8, count);
-    if (last - b == 8 && good_here[b - 1] != 0 && load8(good_above + b) == kOnes &&
-        load8(above + b) == kOnes && load8(below + b) == kOnes && above[b + 8] != 0 && below[b + 8] != 0) {
-      int both = 0;
-      for (int i = b; i < last; ++i)
-        both += cells[i] == grid_cell::kStraight || cells[i] == grid_cell::kTurned;
-      put(kCellBlockTable, both == 8 ? 0 : 1);
-      if (both == 8) {
+    if (last - b == 8 && uniform_cells(good_here, good_above, above, below, b)) {
+      // All are straight or turned: four bits a byte, every other one.
+      const std::uint64_t unlike = load8(cells + b) ^ grid_cell::kTurned * kOnes;
+      const bool both = unlike == (unlike & kOnes) * 15;
+      put(kCellBlockTable, both ? 0 : 1);
+      if (both) {
         triangles += 16;
         std::fill_n(good_here + b, 8, std::uint8_t{1});
         continue;
@@ -166,7 +165,6 @@ void GridEncoder::Slice::read_marks(const Input& in, int line, const std::uint8_
 }
 
 void GridEncoder::Slice::read_columns(const Input& in, int line) {
-  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
   std::int32_t* here = in.grid.columns.data() + in.grid.at(line, 0);
   const std::uint8_t* tolerance = in.tolerance.empty() ? nullptr : in.tolerance.data() + in.grid.at(line, 0);
   const GridRows rows{.up1 = row(in.grid, line - 1),
@@ -178,33 +176,58 @@ void GridEncoder::Slice::read_columns(const Input& in, int line) {
   const int boundaries = in.grid.boundaries;
   std::int32_t* predicted = expected.data() + StripeGrid::kMargin;
   std::uint8_t* size = sizes.data() + StripeGrid::kMargin;
-  std::uint8_t* context = contexts.data() + StripeGrid::kMargin;
-  grid_kernels().predict(rows, in.model, boundaries, predicted);
-  grid_kernels().contexts(size, boundaries, context);
-  residuals.starts.push_back(static_cast<std::uint32_t>(residuals.symbol.size()));
-  Last last;
-  for (int b = 0; b < boundaries; ++b) {
-    if (here[b] == kAbsent) continue;
-    int table = context[b];
-    std::int32_t p = predicted[b];
-    if (rows.up1[b] == kAbsent) {
-      table = kAloneTable;
-      p = expected_alone(here, rows.up1, rows.key, b, last, in.model.spacing);
+  const GridKernels& kernels = grid_kernels();
+  kernels.predict(rows, in.model, boundaries, predicted);
+  kernels.contexts(size, rows.up1, boundaries, contexts.data());
+  kernels.residuals({.up1 = rows.up1,
+                     .expected = predicted,
+                     .tolerance = tolerance,
+                     .tables = contexts.data(),
+                     .columns = here,
+                     .sizes = size,
+                     .codes = line_codes.data(),
+                     .kinds = kinds.data()},
+                    boundaries);
+  const std::size_t start = residuals.codes.size();
+  residuals.starts.push_back(static_cast<std::uint32_t>(start));
+  residuals.codes.resize(start + contexts.size());
+  std::uint16_t* to = residuals.codes.data() + start;
+  for (int b = 0; b < boundaries; b += 8) {
+    if (load8(kinds.data() + b) == 0) {
+      std::memcpy(to, line_codes.data() + b, 8 * sizeof *to);
+      to += 8;
+      continue;
     }
-    std::int32_t d = here[b] - p;
-    if (tolerance != nullptr && d <= tolerance[b] && d >= -static_cast<std::int32_t>(tolerance[b])) {
-      here[b] = p;
-      d = 0;
+    for (int i = b; i < b + 8; ++i) {  // behind the last boundary there are no vertices
+      const auto at = static_cast<std::size_t>(i);
+      if (kinds[at] == kDone) *to++ = line_codes[at];
+      if (kinds[at] == kByItself) read_alone(in, line, rows, i, to);
     }
-    last = {here[b], b};
-    size[b] = static_cast<std::uint8_t>(std::min(d < 0 ? -d : d, kLargestSize));
-    const Symbol symbol = symbol_of(zigzag(d));
-    if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
-    residuals.table.push_back(static_cast<std::uint8_t>(table));
-    residuals.symbol.push_back(symbol.symbol);
-    ++residual_counts[static_cast<std::size_t>(table)][symbol.symbol];
-    ++vertices;
   }
+  const auto count = static_cast<std::size_t>(to - residuals.codes.data());
+  vertices += static_cast<std::uint32_t>(count - start);
+  residuals.codes.resize(count);
+}
+
+/// A vertex that the kernel leaves.
+void GridEncoder::Slice::read_alone(const Input& in, int line, const GridRows& rows, int b,
+                                    std::uint16_t*& to) {
+  std::int32_t* here = in.grid.columns.data() + in.grid.at(line, 0);
+  const int table = contexts[static_cast<std::size_t>(b)];
+  const auto at = static_cast<std::size_t>(b + StripeGrid::kMargin);
+  const std::int32_t p = table == kAloneTable ? expected_alone(here, rows.up1, rows.key, b,
+                                                               last_before(here, b), in.model.spacing)
+                                              : expected[at];
+  std::int32_t d = here[b] - p;
+  const std::int32_t tolerance = in.tolerance.empty() ? 0 : in.tolerance[in.grid.at(line, b)];
+  if (d <= tolerance && d >= -tolerance) {
+    here[b] = p;
+    d = 0;
+  }
+  sizes[at] = static_cast<std::uint8_t>(std::min(d < 0 ? -d : d, kLargestSize));
+  const Symbol symbol = symbol_of(zigzag(d));
+  if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
+  *to++ = rans::code_of(table, symbol.symbol);
 }
 
 void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
@@ -214,7 +237,7 @@ void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
   const std::int32_t* further = row(in.grid, line - 2);
   const std::uint8_t* codes = in.grid.sigmas.data() + in.grid.at(line, 0);
   const std::ptrdiff_t stride = in.grid.stride();
-  sigmas.starts.push_back(static_cast<std::uint32_t>(sigmas.symbol.size()));
+  sigmas.starts.push_back(static_cast<std::uint32_t>(sigmas.codes.size()));
   int last = kFirstSigma;
   for (int b = 0; b < in.grid.boundaries; ++b) {
     if (here[b] == kAbsent) continue;
@@ -227,9 +250,7 @@ void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
     last = codes[b];
     const Symbol symbol = symbol_of(zigzag(codes[b] - p));
     if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
-    sigmas.table.push_back(static_cast<std::uint8_t>(table));
-    sigmas.symbol.push_back(symbol.symbol);
-    ++sigma_counts[static_cast<std::size_t>(table)][symbol.symbol];
+    sigmas.codes.push_back(rans::code_of(table, symbol.symbol));
   }
 }
 
@@ -251,18 +272,21 @@ void GridEncoder::Slice::read(const Input& in) {
     read_columns(in, line);
     if (!in.grid.sigmas.empty()) read_sigmas(in, line);
   }
+  for (const std::uint16_t code : control.codes) ++control_counts[code];
+  rans::count_codes(residuals.codes, residual_counts);
+  rans::count_codes(sigmas.codes, sigma_counts);
 }
 
-void GridEncoder::Slice::write(std::span<const rans::EncoderTable> control_tables,
-                               std::span<const rans::EncoderTable> residual_tables,
-                               std::span<const rans::EncoderTable> sigma_tables) {
+void GridEncoder::Slice::write(const rans::EncoderTables& control_tables,
+                               const rans::EncoderTables& residual_tables,
+                               const rans::EncoderTables* sigma_tables) {
   Bytes streams;
   std::array<std::size_t, 3> ends{};
   rans::encode(control, control_tables, 1, streams);
   ends[0] = streams.size();
   rans::encode(residuals, residual_tables, rans::kLanes, streams);
   ends[1] = streams.size();
-  if (!sigma_tables.empty()) rans::encode(sigmas, sigma_tables, rans::kLanes, streams);
+  if (sigma_tables != nullptr) rans::encode(sigmas, *sigma_tables, rans::kLanes, streams);
   ends[2] = streams.size();
   const Bytes rest = raw.finish();
   bytes.clear();
@@ -282,20 +306,41 @@ GridEncoder& GridEncoder::operator=(GridEncoder&&) noexcept = default;
 
 namespace {
 
-template <std::size_t Tables, std::size_t Symbols>
-void add(const Counts<Tables, Symbols>& from, Counts<Tables, Symbols>& to) {
-  for (std::size_t t = 0; t < Tables; ++t)
-    for (std::size_t s = 0; s < Symbols; ++s) to[t][s] += from[t][s];
+template <std::size_t N>
+void add(const std::array<std::uint32_t, N>& from, std::array<std::uint32_t, N>& to) {
+  for (std::size_t i = 0; i < N; ++i) to[i] += from[i];
 }
 
-template <std::size_t Tables, std::size_t Symbols>
-void make_tables(const Counts<Tables, Symbols>& counts, rans::BitWriter& bits,
-                 std::array<rans::EncoderTable, Tables>& tables) {
+std::span<const std::uint32_t> of_table(std::span<const std::uint32_t> counts, std::size_t table) {
+  return counts.subspan(table * rans::kMostSymbols, rans::kMostSymbols);
+}
+
+template <std::size_t Tables>
+rans::EncoderTables make_tables(const Counts<Tables>& counts, rans::BitWriter& bits) {
+  rans::EncoderTables tables(Tables);
   for (std::size_t t = 0; t < Tables; ++t) {
-    const rans::Levels levels = rans::levels_of(counts[t]);
+    const rans::Levels levels = rans::levels_of(of_table(counts, t));
     rans::write_levels(levels, bits);
-    tables[t].set(levels);
+    tables.set(t, levels);
   }
+  return tables;
+}
+
+rans::EncoderTables make_control_tables(const Counts<kControlTables>& counts, rans::BitWriter& bits) {
+  rans::EncoderTables tables(kControlTables);
+  for (std::size_t t = 0; t < kControlTables; ++t) {
+    const auto of = of_table(counts, t);
+    if (t >= kCellTable && t < kCellTable + kCellTables) {
+      const rans::Levels levels = rans::levels_of(of);
+      rans::write_levels(levels, bits);
+      tables.set(t, levels);
+    } else {
+      const rans::BinaryLevel level = rans::binary_level_of(of[0], of[1]);
+      rans::write_level(level, bits);
+      tables.set(t, level);
+    }
+  }
+  return tables;
 }
 
 }  // namespace
@@ -345,28 +390,13 @@ Bytes GridEncoder::encode(StripeGrid& grid, const GridCalibration& calibration, 
     grid.triangles += slices_[s].triangles;
   }
   rans::BitWriter bits;
-  std::array<rans::EncoderTable, kControlTables> control_tables;
-  for (std::size_t t = 0; t < kControlTables; ++t) {
-    const auto& counts = total.control_counts[t];
-    if (t >= kCellTable && t < kCellTable + kCellTables) {
-      const rans::Levels levels = rans::levels_of(counts);
-      rans::write_levels(levels, bits);
-      control_tables[t].set(levels);
-    } else {
-      const rans::BinaryLevel level = rans::binary_level_of(counts[0], counts[1]);
-      rans::write_level(level, bits);
-      control_tables[t].set(level);
-    }
-  }
-  std::array<rans::EncoderTable, kResidualTables> residual_tables;
-  make_tables(total.residual_counts, bits, residual_tables);
-  std::array<rans::EncoderTable, kSigmaTables> sigma_tables;
-  if (head.has_sigmas) make_tables(total.sigma_counts, bits, sigma_tables);
+  const rans::EncoderTables control_tables = make_control_tables(total.control_counts, bits);
+  const rans::EncoderTables residual_tables = make_tables<kResidualTables>(total.residual_counts, bits);
+  std::optional<rans::EncoderTables> sigma_tables;
+  if (head.has_sigmas) sigma_tables = make_tables<kSigmaTables>(total.sigma_counts, bits);
 
   for_slices([&](int, Slice& slice) {
-    slice.write(control_tables, residual_tables,
-                head.has_sigmas ? std::span<const rans::EncoderTable>(sigma_tables)
-                                : std::span<const rans::EncoderTable>());
+    slice.write(control_tables, residual_tables, sigma_tables ? &*sigma_tables : nullptr);
   });
   Bytes out;
   write_grid_head(head, bits.finish(), out);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/lens.h"
+#include "base/variants.h"
 
 namespace relievo {
 namespace {
@@ -16,29 +17,71 @@ constexpr int kSheetSamples = 65;  // over the projector's height and a quarter 
 constexpr int kSheetRounds = 4;    // of point -> height -> sheet; each gains about two digits
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-// ThreadSanitizer's runtime is not there yet when the loader chooses a clone.
-#if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
-#define RELIEVO_WIDE [[gnu::target_clones("avx2", "default")]]
-#else
-#define RELIEVO_WIDE
-#endif
-
-/// z = numerator / (a x + b y + c), the four of the vertex's own boundary. False where a z is not in front.
-RELIEVO_WIDE bool meet_straight_sheets(const std::int32_t* boundary, const float* x, const float* y,
-                                       const float* numerator, const float* a, const float* b, const float* c,
-                                       int count, float* slope, float* z) {
-  int good = 0;
-  for (int i = 0; i < count; ++i) {
-    const std::int32_t s = boundary[i];
-    const float denominator = a[s] * x[i] + b[s] * y[i] + c[s];
-    z[i] = numerator[s] / denominator;
-    slope[i] = z[i] * a[s] / denominator;
-    good += z[i] > 0 && z[i] < 1e6F;
-  }
-  return good == count;
+bool is_there(const std::int32_t* columns, std::size_t b) {
+  return columns[b] != StripeGrid::kAbsent;
 }
 
+#define RELIEVO_INLINE [[gnu::always_inline]] inline
+
+RELIEVO_INLINE bool meet_body(const SheetRow& row, const Sheets& sheets, int count) {
+  const float* __restrict numerator = sheets.numerator;
+  const float* __restrict a = sheets.a;
+  const float* __restrict b = sheets.b;
+  const float* __restrict c = sheets.c;
+  const std::int32_t* __restrict columns = row.columns;
+  const float* __restrict x = row.ray_x;
+  const float* __restrict y = row.ray_y;
+  float* __restrict slope = row.slope;
+  float* __restrict z = row.z;
+  std::int32_t bad = 0;
+  for (int i = 0; i < count; ++i) {
+    const float denominator = a[i] * x[i] + b[i] * y[i] + c[i];
+    const float depth = numerator[i] / denominator;
+    const bool in_front = (depth > 0) & (depth < 1e6F);
+    z[i] = depth;
+    slope[i] = depth * a[i] / denominator;
+    bad |= (columns[i] != StripeGrid::kAbsent) & !in_front ? 1 : 0;
+  }
+  return bad == 0;
+}
+
+RELIEVO_INLINE void straight_rays_body(const std::int32_t* __restrict columns, const StraightRays& rays,
+                                       int count, float* __restrict column, float* __restrict x,
+                                       float* __restrict y) {
+  for (int i = 0; i < count; ++i) {
+    column[i] = static_cast<float>(columns[i]) * rays.step_px;
+    x[i] = column[i] * rays.per_px - rays.first;
+    y[i] = rays.y;
+  }
+}
+
+#define RELIEVO_KERNELS(set, attributes)                                                                   \
+  struct set {                                                                                             \
+    attributes static bool meet(const SheetRow& row, const Sheets& sheets, int count) {                    \
+      return meet_body(row, sheets, count);                                                                \
+    }                                                                                                      \
+    attributes static void straight_rays(const std::int32_t* columns, const StraightRays& rays, int count, \
+                                         float* column, float* x, float* y) {                              \
+      straight_rays_body(columns, rays, count, column, x, y);                                              \
+    }                                                                                                      \
+    static GridPointKernels table(const char* name) { return {name, meet, straight_rays}; }                \
+  }
+
+RELIEVO_KERNELS(Portable, );
+#if defined(__x86_64__)
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
+#endif
+
 }  // namespace
+
+const std::vector<GridPointKernels>& all_grid_point_kernels() {
+#if defined(__x86_64__)
+  static const auto kernels = variants(Portable::table("portable"), Avx2::table("avx2"));
+#else
+  static const auto kernels = variants(Portable::table("portable"));
+#endif
+  return kernels;
+}
 
 GridPoints::GridPoints(const GridCalibration& calibration)
     : calibration_(calibration),
@@ -70,26 +113,26 @@ GridPoints::GridPoints(const GridCalibration& calibration)
   sheet_step_ = (bottom - top + 2 * margin) / (kSheetSamples - 1);
 }
 
-/// Directions of the line's vertices. Between samples where the line has many, exactly where it has few, so
-/// that few vertices never cost much.
-bool GridPoints::find_rays(int line, std::size_t count) {
+/// Columns in pixels and directions of the line's vertices. Between samples where the line has many, exactly
+/// where it has few, so that few vertices never cost much.
+bool GridPoints::find_rays(const std::int32_t* columns, float step_px, int line, std::size_t count) {
   const PinholeModel& camera = calibration_.camera;
   const double row = line * calibration_.line_step_px;
-  if (straight_rays_) {
-    const auto y = static_cast<float>((row - camera.cy()) / camera.fy());
-    const auto per_px = static_cast<float>(1 / camera.fx());
-    const auto first = static_cast<float>((camera.cx() + camera.matrix[1] * y) / camera.fx());
-    for (std::size_t i = 0; i < count; ++i) {
-      line_.ray_x[i] = line_.column[i] * per_px - first;
-      line_.ray_y[i] = y;
-    }
-    return true;
-  }
+  const int boundaries = calibration_.boundaries();
+  StraightRays rays;
+  rays.step_px = step_px;
+  rays.y = static_cast<float>((row - camera.cy()) / camera.fy());
+  rays.per_px = static_cast<float>(1 / camera.fx());
+  rays.first = static_cast<float>((camera.cx() + camera.matrix[1] * rays.y) / camera.fx());
+  kernels_.straight_rays(columns, rays, boundaries, line_.column.data(), line_.ray_x.data(),
+                         line_.ray_y.data());
+  if (straight_rays_) return true;
   const auto samples = static_cast<std::size_t>(ray_samples_);
   const std::size_t start = static_cast<std::size_t>(line) * samples;
   std::uint8_t& known = line_known_[static_cast<std::size_t>(line)];
   if (known == 0 && 4 * count < samples) {
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < line_.column.size(); ++i) {
+      if (!is_there(columns, i)) continue;
       const auto ray = undistort(camera, static_cast<double>(line_.column[i]), row);
       if (!ray) return false;
       line_.ray_x[i] = static_cast<float>((*ray)[0]);
@@ -107,7 +150,8 @@ bool GridPoints::find_rays(int line, std::size_t count) {
       rays_y_[start + s] = ray ? static_cast<float>((*ray)[1]) : kNone;
     }
   }
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < line_.column.size(); ++i) {
+    if (!is_there(columns, i)) continue;
     const float at = line_.column[i] / kRayStep;
     const int s = std::clamp(static_cast<int>(at), 0, ray_samples_ - 2);
     const float f = at - static_cast<float>(s);
@@ -119,12 +163,12 @@ bool GridPoints::find_rays(int line, std::size_t count) {
   return true;
 }
 
-bool GridPoints::meet_curved_sheets(std::size_t count) {
+bool GridPoints::meet_curved_sheets(const std::int32_t* columns) {
   const auto& r = calibration_.projector_from_camera_rotation;
   const auto& t = calibration_.projector_from_camera_translation;
   const PinholeModel& projector = calibration_.projector;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto boundary = static_cast<std::size_t>(line_.boundary[i]);
+  for (std::size_t boundary = 0; boundary < line_.column.size(); ++boundary) {
+    if (!is_there(columns, boundary)) continue;
     if (sheet_known_[boundary] == 0) {
       sheet_known_[boundary] = 1;
       sheets_.resize(sheet_known_.size() * kSheetSamples);
@@ -138,8 +182,8 @@ bool GridPoints::meet_curved_sheets(std::size_t count) {
       }
     }
     const float* samples = sheets_.data() + boundary * kSheetSamples;
-    const double x = line_.ray_x[i];
-    const double y = line_.ray_y[i];
+    const double x = line_.ray_x[boundary];
+    const double y = line_.ray_y[boundary];
     const double dx = r[0] * x + r[1] * y + r[2];
     const double dy = r[3] * x + r[4] * y + r[5];
     const double dz = r[6] * x + r[7] * y + r[8];
@@ -153,31 +197,25 @@ bool GridPoints::meet_curved_sheets(std::size_t count) {
       const double denominator = dx - sheet * dz;
       z = (sheet * t[2] - t[0]) / denominator;
       height = (z * dy + t[1]) / (z * dz + t[2]);
-      line_.a[i] = static_cast<float>(z * (r[0] - sheet * r[6]) / denominator);
+      line_.slope[boundary] = static_cast<float>(z * (r[0] - sheet * r[6]) / denominator);
     }
-    line_.z[i] = static_cast<float>(z);
+    line_.z[boundary] = static_cast<float>(z);
     if (!(z > 0 && z < 1e6)) return false;
   }
   return true;
 }
 
-bool GridPoints::make_line(const StripeGrid& grid, int line, Surface& out, std::size_t first) {
+bool GridPoints::make_line(const StripeGrid& grid, int line, Surface& out, const std::int32_t* index) {
   const std::int32_t* columns = grid.columns.data() + grid.at(line, 0);
-  const float step = 1.F / static_cast<float>(1 << grid.step_bits);
-  std::size_t count = 0;
-  for (int b = 0; b < grid.boundaries; ++b) {
-    line_.boundary[count] = b;
-    line_.column[count] = static_cast<float>(columns[b]) * step;
-    count += columns[b] != StripeGrid::kAbsent;
-  }
+  const auto boundaries = static_cast<std::size_t>(grid.boundaries);
+  const auto first = static_cast<std::size_t>(index[0]);
+  const std::size_t count = static_cast<std::size_t>(index[boundaries]) - first;
   if (count == 0) return true;
-  if (!find_rays(line, count)) return false;
+  if (!find_rays(columns, 1.F / static_cast<float>(1 << grid.step_bits), line, count)) return false;
+  const SheetRow row{columns, line_.ray_x.data(), line_.ray_y.data(), line_.slope.data(), line_.z.data()};
+  const Sheets sheets{sheet_numerator_.data(), sheet_a_.data(), sheet_b_.data(), sheet_c_.data()};
   const bool met =
-      straight_sheets_
-          ? meet_straight_sheets(line_.boundary.data(), line_.ray_x.data(), line_.ray_y.data(),
-                                 sheet_numerator_.data(), sheet_a_.data(), sheet_b_.data(), sheet_c_.data(),
-                                 static_cast<int>(count), line_.a.data(), line_.z.data())
-          : meet_curved_sheets(count);
+      straight_sheets_ ? kernels_.meet(row, sheets, grid.boundaries) : meet_curved_sheets(columns);
   if (!met) return false;
   const float per_width = 1.F / static_cast<float>(calibration_.camera.width);
   const float v = (static_cast<float>(line * calibration_.line_step_px) + 0.5F) /
@@ -185,36 +223,40 @@ bool GridPoints::make_line(const StripeGrid& grid, int line, Surface& out, std::
   Vec3f* position = out.positions.data() + first;
   Vec2f* coordinate = out.texture_coordinates.data() + first;
   GridPoint* place = out.grid.data() + first;
-  for (std::size_t i = 0; i < count; ++i) {
-    const float z = line_.z[i];
-    position[i] = {z * line_.ray_x[i], z * line_.ray_y[i], z};
-    coordinate[i] = {(line_.column[i] + 0.5F) * per_width, v};
-    place[i].boundary = static_cast<std::uint16_t>(line_.boundary[i]);
-    place[i].line = static_cast<std::uint16_t>(line);
-    place[i].column_px = line_.column[i];
-    place[i].sigma_px = 0;
-    place[i].interpolated = false;
+  for (std::size_t b = 0; b < boundaries; ++b) {
+    if (!is_there(columns, b)) continue;
+    const float z = line_.z[b];
+    *position++ = {z * line_.ray_x[b], z * line_.ray_y[b], z};
+    *coordinate++ = {(line_.column[b] + 0.5F) * per_width, v};
+    *place++ = {static_cast<std::uint16_t>(b), static_cast<std::uint16_t>(line), line_.column[b], 0, false};
   }
-  if (!grid.interpolated.empty()) {
-    const std::uint8_t* marks = grid.interpolated.data() + grid.at(line, 0);
-    for (std::size_t i = 0; i < count; ++i) {
-      place[i].interpolated = marks[line_.boundary[i]] != 0;
-      out.interpolated[first + i] = marks[line_.boundary[i]];
-    }
-  }
-  if (grid.sigmas.empty()) return true;
+  if (!grid.interpolated.empty() || !grid.sigmas.empty()) tell_quality(grid, line, out, first);
+  return true;
+}
+
+void GridPoints::tell_quality(const StripeGrid& grid, int line, Surface& out, std::size_t first) const {
   static const std::array<float, 64> sigma_px = [] {
     std::array<float, 64> all{};
     for (std::size_t c = 0; c < all.size(); ++c) all[c] = sigma_px_of_code(static_cast<std::uint8_t>(c));
     return all;
   }();
   const auto per_fx = static_cast<float>(1 / calibration_.camera.fx());
-  const std::uint8_t* codes = grid.sigmas.data() + grid.at(line, 0);
-  for (std::size_t i = 0; i < count; ++i) {
-    place[i].sigma_px = sigma_px[codes[line_.boundary[i]] & 63U];
-    out.sigmas_m[first + i] = place[i].sigma_px * std::fabs(line_.a[i]) * per_fx;
+  const std::size_t start = grid.at(line, 0);
+  const std::int32_t* columns = grid.columns.data() + start;
+  std::size_t v = first;
+  for (std::size_t b = 0; b < static_cast<std::size_t>(grid.boundaries); ++b) {
+    if (!is_there(columns, b)) continue;
+    GridPoint& place = out.grid[v];
+    if (!grid.interpolated.empty()) {
+      place.interpolated = grid.interpolated[start + b] != 0;
+      out.interpolated[v] = grid.interpolated[start + b];
+    }
+    if (!grid.sigmas.empty()) {
+      place.sigma_px = sigma_px[grid.sigmas[start + b] & 63U];
+      out.sigmas_m[v] = place.sigma_px * std::fabs(line_.slope[b]) * per_fx;
+    }
+    ++v;
   }
-  return true;
 }
 
 namespace {
@@ -230,12 +272,13 @@ Triangle* write_cells(const std::uint8_t* cells, const std::int32_t* above, cons
     if (cell == 0) continue;
     const std::array<std::uint32_t, 4> q{index(above[b]), index(below[b]), index(below[b + 1]),
                                          index(above[b + 1])};
-    if (cell == grid_cell::kStraight) {
-      *to++ = {q[0], q[1], q[2]};
-      *to++ = {q[2], q[3], q[0]};
-    } else if (cell == grid_cell::kTurned) {
-      *to++ = {q[1], q[2], q[3]};
-      *to++ = {q[3], q[0], q[1]};
+    const bool straight = cell == grid_cell::kStraight;
+    if (straight || cell == grid_cell::kTurned) {
+      // Without branches on the diagonal, which is hard to foresee.
+      const std::uint32_t first = straight ? q[0] : q[1];
+      const std::uint32_t third = straight ? q[2] : q[3];
+      *to++ = {first, straight ? q[1] : q[2], third};
+      *to++ = {third, straight ? q[3] : q[0], first};
     } else {
       for (const int lack : kOrder) {
         if ((cell >> lack & 1) == 0) continue;
@@ -251,8 +294,8 @@ Triangle* write_cells(const std::uint8_t* cells, const std::int32_t* above, cons
 
 Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
   const auto places = static_cast<std::size_t>(grid.stride());
-  line_.boundary.resize(places);
-  for (auto* v : {&line_.column, &line_.ray_x, &line_.ray_y, &line_.a, &line_.z}) v->resize(places);
+  for (auto* values : {&line_.column, &line_.ray_x, &line_.ray_y, &line_.slope, &line_.z})
+    values->resize(static_cast<std::size_t>(grid.boundaries));
   out.positions.resize(grid.vertices);
   out.texture_coordinates.resize(grid.vertices);
   out.grid.resize(grid.vertices);
@@ -266,7 +309,6 @@ Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
   Triangle* triangle = out.triangles.data();
   for (auto& index : index_) index.assign(places, -1);
   for (int line = 0; line < grid.lines; ++line) {
-    const auto first = static_cast<std::size_t>(next);
     std::swap(index_[0], index_[1]);
     const std::int32_t* columns = grid.columns.data() + grid.at(line, 0);
     std::int32_t* index = index_[1].data();
@@ -274,7 +316,8 @@ Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
       index[b] = next;
       next += columns[b] != StripeGrid::kAbsent;
     }
-    if (!make_line(grid, line, out, first))
+    index[grid.boundaries] = next;
+    if (!make_line(grid, line, out, index))
       return Error{"grid has a vertex whose ray meets no light sheet of the calibration"};
     if (line > 0)
       triangle = write_cells(grid.cells.data() + grid.at(line - 1, 0), index_[0].data(), index,

@@ -12,6 +12,33 @@
 
 namespace relievo {
 
+/// Light sheets without distortion, one a boundary: z = numerator / (a x + b y + c) on the ray (x, y, 1).
+struct Sheets {
+  const float *numerator, *a, *b, *c;
+};
+/// One line's places: their columns, kAbsent where there is no vertex; rays; z and dz/dx.
+struct SheetRow {
+  const std::int32_t* columns;
+  const float *ray_x, *ray_y;
+  float *slope, *z;
+};
+/// Rays of a line of a lens without distortion: x = column per_px - first.
+struct StraightRays {
+  float step_px, per_px, first, y;
+};
+
+/// As GridKernels: the reference, and others with the same results.
+struct GridPointKernels {
+  const char* name;
+  /// Fills slope and z. False where a vertex is not in front of the camera.
+  bool (*meet)(const SheetRow& row, const Sheets& sheets, int count);
+  /// Fills columns in pixels and rays; of no meaning where there is no vertex.
+  void (*straight_rays)(const std::int32_t* columns, const StraightRays& rays, int count, float* column,
+                        float* x, float* y);
+};
+/// The reference first and the best last.
+const std::vector<GridPointKernels>& all_grid_point_kernels();
+
 /// What can be worked out once for a calibration; lines and boundaries when they are first needed. One
 /// thread.
 class GridPoints {
@@ -26,15 +53,17 @@ class GridPoints {
   Status to_surface(const StripeGrid& grid, Surface& out);
 
  private:
-  struct Line {  // of one line's vertices
-    std::vector<std::int32_t> boundary;
-    std::vector<float> column, ray_x, ray_y, numerator, a, denominator, z;
+  struct Line {  // of one line, a value a boundary
+    std::vector<float> column, ray_x, ray_y, slope, z;
   };
-  bool find_rays(int line, std::size_t count);
-  bool meet_curved_sheets(std::size_t count);
-  bool make_line(const StripeGrid& grid, int line, Surface& out, std::size_t first);
+  bool find_rays(const std::int32_t* columns, float step_px, int line, std::size_t count);
+  bool meet_curved_sheets(const std::int32_t* columns);
+  /// `index`: of the vertex at each boundary, one more at the end.
+  bool make_line(const StripeGrid& grid, int line, Surface& out, const std::int32_t* index);
+  void tell_quality(const StripeGrid& grid, int line, Surface& out, std::size_t first) const;
 
   GridCalibration calibration_;
+  GridPointKernels kernels_ = all_grid_point_kernels().back();
   bool straight_rays_, straight_sheets_;
   int ray_samples_;
   std::vector<float> rays_x_, rays_y_;  // [line][every kRayStep columns], where the line is known

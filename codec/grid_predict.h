@@ -27,15 +27,58 @@ struct GridRows {
   const std::int32_t *key, *key_up;
 };
 
+constexpr std::uint8_t kAloneTable = 7;       // of residuals where nothing is above
+constexpr std::int32_t kLargestSize = 60;     // of a residual, that is remembered for those below
+constexpr std::uint8_t kDirectSymbols = 48;   // folded residuals below are their own symbols
+constexpr std::uint8_t kBothTriangles = 255;  // of a cell whose diagonal follows from the columns
+
+/// Which places a kernel did not do, a byte each.
+enum GridPlaceKind : std::uint8_t {
+  kDone = 0,
+  kNoVertex = 1,
+  kByItself = 2,  // nothing above, or a residual that is not its own symbol
+};
+
+/// What GridKernels::residuals() reads and writes, one a place. Only `kinds` is told of places not done.
+struct GridResiduals {
+  const std::int32_t *up1, *expected;
+  const std::uint8_t* tolerance;  // null: 0 everywhere
+  const std::uint8_t* tables;
+  std::int32_t* columns;  // become what a decoder finds: as expected, where within the tolerance
+  std::uint8_t* sizes;
+  std::uint16_t* codes;  // see rans::code_of()
+  std::uint8_t* kinds;
+};
+
+/// What GridKernels::columns() reads and writes, one a place.
+struct GridColumns {
+  const std::uint8_t *there, *symbols, *tables;
+  const std::int32_t* expected;
+  std::int32_t* columns;
+  std::uint8_t* sizes;
+  std::uint8_t* kinds;
+};
+
 struct GridKernels {
   const char* name;
 
   /// `count` rounded up to 8 places. Of no meaning where up1 is absent.
   void (*predict)(const GridRows& rows, const GridModel& model, int count, std::int32_t* expected);
 
-  /// Number of the residuals' table by the sizes of those around on the lines above (see grid_coder.cpp):
-  /// `sizes` may be read one place before and behind. `count` rounded up to 8 places.
-  void (*contexts)(const std::uint8_t* sizes, int count, std::uint8_t* out);
+  /// Number of the residuals' table by the sizes of those around on the lines above (codec/FORMAT.md,
+  /// "Columns"); kAloneTable where up1 is absent. `sizes` may be read one place before and behind. `count`
+  /// rounded up to 8 places.
+  void (*contexts)(const std::uint8_t* sizes, const std::int32_t* up1, int count, std::uint8_t* out);
+
+  /// A line's residuals as symbols. `count` rounded up to 8 places.
+  void (*residuals)(const GridResiduals& line, int count);
+
+  /// The reverse. False where a column is out of [-most, most]. `count` rounded up to 8 places.
+  bool (*columns)(const GridColumns& line, std::int32_t most, int count);
+
+  /// Cells that are kBothTriangles get their diagonal; `below` is the line below. `count` cells.
+  void (*diagonals)(const std::int32_t* above, const std::int32_t* below, std::int32_t spacing, int count,
+                    std::uint8_t* cells);
 };
 
 /// Those that run on this machine, the reference first and the best last.

@@ -24,17 +24,15 @@ constexpr int kMarkTable = kCellBlockTable + 1;            // interpolated, by t
 constexpr int kControlTables = kMarkTable + 4;
 constexpr int kCellSymbols = 6;
 
-constexpr int kResidualTables = 8;  // by the sizes above; the last where nothing is above
-constexpr int kAloneTable = 7;
+constexpr int kResidualTables = 8;      // by the sizes above; the last where nothing is above
 constexpr std::uint8_t kFirstSize = 1;  // what is taken for the sizes above a slice
-constexpr std::int32_t kLargestSize = 60;
 
 constexpr int kSigmaTables = 5;
 constexpr int kFirstSigma = 32;  // code, before the first vertex of a slice
 
 // Residuals: zigzag, one symbol each up to kDirect, then by the number of bits, which follow in the slice's
 // raw bits.
-constexpr std::uint32_t kDirect = 48;
+constexpr std::uint32_t kDirect = kDirectSymbols;
 constexpr std::uint32_t kFirstEscape = 8;
 
 inline std::uint32_t zigzag(std::int32_t d) {
@@ -87,11 +85,19 @@ inline int place_context(const std::uint8_t* here, const std::uint8_t* above, co
          (key != nullptr ? key[b] << 4 : 0);
 }
 
-/// Where no vertex is above: from the key frame, the left or the right above, or else the last one coded.
+/// A vertex of a line; at first none.
 struct Last {
   std::int32_t column = 0;
   int boundary = 0;
 };
+/// The last vertex on a line before place b.
+inline Last last_before(const std::int32_t* here, int b) {
+  while (--b >= 0)
+    if (here[b] != StripeGrid::kAbsent) return {here[b], b};
+  return {};
+}
+
+/// Where no vertex is above: from the key frame, the left or the right above, or else the last one coded.
 inline std::int32_t expected_alone(const std::int32_t* here, const std::int32_t* above,
                                    const std::int32_t* key, int b, const Last& last, std::int32_t spacing) {
   constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
@@ -103,7 +109,15 @@ inline std::int32_t expected_alone(const std::int32_t* here, const std::int32_t*
 }
 
 /// Of a cell with both triangles; which diagonal they share follows from the columns.
-constexpr std::uint8_t kBoth = 0xff;
+constexpr std::uint8_t kBoth = kBothTriangles;
+
+/// Whether eight cells are all likely to hold two triangles: all corners are there, and left and all above
+/// are good.
+inline bool uniform_cells(const std::uint8_t* good_here, const std::uint8_t* good_above,
+                          const std::uint8_t* above, const std::uint8_t* below, int b) {
+  return good_here[b - 1] != 0 && load8(good_above + b) == kOnes && load8(above + b) == kOnes &&
+         load8(below + b) == kOnes && above[b + 8] != 0 && below[b + 8] != 0;
+}
 
 /// Cells with three corners or four. `lack`: the corner that is not there, 4: none.
 inline int corners_of(const std::uint8_t* above, const std::uint8_t* below, int b, int& lack) {

@@ -193,17 +193,19 @@ EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
 
 }  // namespace
 
-void EncoderTable::set(const Levels& levels) {
+void EncoderTables::set(std::size_t table, const Levels& levels) {
   const auto frequencies = frequencies_of(levels);
+  EncoderSymbol* symbols = symbols_.data() + table * kMostSymbols;
   std::uint32_t start = 0;
-  for (std::size_t s = 0; s < symbols.size(); ++s) {
+  for (std::size_t s = 0; s < frequencies.size(); ++s) {
     if (frequencies[s] == 0) continue;
     symbols[s] = encoder_symbol(start, frequencies[s]);
     start += frequencies[s];
   }
 }
 
-void EncoderTable::set(const BinaryLevel& level) {
+void EncoderTables::set(std::size_t table, const BinaryLevel& level) {
+  EncoderSymbol* symbols = symbols_.data() + table * kMostSymbols;
   const std::uint32_t first = first_frequency(level);
   if (first > 0) symbols[0] = encoder_symbol(0, first);
   if (first < kScale) symbols[1] = encoder_symbol(first, kScale - first);
@@ -219,42 +221,80 @@ bool DecoderTable::set(const Levels& levels) {
     slot += f;
   }
   usable = slot == slots.data() + slots.size();
+  if (!usable) slots.fill(kNoSymbol);
   return usable;
 }
 
 namespace {
 
+/// Words are written from the end on; the one before `to` is written in any case.
 inline std::uint32_t put(std::uint32_t x, const EncoderSymbol& e, std::uint16_t*& to) {
-  if (x >= e.limit) {
-    *--to = static_cast<std::uint16_t>(x);
-    x >>= 16;
-  }
+  to[-1] = static_cast<std::uint16_t>(x);
+  const bool full = x >= e.limit;
+  to -= full ? 1 : 0;
+  x = full ? x >> 16 : x;
   const auto q = static_cast<std::uint32_t>((static_cast<std::uint64_t>(x) * e.reciprocal) >> 32) >> e.shift;
   return x + e.bias + q * e.complement;
 }
 
+using States = std::array<std::uint32_t, kLanes>;
+
+/// A row, its last symbol first.
+void encode_row(const std::uint16_t* begin, const std::uint16_t* end, const EncoderSymbol* symbols,
+                States& states, std::uint16_t*& to) {
+  while ((end - begin) % kLanes != 0) {
+    --end;
+    std::uint32_t& x = states[static_cast<std::size_t>((end - begin) % kLanes)];
+    x = put(x, symbols[*end], to);
+  }
+  auto [a, b, c, d] = states;
+  for (; end != begin; end -= kLanes) {
+    d = put(d, symbols[end[-1]], to);
+    c = put(c, symbols[end[-2]], to);
+    b = put(b, symbols[end[-3]], to);
+    a = put(a, symbols[end[-4]], to);
+  }
+  states = {a, b, c, d};
+}
+
 }  // namespace
 
-void encode(const Rows& rows, std::span<const EncoderTable> tables, int lanes, Bytes& out) {
-  std::vector<std::uint16_t> words(rows.symbol.size());  // each symbol writes one at most
+void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts) {
+  // In turns, since the same code often comes again before its count is written.
+  constexpr std::size_t kTurns = 4;
+  std::vector<std::uint32_t> turns(kTurns * counts.size());
+  std::size_t i = 0;
+  for (; i + kTurns <= codes.size(); i += kTurns)
+    for (std::size_t t = 0; t < kTurns; ++t) ++turns[t * counts.size() + codes[i + t]];
+  for (; i < codes.size(); ++i) ++turns[codes[i]];
+  for (std::size_t t = 0; t < kTurns; ++t)
+    for (std::size_t c = 0; c < counts.size(); ++c) counts[c] += turns[t * counts.size() + c];
+}
+
+void encode(const Rows& rows, const EncoderTables& tables, int lanes, Bytes& out) {
+  const std::size_t count = rows.codes.size();
+  const EncoderSymbol* symbols = tables.symbols();
+  const std::size_t states_bytes = sizeof(std::uint32_t) * static_cast<std::size_t>(lanes);
+  const std::size_t at = out.size();
+  // Each symbol writes one word at most; put() touches one more.
+  std::vector<std::uint16_t> words(count + 1);
   std::uint16_t* to = words.data() + words.size();
-  std::array<std::uint32_t, kLanes> states;
+  States states;
   states.fill(kLow);
-  const std::uint32_t mask = static_cast<std::uint32_t>(lanes) - 1;
-  std::size_t end = rows.symbol.size();
+  std::size_t end = count;
   for (std::size_t r = rows.starts.size(); r-- > 0;) {
     const std::size_t start = rows.starts[r];
-    for (std::size_t i = end; i-- > start;) {
-      std::uint32_t& x = states[(i - start) & mask];
-      x = put(x, tables[rows.table[i]].symbols[rows.symbol[i]], to);
+    if (lanes == kLanes) {
+      encode_row(rows.codes.data() + start, rows.codes.data() + end, symbols, states, to);
+    } else {
+      for (std::size_t i = end; i-- > start;) states[0] = put(states[0], symbols[rows.codes[i]], to);
     }
     end = start;
   }
-  for (int lane = 0; lane < lanes; ++lane) append(out, states[static_cast<std::size_t>(lane)]);
-  const auto bytes = static_cast<std::size_t>(words.data() + words.size() - to) * 2;
-  const std::size_t at = out.size();
-  out.resize(at + bytes);
-  if (bytes > 0) std::memcpy(out.data() + at, to, bytes);
+  const auto bytes = static_cast<std::size_t>(words.data() + words.size() - to) * sizeof(std::uint16_t);
+  out.resize(at + states_bytes + bytes);
+  std::memcpy(out.data() + at, states.data(), states_bytes);
+  if (bytes > 0) std::memcpy(out.data() + at + states_bytes, to, bytes);
 }
 
 Decoder::Decoder(std::span<const std::uint8_t> stream, int lanes) : lanes_(lanes) {

@@ -75,40 +75,55 @@ BinaryLevel read_binary_level(BitReader& in);
 /// Of the first symbol, of kScale; 0 where the alphabet is not used.
 std::uint16_t first_frequency(const BinaryLevel& level);
 
-/// One symbol as an encoder needs it; see put() in the .cpp.
+/// One symbol as an encoder needs it; see put() in rans.cpp.
 struct EncoderSymbol {
   std::uint32_t limit = 0;
   std::uint32_t reciprocal = 0, bias = 0;
   std::uint16_t complement = 0, shift = 0;
 };
 
-struct EncoderTable {
-  void set(const Levels& levels);
-  void set(const BinaryLevel& level);
-  std::array<EncoderSymbol, kMostSymbols> symbols;
+/// All tables of a stream. A symbol of a table is one number, its code: see code_of().
+class EncoderTables {
+ public:
+  explicit EncoderTables(std::size_t tables) : symbols_(tables * kMostSymbols) {}
+  void set(std::size_t table, const Levels& levels);
+  void set(std::size_t table, const BinaryLevel& level);
+  const EncoderSymbol* symbols() const { return symbols_.data(); }
+
+ private:
+  std::vector<EncoderSymbol> symbols_;
 };
 
+inline std::uint16_t code_of(int table, int symbol) {
+  return static_cast<std::uint16_t>(table * kMostSymbols + symbol);
+}
+
+/// What rows decode to where their table is not usable.
+inline constexpr std::uint8_t kNoSymbol = 255;
+
 struct DecoderTable {
-  /// False where no symbol has a level: then nothing may be decoded with it.
+  /// False where no symbol has a level: it decodes to kNoSymbol.
   bool set(const Levels& levels);
   bool usable = false;
   // Low to high: 8 bits of symbol, 12 of its frequency, 12 of the place among the symbol's own.
   std::array<std::uint32_t, kScale> slots;
 };
 
-/// Rows of symbols, each with the number of its table. The lanes take turns from a row's first symbol on.
+/// Rows of symbols' codes. The lanes take turns from a row's first symbol on.
 struct Rows {
-  std::vector<std::uint8_t> table, symbol;
+  std::vector<std::uint16_t> codes;
   std::vector<std::uint32_t> starts;  // of each row, rising
   void clear() {
-    table.clear();
-    symbol.clear();
+    codes.clear();
     starts.clear();
   }
 };
 
+/// Adds to `counts`, one for each code.
+void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts);
+
 /// Appends the coded rows. `lanes` is 1 or kLanes.
-void encode(const Rows& rows, std::span<const EncoderTable> tables, int lanes, Bytes& out);
+void encode(const Rows& rows, const EncoderTables& tables, int lanes, Bytes& out);
 
 /// Any bytes: behind their end zeros are read, and finished() is false.
 class Decoder {
@@ -116,7 +131,7 @@ class Decoder {
   /// The stream must outlive the decoder.
   Decoder(std::span<const std::uint8_t> stream, int lanes);
 
-  /// One row of `count` symbols. All tables named must be usable.
+  /// One row of `count` symbols.
   void row(std::span<const DecoderTable> tables, const std::uint8_t* table, std::size_t count,
            std::uint8_t* symbols);
   /// The next symbol of a stream with one lane.

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <string>
 
@@ -26,9 +27,37 @@ PinholeModel rounded(const PinholeModel& model) {
   return {model.width, model.height, rounded(model.matrix), rounded(model.distortion)};
 }
 
-/// A place's boundary and line in one number, as GridPoint keeps them.
+/// A place's boundary and line in one number: the bytes in which GridPoint keeps them.
 std::uint32_t key_of(const GridPoint& at) {
-  return static_cast<std::uint32_t>(at.line) << 16 | at.boundary;
+  static_assert(offsetof(GridPoint, boundary) == 0 && offsetof(GridPoint, line) == 2 &&
+                std::endian::native == std::endian::little);
+  std::uint32_t key;
+  std::memcpy(&key, &at, sizeof key);
+  return key;
+}
+constexpr std::uint32_t kRight = 1, kBelow = 1U << 16;  // from a place's key to its neighbours'
+
+/// The usual case: two triangles, one after the other, that fill a cell. 0: they do not. Without branches
+/// on the diagonal, which is hard to foresee.
+std::uint8_t filled_cell(const GridPoint* at, const Triangle& first, const Triangle& second,
+                         std::uint32_t& cell) {
+  if (first[2] != second[0] || first[0] != second[2]) return 0;
+  const std::uint32_t a = key_of(at[first[0]]), b = key_of(at[first[1]]), c = key_of(at[first[2]]),
+                      d = key_of(at[second[1]]);
+  // The ring a b c d begins upper left, or else lower left.
+  const bool straight = b - a == kBelow;
+  cell = straight ? a : d;
+  const std::uint32_t to_b = straight ? kBelow : kRight;
+  const std::uint32_t to_c = straight ? kRight : 0U - kBelow;
+  const std::uint32_t to_d = 0U - (straight ? kBelow : kRight);
+  const bool filled = (((b - a) ^ to_b) | ((c - b) ^ to_c) | ((d - c) ^ to_d)) == 0;
+  if (!filled) return 0;
+  return straight ? grid_cell::kStraight : grid_cell::kTurned;
+}
+
+std::int32_t floor_of(float x) {
+  const auto whole = static_cast<std::int32_t>(x);
+  return whole - (x < static_cast<float>(whole) ? 1 : 0);
 }
 
 /// Of a triangle whose vertices lie at three corners of one cell: the corner that it lacks. -1: they do not.
@@ -138,23 +167,36 @@ Status to_grid(const Surface& surface, const GridCalibration& calibration, int s
     const std::size_t at = out.at(p.line, p.boundary);
     if (out.columns[at] != StripeGrid::kAbsent)
       return Error{"surface has two vertices at one place of the grid: send it as a mesh"};
-    out.columns[at] = static_cast<std::int32_t>(std::floor(p.column_px * steps + 0.5F));
+    out.columns[at] = floor_of(p.column_px * steps + 0.5F);
     far |= !(surface.positions[i][2] < farthest);
     if (!out.sigmas.empty()) out.sigmas[at] = sigma_px_code(p.sigma_px);
     if (!out.interpolated.empty()) out.interpolated[at] = surface.interpolated[i] != 0;
   }
   out.vertices = static_cast<std::uint32_t>(count);
   const auto is_far = [&](std::uint32_t v) { return !(surface.positions[v][2] < farthest); };
-  for (const Triangle& triangle : surface.triangles) {
+  const auto cells_at = [&](std::uint32_t cell) {
+    return static_cast<std::size_t>((cell >> 16) * stride + (cell & 0xffffU)) + StripeGrid::kMargin;
+  };
+  const std::size_t triangles = surface.triangles.size();
+  for (std::size_t n = 0; n < triangles; ++n) {
+    const Triangle& triangle = surface.triangles[n];
     if (triangle[0] >= count || triangle[1] >= count || triangle[2] >= count)
       return Error{"surface has a triangle on a vertex that is not there"};
     std::uint32_t cell = 0;
+    if (n + 1 < triangles && !far && surface.triangles[n + 1][1] < count) {
+      const std::uint8_t filled = filled_cell(surface.grid.data(), triangle, surface.triangles[n + 1], cell);
+      if (filled != 0 && out.cells[cells_at(cell)] == 0) {
+        out.cells[cells_at(cell)] = filled;
+        out.triangles += 2;
+        ++n;
+        continue;
+      }
+    }
     const int corner = missing_corner(key_of(surface.grid[triangle[0]]), key_of(surface.grid[triangle[1]]),
                                       key_of(surface.grid[triangle[2]]), cell);
     if (corner < 0) return Error{"surface has a triangle that is in no cell of the grid: send it as a mesh"};
     if (far && (is_far(triangle[0]) || is_far(triangle[1]) || is_far(triangle[2]))) continue;
-    std::uint8_t& cells =
-        out.cells[static_cast<std::size_t>((cell >> 16) * stride + (cell & 0xffffU)) + StripeGrid::kMargin];
+    std::uint8_t& cells = out.cells[cells_at(cell)];
     const auto one = static_cast<std::uint8_t>(1U << corner);
     const auto both = static_cast<std::uint8_t>(cells | one);
     if (cells != 0 && (both == cells || (both != grid_cell::kStraight && both != grid_cell::kTurned)))

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/surface_check.h"
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 namespace relievo {
@@ -9,10 +11,13 @@ namespace {
 
 template <std::size_t N>
 bool all_finite(const std::vector<std::array<float, N>>& values) {
-  for (const auto& value : values)
-    for (const float x : value)
-      if (!std::isfinite(x)) return false;
-  return true;
+  // All of them, without a way out between: several at a time.
+  constexpr std::uint32_t kExponent = 0x7f800000U;
+  std::uint32_t worst = 0;
+  const float* number = values.empty() ? nullptr : values.front().data();
+  for (std::size_t i = 0; i < N * values.size(); ++i)
+    worst |= (std::bit_cast<std::uint32_t>(number[i]) & kExponent) == kExponent ? 1U : 0U;
+  return worst == 0;
 }
 
 /// False, and unchanged, where there is no direction.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "base/variants.h"
+
 namespace relievo {
 namespace {
 
@@ -208,13 +210,12 @@ RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
 }  // namespace
 
 const std::vector<CellKernels>& all_cell_kernels() {
-  static const std::vector<CellKernels> kernels = [] {
-    std::vector<CellKernels> out{{"portable", Portable::make, Portable::normals}};
+  const CellKernels portable{"portable", Portable::make, Portable::normals};
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) out.push_back({"avx2", Avx2::make, Avx2::normals});
+  static const auto kernels = variants(portable, {"avx2", Avx2::make, Avx2::normals});
+#else
+  static const auto kernels = variants(portable);
 #endif
-    return out;
-  }();
   return kernels;
 }
 

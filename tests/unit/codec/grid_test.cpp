@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "base/parallel.h"
@@ -14,6 +15,7 @@
 #include "codec/grid_coder.h"
 #include "codec/grid_points.h"
 #include "codec/grid_predict.h"
+#include "codec/rans.h"
 #include "tests/support/make_grid.h"
 
 namespace relievo {
@@ -390,12 +392,125 @@ TEST(Grid, KernelsAgree) {
     std::vector<std::uint8_t> tables(kPlaces), other(kPlaces);
     const GridKernels& portable = all_grid_kernels().front();
     portable.predict(in, model, kPlaces, reference.data());
-    portable.contexts(sizes.data() + 1, kPlaces, tables.data());
+    portable.contexts(sizes.data() + 1, in.up1, kPlaces, tables.data());
     for (const GridKernels& kernels : all_grid_kernels()) {
       kernels.predict(in, model, kPlaces, expected.data());
-      kernels.contexts(sizes.data() + 1, kPlaces, other.data());
+      kernels.contexts(sizes.data() + 1, in.up1, kPlaces, other.data());
       ASSERT_EQ(expected, reference) << kernels.name;
       ASSERT_EQ(other, tables) << kernels.name;
+    }
+  }
+}
+
+/// What a kernel may have written, for comparing.
+struct LineOutput {
+  std::vector<std::int32_t> columns;
+  std::vector<std::uint8_t> sizes, kinds;
+  std::vector<std::uint16_t> codes;
+  std::vector<std::uint8_t> cells;
+  bool fair = true;
+  bool operator==(const LineOutput&) const = default;
+};
+
+TEST(Grid, ResidualsAndColumnsOfAllKernelsAgreeAndAreEachOthersReverse) {
+  test::Random random(4);
+  constexpr int kPlaces = 64;
+  constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
+  for (int round = 0; round < 200; ++round) {
+    const std::uint32_t range = round % 4 == 0 ? 1U << 22 : 30;
+    std::vector<std::int32_t> up1, expected, here;
+    std::vector<std::uint8_t> tolerance, tables, sizes, there, cells;
+    for (int i = 0; i < kPlaces; ++i) {
+      const auto column = [&] {
+        return random.below(6) == 0 ? kAbsent : static_cast<std::int32_t>(random.below(range)) - 10;
+      };
+      up1.push_back(column());
+      expected.push_back(up1.back() + static_cast<std::int32_t>(random.below(3)));
+      here.push_back(column());
+      there.push_back(here.back() != kAbsent);
+      tolerance.push_back(static_cast<std::uint8_t>(random.below(8)));
+      tables.push_back(static_cast<std::uint8_t>(up1.back() == kAbsent ? kAloneTable : random.below(7)));
+      sizes.push_back(static_cast<std::uint8_t>(random.below(61)));
+      cells.push_back(random.below(2) == 0 ? kBothTriangles : static_cast<std::uint8_t>(random.below(16)));
+    }
+    std::optional<LineOutput> reference, reverse;
+    for (const GridKernels& kernels : all_grid_kernels()) {
+      LineOutput out{here, sizes, sizes, std::vector<std::uint16_t>(kPlaces), cells};
+      kernels.residuals({.up1 = up1.data(),
+                         .expected = expected.data(),
+                         .tolerance = round % 2 == 0 ? tolerance.data() : nullptr,
+                         .tables = tables.data(),
+                         .columns = out.columns.data(),
+                         .sizes = out.sizes.data(),
+                         .codes = out.codes.data(),
+                         .kinds = out.kinds.data()},
+                        kPlaces);
+      kernels.diagonals(up1.data(), here.data(), 20, kPlaces - 1, out.cells.data());
+      for (std::size_t i = 0; i < kPlaces; ++i) {
+        ASSERT_EQ(out.kinds[i] == kNoVertex, there[i] == 0);
+        if (out.kinds[i] != kDone) out.codes[i] = 0;
+        ASSERT_LE(std::abs(out.columns[i] - here[i]), round % 2 == 0 ? tolerance[i] : 0);
+      }
+      if (!reference) reference = out;
+      ASSERT_EQ(out, *reference) << kernels.name;
+
+      LineOutput back{here, sizes, sizes, out.codes, {}};
+      std::vector<std::uint8_t> symbols;
+      for (std::size_t i = 0; i < kPlaces; ++i)
+        symbols.push_back(out.kinds[i] == kDone ? static_cast<std::uint8_t>(out.codes[i] % rans::kMostSymbols)
+                                                : kDirectSymbols);
+      const std::int32_t most = round % 3 == 0 ? 20 : 1 << 23;
+      back.fair = kernels.columns({.there = there.data(),
+                                   .symbols = symbols.data(),
+                                   .tables = tables.data(),
+                                   .expected = expected.data(),
+                                   .columns = back.columns.data(),
+                                   .sizes = back.sizes.data(),
+                                   .kinds = back.kinds.data()},
+                                  most, kPlaces);
+      ASSERT_EQ(back.kinds, out.kinds);
+      ASSERT_EQ(back.sizes, out.sizes);
+      bool fair = true;
+      for (std::size_t i = 0; i < kPlaces; ++i) {
+        ASSERT_EQ(back.columns[i], out.kinds[i] == kDone ? out.columns[i] : kAbsent);
+        fair = fair && (out.kinds[i] != kDone || std::abs(out.columns[i]) <= most);
+      }
+      EXPECT_EQ(back.fair, fair);
+      if (!reverse) reverse = back;
+      ASSERT_EQ(back, *reverse) << kernels.name;
+    }
+  }
+}
+
+TEST(Grid, PointKernelsAgree) {
+  test::Random random(5);
+  constexpr int kPlaces = 61;
+  for (int round = 0; round < 50; ++round) {
+    std::vector<std::int32_t> columns;
+    std::array<std::vector<float>, 4> sheets;
+    for (int i = 0; i < kPlaces; ++i) {
+      columns.push_back(random.below(5) == 0 ? StripeGrid::kAbsent
+                                             : static_cast<std::int32_t>(random.below(10000)));
+      for (std::vector<float>& values : sheets)
+        values.push_back(random.unit() + (round % 2 == 0 ? 0.1F : -0.01F));
+    }
+    std::optional<std::array<std::vector<float>, 5>> reference;
+    std::optional<bool> met;
+    for (const GridPointKernels& kernels : all_grid_point_kernels()) {
+      std::array<std::vector<float>, 5> out;
+      for (std::vector<float>& values : out) values.resize(kPlaces);
+      auto& [column, x, y, slope, z] = out;
+      kernels.straight_rays(columns.data(), {1 / 16.F, 1 / 800.F, 0.1F, 0.2F}, kPlaces, column.data(),
+                            x.data(), y.data());
+      const bool good =
+          kernels.meet({columns.data(), x.data(), y.data(), slope.data(), z.data()},
+                       {sheets[0].data(), sheets[1].data(), sheets[2].data(), sheets[3].data()}, kPlaces);
+      if (!reference) reference = out;
+      if (!met) met = good;
+      EXPECT_EQ(good, *met) << kernels.name;
+      for (std::size_t k = 0; k < out.size(); ++k)
+        for (std::size_t i = 0; i < kPlaces; ++i)
+          ASSERT_TRUE(columns[i] == StripeGrid::kAbsent || out[k][i] == (*reference)[k][i]) << kernels.name;
     }
   }
 }

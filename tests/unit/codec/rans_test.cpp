@@ -34,7 +34,7 @@ TEST(Rans, SymbolsComeBackFromAnyTables) {
   test::Random random(2);
   for (int round = 0; round < 60; ++round) {
     const int lanes = round % 2 == 0 ? 1 : kLanes;
-    std::vector<EncoderTable> encoders(3);
+    EncoderTables encoders(3);
     std::vector<DecoderTable> decoders(3);
     std::vector<std::vector<std::uint8_t>> alphabets(3);
     for (std::size_t t = 0; t < 3; ++t) {
@@ -45,37 +45,39 @@ TEST(Rans, SymbolsComeBackFromAnyTables) {
         counts[s] += 1 + random.below(1U << random.below(16));
         alphabets[t].push_back(static_cast<std::uint8_t>(s));
       }
-      encoders[t].set(levels_of(counts));
+      encoders.set(t, levels_of(counts));
       ASSERT_TRUE(decoders[t].set(levels_of(counts)));
     }
     Rows rows;
+    std::vector<std::uint8_t> tables, symbols;
     for (std::uint32_t r = 0; r < 20; ++r) {
-      rows.starts.push_back(static_cast<std::uint32_t>(rows.symbol.size()));
+      rows.starts.push_back(static_cast<std::uint32_t>(symbols.size()));
       for (std::uint32_t i = random.below(40); i > 0; --i) {
         const std::uint32_t t = random.below(3);
-        rows.table.push_back(static_cast<std::uint8_t>(t));
-        rows.symbol.push_back(alphabets[t][random.below(static_cast<std::uint32_t>(alphabets[t].size()))]);
+        tables.push_back(static_cast<std::uint8_t>(t));
+        symbols.push_back(alphabets[t][random.below(static_cast<std::uint32_t>(alphabets[t].size()))]);
+        rows.codes.push_back(code_of(tables.back(), symbols.back()));
       }
     }
     Bytes bytes;
     encode(rows, encoders, lanes, bytes);
     Decoder decoder(bytes, lanes);
-    std::vector<std::uint8_t> got(rows.symbol.size() + 1);
+    std::vector<std::uint8_t> got(symbols.size() + 1);
     for (std::size_t r = 0; r < rows.starts.size(); ++r) {
       const std::size_t start = rows.starts[r];
-      const std::size_t end = r + 1 < rows.starts.size() ? rows.starts[r + 1] : rows.symbol.size();
-      decoder.row(decoders, rows.table.data() + start, end - start, got.data() + start);
+      const std::size_t end = r + 1 < rows.starts.size() ? rows.starts[r + 1] : symbols.size();
+      decoder.row(decoders, tables.data() + start, end - start, got.data() + start);
     }
     got.pop_back();
-    ASSERT_EQ(got, rows.symbol);
+    ASSERT_EQ(got, symbols);
     EXPECT_TRUE(decoder.finished());
     if (bytes.size() > 4U * static_cast<unsigned>(lanes)) {
       bytes.pop_back();
       Decoder cut(bytes, lanes);
       for (std::size_t r = 0; r < rows.starts.size(); ++r) {
         const std::size_t start = rows.starts[r];
-        const std::size_t end = r + 1 < rows.starts.size() ? rows.starts[r + 1] : rows.symbol.size();
-        cut.row(decoders, rows.table.data() + start, end - start, got.data());
+        const std::size_t end = r + 1 < rows.starts.size() ? rows.starts[r + 1] : symbols.size();
+        cut.row(decoders, tables.data() + start, end - start, got.data());
       }
       EXPECT_FALSE(cut.finished());
     }
@@ -92,22 +94,38 @@ TEST(Rans, AlphabetsOfTwoKeepTheirOdds) {
     const Bytes told = out.finish();
     BitReader in(told);
     ASSERT_EQ(first_frequency(read_binary_level(in)), first_frequency(level));
-    std::vector<EncoderTable> table(1);
-    table[0].set(level);
+    EncoderTables table(1);
+    table.set(0, level);
+    std::vector<std::uint8_t> symbols;
     Rows rows;
     rows.starts.push_back(0);
     for (std::uint32_t i = 0; i < first + second; ++i) {
-      rows.table.push_back(0);
-      rows.symbol.push_back(i % 2 == 0 ? (i / 2 < second) : (second > first ? i / 2 < second : 0));
+      symbols.push_back(i % 2 == 0 ? (i / 2 < second) : (second > first ? i / 2 < second : 0));
     }
-    for (std::uint8_t& s : rows.symbol) s = second == 0 ? 0 : first == 0 ? 1 : s;
+    for (std::uint8_t& s : symbols) {
+      s = second == 0 ? 0 : first == 0 ? 1 : s;
+      rows.codes.push_back(code_of(0, s));
+    }
     Bytes bytes;
     encode(rows, table, 1, bytes);
     Decoder decoder(bytes, 1);
-    for (const std::uint8_t s : rows.symbol) ASSERT_EQ(decoder.one(first_frequency(level)), s != 0);
+    for (const std::uint8_t s : symbols) ASSERT_EQ(decoder.one(first_frequency(level)), s != 0);
     EXPECT_TRUE(decoder.finished());
   }
   EXPECT_FALSE(binary_level_of(0, 0).used);
+}
+
+TEST(Rans, CodesAreCounted) {
+  test::Random random(4);
+  std::vector<std::uint16_t> codes;
+  std::vector<std::uint32_t> expected(2 * kMostSymbols), counts(2 * kMostSymbols);
+  expected[0] = counts[0] = 7;  // they are added
+  for (int i = 0; i < 1003; ++i) {
+    codes.push_back(code_of(static_cast<int>(random.below(2)), static_cast<int>(random.below(kMostSymbols))));
+    ++expected[codes.back()];
+  }
+  count_codes(codes, counts);
+  EXPECT_EQ(counts, expected);
 }
 
 }  // namespace
