@@ -13,5 +13,6 @@ Command info_command();
 Command recover_command();
 Command export_command();
 Command web_command();
+Command keys_command();
 
 }  // namespace relievo

@@ -16,6 +16,10 @@ std::shared_ptr<DomainOptions> add_domain_options(CLI::App& app) {
                  "Network interface, by name or address (default: the first that "
                  "reaches others; lo for this machine alone)")
       ->type_name("NAME");
+  app.add_option("--keys", options->keys,
+                 "Folder of the keys for secured streams; none for plain ones (default: $RELIEVO_KEYS, "
+                 "~/.config/relievo/keys or /etc/relievo/keys, where there are some)")
+      ->type_name("DIR");
   return options;
 }
 

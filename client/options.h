@@ -14,7 +14,7 @@ class App;
 
 namespace relievo {
 
-/// --domain and --interface, filled while parsing.
+/// --domain, --interface and --keys, filled while parsing.
 std::shared_ptr<DomainOptions> add_domain_options(CLI::App& app);
 
 /// "12.3 MB", "2 min 5 s", and UTC as "2026-01-02T03:04:05Z".

@@ -11,11 +11,14 @@
 
 #include "base/log.h"
 #include "idl/interface.h"
+#include "idl/security.h"
 
 namespace relievo {
 namespace {
 
 constexpr int kMaxDomain = 230;  // beyond it the ports exceed 65535
+
+constexpr int kBeside = 1000;  // numbers that no domain on the network has
 
 std::mutex g_mutex;
 std::condition_variable g_closed;
@@ -26,9 +29,18 @@ bool user_configures() {
   return uri != nullptr && *uri != '\0';
 }
 
+Status create_domain(dds_domainid_t id, const std::string& config, Entity& out) {
+  log_debug("DDS domain " + std::to_string(id) + ": " + config);
+  auto made = take_entity(dds_create_domain(id, config.c_str()), "domain");
+  if (!made) return made.error();
+  out = std::move(made).value();
+  return {};
+}
+
 }  // namespace
 
 Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
+  const auto keys = find_keys(options.keys);
   if (options.domain < 0 || options.domain > kMaxDomain) {
     return Error{"DDS domain " + std::to_string(options.domain) + " is out of range: use 0 to " +
                  std::to_string(kMaxDomain)};
@@ -38,10 +50,12 @@ Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
     const auto known = g_domains.find(options.domain);
     if (known == g_domains.end()) break;
     if (auto existing = known->second.lock()) {
-      if (existing->interface_ == options.interface) return existing;
+      const bool same_keys = existing->keys_ ? keys && existing->keys_->folder == *keys : !keys;
+      if (existing->interface_ == options.interface && same_keys) return existing;
       lock.unlock();  // before `existing` goes, which may be the last
-      return Error{"DDS domain " + std::to_string(options.domain) +
-                   " is already open on another network interface: use the same one, or another domain"};
+      return Error{"DDS domain " + std::to_string(options.domain) + " is already open " +
+                   (same_keys ? "on another network interface" : "with other keys") +
+                   ": use the same, or another domain"};
     }
     g_closed.wait(lock);
   }
@@ -63,6 +77,12 @@ Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
 Result<std::unique_ptr<Domain>> Domain::make(const DomainOptions& options) {
   std::unique_ptr<Domain> domain(new Domain);
   domain->interface_ = options.interface;
+  if (const auto folder = find_keys(options.keys)) {
+    auto keys = read_keys(*folder);
+    if (!keys) return keys.error();
+    domain->keys_ = std::move(keys).value();
+    log_debug("keys of '" + domain->keys_->name + "' in " + folder->string());
+  }
   const auto id = static_cast<dds_domainid_t>(options.domain);
   if (user_configures()) {
     if (!options.interface.empty()) {
@@ -72,17 +92,29 @@ Result<std::unique_ptr<Domain>> Domain::make(const DomainOptions& options) {
   } else {
     auto interface = choose_interface(network_interfaces(), options.interface);
     if (!interface) return interface.error();
-    const std::string config = domain_config(*interface);
-    log_debug("DDS domain " + std::to_string(options.domain) + " on " + interface->name + ": " + config);
-    auto made = take_entity(dds_create_domain(id, config.c_str()),
-                            "domain " + std::to_string(options.domain) + " on " + interface->name);
-    if (!made) return made.error();
-    domain->domain_ = std::move(made).value();
+    if (auto made = create_domain(id, domain_config(*interface), domain->domain_); !made)
+      return made.error().in("cannot open DDS domain " + std::to_string(options.domain) + " on " +
+                             interface->name);
+    if (domain->keys_) {
+      if (auto made = domain->open_beside(options.domain, *interface); !made) return made.error();
+    }
   }
-  auto participant = take_entity(dds_create_participant(id, nullptr, nullptr), "participant");
+  auto participant = domain->keys_ ? create_secured_participant(options.domain, *domain->keys_)
+                                   : take_entity(dds_create_participant(id, nullptr, nullptr), "participant");
   if (!participant) return participant.error();
   domain->participant_ = std::move(participant).value();
   return domain;
+}
+
+// Cyclone 0.10 cannot have plain and secured participants in one domain of a process; in two that are the
+// same on the network it can.
+Status Domain::open_beside(int domain, const NetworkInterface& interface) {
+  const auto id = static_cast<dds_domainid_t>(domain + kBeside);
+  if (auto made = create_domain(id, domain_config(interface, domain), plain_domain_); !made) return made;
+  auto participant = take_entity(dds_create_participant(id, nullptr, nullptr), "participant");
+  if (!participant) return participant.error();
+  plain_participant_ = std::move(participant).value();
+  return {};
 }
 
 }  // namespace relievo

@@ -80,7 +80,7 @@ Result<NetworkInterface> choose_interface(const std::vector<NetworkInterface>& a
   return *chosen;
 }
 
-std::string domain_config(const NetworkInterface& interface) {
+std::string domain_config(const NetworkInterface& interface, std::optional<int> on_network) {
   const MessageSize size = message_size(interface);
   const bool multicast = interface.multicast && !interface.loopback;
   std::string xml = "<General><Interfaces><NetworkInterface name=\"" + interface.name + "\"/></Interfaces>";
@@ -91,6 +91,7 @@ std::string domain_config(const NetworkInterface& interface) {
   xml += "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>";
   // Without multicast participants find each other by asking every port of the machine itself.
   if (!multicast) xml += "<Peers><Peer address=\"" + interface.address + "\"/></Peers>";
+  if (on_network) xml += "<ExternalDomainId>" + std::to_string(*on_network) + "</ExternalDomainId>";
   xml += "</Discovery>";
   // min="default": take what the kernel grants (net.core.rmem_max) instead of failing.
   xml += "<Internal><SocketReceiveBufferSize min=\"default\" max=\"8MB\"/></Internal>";

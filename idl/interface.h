@@ -3,6 +3,7 @@
 // idl/.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,8 @@ Result<NetworkInterface> choose_interface(const std::vector<NetworkInterface>& a
                                           const std::string& wanted);
 
 /// The CYCLONEDDS_URI for it: message and fragment sizes that survive loss at its MTU, a large receive buffer
-/// where the kernel grants one, discovery that works without multicast on the loopback.
-std::string domain_config(const NetworkInterface& interface);
+/// where the kernel grants one, discovery that works without multicast on the loopback. `on_network`: the
+/// domain's number there, where it is another than in the process.
+std::string domain_config(const NetworkInterface& interface, std::optional<int> on_network = {});
 
 }  // namespace relievo

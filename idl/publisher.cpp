@@ -9,6 +9,7 @@
 
 #include "idl/domain.h"
 #include "idl/live_streams.h"
+#include "idl/security.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
 #include "relievo.h"
@@ -93,6 +94,7 @@ class DdsPublisher final : public Publisher {
     }
     auto domain = Domain::open(options);
     if (!domain) return domain.error();
+    if (auto may = check_may_publish(**domain); !may) return may.error();
     if (auto free = check_name_is_free(**domain, info.stream, kDiscoveryWait); !free) return free.error();
 
     auto publisher = std::make_unique<DdsPublisher>();
@@ -108,6 +110,9 @@ class DdsPublisher final : public Publisher {
       publisher->writers_[static_cast<std::size_t>(topic)] = std::move(writer).value();
     }
     if (auto status = publisher->publish(info); !status) return status.error();
+    auto notice = SecuredNotice::create(*publisher->domain_, info.stream);
+    if (!notice) return notice.error();
+    publisher->notice_ = std::move(notice).value();
     if (key_frame_wanted) {
       if (auto status = publisher->listen(std::move(key_frame_wanted)); !status) return status.error();
     }
@@ -185,7 +190,7 @@ class DdsPublisher final : public Publisher {
     auto group = create_group(participant, Role::kServer, false, stream_);
     if (!group) return group.error();
     request_group_ = std::move(group).value();
-    auto reader = create_request_reader(participant, request_group_.get());
+    auto reader = create_reader(participant, request_group_.get(), SideTopic::kKeyFrameRequest);
     if (!reader) return reader.error();
     requests_ = std::move(reader).value();
     const std::unique_ptr<dds_listener_t, ListenerDeleter> listener(dds_create_listener(this));
@@ -236,6 +241,7 @@ class DdsPublisher final : public Publisher {
   std::shared_ptr<Domain> domain_;
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
+  SecuredNotice notice_;
   Entity request_group_;
   Entity requests_;
   std::function<void()> wanted_;

@@ -14,6 +14,7 @@
 #include "idl/cdr.h"
 #include "idl/domain.h"
 #include "idl/live_streams.h"
+#include "idl/security.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
 #include "relievo.h"
@@ -92,6 +93,7 @@ class DdsRawPublisher final : public RawPublisher {
     if (!valid_stream_name(stream)) return Error{"'" + stream + "' cannot name a stream"};
     auto domain = Domain::open(options);
     if (!domain) return domain.error();
+    if (auto may = check_may_publish(**domain); !may) return may.error();
     if (auto free = check_name_is_free(**domain, stream, kDiscoveryWait); !free) return free.error();
 
     auto publisher = std::make_unique<DdsRawPublisher>();
@@ -101,6 +103,9 @@ class DdsRawPublisher final : public RawPublisher {
     auto group = create_group(participant, Role::kServer, true, stream);
     if (!group) return group.error();
     publisher->group_ = std::move(group).value();
+    auto notice = SecuredNotice::create(*publisher->domain_, stream);
+    if (!notice) return notice.error();
+    publisher->notice_ = std::move(notice).value();
     for (const Topic topic : kTopics) {
       const auto index = static_cast<std::size_t>(topic);
       auto type = sertype_of(participant, topic);
@@ -142,6 +147,7 @@ class DdsRawPublisher final : public RawPublisher {
  private:
   std::string stream_;
   std::shared_ptr<Domain> domain_;
+  SecuredNotice notice_;
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
   std::array<ddsi_sertype*, kTopics.size()> types_{};

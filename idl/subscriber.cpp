@@ -13,6 +13,7 @@
 #include "base/time.h"
 #include "idl/cdr.h"
 #include "idl/domain.h"
+#include "idl/security.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
 #include "relievo.h"
@@ -115,8 +116,14 @@ class DdsSubscriber final : public Subscriber {
     if (wants_frames()) {
       if (auto s = keep(create_group(participant, Role::kWatcher, true, stream), request_group_); !s)
         return s;
-      if (auto s = keep(create_request_writer(participant, request_group_.get()), requests_); !s) return s;
+      if (auto s =
+              keep(create_writer(participant, request_group_.get(), SideTopic::kKeyFrameRequest), requests_);
+          !s)
+        return s;
     }
+    auto notices = SecuredNoticeListener::create(*domain_, stream);
+    if (!notices) return notices.error();
+    notices_ = std::move(notices).value();
     thread_ = std::thread([this] { run(); });
     return {};
   }
@@ -276,6 +283,7 @@ class DdsSubscriber final : public Subscriber {
   Entity group_;
   std::array<Entity, kTopics.size()> readers_;
   std::array<Entity, kTopics.size()> conditions_;
+  std::unique_ptr<SecuredNoticeListener> notices_;
   Entity request_group_;
   Entity requests_;
   Entity stop_;

@@ -40,10 +40,10 @@ struct QosDeleter {
 };
 using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-Qos common_qos(Topic topic) {
+Qos reliable_qos(dds_durability_kind_t durability) {
   Qos qos(dds_create_qos());
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking_ns);
-  dds_qset_durability(qos.get(), row(topic).durability);
+  dds_qset_durability(qos.get(), durability);
   const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
   dds_qset_data_representation(qos.get(), 1, &representation);
   return qos;
@@ -58,17 +58,25 @@ Result<Entity> create_topic(std::int32_t participant, Topic topic) {
   return create_topic(participant, *row(topic).type, topic_type(topic).topic_name);
 }
 
-constexpr const char* kRequestTopic = "relievo/key_frame_request";
+struct SideRow {
+  const dds_topic_descriptor_t* type;
+  const char* name;
+  dds_durability_kind_t durability;
+};
+const SideRow& row(SideTopic topic) {
+  static const SideRow rows[] = {
+      {&relievo_KeyFrameRequest_desc, "relievo/key_frame_request", DDS_DURABILITY_VOLATILE},
+      {&relievo_SecuredNotice_desc, "relievo/secured", DDS_DURABILITY_TRANSIENT_LOCAL},
+  };
+  return rows[static_cast<std::size_t>(topic)];
+}
 
-// Only the last one counts, and one that nobody heard is worth nothing later.
-Qos request_qos() {
-  Qos qos(dds_create_qos());
-  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking_ns);
+// Only the last one of a stream counts.
+Qos side_qos(SideTopic topic) {
+  Qos qos = reliable_qos(row(topic).durability);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
   dds_qset_resource_limits(qos.get(), DDS_LENGTH_UNLIMITED, kMaxStreams, DDS_LENGTH_UNLIMITED);
   dds_qset_writer_data_lifecycle(qos.get(), false);
-  const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
-  dds_qset_data_representation(qos.get(), 1, &representation);
   return qos;
 }
 
@@ -98,7 +106,7 @@ Result<Entity> create_group(std::int32_t participant, Role role, bool writing, c
 Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic) {
   auto dds_topic = create_topic(participant, topic);
   if (!dds_topic) return dds_topic.error();
-  const Qos qos = common_qos(topic);
+  const Qos qos = reliable_qos(row(topic).durability);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, row(topic).writer_depth);
   dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, kLiveliness_ns);
   // Otherwise a server's exit would read as "stream deleted" and a late joiner would get one sample at most.
@@ -114,25 +122,25 @@ Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic) {
   auto dds_topic = create_topic(participant, topic);
   if (!dds_topic) return dds_topic.error();
-  const Qos qos = common_qos(topic);
+  const Qos qos = reliable_qos(row(topic).durability);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, row(topic).reader_depth);
   dds_qset_resource_limits(qos.get(), DDS_LENGTH_UNLIMITED, kMaxStreams, DDS_LENGTH_UNLIMITED);
   return take_entity(dds_create_reader(group, dds_topic->get(), qos.get(), nullptr),
                      "reader of " + topic_type(topic).topic_name);
 }
 
-Result<Entity> create_request_writer(std::int32_t participant, std::int32_t group) {
-  auto topic = create_topic(participant, relievo_KeyFrameRequest_desc, kRequestTopic);
-  if (!topic) return topic.error();
-  return take_entity(dds_create_writer(group, topic->get(), request_qos().get(), nullptr),
-                     std::string("writer of ") + kRequestTopic);
+Result<Entity> create_writer(std::int32_t participant, std::int32_t group, SideTopic topic) {
+  auto dds_topic = create_topic(participant, *row(topic).type, row(topic).name);
+  if (!dds_topic) return dds_topic.error();
+  return take_entity(dds_create_writer(group, dds_topic->get(), side_qos(topic).get(), nullptr),
+                     std::string("writer of ") + row(topic).name);
 }
 
-Result<Entity> create_request_reader(std::int32_t participant, std::int32_t group) {
-  auto topic = create_topic(participant, relievo_KeyFrameRequest_desc, kRequestTopic);
-  if (!topic) return topic.error();
-  return take_entity(dds_create_reader(group, topic->get(), request_qos().get(), nullptr),
-                     std::string("reader of ") + kRequestTopic);
+Result<Entity> create_reader(std::int32_t participant, std::int32_t group, SideTopic topic) {
+  auto dds_topic = create_topic(participant, *row(topic).type, row(topic).name);
+  if (!dds_topic) return dds_topic.error();
+  return take_entity(dds_create_reader(group, dds_topic->get(), side_qos(topic).get(), nullptr),
+                     std::string("reader of ") + row(topic).name);
 }
 
 }  // namespace relievo

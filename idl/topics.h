@@ -30,8 +30,12 @@ Result<Entity> create_group(std::int32_t participant, Role role, bool writing, c
 Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic);
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic);
 
-/// The same for requests of key frames, which watchers write and servers read.
-Result<Entity> create_request_writer(std::int32_t participant, std::int32_t group);
-Result<Entity> create_request_reader(std::int32_t participant, std::int32_t group);
+/// What is said beside the streams: never recorded.
+enum class SideTopic : std::uint8_t {
+  kKeyFrameRequest,  // watchers to servers; one that nobody hears is gone
+  kSecuredNotice,    // servers to watchers, kept for those that come late
+};
+Result<Entity> create_writer(std::int32_t participant, std::int32_t group, SideTopic topic);
+Result<Entity> create_reader(std::int32_t participant, std::int32_t group, SideTopic topic);
 
 }  // namespace relievo

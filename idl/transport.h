@@ -18,6 +18,9 @@ namespace relievo {
 struct DomainOptions {
   int domain = 0;
   std::string interface;  // IP address or name; empty: Cyclone's own choice
+  // Folder of the keys with which all is authenticated and encrypted (idl/keys.h); empty: where find_keys()
+  // finds some; "none": in plain.
+  std::string keys;
 };
 
 /// Which of a stream's topics a sample belongs to.

@@ -219,6 +219,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.text("stream", config.stream);
   reader.integer("domain", 0, 230, config.domain);
   reader.text("interface", config.interface);
+  reader.text("keys", config.keys);
   reader.text("web", config.web);
   reader.text("record", config.record);
   if (const auto frames = reader.integer("frames", 1, std::numeric_limits<std::int64_t>::max())) {

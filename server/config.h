@@ -21,6 +21,7 @@ struct ServeConfig {
   std::string stream;    // empty: named after the source
   int domain = 0;
   std::string interface;               // empty: Cyclone DDS chooses
+  std::string keys;                    // as DomainOptions::keys
   std::string web = "127.0.0.1:8080";  // "none": no gateway
   std::string record;                  // empty: not recorded
   std::optional<std::uint64_t> frames;

@@ -39,6 +39,10 @@ std::string stream_name_of(const std::string& source) {
   return valid_stream_name(name) ? name : "stream";
 }
 
+DomainOptions domain_options(const ServeConfig& config) {
+  return {.domain = config.domain, .interface = config.interface, .keys = config.keys};
+}
+
 void say_drops(const ServerStatus& s) {
   log_info(std::to_string(s.frames_captured) + " frames captured, " + std::to_string(s.frames_published) +
            " published; dropped: " + std::to_string(s.drops_capture) + " in capture, " +
@@ -68,8 +72,7 @@ struct Recording {
       return Error{"cannot record to " + config.record + ": there is no folder " + folder.string()};
     }
     recorder.emplace(Recorder::Options{.file = config.record, .stream = stream});
-    auto created = Subscriber::create({.domain = config.domain, .interface = config.interface}, stream,
-                                      recorder->callbacks());
+    auto created = Subscriber::create(domain_options(config), stream, recorder->callbacks());
     if (!created) return created.error();
     subscriber = *std::move(created);
     // The first frame should be in the file: wait until reader and writer have found each other.
@@ -130,7 +133,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   info.started_ns = utc_now_ns();
   info.rig = (*source)->info().rig;
   info.pattern = (*source)->info().pattern;
-  auto publisher = Publisher::create({.domain = config.domain, .interface = config.interface}, info);
+  auto publisher = Publisher::create(domain_options(config), info);
   if (!publisher) return publisher.error();
   Recording recording;
   if (!config.record.empty()) {
@@ -188,7 +191,7 @@ std::string stream_name(const std::string& name) {
 
 /// Flags as given; what is not given leaves the file's or the default value.
 struct Flags {
-  std::optional<std::string> config, source, stream, interface, web, record;
+  std::optional<std::string> config, source, stream, interface, keys, web, record;
   std::optional<std::string> decoder, geometry, texture;
   std::string scheme;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
@@ -208,6 +211,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   set(flags.source, config.source);
   set(flags.stream, config.stream);
   set(flags.interface, config.interface);
+  set(flags.keys, config.keys);
   set(flags.web, config.web);
   set(flags.record, config.record);
   set(flags.domain, config.domain);
@@ -250,6 +254,10 @@ Command serve_command() {
                        "Network interface, by name or address (default: the first that reaches others; lo "
                        "for this machine alone)")
             ->type_name("NAME");
+        app.add_option("--keys", f->keys,
+                       "Folder of the keys that secure the stream; none for a plain one (default: "
+                       "$RELIEVO_KEYS, ~/.config/relievo/keys or /etc/relievo/keys, where there are some)")
+            ->type_name("DIR");
         app.add_option("--web", f->web,
                        "Where browsers find the viewer; :PORT for every interface, none for no viewer "
                        "(default 127.0.0.1:8080)")

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// A machine's keys: the folder that lets it read, or publish, the secured streams of one authority (OMG DDS
+// Security 1.1: authenticated, access-controlled, encrypted). docs/SECURITY.md. Any thread.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace relievo {
+
+/// Files of such a folder. Only identity.key is secret.
+namespace key_files {
+inline constexpr const char* kAuthority = "authority.pem";      // whose keys these are
+inline constexpr const char* kIdentity = "identity.pem";        // who this is
+inline constexpr const char* kPrivate = "identity.key";         // readable by its owner alone
+inline constexpr const char* kGovernance = "governance.p7s";    // what is protected, and how
+inline constexpr const char* kPermissions = "permissions.p7s";  // what this machine may do
+inline constexpr const char* kRevoked = "revoked.pem";          // keys that count no longer
+}  // namespace key_files
+
+struct Keys {
+  std::filesystem::path folder;
+  std::string name;                  // whose, as the authority calls it
+  std::string serial;                // of the identity, hexadecimal
+  std::string authority;             // its fingerprint, 16 hexadecimal digits
+  std::vector<std::string> revoked;  // serials, as far as this folder knows
+  bool may_publish = false;
+  std::int64_t expires_ns = 0;  // UTC
+};
+
+/// Where this process finds its keys: `given`, or else $RELIEVO_KEYS, or else what exists of
+/// ~/.config/relievo/keys and /etc/relievo/keys. "none", or no such folder: nothing, streams are plain.
+std::optional<std::filesystem::path> find_keys(const std::string& given);
+
+/// The folder for keys of this user, which find_keys() looks at.
+std::filesystem::path user_keys_folder();
+
+/// Checks all of the folder. The error says which file is missing, damaged or of another authority, or that
+/// the keys have expired.
+Result<Keys> read_keys(const std::filesystem::path& folder);
+
+}  // namespace relievo

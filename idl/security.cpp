@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "idl/security.h"
+
+#include <dds/dds.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "base/stream.h"
+#include "idl/topics.h"
+#include "relievo.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::size_t kMaxSaid = 256;  // what a hostile peer can make us say
+
+struct QosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+struct ListenerDeleter {
+  void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
+};
+
+/// Each sample that is there, once.
+template <typename Sample, typename Use>
+void take_all(std::int32_t reader, Use use) {
+  void* sample = nullptr;  // lent by Cyclone
+  dds_sample_info_t info;
+  while (dds_take(reader, &sample, &info, 1, 1) == 1) {
+    if (info.valid_data) use(*static_cast<const Sample*>(sample));
+    dds_return_loan(reader, &sample, 1);
+  }
+}
+
+}  // namespace
+
+Result<Entity> create_secured_participant(int domain, const Keys& keys) {
+  const std::unique_ptr<dds_qos_t, QosDeleter> qos(dds_create_qos());
+  const auto set = [&](const char* name, const std::string& value) {
+    dds_qset_prop(qos.get(), name, value.c_str());
+  };
+  const auto set_file = [&](const char* name, const char* file) {
+    set(name, "file:" + (keys.folder / file).string());
+  };
+  for (const auto& [service, library, function] :
+       {std::tuple{"dds.sec.auth.library.", "dds_security_auth", "authentication"},
+        {"dds.sec.crypto.library.", "dds_security_crypto", "crypto"},
+        {"dds.sec.access.library.", "dds_security_ac", "access_control"}}) {
+    set((std::string(service) + "path").c_str(), library);
+    set((std::string(service) + "init").c_str(), std::string("init_") + function);
+    set((std::string(service) + "finalize").c_str(), std::string("finalize_") + function);
+  }
+  set_file("dds.sec.auth.identity_ca", key_files::kAuthority);
+  set_file("dds.sec.auth.identity_certificate", key_files::kIdentity);
+  set_file("dds.sec.auth.private_key", key_files::kPrivate);
+  set_file("org.eclipse.cyclonedds.sec.auth.crl", key_files::kRevoked);
+  set_file("dds.sec.access.permissions_ca", key_files::kAuthority);
+  set_file("dds.sec.access.governance", key_files::kGovernance);
+  set_file("dds.sec.access.permissions", key_files::kPermissions);
+  auto participant = take_entity(
+      dds_create_participant(static_cast<dds_domainid_t>(domain), qos.get(), nullptr), "secured participant");
+  if (!participant)
+    return Error{participant.error().message + "; the keys in " + keys.folder.string() +
+                 " were refused, or Cyclone DDS's security libraries are missing"};
+  return participant;
+}
+
+Status check_may_publish(const Domain& domain) {
+  const Keys* keys = domain.keys();
+  if (keys == nullptr || keys->may_publish) return {};
+  return Error{"the keys in " + keys->folder.string() +
+               " let their holder watch streams, not publish them: ask for others (relievo keys add-client "
+               "NAME --publish)"};
+}
+
+Result<SecuredNotice> SecuredNotice::create(const Domain& domain, const std::string& stream) {
+  SecuredNotice notice;
+  const Keys* keys = domain.keys();
+  const std::int32_t participant = domain.plain_participant();
+  if (keys == nullptr || participant == 0) return notice;
+  auto group = create_group(participant, Role::kServer, true, stream);
+  if (!group) return group.error();
+  notice.group_ = std::move(group).value();
+  auto writer = create_writer(participant, notice.group_.get(), SideTopic::kSecuredNotice);
+  if (!writer) return writer.error();
+  notice.writer_ = std::move(writer).value();
+  std::vector<char*> revoked;  // dds_write only reads them
+  for (const std::string& serial : keys->revoked) revoked.push_back(const_cast<char*>(serial.c_str()));
+  relievo_SecuredNotice sample{};
+  sample.stream = const_cast<char*>(stream.c_str());
+  sample.authority = const_cast<char*>(keys->authority.c_str());
+  sample.revoked._length = sample.revoked._maximum = static_cast<std::uint32_t>(revoked.size());
+  sample.revoked._buffer = revoked.data();
+  if (const auto code = dds_write(notice.writer_.get(), &sample); code < 0)
+    return dds_error(code, "cannot say that the stream is secured");
+  return notice;
+}
+
+Result<std::unique_ptr<SecuredNoticeListener>> SecuredNoticeListener::create(const Domain& domain,
+                                                                             const std::string& stream) {
+  std::unique_ptr<SecuredNoticeListener> self(new SecuredNoticeListener(domain));
+  const std::int32_t participant = domain.plain_participant();
+  if (participant == 0) return self;
+  auto group = create_group(participant, Role::kWatcher, false, stream);
+  if (!group) return group.error();
+  self->group_ = std::move(group).value();
+  auto notices = create_reader(participant, self->group_.get(), SideTopic::kSecuredNotice);
+  if (!notices) return notices.error();
+  self->notices_ = std::move(notices).value();
+  if (domain.keys() != nullptr) {
+    auto streams = create_reader(participant, self->group_.get(), Topic::kInfo);
+    if (!streams) return streams.error();
+    self->plain_streams_ = std::move(streams).value();
+  }
+  const std::unique_ptr<dds_listener_t, ListenerDeleter> listener(dds_create_listener(self.get()));
+  const auto listen = [&](const Entity& reader, dds_on_data_available_fn call) {
+    if (reader.get() == 0) return;
+    dds_lset_data_available(listener.get(), call);
+    dds_set_listener(reader.get(), listener.get());
+  };
+  listen(self->notices_,
+         [](dds_entity_t, void* to) { static_cast<SecuredNoticeListener*>(to)->take_notices(); });
+  listen(self->plain_streams_,
+         [](dds_entity_t, void* to) { static_cast<SecuredNoticeListener*>(to)->take_plain_streams(); });
+  return self;
+}
+
+SecuredNoticeListener::~SecuredNoticeListener() {
+  for (const Entity* reader : {&notices_, &plain_streams_})
+    if (reader->get() != 0) dds_set_listener(reader->get(), nullptr);  // waits for a call in progress
+}
+
+void SecuredNoticeListener::take_notices() {
+  take_all<relievo_SecuredNotice>(notices_.get(), [this](const relievo_SecuredNotice& notice) {
+    const Keys* keys = domain_.keys();
+    const auto is_ours = [&](const char* serial) { return keys->serial == serial; };
+    if (keys == nullptr) {
+      say(notice.stream,
+          "is secured and this machine has no keys: ask whoever runs its server for keys (relievo keys "
+          "add-client "
+          "NAME makes a folder of them), then give that folder with --keys or as " +
+              user_keys_folder().string());
+    } else if (keys->authority != notice.authority) {
+      say(notice.stream, "is secured by another authority than the one of the keys in " +
+                             keys->folder.string() + ": ask whoever runs its server for keys");
+    } else if (std::any_of(notice.revoked._buffer, notice.revoked._buffer + notice.revoked._length,
+                           is_ours)) {
+      say(notice.stream,
+          "does not take the keys in " + keys->folder.string() + " any more: they were revoked");
+    }
+  });
+}
+
+void SecuredNoticeListener::take_plain_streams() {
+  take_all<relievo_StreamInfo>(plain_streams_.get(), [this](const relievo_StreamInfo& info) {
+    say(info.stream, "is not secured, and with keys only secured streams are read: --keys none reads it");
+  });
+}
+
+void SecuredNoticeListener::say(const std::string& stream, const std::string& why) {
+  if (!valid_stream_name(stream) || said_.size() >= kMaxSaid || !said_.insert(stream).second) return;
+  log_warning("stream '" + stream + "' " + why);
+}
+
+}  // namespace relievo
