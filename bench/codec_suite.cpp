@@ -151,6 +151,15 @@ std::vector<Codec> codecs(const SourceInfo& source) {
   options.key_interval = 1;
   options.quality = true;
   all.push_back(grid("grid-1/16px-sigma", source, options));
+  options.quality = false;
+  options.key_interval = 30;
+  options.step_bits = 6;
+  options.estimate = true;
+  all.push_back(grid("metric", source, options));
+  options.estimate = false;
+  options.bound_px = 0.5F;
+  all.push_back(grid("visual", source, options));
+  for (const int bits : {8, 9, 10, 11}) all.push_back(draco(0, bits));  // as coarse as visual
   for (const int bits : {12, 0})
     for (const int speed : {0, 4, 5, 7, 9}) all.push_back(draco(speed, bits));
   return all;

@@ -12,6 +12,7 @@
 #include "codec/draco_mesh.h"
 #include "codec/frame_layout.h"
 #include "codec/grid_coder.h"
+#include "codec/grid_estimator.h"
 #include "codec/grid_points.h"
 #include "codec/surface_check.h"
 #include "codec/texture_codec.h"
@@ -21,6 +22,7 @@ namespace relievo {
 namespace {
 
 constexpr DecodeLimits kFormatLimits{};
+constexpr float kLeastBound_px = 1.5F / 256, kLargestBound_px = 8;
 
 Status check(const char* name, int value, int low, int high) {
   if (value >= low && value <= high) return {};
@@ -42,6 +44,9 @@ Status check_options(const EncodeOptions& options) {
         check("step_bits", options.step_bits, 0, 8), check("slice_lines", options.slice_lines, 8, 16384),
         check("key_interval", options.key_interval, 1, 1000)})
     if (!status) return status;
+  if (!(options.bound_px == 0 ||
+        (options.bound_px >= kLeastBound_px && options.bound_px <= kLargestBound_px)))
+    return Error{"bound_px is " + std::to_string(options.bound_px) + ", allowed are 0 and 0.006 to 8"};
   const Volume& volume = options.volume;
   const bool finite =
       std::isfinite(volume.min[0]) && std::isfinite(volume.min[1]) && std::isfinite(volume.min[2]);
@@ -103,6 +108,14 @@ float step_mm(const Surface& surface, const GridCalibration& calibration, int st
   return static_cast<float>(1000 * z * z / (calibration.camera.fx() * baseline) / (1 << step_bits));
 }
 
+/// Of the largest steps with which a column is at most `bound_px` off: rounding takes half a step, the
+/// encoder another one.
+int step_bits_within(float bound_px) {
+  int bits = 0;
+  while (bits < 8 && 1.5F / static_cast<float>(1 << bits) > bound_px) ++bits;
+  return bits;
+}
+
 Result<Coded> encode_mesh(const Frame3D& frame, const EncodeOptions& options) {
   auto geometry = encode_draco(frame.surface, options);
   if (!geometry) return geometry.error();
@@ -133,6 +146,8 @@ struct FrameEncoder::State {
   GridCalibration calibration;
   GridEncoder encoder;
   StripeGrid grid;
+  GridEstimator estimator;
+  std::vector<std::uint8_t> tolerance;
   GridKey key;
   bool has_key = false;  // a grid to build on
   std::unique_ptr<TextureEncoder> texture;
@@ -143,9 +158,9 @@ struct FrameEncoder::State {
   /// The surface as a grid, which `grid` already is.
   Coded encode_grid(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
     Coded coded;
-    coded.geometry_is_key = want_key || !has_key || key.grid.step_bits != options.step_bits;
-    coded.geometry = encoder.encode(grid, calibration, coded.geometry_is_key ? nullptr : &key, {},
-                                    step_mm(frame.surface, calibration, options.step_bits),
+    coded.geometry_is_key = want_key || !has_key || key.grid.step_bits != grid.step_bits;
+    coded.geometry = encoder.encode(grid, calibration, coded.geometry_is_key ? nullptr : &key, tolerance,
+                                    step_mm(frame.surface, calibration, grid.step_bits),
                                     {.slice_lines = options.slice_lines});
     // Nothing may be smaller than FORMAT.md allows.
     const std::uint64_t places =
@@ -169,10 +184,17 @@ struct FrameEncoder::State {
   }
 
   Result<Coded> encode_geometry(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
+    const int step_bits = options.bound_px > 0 ? step_bits_within(options.bound_px) : options.step_bits;
     const bool is_grid = options.geometry == GeometryCodec::kGrid && !frame.surface.positions.empty() &&
-                         to_grid(frame.surface, calibration, options.step_bits, options.quality, grid);
-    if (is_grid) return encode_grid(frame, options, want_key);
+                         to_grid(frame.surface, calibration, step_bits, options.quality, grid);
+    if (is_grid) {
+      tolerance.clear();
+      if (options.estimate) estimator.estimate(frame.surface, grid, tolerance);
+      if (options.bound_px > 0) tolerance.assign(grid.columns.size(), 1);
+      return encode_grid(frame, options, want_key);
+    }
     has_key = false;
+    estimator.forget();
     EncodeOptions mesh = options;
     mesh.geometry = GeometryCodec::kDracoMesh;
     return encode_mesh(frame, mesh);

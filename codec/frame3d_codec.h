@@ -36,8 +36,12 @@ struct EncodeOptions {
   int texture_quality = 80;  // 1..100: about the error of a JPEG of that quality
   bool quality = true;       // sigma and interpolation of each vertex, where the surface has them
   int step_bits = 4;         // 0..8; grid: columns are whole steps of 2^-step_bits pixels
-  int slice_lines = 270;     // 8..16384; grid: lines that are coded together, and lost together
-  int key_interval = 1;  // 1..1000; grid and H.264: every so many frames decodes alone, those between do not
+  // Grid: estimates from this frame and those before go instead of what was measured (GridEstimator).
+  bool estimate = false;
+  // Grid: how far off a column may be, 0.006 to 8 pixels; chooses the step. 0: step_bits does.
+  float bound_px = 0;
+  int slice_lines = 270;  // 8..16384; grid: lines that are coded together, and lost together
+  int key_interval = 1;   // 1..1000; grid and H.264: every so many frames decodes alone, those between do not
 };
 
 /// What a frame says of itself; read without decoding it.

@@ -11,7 +11,7 @@ namespace relievo {
 
 /// Sets what the profile of that name does; false, and nothing set, where there is none.
 bool set_geometry_profile(std::string_view name, EncodeOptions& options);
-/// "grid or draco-mesh": for messages and help.
+/// "grid, metric, ... or draco-mesh": for messages and help.
 std::string geometry_profile_names();
 
 }  // namespace relievo

@@ -97,6 +97,14 @@ class Reader {
       return refuse(*node, key, "must be a number of pictures a second from 0.1 to 1000");
     out = *value;
   }
+  void bound(std::string_view key, std::optional<double>& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value<double>();  // a whole number too
+    if (!value || !(*value >= kLeastBound_px && *value <= kMostBound_px))
+      return refuse(*node, key, "must be a number of pixels from 0.01 to 8");
+    out = *value;
+  }
   void size(std::string_view key, int& width, int& height) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
@@ -196,8 +204,9 @@ EncodeOptions encode_options(const ServeConfig& config) {
   options.draco_speed = config.draco_speed;
   options.texture = config.texture;
   options.texture_quality = config.texture_quality;
-  options.key_interval =
-      config.key_interval.value_or(config.texture == TextureCodec::kH264 ? kVideoInterval : 1);
+  const int usual = config.texture == TextureCodec::kH264 ? kVideoInterval : 1;
+  options.key_interval = config.key_interval.value_or(std::max(usual, options.key_interval));
+  if (options.bound_px > 0 && config.bound_px) options.bound_px = static_cast<float>(*config.bound_px);
   return options;
 }
 
@@ -236,6 +245,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.integer("texture_quality", 1, 100, config.texture_quality);
   reader.geometry("geometry", config.geometry);
   reader.integer("step_bits", 0, 8, config.step_bits);
+  reader.bound("bound", config.bound_px);
   if (const auto frames = reader.integer("key_interval", 1, 1000))
     config.key_interval = static_cast<int>(*frames);
   reader.integer("draco_speed", 0, 9, config.draco_speed);

@@ -14,6 +14,8 @@
 
 namespace relievo {
 
+inline constexpr double kLeastBound_px = 0.01, kMostBound_px = 8;  // of ServeConfig::bound_px
+
 struct ServeConfig {
   std::string source = "sim:face";
   std::string scheme;    // of a simulated source; empty: as the source says
@@ -34,7 +36,9 @@ struct ServeConfig {
   int texture_quality = 80;
   std::string geometry = "grid";  // a name of codec/geometry_profile.h
   int step_bits = 6;
-  std::optional<int> key_interval;  // not said: every frame a key frame, but of H.264 every 30th
+  // Not said: every frame a key frame, but of metric, visual and H.264 every 30th.
+  std::optional<int> key_interval;
+  std::optional<double> bound_px;  // of visual
   int draco_speed = 4;
 };
 

@@ -195,6 +195,7 @@ struct Flags {
   std::optional<std::string> decoder, geometry, texture;
   std::string scheme;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
+  std::optional<double> bound_px;
   std::optional<std::uint64_t> frames;
   bool loop = false, fast = false, dense = false;
   CameraOptions camera;
@@ -223,6 +224,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   set(flags.geometry, config.geometry);
   set(flags.step_bits, config.step_bits);
   set(flags.key_interval, config.key_interval);
+  set(flags.bound_px, config.bound_px);
   set(flags.draco_speed, config.draco_speed);
   set(flags.fill_holes, config.surface.fill_holes);
   config.surface.dense = config.surface.dense || flags.dense;
@@ -291,21 +293,26 @@ Command serve_command() {
             ->check(CLI::Range(1, 100))
             ->type_name("N");
         app.add_option("--geometry", f->geometry,
-                       "How the surface is sent: grid (default: small, for relievo's own receivers) or "
-                       "draco-mesh (for any)")
+                       "How the surface is sent: grid (default: as measured, for relievo's own receivers), "
+                       "metric (the same estimated from all frames so far: smaller and exacter), visual (the "
+                       "smallest, within --bound) or draco-mesh (for any receiver)")
             ->check([](const std::string& name) {
               EncodeOptions unused;
               return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
             })
             ->type_name("NAME");
         app.add_option("--step-bits", f->step_bits,
-                       "Of grid: columns are sent in steps of 1/2^N pixel (default 6: 1/64)")
+                       "Of grid and metric: columns are sent in steps of 1/2^N pixel (default 6: 1/64)")
             ->check(CLI::Range(0, 8))
             ->type_name("N");
+        app.add_option("--bound", f->bound_px,
+                       "Of visual: how far a vertex may be off in the camera's picture, pixels (default 0.5)")
+            ->check(CLI::Range(kLeastBound_px, kMostBound_px))
+            ->type_name("PX");
         app.add_option("--key-interval", f->key_interval,
-                       "Of grid and h264: every Nth frame decodes alone, the others need frames before "
+                       "Of grids and h264: every Nth frame decodes alone, the others need frames before "
                        "(default 1: all do; with "
-                       "h264 30)")
+                       "metric, visual or h264 30)")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         app.add_option("--draco-speed", f->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest (default 4)")

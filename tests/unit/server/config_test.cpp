@@ -47,6 +47,7 @@ draco_speed = 4
 geometry = "draco-mesh"
 step_bits = 5
 key_interval = 15
+bound = 0.25
 dense = true
 fill_holes = 3
 )");
@@ -68,6 +69,7 @@ fill_holes = 3
   EXPECT_EQ(r.config.geometry, "draco-mesh");
   EXPECT_EQ(r.config.step_bits, 5);
   EXPECT_EQ(r.config.key_interval, 15);
+  EXPECT_EQ(r.config.bound_px, 0.25);
   EXPECT_TRUE(r.config.surface.dense);
   EXPECT_EQ(r.config.surface.fill_holes, 3);
 }
@@ -184,8 +186,10 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"holes_over", "fill_holes = 17", "fill_holes must be a whole number from 0 to 16"},
         Wrong{"speed_over", "draco_speed = 10", "draco_speed must be a whole number from 0 to 9"},
         Wrong{"speed_huge", "draco_speed = 4294967297", "draco_speed must be a whole number"},
-        Wrong{"geometry_unknown", "geometry = \"mesh\"", "geometry must be grid or draco-mesh in quotes"},
+        Wrong{"geometry_unknown", "geometry = \"mesh\"",
+              "geometry must be grid, metric, visual or draco-mesh in quotes"},
         Wrong{"steps_over", "step_bits = 9", "step_bits must be a whole number from 0 to 8"},
+        Wrong{"bound_over", "bound = 9", "bound must be a number of pixels from 0.01 to 8"},
         Wrong{"keys_none", "key_interval = 0", "key_interval must be a whole number from 1 to 1000"},
         Wrong{"unknown", "quality = 80", "quality is no setting; there are: source stream"},
         Wrong{"texture_unknown", "texture = \"gif\"", "texture must be jpeg, webp, png or h264"},
@@ -226,6 +230,21 @@ TEST(Config, MissingFileAndFolder) {
   status = read_config(folder.path(), config);  // a folder is no configuration
   ASSERT_FALSE(status);
   EXPECT_NE(status.error().message.find(folder.path().string()), std::string::npos);
+}
+
+TEST(Config, AGeometryProfileSaysWhatIsNotSaidOtherwise) {
+  ServeConfig config;
+  EXPECT_EQ(encode_options(config).key_interval, 1);
+  config.geometry = "metric";
+  EXPECT_TRUE(encode_options(config).estimate);
+  EXPECT_EQ(encode_options(config).key_interval, 30);
+  EXPECT_EQ(encode_options(config).bound_px, 0);
+  config.geometry = "visual";
+  EXPECT_EQ(encode_options(config).bound_px, 0.5F);
+  config.bound_px = 0.25;
+  config.key_interval = 7;
+  EXPECT_EQ(encode_options(config).bound_px, 0.25F);
+  EXPECT_EQ(encode_options(config).key_interval, 7);
 }
 
 }  // namespace
