@@ -16,8 +16,8 @@ struct SurfaceError {
 
 /// Over the decoded vertices: the distance to the encoded vertex that it is, which is the one at its place on
 /// the grid of stripes and lines, since codecs may permute and leave out vertices. The place of a decoded
-/// vertex is where its position is seen and lit, whatever its codec says; `encoded` must have its grid. Fails
-/// where nothing was encoded at a decoded vertex's place.
+/// vertex follows from its position and, where it has them, texture coordinates, whatever grid its codec
+/// says; `encoded` must have its grid. Fails where nothing was encoded at a decoded vertex's place.
 Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decoded, const Rig& rig,
                                    const Pattern& pattern);
 

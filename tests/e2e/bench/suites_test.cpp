@@ -102,6 +102,13 @@ TEST(Bench, Codec) {
     EXPECT_GT(r["rms_mm"]["max"], 0) << name;
   }
   EXPECT_EQ(raw["max_mm"]["max"], 0);
+  for (const char* stage : {"gather", "code", "decode", "surface"})
+    expect_spread(report["ns_per_vertex"][stage], 6, stage);
+  for (const char* name : {"raw-float32", "metric", "visual", "draco-mesh-s0-8bit"}) {
+    expect_spread(row(report, name)["truth_um_per_m"], 3, name);  // once a frame
+    EXPECT_LT(row(report, name)["truth_outliers"]["max"], 0.1) << name;
+  }
+  EXPECT_LT(row(report, "visual")["bytes"]["max"], row(report, "grid-1/16px")["bytes"]["min"]);
   for (const std::string bits : {"12bit", "pipeline"}) {
     for (const std::string speed : {"0", "4", "5", "7", "9"}) {
       const std::string name = "draco-mesh-s" + speed + "-" + bits;
