@@ -38,7 +38,7 @@ struct GridEncoder::Slice {
   Counts<kResidualTables> residual_counts;
   Counts<kSigmaTables> sigma_counts;
   std::vector<std::uint8_t> there[2], key_there, good[2], sizes, contexts, kinds;
-  std::vector<std::uint16_t> line_codes;
+  std::vector<std::uint16_t> line_codes, words;
   std::vector<std::int32_t> expected, absent;
   Bytes bytes;
 
@@ -282,11 +282,11 @@ void GridEncoder::Slice::write(const rans::EncoderTables& control_tables,
                                const rans::EncoderTables* sigma_tables) {
   Bytes streams;
   std::array<std::size_t, 3> ends{};
-  rans::encode(control, control_tables, 1, streams);
+  rans::encode(control, control_tables, 1, words, streams);
   ends[0] = streams.size();
-  rans::encode(residuals, residual_tables, rans::kLanes, streams);
+  rans::encode(residuals, residual_tables, rans::kLanes, words, streams);
   ends[1] = streams.size();
-  if (sigma_tables != nullptr) rans::encode(sigmas, *sigma_tables, rans::kLanes, streams);
+  if (sigma_tables != nullptr) rans::encode(sigmas, *sigma_tables, rans::kLanes, words, streams);
   ends[2] = streams.size();
   const Bytes rest = raw.finish();
   bytes.clear();

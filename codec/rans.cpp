@@ -271,13 +271,14 @@ void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> 
     for (std::size_t c = 0; c < counts.size(); ++c) counts[c] += turns[t * counts.size() + c];
 }
 
-void encode(const Rows& rows, const EncoderTables& tables, int lanes, Bytes& out) {
+void encode(const Rows& rows, const EncoderTables& tables, int lanes, std::vector<std::uint16_t>& words,
+            Bytes& out) {
   const std::size_t count = rows.codes.size();
   const EncoderSymbol* symbols = tables.symbols();
   const std::size_t states_bytes = sizeof(std::uint32_t) * static_cast<std::size_t>(lanes);
   const std::size_t at = out.size();
   // Each symbol writes one word at most; put() touches one more.
-  std::vector<std::uint16_t> words(count + 1);
+  if (words.size() < count + 1) words.resize(count + 1);
   std::uint16_t* to = words.data() + words.size();
   States states;
   states.fill(kLow);

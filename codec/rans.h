@@ -122,8 +122,9 @@ struct Rows {
 /// Adds to `counts`, one for each code.
 void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts);
 
-/// Appends the coded rows. `lanes` is 1 or kLanes.
-void encode(const Rows& rows, const EncoderTables& tables, int lanes, Bytes& out);
+/// Appends the coded rows. `lanes` is 1 or kLanes. `words` is scratch memory.
+void encode(const Rows& rows, const EncoderTables& tables, int lanes, std::vector<std::uint16_t>& words,
+            Bytes& out);
 
 /// Any bytes: behind their end zeros are read, and finished() is false.
 class Decoder {

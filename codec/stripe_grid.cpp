@@ -44,15 +44,17 @@ std::uint8_t filled_cell(const GridPoint* at, const Triangle& first, const Trian
   if (first[2] != second[0] || first[0] != second[2]) return 0;
   const std::uint32_t a = key_of(at[first[0]]), b = key_of(at[first[1]]), c = key_of(at[first[2]]),
                       d = key_of(at[second[1]]);
-  // The ring a b c d begins upper left, or else lower left.
-  const bool straight = b - a == kBelow;
-  cell = straight ? a : d;
-  const std::uint32_t to_b = straight ? kBelow : kRight;
-  const std::uint32_t to_c = straight ? kRight : 0U - kBelow;
-  const std::uint32_t to_d = 0U - (straight ? kBelow : kRight);
-  const bool filled = (((b - a) ^ to_b) | ((c - b) ^ to_c) | ((d - c) ^ to_d)) == 0;
-  if (!filled) return 0;
-  return straight ? grid_cell::kStraight : grid_cell::kTurned;
+  // The ring a b c d begins upper left, or else lower left. As masks, since compilers make branches of
+  // choices.
+  const std::uint32_t straight = b - a == kBelow ? ~0U : 0U;
+  const auto choose = [straight](std::uint32_t one, std::uint32_t other) {
+    return (one & straight) | (other & ~straight);
+  };
+  cell = choose(a, d);
+  const std::uint32_t wrong = ((b - a) ^ choose(kBelow, kRight)) | ((c - b) ^ choose(kRight, 0U - kBelow)) |
+                              ((c - d) ^ choose(kBelow, kRight));
+  return wrong != 0 ? std::uint8_t{0}
+                    : static_cast<std::uint8_t>(choose(grid_cell::kStraight, grid_cell::kTurned));
 }
 
 std::int32_t floor_of(float x) {

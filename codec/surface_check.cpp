@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/surface_check.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -18,6 +19,13 @@ bool all_finite(const std::vector<std::array<float, N>>& values) {
   for (std::size_t i = 0; i < N * values.size(); ++i)
     worst |= (std::bit_cast<std::uint32_t>(number[i]) & kExponent) == kExponent ? 1U : 0U;
   return worst == 0;
+}
+
+std::uint32_t largest_index(const std::vector<Triangle>& triangles) {
+  std::uint32_t largest = 0;
+  const std::uint32_t* index = triangles.empty() ? nullptr : triangles.front().data();
+  for (std::size_t i = 0; i < 3 * triangles.size(); ++i) largest = std::max(largest, index[i]);
+  return largest;
 }
 
 /// False, and unchanged, where there is no direction.
@@ -49,11 +57,10 @@ Status check_surface(const Surface& surface) {
   if (!all_finite(surface.positions) || !all_finite(surface.normals) ||
       !all_finite(surface.texture_coordinates))
     return Error{"surface has a position, normal or texture coordinate that is not finite"};
-  for (const Triangle& triangle : surface.triangles)
-    for (const std::uint32_t index : triangle)
-      if (index >= count)
-        return Error{"surface has a triangle on vertex " + std::to_string(index) + " of " +
-                     std::to_string(count)};
+  if (const std::uint32_t largest = largest_index(surface.triangles);
+      !surface.triangles.empty() && largest >= count)
+    return Error{"surface has a triangle on vertex " + std::to_string(largest) + " of " +
+                 std::to_string(count)};
   return {};
 }
 

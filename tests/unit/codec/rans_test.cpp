@@ -32,6 +32,7 @@ TEST(Rans, FrequenciesAddUpWhateverTheLevels) {
 
 TEST(Rans, SymbolsComeBackFromAnyTables) {
   test::Random random(2);
+  std::vector<std::uint16_t> words;
   for (int round = 0; round < 60; ++round) {
     const int lanes = round % 2 == 0 ? 1 : kLanes;
     EncoderTables encoders(3);
@@ -60,7 +61,7 @@ TEST(Rans, SymbolsComeBackFromAnyTables) {
       }
     }
     Bytes bytes;
-    encode(rows, encoders, lanes, bytes);
+    encode(rows, encoders, lanes, words, bytes);
     Decoder decoder(bytes, lanes);
     std::vector<std::uint8_t> got(symbols.size() + 1);
     for (std::size_t r = 0; r < rows.starts.size(); ++r) {
@@ -107,7 +108,8 @@ TEST(Rans, AlphabetsOfTwoKeepTheirOdds) {
       rows.codes.push_back(code_of(0, s));
     }
     Bytes bytes;
-    encode(rows, table, 1, bytes);
+    std::vector<std::uint16_t> words;
+    encode(rows, table, 1, words, bytes);
     Decoder decoder(bytes, 1);
     for (const std::uint8_t s : symbols) ASSERT_EQ(decoder.one(first_frequency(level)), s != 0);
     EXPECT_TRUE(decoder.finished());
