@@ -23,7 +23,7 @@ std::uint32_t sequence_of(const RawSample& sample) {
 }  // namespace
 
 Recorder::Recorder(Options options)
-    : options_(std::move(options)), segments_(options_.file, options_.segments) {}
+    : options_(std::move(options)), segments_(options_.file, options_.recording.segments) {}
 
 Subscriber::Callbacks Recorder::callbacks() {
   Subscriber::Callbacks callbacks;
@@ -84,8 +84,9 @@ Status Recorder::finish() {
 }
 
 void Recorder::add(const RawSample& sample) {
-  if (limit_reached_ || error_) return;
   const bool is_frame = sample.topic == Topic::kFrame;
+  if (error_ && is_frame && !limit_reached_) ++counts_.missed;
+  if (limit_reached_ || error_) return;
   if (is_frame && options_.max_s > 0 && first_frame_ns_ > 0 &&
       seconds(sample.receive_time_ns - first_frame_ns_) >= options_.max_s) {
     limit_reached_ = true;
@@ -128,8 +129,9 @@ void Recorder::add_attachments() {
 }
 
 Status Recorder::open_file() {
-  open_ = options_.segments.split() ? segments_.next() : options_.file;
-  auto writer = RecordingWriter::create(open_, {});
+  open_ = options_.recording.segments.split() ? segments_.next() : options_.file;
+  auto writer =
+      RecordingWriter::create(open_, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
   ++counts_.files;
@@ -146,7 +148,7 @@ Status Recorder::open_file() {
 
 /// At a frame that decodes without those before; where none comes, at twice the limits all the same.
 bool Recorder::segment_ends_before(const RawSample& sample) const {
-  if (!options_.segments.split()) return false;
+  if (!options_.recording.segments.split()) return false;
   const std::uint64_t bytes = writer_->size();
   const double duration_s = seconds(sample.receive_time_ns - segment_ns_);
   return segments_.is_full(bytes, duration_s) &&

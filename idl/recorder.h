@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "base/recording_options.h"
 #include "base/result.h"
 #include "codec/recording.h"
 #include "idl/recording_segments.h"
@@ -30,15 +31,16 @@ class Recorder {
     std::string stream;
     std::uint64_t max_frames = 0;  // 0: no limit
     double max_s = 0;              // after the first frame; 0: no limit
-    SegmentOptions segments;       // where it splits, `file` names them: see RecordingSegments
+    RecordingOptions recording;    // where it splits, `file` names the files: see RecordingSegments
   };
   struct Counts {
     std::uint64_t frames = 0;
-    std::uint64_t lost = 0;
-    std::uint64_t bytes = 0;  // of samples
-    std::uint64_t files = 0;  // begun
-    double duration_s = 0;    // first to last frame
-    bool live = false;        // the stream is there now
+    std::uint64_t lost = 0;    // on the way here
+    std::uint64_t missed = 0;  // that came after writing had failed
+    std::uint64_t bytes = 0;   // of samples
+    std::uint64_t files = 0;   // begun
+    double duration_s = 0;     // first to last frame
+    bool live = false;         // the stream is there now
   };
 
   explicit Recorder(Options options);
