@@ -29,6 +29,7 @@ struct Options {
   double seconds = 0;
   double wait_s = -1;  // below 0: for ever
   std::shared_ptr<RecordingTexts> recording;
+  bool foxglove = false;
   bool json = false;
 };
 
@@ -99,6 +100,7 @@ Status run(Options options, StopSignal& stop) {
                      .stream = options.stream,
                      .max_frames = options.frames,
                      .max_s = options.seconds,
+                     .foxglove = options.foxglove,
                      .recording = *recording});
   auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks());
   if (!subscriber) return subscriber.error();
@@ -139,6 +141,10 @@ Command record_command() {
                        "Seconds to wait for the stream, at first and when it has gone (default: for ever)")
             ->check(number(0, 1e9));
         options->recording = add_recording_flags(app);
+        app.add_flag(
+            "--foxglove", options->foxglove,
+            "Besides, the texture as foxglove.CompressedImage and the surface as foxglove.SceneUpdate, which "
+            "generic viewers show, in many times the bytes");
         app.add_flag("--json", options->json, "Print the result as JSON");
         app.final_callback([options] {
           if (const auto all = recording_options(*options->recording); !all)

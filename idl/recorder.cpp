@@ -99,6 +99,7 @@ void Recorder::add(const RawSample& sample) {
     fail(next_segment(sample.receive_time_ns));
   }
   if (!error_) fail(write(sample));
+  if (!error_ && is_frame && foxglove_) fail(write_for_viewers(sample));
   if (sample.topic == Topic::kInfo) info_sample_ = sample;
   if (error_) return;
   counts_.bytes += sample.cdr.size();
@@ -143,6 +144,10 @@ Status Recorder::open_file() {
     if (!channel) return channel.error();
     channels_[static_cast<std::size_t>(topic)] = *channel;
   }
+  if (!options_.foxglove) return {};
+  auto foxglove = FoxgloveChannels::add_to(*writer_, options_.stream);
+  if (!foxglove) return foxglove.error();
+  foxglove_ = *std::move(foxglove);
   return {};
 }
 
@@ -181,6 +186,16 @@ Status Recorder::write(const RawSample& sample) {
   message.publish_time_ns = sample.source_time_ns;
   message.data = sample.cdr;
   return writer_->write(message);
+}
+
+/// What cannot be decoded, before the first key frame say, is recorded all the same, but not shown.
+Status Recorder::write_for_viewers(const RawSample& frame) {
+  const auto view = read_frame_cdr(frame.cdr);
+  if (!view) return {};
+  const auto decoded = decoder_.decode(view->data);
+  if (!decoded) return {};
+  return foxglove_->write(*writer_, *decoded,
+                          {frame.receive_time_ns, frame.source_time_ns, view->capture_time_ns});
 }
 
 void Recorder::fail(const Status& status) {

@@ -11,6 +11,8 @@
 
 #include "base/recording_options.h"
 #include "base/result.h"
+#include "codec/foxglove.h"
+#include "codec/frame3d_codec.h"
 #include "codec/recording.h"
 #include "idl/recording_segments.h"
 #include "idl/transport.h"
@@ -31,6 +33,7 @@ class Recorder {
     std::string stream;
     std::uint64_t max_frames = 0;  // 0: no limit
     double max_s = 0;              // after the first frame; 0: no limit
+    bool foxglove = false;         // channels besides that generic viewers show: FoxgloveChannels
     RecordingOptions recording;    // where it splits, `file` names the files: see RecordingSegments
   };
   struct Counts {
@@ -66,12 +69,15 @@ class Recorder {
   bool segment_ends_before(const RawSample& sample) const;
   Status next_segment(std::int64_t now_ns);
   Status write(const RawSample& sample);
+  Status write_for_viewers(const RawSample& frame);
   void fail(const Status& status);
 
   const Options options_;
   mutable std::mutex mutex_;
   std::unique_ptr<RecordingWriter> writer_;  // made with the first sample, so that no empty file is left
   std::uint16_t channels_[3] = {};
+  std::optional<FoxgloveChannels> foxglove_;
+  FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
   std::filesystem::path open_;            // the file being written
   std::int64_t segment_ns_ = 0;           // when its first sample was received
