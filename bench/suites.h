@@ -11,5 +11,6 @@ Command codec_suite();
 Command texture_suite();
 Command chain_suite();
 Command peer_suite();
+Command recording_suite();
 
 }  // namespace relievo::bench

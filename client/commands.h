@@ -12,6 +12,7 @@ Command play_command();
 Command info_command();
 Command recover_command();
 Command export_command();
+Command convert_command();
 Command web_command();
 Command keys_command();
 

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "base/time.h"
-#include "idl/cdr.h"
 
 namespace relievo {
 namespace {
@@ -20,11 +19,6 @@ TimeRange range_of(const PlayOptions& options, const RecordedStream& recorded) {
       TimeRange{.from_ns = recorded.summary().start_ns, .to_ns = std::numeric_limits<std::int64_t>::max()});
 }
 
-/// Of samples that are not played: frames may build on the last key frame, none on others.
-bool needed_before(const RawSample& sample) {
-  return sample.topic == Topic::kInfo || (sample.topic == Topic::kFrame && holds_key_frame(sample.cdr));
-}
-
 Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
                  const std::function<Status(const RawSample&)>& publish) {
   const TimeRange range = range_of(options, recorded);
@@ -35,7 +29,7 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
     if (!sample) return sample.error();
     if (!*sample || (*sample)->receive_time_ns > range.to_ns) return {};
     if ((*sample)->receive_time_ns < range.from_ns) {
-      if (!needed_before(**sample)) continue;
+      if (!needed_later(**sample)) continue;
       if (auto status = publish(**sample); !status) return status;
       continue;
     }

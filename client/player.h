@@ -20,8 +20,8 @@ struct PlayOptions {
 };
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or
-/// until stopped. An error of `publish` ends it. Where the range starts between key frames, the one before it
-/// comes first, at once, since what follows builds on it. One thread.
+/// until stopped. An error of `publish` ends it. Where the range starts between key frames, what it
+/// builds on comes first, at once. One thread.
 Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
             const std::function<Status(const RawSample&)>& publish);
 

@@ -5,13 +5,12 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
-#include "cli/quantities.h"
+#include "cli/recording_flags.h"
 #include "client/commands.h"
 #include "client/options.h"
 #include "idl/recorder.h"
@@ -28,8 +27,9 @@ struct Options {
   std::string file;
   std::uint64_t frames = 0;
   double seconds = 0;
-  double wait_s = -1;                                        // below 0: for ever
-  std::string split_size, split_every, keep_size, keep_for;  // quantities; empty: none
+  double wait_s = -1;  // below 0: for ever
+  std::shared_ptr<RecordingTexts> recording;
+  bool foxglove = false;
   bool json = false;
 };
 
@@ -37,29 +37,6 @@ std::string default_file(const std::string& stream) {
   std::string time = utc_text(utc_now_ns());
   std::erase_if(time, [](char c) { return c == '-' || c == ':'; });
   return stream + '-' + time + ".mcap";
-}
-
-// The texts were checked when they were given.
-SegmentOptions segments_of(const Options& options) {
-  SegmentOptions out;
-  if (!options.split_size.empty()) out.split_bytes = parse_bytes(options.split_size).value();
-  if (!options.split_every.empty()) out.split_s = parse_duration_s(options.split_every).value();
-  if (!options.keep_size.empty()) out.keep_bytes = parse_bytes(options.keep_size).value();
-  if (!options.keep_for.empty()) out.keep_s = parse_duration_s(options.keep_for).value();
-  return out;
-}
-
-// Found out before waiting for a stream rather than after.
-Status check_target(const std::filesystem::path& file, bool split) {
-  std::error_code error;
-  if (!split && std::filesystem::exists(file, error)) {
-    return Error{file.string() + " exists already: name another file with --out, or remove it"};
-  }
-  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-  if (!std::filesystem::is_directory(folder, error)) {
-    return Error{folder.string() + " is no folder: make it first, or name another file with --out"};
-  }
-  return {};
 }
 
 std::string lost_note(std::uint64_t lost) {
@@ -115,13 +92,16 @@ void report(const Options& options, const Recorder::Counts& counts) {
 
 Status run(Options options, StopSignal& stop) {
   if (options.file.empty()) options.file = default_file(options.stream);
-  const SegmentOptions segments = segments_of(options);
-  if (auto status = check_target(options.file, segments.split()); !status) return status;
+  const auto recording = recording_options(*options.recording);
+  if (!recording) return recording.error();
+  // Found out before waiting for a stream rather than after.
+  if (auto status = check_recording_target(options.file, recording->segments.split()); !status) return status;
   Recorder recorder({.file = options.file,
                      .stream = options.stream,
                      .max_frames = options.frames,
                      .max_s = options.seconds,
-                     .segments = segments});
+                     .foxglove = options.foxglove,
+                     .recording = *recording});
   auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks());
   if (!subscriber) return subscriber.error();
   const Status watched = watch(options, recorder, stop);
@@ -129,7 +109,10 @@ Status run(Options options, StopSignal& stop) {
   const Status finished = recorder.finish();
   const Recorder::Counts counts = recorder.counts();
   if (!finished) {
-    return finished.error().in("recording stopped after " + std::to_string(counts.frames) + " frames");
+    const std::string missed =
+        counts.missed > 0 ? " and missed " + std::to_string(counts.missed) : std::string();
+    return finished.error().in("recording stopped after " + std::to_string(counts.frames) + " frames" +
+                               missed);
   }
   if (!watched) return watched;
   if (counts.lost > 0) {
@@ -157,28 +140,15 @@ Command record_command() {
         app.add_option("--wait", options->wait_s,
                        "Seconds to wait for the stream, at first and when it has gone (default: for ever)")
             ->check(number(0, 1e9));
-        auto* size = app.add_option("--split-size", options->split_size,
-                                    "Begin a new file, FILE_000001.mcap, where one is as large, e.g. 2GB")
-                         ->type_name("SIZE")
-                         ->check(byte_count());
-        auto* every = app.add_option("--split-every", options->split_every, "or as long, e.g. 10min")
-                          ->type_name("TIME")
-                          ->check(duration());
-        auto* keep_size = app.add_option("--keep-size", options->keep_size,
-                                         "Remove the oldest of these files while all are larger, e.g. 100GB")
-                              ->type_name("SIZE")
-                              ->check(byte_count());
-        auto* keep_for =
-            app.add_option("--keep-for", options->keep_for, "Remove those that ended longer ago, e.g. 7d")
-                ->type_name("TIME")
-                ->check(duration());
+        options->recording = add_recording_flags(app);
+        app.add_flag(
+            "--foxglove", options->foxglove,
+            "Besides, the texture as foxglove.CompressedImage and the surface as foxglove.SceneUpdate, which "
+            "generic viewers show, in many times the bytes");
         app.add_flag("--json", options->json, "Print the result as JSON");
-        app.final_callback([size, every, keep_size, keep_for] {
-          const bool keeps = !keep_size->empty() || !keep_for->empty();
-          if (keeps && size->empty() && every->empty()) {
-            throw CLI::ValidationError("--keep-size, --keep-for",
-                                       "remove whole files: give --split-size or --split-every too");
-          }
+        app.final_callback([options] {
+          if (const auto all = recording_options(*options->recording); !all)
+            throw CLI::ValidationError("--keep-size, --keep-for", all.error().message);
         });
         app.footer(
             "Examples:\n"

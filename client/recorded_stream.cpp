@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 #include "idl/recorder.h"
 
@@ -37,6 +38,14 @@ std::string joined(const std::set<std::string>& names) {
 }
 
 }  // namespace
+
+bool needed_later(const RawSample& sample) {
+  if (sample.topic != Topic::kFrame) return sample.topic == Topic::kInfo;
+  if (holds_key_frame(sample.cdr)) return true;
+  const auto view = read_frame_cdr(sample.cdr);
+  const auto header = view ? read_frame_header(view->data) : Result<FrameHeader>(view.error());
+  return header && header->texture == TextureCodec::kH264;
+}
 
 Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, const std::string& stream) {
   auto reader = RecordingReader::open(file);

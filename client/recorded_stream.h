@@ -15,6 +15,10 @@
 
 namespace relievo {
 
+/// Whether frames after this sample may build on it: it is a key frame, or its texture is video; and
+/// descriptions always. What comes before a range that is to be decoded, and is itself not wanted.
+bool needed_later(const RawSample& sample);
+
 /// One thread.
 class RecordedStream {
  public:

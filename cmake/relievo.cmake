@@ -33,6 +33,9 @@ if(RELIEVO_SANITIZE)
     add_compile_definitions(BOOST_ASIO_DISABLE_FENCED_BLOCK)
   endif()
 endif()
+if(RELIEVO_FUZZ)
+  add_compile_options(-fsanitize=fuzzer-no-link,address -fno-omit-frame-pointer)
+endif()
 
 # relievo_library(NAME SOURCES ... LIBS ... PUBLIC_LIBS ...): a static library of one folder.
 # LIBS are private to it; PUBLIC_LIBS only for folders whose headers are included by this one's headers.

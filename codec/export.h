@@ -7,6 +7,7 @@
 
 #include "base/frame3d.h"
 #include "base/result.h"
+#include "base/stream.h"
 
 namespace relievo {
 
@@ -20,6 +21,9 @@ Status write_ply(const std::filesystem::path& path, const Surface& surface, View
 /// in the texture), _SIGMA and _INTERPOLATED of each vertex where known (floats). Metres, turned by half a
 /// turn about x into glTF's axes: x right, y up, z backward.
 Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jpeg_quality = 90);
+
+/// The bytes of that file.
+Result<Bytes> encode_glb(const Frame3D& frame, int jpeg_quality = 90);
 
 /// Wavefront OBJ in glTF's axes; with a texture also NAME.mtl and NAME.png beside it (written first).
 Status write_obj(const std::filesystem::path& path, const Frame3D& frame);

@@ -154,9 +154,9 @@ void append_chunk(Bytes& out, std::string_view type, std::span<const std::uint8_
 
 }  // namespace
 
-Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jpeg_quality) {
+Result<Bytes> encode_glb(const Frame3D& frame, int jpeg_quality) {
   if (jpeg_quality < 1 || jpeg_quality > 100) return Error{"jpeg_quality is not 1 to 100"};
-  if (auto status = check_surface(frame.surface); !status) return status;
+  if (auto status = check_surface(frame.surface); !status) return status.error();
   Document document;
   document.root["asset"] = {{"version", "2.0"}, {"generator", "relievo " RELIEVO_VERSION}};
   document.root["scene"] = 0;
@@ -164,11 +164,11 @@ Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jp
   document.root["scenes"] =
       json::array({{{"extras", {{"frame", frame.number}, {"time_ns", std::to_string(frame.time_ns)}}}}});
   if (!frame.surface.positions.empty())
-    if (auto status = add_mesh(document, frame, jpeg_quality); !status) return status;
+    if (auto status = add_mesh(document, frame, jpeg_quality); !status) return status.error();
   const std::string text = document.root.dump();
   const std::size_t size = 12 + 8 + text.size() + 3 + 8 + document.binary.size() + 3;
   if (size > std::numeric_limits<std::uint32_t>::max())
-    return Error{"cannot write " + path.string() + ": the frame is too large for a GLB (4 GiB)"};
+    return Error{"the frame is too large for a GLB (4 GiB)"};
   Bytes out{'g', 'l', 'T', 'F'};
   out.reserve(size);
   append(out, std::uint32_t{2});
@@ -176,7 +176,12 @@ Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jp
   append_chunk(out, "JSON", Bytes(text.begin(), text.end()), ' ');
   if (!document.binary.empty()) append_chunk(out, std::string_view("BIN\0", 4), document.binary, 0);
   put(out, 8, static_cast<std::uint32_t>(out.size()));
-  return write_whole_file(path, out);
+  return out;
+}
+
+Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jpeg_quality) {
+  const auto bytes = encode_glb(frame, jpeg_quality);
+  return bytes ? write_whole_file(path, *bytes) : Status(bytes.error().in("cannot write " + path.string()));
 }
 
 }  // namespace relievo

@@ -46,14 +46,16 @@ struct RecordedMessage {
   Bytes data;
 };
 
-/// Writes one file. Chunks are closed and put on the disk (fdatasync) at most `chunk_ns` after their first
-/// message or at `chunk_bytes`, so a crash or a power loss loses at most that much. write() may therefore
-/// wait for the disk: call it from a thread of its own. One thread.
+/// Writes one file. Chunks are closed at most `chunk_ns` after their first message or at `chunk_bytes`, so a
+/// crash loses at most that much; and put on the disk (fdatasync) as `sync_ns` says, so a power loss loses at
+/// most that much more. write() may therefore wait for the disk: call it from a thread of its own. One
+/// thread.
 class RecordingWriter {
  public:
   struct Options {
     std::int64_t chunk_ns = 500'000'000;
     std::size_t chunk_bytes = 4u << 20;
+    std::int64_t sync_ns = 0;  // of the messages' times; 0: each chunk; below 0: only the finished file
   };
   /// Fails, saying why, where the file exists already or cannot be made; never touches an existing file.
   static Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& file,
@@ -64,8 +66,8 @@ class RecordingWriter {
   virtual Result<std::uint16_t> add_channel(const RecordingSchema& schema,
                                             const RecordingChannel& channel) = 0;
   virtual Status add_attachment(const RecordingAttachment& attachment) = 0;
-  /// After a failed write (a full disk) the file is closed with what fits, readable, and every later call
-  /// fails.
+  /// After a failed write (a full disk) the file is closed with what was written before, and its index, for
+  /// which there is always room where the file system can reserve it; every later call fails.
   virtual Status write(const RecordedMessage& message) = 0;
   /// Closes the open chunk where it is older than chunk_ns: call while no messages come.
   virtual Status flush_if_due(std::int64_t now_ns) = 0;

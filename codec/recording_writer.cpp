@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The file grows by whole records only: what a crash cuts off is at most the chunk being written.
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -19,6 +20,10 @@
 namespace relievo {
 namespace {
 
+constexpr std::uint64_t kEmptyIndexBytes = (9 + 4) + (9 + 50) + 5 * (9 + 17) + mcap::kFooterBytes +
+                                           8;  // data end, statistics, offsets, footer, magic
+constexpr std::uint64_t kStatisticsOfChannel = 2 + 8;
+
 class Writer final : public RecordingWriter {
  public:
   Writer(int file, std::filesystem::path path, const Options& options)
@@ -31,6 +36,7 @@ class Writer final : public RecordingWriter {
   Status start() {
     Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
     mcap::append_header(bytes, "relievo " RELIEVO_VERSION);
+    if (auto status = reserve(bytes.size()); !status) return status;
     return write_whole({bytes});
   }
 
@@ -51,6 +57,7 @@ class Writer final : public RecordingWriter {
     const auto id = static_cast<std::uint16_t>(channels_.size());
     const mcap::Channel new_channel{id, schema_id, channel.topic, channel.message_encoding, channel.metadata};
     mcap::append(records, new_channel);
+    index_bytes_ += records.size() + kStatisticsOfChannel;
     if (auto status = write_or_close({records}); !status) return status.error();
     if (is_new) schemas_.push_back(new_schema);
     channels_.push_back(new_channel);
@@ -66,6 +73,7 @@ class Writer final : public RecordingWriter {
                  mcap::Attachment{time, time, attachment.name, attachment.media_type, attachment.data});
     const mcap::AttachmentIndex index{
         offset_, record.size(), time, time, attachment.data.size(), attachment.name, attachment.media_type};
+    index_grows_by(index);
     if (auto status = write_or_close({record}); !status) return status;
     attachments_.push_back(index);
     return {};
@@ -135,6 +143,32 @@ class Writer final : public RecordingWriter {
     return {};
   }
 
+  /// Room on the disk for so many bytes and for the index behind them: whenever the disk is full, the index
+  /// still fits. Where that cannot be asked for (NFS, FAT), what a failed write gives back has to do.
+  Status reserve(std::uint64_t bytes) {
+    const std::uint64_t length = bytes + index_bytes_;
+    rlimit limit{};
+    const bool limited = ::getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+    int failure = limited && offset_ + length > limit.rlim_cur ? EFBIG : 0;
+    if (failure == 0 && can_reserve_ &&
+        ::fallocate(file_, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset_), static_cast<off_t>(length)) !=
+            0) {
+      const bool full = errno == ENOSPC || errno == EDQUOT || errno == EFBIG;
+      failure = full ? errno : 0;
+      can_reserve_ = full;
+    }
+    if (failure == 0) return {};
+    return Error{"cannot write " + path_.string() + ": " + write_failure(failure)};
+  }
+
+  /// The index will be that much longer.
+  template <typename Record>
+  void index_grows_by(const Record& record) {
+    Bytes bytes;
+    mcap::append(bytes, record);
+    index_bytes_ += bytes.size();
+  }
+
   /// All parts or, after a failure, none: the file is cut back to where it was.
   Status write_whole(Parts parts) {
     std::uint32_t crc = crc_;
@@ -163,6 +197,9 @@ class Writer final : public RecordingWriter {
     return error;
   }
   Status write_or_close(Parts parts) {
+    std::uint64_t bytes = 0;
+    for (const auto part : parts) bytes += part.size();
+    if (auto status = reserve(bytes); !status) return fail(status.error());
     if (auto status = write_whole(parts); !status) return fail(status.error());
     return {};
   }
@@ -188,9 +225,9 @@ class Writer final : public RecordingWriter {
       mcap::append(tail, mcap::MessageIndex{channel, entries});
     }
     index.message_index_length = tail.size();
+    index_grows_by(index);
     if (auto status = write_or_close({head, chunk_, tail}); !status) return status;
-    if (::fdatasync(file_) != 0 && errno != EINVAL && errno != EROFS)
-      return fail({"cannot write " + path_.string() + ": " + write_failure(errno)});
+    if (auto status = sync(); !status) return status;
     for (const auto& [channel, entries] : chunk_index_) {
       statistics_.channel_messages[channel].second += entries.size();
       statistics_.messages += entries.size();
@@ -202,6 +239,15 @@ class Writer final : public RecordingWriter {
     chunk_.clear();
     chunk_index_.clear();
     return {};
+  }
+
+  Status sync() {
+    const std::int64_t now_ns = static_cast<std::int64_t>(chunk_header_.end_time);
+    const bool due = now_ns - synced_ns_ >= options_.sync_ns || now_ns < synced_ns_;  // as in flush_if_due()
+    if (options_.sync_ns < 0 || !due) return {};
+    synced_ns_ = now_ns;
+    if (::fdatasync(file_) == 0 || errno == EINVAL || errno == EROFS) return {};
+    return fail({"cannot write " + path_.string() + ": " + write_failure(errno)});
   }
 
   /// Data end, summary, footer and closing magic, at once.
@@ -236,6 +282,7 @@ class Writer final : public RecordingWriter {
   }
 
   Status close_file() {
+    static_cast<void>(::ftruncate(file_, static_cast<off_t>(offset_)));  // gives back what was reserved
     const bool synced = ::fsync(file_) == 0 || errno == EINVAL || errno == EROFS;
     const int sync_error = errno;
     const bool closed = ::close(std::exchange(file_, -1)) == 0;
@@ -250,6 +297,9 @@ class Writer final : public RecordingWriter {
   std::string failure_;  // the first one; empty while all is well
   std::uint64_t offset_ = 0;
   std::uint32_t crc_ = 0;  // of everything before offset_
+  bool can_reserve_ = true;
+  std::uint64_t index_bytes_ = kEmptyIndexBytes;  // what write_index() will take, or a little more
+  std::int64_t synced_ns_ = 0;                    // the end of the last chunk that is on the disk for sure
 
   std::vector<mcap::Schema> schemas_;
   std::vector<mcap::Channel> channels_;

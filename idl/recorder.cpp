@@ -23,7 +23,7 @@ std::uint32_t sequence_of(const RawSample& sample) {
 }  // namespace
 
 Recorder::Recorder(Options options)
-    : options_(std::move(options)), segments_(options_.file, options_.segments) {}
+    : options_(std::move(options)), segments_(options_.file, options_.recording.segments) {}
 
 Subscriber::Callbacks Recorder::callbacks() {
   Subscriber::Callbacks callbacks;
@@ -84,8 +84,9 @@ Status Recorder::finish() {
 }
 
 void Recorder::add(const RawSample& sample) {
-  if (limit_reached_ || error_) return;
   const bool is_frame = sample.topic == Topic::kFrame;
+  if (error_ && is_frame && !limit_reached_) ++counts_.missed;
+  if (limit_reached_ || error_) return;
   if (is_frame && options_.max_s > 0 && first_frame_ns_ > 0 &&
       seconds(sample.receive_time_ns - first_frame_ns_) >= options_.max_s) {
     limit_reached_ = true;
@@ -98,6 +99,7 @@ void Recorder::add(const RawSample& sample) {
     fail(next_segment(sample.receive_time_ns));
   }
   if (!error_) fail(write(sample));
+  if (!error_ && is_frame && foxglove_) fail(write_for_viewers(sample));
   if (sample.topic == Topic::kInfo) info_sample_ = sample;
   if (error_) return;
   counts_.bytes += sample.cdr.size();
@@ -128,8 +130,9 @@ void Recorder::add_attachments() {
 }
 
 Status Recorder::open_file() {
-  open_ = options_.segments.split() ? segments_.next() : options_.file;
-  auto writer = RecordingWriter::create(open_, {});
+  open_ = options_.recording.segments.split() ? segments_.next() : options_.file;
+  auto writer =
+      RecordingWriter::create(open_, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
   ++counts_.files;
@@ -141,12 +144,16 @@ Status Recorder::open_file() {
     if (!channel) return channel.error();
     channels_[static_cast<std::size_t>(topic)] = *channel;
   }
+  if (!options_.foxglove) return {};
+  auto foxglove = FoxgloveChannels::add_to(*writer_, options_.stream);
+  if (!foxglove) return foxglove.error();
+  foxglove_ = *std::move(foxglove);
   return {};
 }
 
 /// At a frame that decodes without those before; where none comes, at twice the limits all the same.
 bool Recorder::segment_ends_before(const RawSample& sample) const {
-  if (!options_.segments.split()) return false;
+  if (!options_.recording.segments.split()) return false;
   const std::uint64_t bytes = writer_->size();
   const double duration_s = seconds(sample.receive_time_ns - segment_ns_);
   return segments_.is_full(bytes, duration_s) &&
@@ -179,6 +186,16 @@ Status Recorder::write(const RawSample& sample) {
   message.publish_time_ns = sample.source_time_ns;
   message.data = sample.cdr;
   return writer_->write(message);
+}
+
+/// What cannot be decoded, before the first key frame say, is recorded all the same, but not shown.
+Status Recorder::write_for_viewers(const RawSample& frame) {
+  const auto view = read_frame_cdr(frame.cdr);
+  if (!view) return {};
+  const auto decoded = decoder_.decode(view->data);
+  if (!decoded) return {};
+  return foxglove_->write(*writer_, *decoded,
+                          {frame.receive_time_ns, frame.source_time_ns, view->capture_time_ns});
 }
 
 void Recorder::fail(const Status& status) {

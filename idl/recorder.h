@@ -9,7 +9,10 @@
 #include <optional>
 #include <string>
 
+#include "base/recording_options.h"
 #include "base/result.h"
+#include "codec/foxglove.h"
+#include "codec/frame3d_codec.h"
 #include "codec/recording.h"
 #include "idl/recording_segments.h"
 #include "idl/transport.h"
@@ -30,15 +33,17 @@ class Recorder {
     std::string stream;
     std::uint64_t max_frames = 0;  // 0: no limit
     double max_s = 0;              // after the first frame; 0: no limit
-    SegmentOptions segments;       // where it splits, `file` names them: see RecordingSegments
+    bool foxglove = false;         // channels besides that generic viewers show: FoxgloveChannels
+    RecordingOptions recording;    // where it splits, `file` names the files: see RecordingSegments
   };
   struct Counts {
     std::uint64_t frames = 0;
-    std::uint64_t lost = 0;
-    std::uint64_t bytes = 0;  // of samples
-    std::uint64_t files = 0;  // begun
-    double duration_s = 0;    // first to last frame
-    bool live = false;        // the stream is there now
+    std::uint64_t lost = 0;    // on the way here
+    std::uint64_t missed = 0;  // that came after writing had failed
+    std::uint64_t bytes = 0;   // of samples
+    std::uint64_t files = 0;   // begun
+    double duration_s = 0;     // first to last frame
+    bool live = false;         // the stream is there now
   };
 
   explicit Recorder(Options options);
@@ -64,12 +69,15 @@ class Recorder {
   bool segment_ends_before(const RawSample& sample) const;
   Status next_segment(std::int64_t now_ns);
   Status write(const RawSample& sample);
+  Status write_for_viewers(const RawSample& frame);
   void fail(const Status& status);
 
   const Options options_;
   mutable std::mutex mutex_;
   std::unique_ptr<RecordingWriter> writer_;  // made with the first sample, so that no empty file is left
   std::uint16_t channels_[3] = {};
+  std::optional<FoxgloveChannels> foxglove_;
+  FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
   std::filesystem::path open_;            // the file being written
   std::int64_t segment_ns_ = 0;           // when its first sample was received

@@ -56,7 +56,7 @@ bool RecordingSegments::is_full(std::uint64_t bytes, double duration_s) const {
 }
 
 Status RecordingSegments::remove_old(const fs::path& open) const {
-  if (options_.keep_bytes == 0 && options_.keep_s <= 0) return {};
+  if (!options_.keep()) return {};
   std::vector<fs::path> files = there();
   std::erase_if(files, [&](const fs::path& f) { return f.filename() == open.filename(); });
   std::error_code error, failed;
@@ -85,6 +85,16 @@ Status RecordingSegments::remove_old(const fs::path& open) const {
   }
   return failed ? Status(Error{"cannot remove the old recording " + kept.string() + ": " + failed.message()})
                 : Status();
+}
+
+Status check_recording_target(const fs::path& file, bool split) {
+  std::error_code error;
+  if (!split && fs::exists(file, error))
+    return Error{"cannot record to " + file.string() + ": it exists already; give another name or remove it"};
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error))
+    return Error{"cannot record to " + file.string() + ": there is no folder " + folder.string()};
+  return {};
 }
 
 }  // namespace relievo

@@ -7,18 +7,10 @@
 #include <filesystem>
 #include <vector>
 
+#include "base/recording_options.h"
 #include "base/result.h"
 
 namespace relievo {
-
-struct SegmentOptions {
-  std::uint64_t split_bytes = 0;  // a file ends when it is as large; 0: no limit
-  double split_s = 0;             // or as long; 0: no limit
-  std::uint64_t keep_bytes = 0;   // of all files together, the oldest go; 0: all stay
-  double keep_s = 0;              // files that ended longer ago go; 0: all stay
-
-  bool split() const { return split_bytes > 0 || split_s > 0; }
-};
 
 /// The files face_000000.mcap, face_000001.mcap ... beside `face.mcap`. The file system is all it remembers:
 /// a recorder that is started again goes on counting. One thread.
@@ -41,5 +33,9 @@ class RecordingSegments {
   const std::filesystem::path file_;
   const SegmentOptions options_;
 };
+
+/// Fails where `file` cannot be recorded to, found out before anything is received: it exists already (unless
+/// it is to be split, which names other files), or its folder does not.
+Status check_recording_target(const std::filesystem::path& file, bool split);
 
 }  // namespace relievo

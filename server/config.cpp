@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/quantities.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "server/camera_flags.h"
@@ -34,6 +35,16 @@ class Reader {
       else
         refuse(*node, key, "must be a string in quotes");
     }
+  }
+  /// Text that the flag of that name takes.
+  void checked(std::string_view key, const ValueCheck& check, std::string& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    if (!value) return refuse(*node, key, "must be a string in quotes");
+    if (const std::string wrong = check(*value); !wrong.empty())
+      return refuse(*node, key, "is wrong: " + wrong);
+    out = *value;
   }
   void decoder(std::string_view key, Decoder& out) {
     const toml::node* node = take(key);
@@ -194,6 +205,14 @@ void read_camera(Reader& reader, CameraOptions& camera) {
   reader.controls("controls", camera.controls);
 }
 
+void read_recording(Reader& reader, RecordingTexts& recording) {
+  reader.checked("split_size", byte_count(), recording.split_size);
+  reader.checked("split_every", duration(), recording.split_every);
+  reader.checked("keep_size", byte_count(), recording.keep_size);
+  reader.checked("keep_for", duration(), recording.keep_for);
+  reader.checked("sync", sync_policy(), recording.sync);
+}
+
 }  // namespace
 
 EncodeOptions encode_options(const ServeConfig& config) {
@@ -249,6 +268,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   if (const auto frames = reader.integer("key_interval", 1, 1000))
     config.key_interval = static_cast<int>(*frames);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
+  reader.table("recording", [&](Reader& recording) { read_recording(recording, config.recording); });
   reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
   return reader.finish();
 }

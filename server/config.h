@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/camera_options.h"
+#include "cli/recording_flags.h"
 #include "codec/frame3d_codec.h"
 
 namespace relievo {
@@ -26,6 +27,7 @@ struct ServeConfig {
   std::string keys;                    // as DomainOptions::keys
   std::string web = "127.0.0.1:8080";  // "none": no gateway
   std::string record;                  // empty: not recorded
+  RecordingTexts recording;            // in the table [recording]
   std::optional<std::uint64_t> frames;
   bool loop = false;
   bool fast = false;

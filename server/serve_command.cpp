@@ -63,15 +63,12 @@ struct Recording {
   std::unique_ptr<Subscriber> subscriber;
 
   Status start(const ServeConfig& config, const std::string& stream, const Publisher& publisher) {
-    if (std::filesystem::exists(config.record)) {
-      return Error{config.record + " exists already: name another file with --record, or remove it"};
-    }
+    const auto options = recording_options(config.recording);
+    if (!options) return options.error();
     // The recorder makes the file with the first sample; that it cannot should be said before.
-    const std::filesystem::path folder = std::filesystem::absolute(config.record).parent_path();
-    if (!std::filesystem::is_directory(folder)) {
-      return Error{"cannot record to " + config.record + ": there is no folder " + folder.string()};
-    }
-    recorder.emplace(Recorder::Options{.file = config.record, .stream = stream});
+    if (const Status target = check_recording_target(config.record, options->segments.split()); !target)
+      return target;
+    recorder.emplace(Recorder::Options{.file = config.record, .stream = stream, .recording = *options});
     auto created = Subscriber::create(domain_options(config), stream, recorder->callbacks());
     if (!created) return created.error();
     subscriber = *std::move(created);
@@ -94,9 +91,10 @@ struct Recording {
     const Status done = recorder->finish();
     const Recorder::Counts counts = recorder->counts();
     if (!done)
-      return done.error().in("the recording stopped after " + std::to_string(counts.frames) + " frames");
+      return done.error().in("the recording stopped after " + std::to_string(counts.frames) +
+                             " frames; the " + std::to_string(counts.missed) + " after them are not in it");
     log_info("recorded " + std::to_string(counts.frames) + " frames, " + std::to_string(counts.lost) +
-             " lost");
+             " lost" + (counts.files > 1 ? ", in " + std::to_string(counts.files) + " files" : ""));
     return {};
   }
 };
@@ -194,6 +192,7 @@ struct Flags {
   std::optional<std::string> config, source, stream, interface, keys, web, record;
   std::optional<std::string> decoder, geometry, texture;
   std::string scheme;
+  std::shared_ptr<RecordingTexts> recording;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<double> bound_px;
   std::optional<std::uint64_t> frames;
@@ -215,6 +214,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   set(flags.keys, config.keys);
   set(flags.web, config.web);
   set(flags.record, config.record);
+  config.recording = merged(*flags.recording, std::move(config.recording));
   set(flags.domain, config.domain);
   set(flags.threads, config.threads);
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
@@ -267,6 +267,7 @@ Command serve_command() {
             ->check(listen_address(true));
         app.add_option("--record", f->record, "Record the stream into this new .mcap file")
             ->type_name("FILE");
+        f->recording = add_recording_flags(app);
         app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
         app.add_option("--decoder", f->decoder,
                        "ordered (default: more exact) or paper (as published: three times as fast)")

@@ -81,7 +81,7 @@ double least_spacing(const std::vector<cv::Point2f>& corners, const std::vector<
   for (std::size_t i = 0; i < index.size(); ++i) at[index[i]] = corners[i];
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [i, place] : at) {
-    const auto look = [&](int j) {
+    const auto look = [&, place = place](int j) {  // clang before 16 captures no binding by itself
       if (const auto found = at.find(j); found != at.end())
         least = std::min(least, cv::norm(found->second - place));
     };

@@ -392,6 +392,76 @@ TEST(RecordPlay, WebServesARecordingInALoop) {
   EXPECT_EQ(web.wait(), 0) << web.err();
 }
 
+TEST(RecordPlay, ARecordingIsCodedAnew) {
+  const test::TempFolder folder;
+  const std::string original = folder / "fine.mcap";
+  const auto served = test::run(
+      {program("relievo-server"), "serve", "--source", "sim:plane,width=160,height=120,stripes=30", "--web",
+       "none", "--domain", kDomain, "--interface", "lo", "--fast", "--frames", "12", "--record", original});
+  ASSERT_EQ(served.status, 0) << served.err;
+  const auto frames = info(original)["frames"].get<int>();
+  ASSERT_GT(frames, 8);
+  const auto convert = [&](const std::string& from, const std::string& to, std::vector<std::string> more) {
+    more.insert(more.begin(), {program("relievo"), "convert", from, "--out", folder / to, "--json"});
+    return test::run(more);
+  };
+  const auto coarse =
+      convert(original, "coarse.mcap", {"--step-bits", "2", "--key-interval", "4", "--from", "0"});
+  ASSERT_EQ(coarse.status, 0) << coarse.err;
+  const auto result = nlohmann::json::parse(coarse.out);
+  EXPECT_EQ(result["frames"], frames);
+  EXPECT_LT(result["bytes_after"], result["bytes_before"]);
+  EXPECT_EQ(info(folder / "coarse.mcap")["geometry_codecs"], nlohmann::json({"grid"}));
+  EXPECT_EQ(info(folder / "coarse.mcap")["mean_vertices"], info(original)["mean_vertices"]);
+  const auto exported = test::run({program("relievo"), "export", folder / "coarse.mcap", "--out",
+                                   folder / "ply", "--frames", "6:7", "--json"});
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  EXPECT_EQ(nlohmann::json::parse(exported.out)["frames"], 2);
+
+  const auto mesh = convert(original, "mesh.mcap", {"--geometry", "draco-mesh"});
+  ASSERT_EQ(mesh.status, 0) << mesh.err;
+  EXPECT_EQ(info(folder / "mesh.mcap")["geometry_codecs"], nlohmann::json({"draco-mesh"}));
+  const auto back = convert(folder / "mesh.mcap", "back.mcap", {"--geometry", "grid"});
+  EXPECT_EQ(back.status, 1);
+  EXPECT_THAT(back.err, HasSubstr("can only be coded as draco-mesh"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "back.mcap"));
+}
+
+/// From the live stream, and from a recording of it.
+TEST(RecordPlay, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@foxglove/schemas")) {
+    GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
+  }
+  const test::TempFolder folder;
+  {
+    test::Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
+    const auto done = test::run(
+        on_loopback({"record", "face", "--out", folder / "live.mcap", "--frames", "9", "--foxglove"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  const auto done = test::run({program("relievo"), "convert", folder / "live.mcap", "--out",
+                               folder / "part.mcap", "--frames", "3:6", "--foxglove", "--json"});
+  ASSERT_EQ(done.status, 0) << done.err;
+  EXPECT_EQ(nlohmann::json::parse(done.out)["frames"], 4);
+  const auto live = recorded_frames(folder / "live.mcap");
+  const auto part = recorded_frames(folder / "part.mcap");
+  ASSERT_EQ(live.size(), 9u);
+  EXPECT_EQ(part, (std::vector<Bytes>{live.begin() + 3, live.begin() + 7})) << "as they were";
+  for (const auto& [file, count] : {std::pair{"live.mcap", 9}, std::pair{"part.mcap", 4}}) {
+    const auto checked =
+        test::run({"/usr/bin/env", "node", js / "check_foxglove.mjs", folder / file, folder.path().string()});
+    ASSERT_EQ(checked.status, 0) << checked.err;
+    const auto counts = nlohmann::json::parse(checked.out);
+    EXPECT_EQ(counts["foxglove::CompressedImage"], count);
+    EXPECT_EQ(counts["foxglove::SceneUpdate"], count);
+    const auto glb = test::run({"/usr/bin/env", "node", js / "validate_glb.mjs", folder / "last.glb"});
+    EXPECT_EQ(glb.status, 0) << glb.err;
+    const auto whole = test::run({"/usr/bin/env", "node", js / "validate.mjs", folder / file});
+    EXPECT_EQ(whole.status, 0) << whole.err;
+  }
+}
+
 TEST(RecordPlay, OtherMcapReadersDecodeEverySample) {
   const std::filesystem::path js = RELIEVO_MCAP_JS;
   if (!std::filesystem::exists(js / "node_modules/@mcap/core")) {

@@ -126,6 +126,15 @@ TEST(Bench, Codec) {
   }
 }
 
+TEST(Bench, Recording) {
+  const Json report = report_of(
+      {"recording", "--source", kSource, "--minutes", "0.5", "--key-interval", "6", "--seeks", "7"});
+  ASSERT_TRUE(report.is_object());
+  expect_spread(report["open_ms"], 9, "open_ms");
+  EXPECT_GT(report["file_mb"], 0.1);
+  for (const char* from : {"cached", "from disk"}) expect_spread(row(report, from)["seek_ms"], 7, from);
+}
+
 TEST(Bench, Texture) {
   const Json report = report_of({"texture", "--source", kSource, "--frames", "3", "--rounds", "2"});
   ASSERT_TRUE(report.is_object());

@@ -48,9 +48,29 @@ TEST_F(ServerRecording, OntoAFullDisk) {
   EXPECT_EQ(process.wait(), 1) << process.err();
   ASSERT_EQ(errors(process.err()).size(), 1U) << process.err();
   EXPECT_NE(errors(process.err())[0].find(file_.string()), std::string::npos) << process.err();
+  EXPECT_NE(errors(process.err())[0].find("after them are not in it"), std::string::npos) << process.err();
   if (fs::exists(file_)) expect_readable();
   for (const std::string& name : names_in(folder_.path()))
     EXPECT_TRUE(name == "take" || name == "out.mcap") << name;
+}
+
+TEST_F(ServerRecording, InFilesThatAreReadAlone) {
+  const Finished done = run(serve(source_, {"--loop", "--fast", "--frames", "60", "--record", file_.string(),
+                                            "--split-size", "40kB", "--sync", "1s"}));
+  ASSERT_EQ(done.status, 0) << done.err;
+  EXPECT_NE(done.err.find(" files"), std::string::npos) << done.err;
+  const std::set<std::string> names = names_in(folder_.path());
+  ASSERT_TRUE(names.contains("out_000000.mcap") && names.contains("out_000001.mcap")) << done.err;
+  EXPECT_FALSE(names.contains("out.mcap"));
+  for (const char* name : {"out_000000.mcap", "out_000001.mcap"}) {
+    const Finished info = run({program("relievo").string(), "info", (folder_.path() / name).string()});
+    EXPECT_EQ(info.status, 0) << info.err;
+    EXPECT_NE(info.out.find("16 stripes"), std::string::npos) << "described in each: " << info.out;
+  }
+}
+
+TEST_F(ServerRecording, KeepingWithoutSplittingIsRefused) {
+  expect_one_error(run(serve(source_, {"--record", file_.string(), "--keep-for", "1h"})), "--split-every");
 }
 
 TEST_F(ServerRecording, EndsWholeOnASignal) {

@@ -2,7 +2,10 @@
 #include "codec/recording.h"
 
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -380,8 +383,54 @@ TEST(RecordingFault, AFullDiskEndsTheRecordingReadable) {
     EXPECT_GE(back.messages.size(), 10u);
     EXPECT_EQ(back.messages.size() % 5, 0u);
     EXPECT_EQ(reader->summary().lost_bytes, 0u) << "cut back to whole records";
+    EXPECT_FALSE(reader->summary().recovered) << "there was room for the index";
     EXPECT_LE(std::filesystem::file_size(file), limit);
   }
+}
+
+/// A file system of its own, that only this process sees, and nothing left behind.
+bool mount_small_disk(const std::filesystem::path& folder, const char* size) {
+  return ::unshare(CLONE_NEWNS) == 0 && ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+         ::mount("none", folder.c_str(), "tmpfs", 0, size) == 0;
+}
+
+/// 0: it ended whole, with its index, and says why.
+int record_until_full(const std::filesystem::path& file, std::size_t message_bytes) {
+  auto writer = RecordingWriter::create(file, {.chunk_ns = 5 * kStep_ns});
+  if (!writer || !(*writer)->add_channel(schema(), channel("t"))) return 2;
+  int written = 0;
+  while (written < 10000 && (*writer)->write(message(0, written, message_bytes)).ok()) ++written;
+  const Status ended = (*writer)->finish();
+  if (ended.ok() || ended.error().message.find("no space left") == std::string::npos) return 3;
+  const auto reader = RecordingReader::open(file);
+  if (!reader || (*reader)->summary().recovered) return 4;
+  const ReadBack back = read_all(**reader);
+  const auto missing = static_cast<std::size_t>(written) - back.messages.size();
+  return back.errors.empty() && back.messages.size() > 20 && missing <= 5 ? 0 : 5;
+}
+
+TEST(RecordingFault, ADiskThatFillsUpLeavesRoomForTheIndex) {
+  constexpr int kNoSmallDisk = 77;
+  for (const std::size_t message_bytes : {90u, 1000u, 7000u}) {
+    test::TempFolder folder;
+    const pid_t child = fork();
+    if (child == 0)
+      _exit(mount_small_disk(folder.path(), "size=1m") ? record_until_full(folder / "a.mcap", message_bytes)
+                                                       : kNoSmallDisk);
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    if (WEXITSTATUS(status) == kNoSmallDisk) GTEST_SKIP() << "may not mount a small file system here";
+    EXPECT_EQ(WEXITSTATUS(status), 0) << message_bytes;
+  }
+}
+
+TEST(Recording, ReservedRoomIsGivenBack) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 200, 3000);
+  struct stat info {};
+  ASSERT_EQ(::stat((folder / "a.mcap").c_str(), &info), 0);
+  EXPECT_LE(info.st_blocks * 512, info.st_size + 64 * 1024);
 }
 
 TEST(RecordingFault, NoRoomAtAllLeavesNoFile) {

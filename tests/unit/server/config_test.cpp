@@ -74,6 +74,31 @@ fill_holes = 3
   EXPECT_EQ(r.config.surface.fill_holes, 3);
 }
 
+TEST(Config, ARecordingsTable) {
+  const Read r = read(R"(record = "a.mcap"
+[recording]
+split_size = "2GB"
+split_every = "10min"
+keep_size = "100GB"
+keep_for = "7d"
+sync = "5s"
+)");
+  ASSERT_TRUE(r.status) << r.status.error().message;
+  const auto options = recording_options(r.config.recording);
+  ASSERT_TRUE(options) << options.error().message;
+  EXPECT_EQ(options->segments.split_bytes, 2'000'000'000u);
+  EXPECT_EQ(options->segments.split_s, 600);
+  EXPECT_EQ(options->segments.keep_bytes, 100'000'000'000u);
+  EXPECT_EQ(options->segments.keep_s, 7 * 86400);
+  EXPECT_EQ(options->sync_s, 5);
+  const auto flags_win = recording_options(merged({.keep_for = "1h", .sync = "none"}, r.config.recording));
+  EXPECT_EQ(flags_win->segments.keep_s, 3600);
+  EXPECT_EQ(flags_win->segments.split_s, 600);
+  EXPECT_LT(flags_win->sync_s, 0);
+  EXPECT_FALSE(recording_options({.keep_size = "1GB"}).ok()) << "nothing ends that could be removed";
+  EXPECT_EQ(recording_options({.sync = "chunk"})->sync_s, 0);
+}
+
 TEST(Config, ACamerasTable) {
   const Read r = read(R"(source = "v4l2:/dev/video0"
 [camera]
@@ -206,6 +231,10 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"camera_control", "camera = {controls = {gain = 1.5}}",
               "gain must be a whole number, true, false"},
         Wrong{"camera_controls", "camera = {controls = 7}", "controls must be a table of controls"},
+        Wrong{"recording_split", "recording = {split_size = \"big\"}",
+              "split_size is wrong: 'big' is no size"},
+        Wrong{"recording_sync", "recording = {sync = \"often\"}", "sync is wrong: 'often' is neither chunk"},
+        Wrong{"recording_number", "recording = {keep_for = 7}", "keep_for must be a string in quotes"},
         Wrong{"unknown_table", "[server]", "server is no setting"}),
     [](const auto& wrong) { return wrong.param.name; });
 

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "cli/checks.h"
+#include "cli/progress.h"
+#include "client/commands.h"
+#include "client/recorded_stream.h"
+#include "client/time_range.h"
+#include "codec/foxglove.h"
+#include "codec/frame3d_codec.h"
+#include "codec/geometry_profile.h"
+#include "idl/cdr.h"
+
+namespace relievo {
+namespace {
+
+struct Options {
+  std::string file, stream;
+  std::filesystem::path out;
+  std::shared_ptr<RangeOptions> range;
+  std::optional<std::string> geometry;
+  std::optional<int> step_bits, key_interval, draco_speed, texture_quality;
+  bool foxglove = false;
+  bool json = false;
+
+  /// Else frames stay as they are.
+  bool encode() const { return geometry || step_bits || key_interval || draco_speed || texture_quality; }
+};
+
+EncodeOptions encode_options(const Options& options) {
+  EncodeOptions out{.geometry = GeometryCodec::kGrid, .step_bits = 6};  // as serve has them
+  if (options.geometry) set_geometry_profile(*options.geometry, out);
+  const auto set = [](const auto& given, auto& field) { field = given.value_or(field); };
+  set(options.step_bits, out.step_bits);
+  set(options.key_interval, out.key_interval);
+  set(options.draco_speed, out.draco_speed);
+  set(options.texture_quality, out.texture_quality);
+  return out;
+}
+
+struct Converted {
+  std::uint64_t frames = 0;
+  std::uint64_t unreadable = 0;                     // and left out
+  std::uint64_t bytes_before = 0, bytes_after = 0;  // of frames
+};
+
+/// Sample after sample from one file into another.
+class Conversion {
+ public:
+  Conversion(const Options& options, RecordedStream& recorded) : options_(options), recorded_(recorded) {}
+
+  Status begin() {
+    if (options_.encode()) {
+      const auto described = recorded_.find_info();
+      const auto info = described && *described ? read_info_cdr((*described)->cdr)
+                                                : Result<StreamInfo>(Error{"it is missing"});
+      if (!info)
+        return Error{options_.file + ": frames cannot be coded anew without the stream's description: " +
+                     info.error().message};
+      encoder_.emplace(info->rig, info->pattern);
+    }
+    auto writer = RecordingWriter::create(options_.out, {.sync_ns = -1});
+    if (!writer) return writer.error();
+    writer_ = *std::move(writer);
+    for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
+      const TopicType& type = topic_type(topic);
+      const auto channel =
+          writer_->add_channel({type.type_name, "omgidl", type.idl},
+                               {type.topic_name, "cdr", type.type_name, {{"stream", recorded_.stream()}}});
+      if (!channel) return channel.error();
+      channels_[topic] = *channel;
+    }
+    for (const RecordingAttachment& attachment : recorded_.summary().attachments)
+      if (auto added = writer_->add_attachment(attachment); !added) return added;
+    if (!options_.foxglove) return {};
+    auto foxglove = FoxgloveChannels::add_to(*writer_, recorded_.stream());
+    if (!foxglove) return foxglove.error();
+    foxglove_ = *std::move(foxglove);
+    return {};
+  }
+
+  /// `wanted` false: before the range, where only what later frames build on counts.
+  Status add(const RawSample& sample, bool wanted) {
+    if (sample.topic != Topic::kFrame) return wanted || needed_later(sample) ? write(sample) : Status();
+    const auto view = read_frame_cdr(sample.cdr);
+    if (!wanted) {
+      if (view) (void)decoder_.remember(view->data);
+      return encoder_ || !needed_later(sample) ? Status() : copy(sample);
+    }
+    if (!encoder_ && !foxglove_) return copy(sample);
+    const auto frame = view ? decoder_.decode(view->data) : Result<Frame3D>(view.error());
+    if (!frame) {
+      ++converted_.unreadable;
+      return {};
+    }
+    if (auto status = encoder_ ? encode(sample, *view, *frame) : copy(sample); !status) return status;
+    if (!foxglove_) return {};
+    return foxglove_->write(*writer_, *frame,
+                            {sample.receive_time_ns, sample.source_time_ns, view->capture_time_ns});
+  }
+
+  Status finish() { return writer_->finish(); }
+  const Converted& converted() const { return converted_; }
+
+ private:
+  Status copy(const RawSample& sample) {
+    ++converted_.frames;
+    converted_.bytes_before += sample.cdr.size();
+    converted_.bytes_after += sample.cdr.size();
+    return write(sample);
+  }
+  Status encode(const RawSample& sample, FrameView view, const Frame3D& frame) {
+    const EncodeOptions wanted = encode_options(options_);
+    const auto bytes = encoder_->encode(frame, wanted);
+    if (!bytes) return bytes.error();
+    const auto header = read_frame_header(*bytes);
+    if (wanted.geometry == GeometryCodec::kGrid && header && header->geometry != wanted.geometry &&
+        header->vertices > 0)
+      return Error{options_.file +
+                   ": the places of its vertices in the grid were not recorded (it is Draco): it can "
+                   "only be coded as draco-mesh"};
+    view.data = *bytes;
+    RawSample coded{sample.topic, sample.stream, sample.source_time_ns, sample.receive_time_ns,
+                    write_frame_cdr(view)};
+    ++converted_.frames;
+    converted_.bytes_before += sample.cdr.size();
+    converted_.bytes_after += coded.cdr.size();
+    return write(coded);
+  }
+  Status write(const RawSample& sample) {
+    const auto view =
+        sample.topic == Topic::kFrame ? read_frame_cdr(sample.cdr) : Result<FrameView>(FrameView{});
+    return writer_->write({channels_[sample.topic], view ? static_cast<std::uint32_t>(view->sequence) : 0,
+                           sample.receive_time_ns, sample.source_time_ns, sample.cdr});
+  }
+
+  const Options& options_;
+  RecordedStream& recorded_;
+  std::unique_ptr<RecordingWriter> writer_;
+  std::map<Topic, std::uint16_t> channels_;
+  std::optional<FrameEncoder> encoder_;
+  std::optional<FoxgloveChannels> foxglove_;
+  FrameDecoder decoder_;
+  Converted converted_;
+};
+
+Status convert(const Options& options, RecordedStream& recorded, Conversion& conversion, StopSignal& stop) {
+  const auto range = find_range(*options.range, recorded);
+  if (!range) return range.error().in(options.file);
+  if (auto begun = conversion.begin(); !begun) return begun;
+  if (auto sought = recorded.seek(range->from_ns); !sought) return sought;
+  Progress progress("convert", "frames", range->frames);
+  while (!stop.stopped()) {
+    const auto sample = recorded.next();
+    if (!sample) return sample.error();
+    if (!*sample || (*sample)->receive_time_ns > range->to_ns) return conversion.finish();
+    if (auto added = conversion.add(**sample, (*sample)->receive_time_ns >= range->from_ns); !added)
+      return added;
+    progress.update(conversion.converted().frames);
+  }
+  return Error{"stopped before the end; nothing was written"};
+}
+
+void report(const Options& options, const Converted& converted, const RecordedStream& recorded) {
+  if (options.json) {
+    const nlohmann::json j = {
+        {"file", options.out.string()},           {"frames", converted.frames},
+        {"unreadable", converted.unreadable},     {"damaged", recorded.damaged()},
+        {"bytes_before", converted.bytes_before}, {"bytes_after", converted.bytes_after}};
+    std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    return;
+  }
+  std::printf("%s: %llu frames\n", options.out.c_str(), static_cast<unsigned long long>(converted.frames));
+  if (converted.unreadable > 0)
+    std::printf("%llu frames could not be decoded and were left out\n",
+                static_cast<unsigned long long>(converted.unreadable));
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  auto recorded = RecordedStream::open(options.file, options.stream);
+  if (!recorded) return recorded.error();
+  if (std::filesystem::exists(options.out))
+    return Error{options.out.string() + " exists already: name another file, or remove it"};
+  Conversion conversion(options, *recorded);
+  if (auto done = convert(options, *recorded, conversion, stop); !done) {
+    std::error_code ignored;
+    std::filesystem::remove(options.out, ignored);
+    return done;
+  }
+  report(options, conversion.converted(), *recorded);
+  return {};
+}
+
+}  // namespace
+
+Command convert_command() {
+  return {
+      "convert", "Write a part of a recording, coded anew, or with channels for generic viewers",
+      [](CLI::App& app) {
+        auto options = std::make_shared<Options>();
+        app.add_option("file", options->file, "Recording; it is not changed")->type_name("FILE")->required();
+        app.add_option("--out", options->out, "New file to write")->type_name("FILE")->required();
+        app.add_option("--stream", options->stream, "Which stream, where the file holds several")
+            ->type_name("NAME");
+        options->range = add_range_options(app);
+        app.add_option("--geometry", options->geometry,
+                       "Code surfaces anew, as " + geometry_profile_names() + "; and textures, as JPEG")
+            ->check([](const std::string& name) {
+              EncodeOptions unused;
+              return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
+            })
+            ->type_name("NAME");
+        app.add_option("--step-bits", options->step_bits, "Of grid: steps of 1/2^N pixel (default 6)")
+            ->check(CLI::Range(0, 8));
+        app.add_option("--key-interval", options->key_interval,
+                       "Of grid: every Nth frame decodes alone (default 1)")
+            ->check(CLI::Range(1, 1000));
+        app.add_option("--draco-speed", options->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest")
+            ->check(CLI::Range(0, 9));
+        app.add_option("--texture-quality", options->texture_quality, "Of textures coded anew (default 80)")
+            ->check(CLI::Range(1, 100));
+        app.add_flag(
+            "--foxglove", options->foxglove,
+            "Besides, the texture as foxglove.CompressedImage and the surface as foxglove.SceneUpdate");
+        app.add_flag("--json", options->json, "Print the result as JSON");
+        app.footer(
+            "Examples:\n"
+            "  relievo convert face.mcap --out part.mcap --from 10 --to 20\n"
+            "  relievo convert face.mcap --out small.mcap --geometry grid --step-bits 4 --key-interval 15\n"
+            "  relievo convert face.mcap --out shown.mcap --foxglove");
+        return [options](StopSignal& stop) { return run(*options, stop); };
+      }};
+}
+
+}  // namespace relievo

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/foxglove.h"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "base/time.h"
+#include "codec/byte_io.h"
+#include "codec/export.h"
+#include "codec/jpeg_texture.h"
+
+namespace relievo {
+namespace {
+
+constexpr int kJpegQuality = 90;
+
+constexpr const char* kImageIdl = R"(module foxglove {
+  struct Time { uint32 sec; uint32 nsec; };
+  struct CompressedImage { Time timestamp; string frame_id; sequence<uint8> data; string format; };
+};
+)";
+
+constexpr const char* kSceneIdl = R"(module foxglove {
+  struct Time { uint32 sec; uint32 nsec; };
+  struct Duration { int32 sec; uint32 nsec; };
+  struct Vector3 { double x; double y; double z; };
+  struct Point3 { double x; double y; double z; };
+  struct Quaternion { double x; double y; double z; double w; };
+  struct Pose { Vector3 position; Quaternion orientation; };
+  struct Color { double r; double g; double b; double a; };
+  struct KeyValuePair { string key; string value; };
+  struct ArrowPrimitive {
+    Pose pose; double shaft_length; double shaft_diameter; double head_length; double head_diameter; Color color;
+  };
+  struct CubePrimitive { Pose pose; Vector3 size; Color color; };
+  struct SpherePrimitive { Pose pose; Vector3 size; Color color; };
+  struct CylinderPrimitive { Pose pose; Vector3 size; double bottom_scale; double top_scale; Color color; };
+  enum LineType { LINE_STRIP, LINE_LOOP, LINE_LIST };
+  struct LinePrimitive {
+    LineType type; Pose pose; double thickness; boolean scale_invariant; sequence<Point3> points; Color color;
+    sequence<Color> colors; sequence<uint32> indices;
+  };
+  struct TriangleListPrimitive {
+    Pose pose; sequence<Point3> points; Color color; sequence<Color> colors; sequence<uint32> indices;
+  };
+  struct TextPrimitive {
+    Pose pose; boolean billboard; double font_size; boolean scale_invariant; Color color; string text;
+  };
+  struct ModelPrimitive {
+    Pose pose; Vector3 scale; Color color; boolean override_color; string url; string media_type;
+    sequence<uint8> data;
+  };
+  enum SceneEntityDeletionType { MATCHING_ID, ALL };
+  struct SceneEntityDeletion { Time timestamp; SceneEntityDeletionType type; string id; };
+  struct SceneEntity {
+    Time timestamp; string frame_id; string id; Duration lifetime; boolean frame_locked;
+    sequence<KeyValuePair> metadata; sequence<ArrowPrimitive> arrows; sequence<CubePrimitive> cubes;
+    sequence<SpherePrimitive> spheres; sequence<CylinderPrimitive> cylinders; sequence<LinePrimitive> lines;
+    sequence<TriangleListPrimitive> triangles; sequence<TextPrimitive> texts; sequence<ModelPrimitive> models;
+  };
+  struct SceneUpdate { sequence<SceneEntityDeletion> deletions; sequence<SceneEntity> entities; };
+};
+)";
+
+/// XCDR version 1, little endian: values are aligned to their size, counted from behind the encapsulation
+/// header.
+class Cdr {
+ public:
+  template <Scalar T>
+  void put(T value) {
+    const std::size_t body = bytes_.size() - kEncapsulationBytes;
+    bytes_.resize(kEncapsulationBytes + (body + sizeof(T) - 1) / sizeof(T) * sizeof(T));
+    append(bytes_, value);
+  }
+  void text(std::string_view text) {
+    put(static_cast<std::uint32_t>(text.size() + 1));
+    bytes_.insert(bytes_.end(), text.begin(), text.end());
+    bytes_.push_back(0);
+  }
+  void octets(const Bytes& octets) {
+    put(static_cast<std::uint32_t>(octets.size()));
+    append_bytes(bytes_, octets);
+  }
+  void time(std::int64_t ns) {
+    ns = std::max<std::int64_t>(ns, 0);
+    put(static_cast<std::uint32_t>(ns / kNanosecondsPerSecond));
+    put(static_cast<std::uint32_t>(ns % kNanosecondsPerSecond));
+  }
+  void empty_sequences(int count) {
+    for (int i = 0; i < count; ++i) put(std::uint32_t{0});
+  }
+  void numbers(std::initializer_list<double> values) {
+    for (const double value : values) put(value);
+  }
+  Bytes take() { return std::move(bytes_); }
+
+ private:
+  static constexpr std::size_t kEncapsulationBytes = 4;
+  Bytes bytes_{0, 1, 0, 0};
+};
+
+Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std::int64_t time_ns) {
+  Bytes jpeg;
+  if (auto status = append_jpeg(frame.texture.view(), kJpegQuality, jpeg); !status) return status.error();
+  Cdr cdr;
+  cdr.time(time_ns);
+  cdr.text(stream);
+  cdr.octets(jpeg);
+  cdr.text("jpeg");
+  return cdr.take();
+}
+
+Result<Bytes> scene_message(const Frame3D& frame, const std::string& stream, std::int64_t time_ns) {
+  const auto glb = encode_glb(frame, kJpegQuality);
+  if (!glb) return glb.error();
+  Cdr cdr;
+  cdr.empty_sequences(1);  // deletions
+  cdr.put(std::uint32_t{1});
+  cdr.time(time_ns);
+  cdr.text(stream);  // coordinate frame
+  cdr.text("surface");
+  cdr.put(std::int32_t{0});  // lives until the next of its name
+  cdr.put(std::uint32_t{0});
+  cdr.put(std::uint8_t{0});  // not locked to its coordinate frame
+  cdr.empty_sequences(8);    // metadata and the other primitives
+  cdr.put(std::uint32_t{1});
+  cdr.numbers({0, 0, 0, 0, 0, 0, 1});  // no translation, no rotation
+  cdr.numbers({1, 1, 1});              // scale
+  cdr.numbers({1, 1, 1, 1});           // colour, not used:
+  cdr.put(std::uint8_t{0});            // the model's own
+  cdr.text("");                        // no address, but data
+  cdr.text("model/gltf-binary");
+  cdr.octets(*glb);
+  return cdr.take();
+}
+
+}  // namespace
+
+Result<FoxgloveChannels> FoxgloveChannels::add_to(RecordingWriter& writer, const std::string& stream) {
+  FoxgloveChannels out;
+  out.stream_ = stream;
+  const auto add = [&](const char* name, const char* idl, const char* topic, std::uint16_t& id) -> Status {
+    const auto channel =
+        writer.add_channel({name, "omgidl", idl}, {topic, "cdr", name, {{"stream", stream}}});
+    if (!channel) return channel.error();
+    id = *channel;
+    return {};
+  };
+  if (auto status = add("foxglove::CompressedImage", kImageIdl, "relievo/image", out.image_); !status)
+    return status.error();
+  if (auto status = add("foxglove::SceneUpdate", kSceneIdl, "relievo/scene", out.scene_); !status)
+    return status.error();
+  return out;
+}
+
+Status FoxgloveChannels::write(RecordingWriter& writer, const Frame3D& frame, const Times& times) const {
+  const auto add = [&](std::uint16_t channel, Result<Bytes> data) -> Status {
+    if (!data) return data.error();
+    const auto sequence = static_cast<std::uint32_t>(frame.number);
+    return writer.write({channel, sequence, times.log_ns, times.publish_ns, *std::move(data)});
+  };
+  if (!frame.texture.empty())
+    if (auto status = add(image_, image_message(frame, stream_, times.capture_ns)); !status) return status;
+  return add(scene_, scene_message(frame, stream_, times.capture_ns));
+}
+
+}  // namespace relievo

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// fuzz_seeds SOURCE_DIR OUT: sound inputs of every fuzz target, OUT/TARGET/*, from the conformance vectors
+// and the writers.
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "codec/byte_io.h"
+#include "codec/mcap_records.h"
+#include "codec/recording.h"
+#include "codec/texture_codec.h"
+#include "idl/cdr.h"
+#include "tests/support/make_surface.h"
+#include "tests/support/striped_scene.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+Bytes read(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return Bytes(std::istreambuf_iterator<char>(in), {});
+}
+void write(const fs::path& file, const Bytes& bytes) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+/// Each vector, those to be refused too, and each sequence of frames that build on one another.
+void frames(const fs::path& conformance, const fs::path& out) {
+  for (const char* folder : {"frame_v1", "grid_v1"}) {
+    for (const auto& entry : fs::directory_iterator(conformance / folder))
+      if (entry.path().extension() == ".rlv")
+        write(out / (std::string(folder) + "_" + entry.path().filename().string()), read(entry.path()));
+  }
+  std::ifstream expected(conformance / "grid_v1" / "expected.json");
+  int number = 0;
+  for (const auto& sequence : nlohmann::json::parse(expected)["sequences"]) {
+    Bytes all;
+    for (const auto& frame : sequence)
+      append_bytes(all, read(conformance / "grid_v1" / frame["file"].get<std::string>()));
+    write(out / ("sequence_" + std::to_string(number++)), all);
+  }
+}
+
+/// So that changes are not all caught by a CRC before they get anywhere.
+Bytes without_crcs(Bytes bytes) {
+  constexpr std::size_t kChunkCrcAt = 24;  // in the record's content, as kFooterCrcAt
+  constexpr std::size_t kFooterCrcAt = 16;
+  std::span<const std::uint8_t> rest = std::span(bytes).subspan(mcap::kMagic.size());
+  while (const auto record = mcap::take_record(rest)) {
+    const auto at = static_cast<std::size_t>(record->content.data() - bytes.data());
+    if (record->op == mcap::Op::kChunk) put(bytes, at + kChunkCrcAt, std::uint32_t{0});
+    if (record->op == mcap::Op::kFooter) put(bytes, at + kFooterCrcAt, std::uint32_t{0});
+  }
+  return bytes;
+}
+
+bool recordings(const Bytes& frame, const fs::path& out) {
+  const test::TempFolder folder;
+  const fs::path file = folder / "a.mcap";
+  {
+    const auto writer = RecordingWriter::create(file, {.chunk_ns = 100});
+    if (!writer) return false;
+    const RecordingSchema schema{"relievo::Frame", "omgidl", "struct Frame {};"};
+    for (const char* topic : {"relievo/frame", "relievo/status"})
+      if (!(*writer)->add_channel(schema, {topic, "cdr", schema.name, {{"stream", "s"}}})) return false;
+    if (!(*writer)->add_attachment({"rig.yaml", "application/yaml", 5, {'a', ':', ' ', '1'}})) return false;
+    for (std::uint16_t i = 0; i < 9; ++i)
+      if (!(*writer)->write({static_cast<std::uint16_t>(i % 2), i, 1000 + 30 * i, 1000, frame})) return false;
+    if (!(*writer)->finish()) return false;
+  }
+  const Bytes whole = read(file);
+  write(out / "whole", whole);
+  write(out / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)});
+  write(out / "no_crcs", without_crcs(whole));
+  return true;
+}
+
+void append_text(Bytes& out, std::string_view text) {
+  append(out, static_cast<std::uint32_t>(text.size() + 1));
+  out.insert(out.end(), text.begin(), text.end());
+  out.push_back(0);
+  out.resize((out.size() + 3) / 4 * 4);
+}
+
+/// As a top-level @appendable struct.
+Bytes sample_of(const Bytes& body) {
+  Bytes out{0, 9, 0, 0};
+  append(out, static_cast<std::uint32_t>(body.size()));
+  append_bytes(out, body);
+  return out;
+}
+
+void append_pinhole(Bytes& out) {
+  constexpr std::uint32_t kBytes = 4 + 4 + (9 + 5) * 8;
+  append(out, kBytes);
+  append(out, std::uint32_t{640});
+  append(out, std::uint32_t{480});
+  for (int i = 0; i < 9 + 5; ++i) append(out, 1.0 + i);
+}
+
+Bytes info_sample() {
+  Bytes rig;
+  append(rig, std::uint32_t{0});
+  append(rig, 29.97);
+  append_pinhole(rig);
+  append_pinhole(rig);
+  for (int i = 0; i < 9 + 3 + 9; ++i) append(rig, 0.5 * i);
+  Bytes pattern;
+  append(pattern, std::uint32_t{2});
+  append(pattern, std::uint32_t{2});
+  append(pattern, std::uint32_t{2});
+  append(pattern, std::uint32_t{0x0201});  // two colours and padding
+  append(pattern, std::uint32_t{3});
+  for (const std::uint32_t stripe : {0U, 1U, 3U}) append(pattern, stripe);
+  Bytes body;
+  append_text(body, "face");
+  append_text(body, "sim:face");
+  append(body, std::int64_t{7});
+  for (const Bytes& part : {rig, pattern}) {
+    append(body, static_cast<std::uint32_t>(part.size()));
+    append_bytes(body, part);
+  }
+  return sample_of(body);
+}
+
+Bytes status_sample() {
+  Bytes body;
+  append_text(body, "face");
+  append(body, std::int64_t{7});
+  append(body, std::uint32_t{1});
+  append_text(body, "fine");
+  append(body, 30.0);
+  for (std::uint64_t i = 0; i < 6; ++i) append(body, i);
+  for (int i = 0; i < 3; ++i) append(body, 1.5 * i);
+  append(body, std::uint32_t{2});                         // filters
+  for (std::uint64_t i = 0; i < 4; ++i) append(body, i);  // those, mixed, regrouped
+  for (int i = 0; i < 2; ++i) {
+    append(body, std::uint32_t{1});
+    append(body, 0.5);
+  }
+  return sample_of(body);
+}
+
+/// As texture.cpp reads them: three pictures of each codec that this build can encode.
+bool textures(const fs::path& out) {
+  for (const auto codec :
+       {TextureCodec::kJpeg, TextureCodec::kWebp, TextureCodec::kPng, TextureCodec::kH264}) {
+    if (!check_texture_codec(codec)) continue;
+    const auto encoder = make_texture_encoder(codec);
+    Bytes bytes{static_cast<std::uint8_t>(codec), 3};
+    append(bytes, std::uint16_t{40});
+    append(bytes, std::uint16_t{24});
+    for (int i = 0; i < 3; ++i) {
+      Bytes section;
+      if (!encoder->encode(test::picture(40, 24).view(), {.quality = 60, .key = i == 0}, section))
+        return false;
+      append(bytes, static_cast<std::uint16_t>(section.size()));
+      append_bytes(bytes, section);
+    }
+    write(out / std::to_string(static_cast<int>(codec)), bytes);
+  }
+  return true;
+}
+
+bool takes(const fs::path& out) {
+  const test::TempFolder folder;
+  if (!test::write_striped_take(test::striped_scene(), folder.path(), 2)) return false;
+  std::uint8_t number = 0;  // in the order of take.cpp
+  for (const char* file :
+       {"rig.yaml", "pattern.yaml", "timestamps.csv", "frames/000000.png", "truth/000000.npy"}) {
+    Bytes bytes{number++};
+    append_bytes(bytes, read(folder / file));
+    write(out / fs::path(file).filename(), bytes);
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace relievo
+
+int main(int argc, char** argv) {
+  using namespace relievo;
+  if (argc != 3) return 2;
+  const fs::path conformance = fs::path(argv[1]) / "tests" / "conformance";
+  const fs::path out = argv[2];
+  const Bytes frame = read(conformance / "grid_v1" / "plain.rlv");
+  frames(conformance, out / "frame");
+  write(out / "cdr" / "frame", write_frame_cdr({"face", 1, 2, 3, 4, frame}));
+  write(out / "cdr" / "info", info_sample());
+  write(out / "cdr" / "status", status_sample());
+  const bool info = read_info_cdr(info_sample()).ok();
+  const bool status = read_status_cdr(status_sample()).ok();
+  const bool made = info && status &&
+                    recordings(write_frame_cdr({"face", 1, 2, 3, 4, frame}), out / "recording") &&
+                    textures(out / "texture") && takes(out / "take");
+  if (!made) std::fprintf(stderr, "a seed cannot be made, or is not sound\n");
+  return made ? 0 : 1;
+}
