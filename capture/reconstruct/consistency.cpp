@@ -49,7 +49,8 @@ constexpr float kAlone_px = 0.1F;         // beside a step, without a prediction
 constexpr float kAtStep_px = 0.25F;       // beside a step, after weighing
 constexpr float kNoisy = 1.2F;            // or, where noise is strong, this many times its part
 constexpr float kGoesOn_px = 0.5F;        // off a line above or below, or the straight through two of them
-constexpr float kAtMost_px = 0.3F;        // elsewhere, for instance where texture spoils it
+constexpr float kAtMost_px = 0.3F;        // elsewhere, for instance where texture spoils it, if it moves
+constexpr float kAtMostStill_px = 0.6F;   // or holds still
 constexpr float kLean_px = 2.5F;          // a boundary hangs together over lines that differ by less
 constexpr float kWidest_px = 40.F;        // and with the next one over less
 constexpr std::int32_t kLeastPiece = 25;  // boundaries; smaller pieces of surface are wrong codes
@@ -249,9 +250,10 @@ std::int32_t ConsistencyCheck::piece_size(std::size_t cell) const {
   return size_[static_cast<std::size_t>(i)];
 }
 
-/// Weighs a suspect boundary's own place against what its neighbours predict. False where it is to be given
+/// Weighs a suspect boundary's own place against what its neighbours predict. Nothing where it is to be given
 /// up.
-bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate& out) const {
+std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int boundary, const Edge& edge,
+                                                                   bool still) const {
   const float sigma_px = edge.sigma_px;
   const std::uint8_t state = state_[static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_) +
                                     static_cast<std::size_t>(boundary)];
@@ -280,7 +282,6 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
   float own_variance = sigma_px * sigma_px + kOwn_px * kOwn_px;
   if (state & (kOpenAlong | kBentAlong)) own_variance += kDoubtAlong_px * kDoubtAlong_px;
   if (state & (kOpenAcross | kBentAcross)) own_variance += kDoubtAcross_px * kDoubtAcross_px;
-  out = {own, sigma_px};
   // Where lines above and below are other surfaces, the line itself may be a mixture of both.
   const auto goes_on = [&](int direction) {
     const float next = row(smooth_, line + direction)[boundary];
@@ -289,13 +290,17 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
   };
   const bool above = !edge.above_differs && goes_on(-1);
   const bool below = !edge.below_differs && goes_on(1);
-  if ((state & (kOpenAlong | kBentAlong)) && !above && !below) return false;
+  if ((state & (kOpenAlong | kBentAlong)) && !above && !below) return std::nullopt;
   const bool step = beside_step(state);
   const float noise_px = kNoisy * row(noise_, line)[boundary];
   const float alone_px = std::max(kAlone_px * scale_, noise_px);
   const float at_step_px = std::max(kAtStep_px * scale_, noise_px);
-  const float at_most_px = std::max(kAtMost_px * scale_, noise_px);
-  if (count == 0) return sigma_px < (step ? alone_px : at_most_px);
+  const float at_most_px = std::max((still ? kAtMostStill_px : kAtMost_px) * scale_, noise_px);
+  const auto by_itself = [&]() -> std::optional<Estimate> {
+    if (!(sigma_px < (step ? alone_px : at_most_px))) return std::nullopt;
+    return Estimate{own, sigma_px};
+  };
+  if (count == 0) return by_itself();
   // Predictions that agree are on the boundary's side of the step.
   float weights = 1 / own_variance;
   float sum = weights * own;
@@ -309,10 +314,10 @@ bool ConsistencyCheck::settle(int line, int boundary, const Edge& edge, Estimate
     sum += weight * p.column_px;
     agrees = true;
   }
-  if (!agrees) return sigma_px < (step ? alone_px : at_most_px);
-  out.column_px = sum / weights;
-  out.sigma_px = 1 / std::sqrt(weights);
-  return out.sigma_px <= (step ? at_step_px : at_most_px);
+  if (!agrees) return by_itself();
+  const Estimate weighed{sum / weights, 1 / std::sqrt(weights)};
+  if (!(weighed.sigma_px <= (step ? at_step_px : at_most_px))) return std::nullopt;
+  return weighed;
 }
 
 ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, SequenceResult& result,
@@ -369,7 +374,7 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
           edge.sigma_px = std::sqrt(
               std::max(0.5F * edge.sigma_px * edge.sigma_px, edge.sigma_px * edge.sigma_px - averaged));
         }
-        Estimate settled{row(smooth_, line)[b], edge.sigma_px};
+        std::optional<Estimate> settled = Estimate{row(smooth_, line)[b], edge.sigma_px};
         const bool replaced = row(measured_, line)[b] != edge.column_px;
         const bool is_step = edge.at_step && beside_step(s);
         const bool suspect =
@@ -379,14 +384,15 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
           ++counts.rejected;
           continue;
         }
-        if (is_step || (suspect && !settle(line, b, edge, settled))) {
+        if (suspect) settled = settle(line, b, edge, result.still[e] != 0);
+        if (is_step || !settled) {
           result.doubted[e] = std::exchange(result.boundary[e], std::int16_t{-1});
           ++counts.rejected;
           continue;
         }
         counts.moved += s != 0;
-        edge.column_px = settled.column_px;
-        edge.sigma_px = settled.sigma_px;
+        edge.column_px = settled->column_px;
+        edge.sigma_px = settled->sigma_px;
       }
     }
   });

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "base/parallel.h"
@@ -46,7 +47,7 @@ class ConsistencyCheck {
   void join_to_above(int line);
   void measure_pieces(int begin, int end);
   std::int32_t piece_size(std::size_t cell) const;
-  bool settle(int line, int boundary, const Edge& edge, Estimate& out) const;
+  std::optional<Estimate> settle(int line, int boundary, const Edge& edge, bool still) const;
 
   int boundaries_ = 0;
   int lines_ = 0;

@@ -87,6 +87,7 @@ std::size_t Continuity::drop_line(int line, SequenceResult& result, const EdgeIm
     if (inside) continue;
     const Motion around = motion(line, b);
     if (around.neighbours < kLeastKnown || std::fabs(moved_px - around.px) < kApart_px) continue;
+    if (result.still[e] != 0) result.doubted[e] = result.boundary[e];
     result.boundary[e] = -1;
     ++dropped;
   }

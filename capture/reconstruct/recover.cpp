@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace relievo {
 namespace {
@@ -140,7 +141,7 @@ void Recovery::check_line(const RecoveryView& view, const Refiner& refiner, cons
     // Where the scene moves, the other slide saw the boundary elsewhere.
     const float near_px = result.still[e] ? kContradicts_px : kMoves_px;
     if (!other.visible || (other.found && std::fabs(other.column_px - column) < near_px)) continue;
-    result.boundary[e] = -1;
+    result.doubted[e] = std::exchange(result.boundary[e], std::int16_t{-1});
   }
 }
 

@@ -28,8 +28,7 @@ struct SequenceCounts {
 
 struct SequenceResult {
   std::vector<std::int16_t> boundary;  // one an edge: its index in the pattern, or -1
-  std::vector<std::int16_t>
-      doubted;                      // one an edge: its boundary where the surface does not confirm it, or -1
+  std::vector<std::int16_t> doubted;   // one an edge: a boundary given up, which others may confirm, or -1
   std::vector<std::uint8_t> still;  // one an edge: two frames ago, under the same slide, it was where it is
   SequenceCounts counts;
   double score = 0;  // sum over the lines: the greater, the better the slides' order explains the frame

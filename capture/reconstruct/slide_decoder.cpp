@@ -10,6 +10,7 @@
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
+#include "capture/reconstruct/readmit.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/sequence.h"
@@ -44,6 +45,8 @@ struct SlideDecoder::State {
         refiner(rig.colour_matrix),
         continuity(p.boundaries(),
                    rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
+        readmission(p.boundaries(),
+                    rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
         instant(p.boundaries(),
                 rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height,
                 1e9 / rig.frame_rate) {}
@@ -61,6 +64,7 @@ struct SlideDecoder::State {
   ConsistencyCheck consistency;
   Recovery recovery;
   Continuity continuity;
+  Readmission readmission;
   InstantFilter instant;
 
   Observation newer;
@@ -240,6 +244,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
       report.filters.rejected += by_before.rejected;
       report.filters.recovered += by_before.carried;
     }
+    report.filters.recovered += s.readmission.readmit(s.recovered, s.result, s.edges);
     report.matched =
         counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
     // Under white-field the difference is of the slide's own instant already.

@@ -38,6 +38,8 @@ Frame surface(float moved_px) {
       edge.contrast = 0.2F;
       f.edges.edges.push_back(edge);
       f.result.boundary.push_back(static_cast<std::int16_t>(b));
+      f.result.doubted.push_back(-1);
+      f.result.still.push_back(1);
     }
     f.edges.line_start.push_back(static_cast<std::uint32_t>(f.edges.edges.size()));
   }
@@ -86,9 +88,14 @@ TEST(Continuity, AnEndThatMovesUnlikeItsSurfaceIsGivenUp) {
   Frame now = surface(1);
   now.edges.edges[at(9, kBoundaries - 1)].column_px += 0.9F;  // at the surface's end
   now.edges.edges[at(9, 4)].column_px += 0.9F;                // amid it: other stages judge that
+  now.edges.edges[at(15, 0)].column_px -= 0.9F;               // at an end where the scene moves
+  now.result.still[at(15, 0)] = 0;
   const ContinuityCounts counts = continuity.check({}, pool, now.result, now.edges);
-  EXPECT_EQ(counts.rejected, 1U);
+  EXPECT_EQ(counts.rejected, 2U);
   EXPECT_EQ(now.result.boundary[at(9, kBoundaries - 1)], -1);
+  EXPECT_EQ(now.result.doubted[at(9, kBoundaries - 1)], kBoundaries - 1) << "others may yet confirm it";
+  EXPECT_EQ(now.result.boundary[at(15, 0)], -1);
+  EXPECT_EQ(now.result.doubted[at(15, 0)], -1);
   EXPECT_EQ(now.result.boundary[at(9, 4)], 4);
 }
 

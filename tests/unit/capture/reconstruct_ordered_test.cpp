@@ -275,6 +275,7 @@ Surface2D slanted(float noise_px) {
     s.edges.edges[i].column_px += 0.2F * static_cast<float>(i / 20) + noise(random);
     s.edges.edges[i].sigma_px = s.edges.edges[i].noise_px = noise_px;
     s.result.boundary.push_back(static_cast<std::int16_t>(i % 20));
+    s.result.still.push_back(1);
   }
   return s;
 }
@@ -309,6 +310,21 @@ TEST(Consistency, PutsBackWhatAStepDrewOff) {
     const auto i = static_cast<std::size_t>(l * 20 + 19);
     EXPECT_NEAR(s.edges.edges[i].column_px, truth(i), 0.2) << l;
     EXPECT_LT(s.edges.edges[i].sigma_px, 0.15F);
+  }
+}
+
+TEST(Consistency, AmidASurfaceThatHoldsStillMoreDoubtIsLeftThanWhereItMoves) {
+  for (const bool still : {true, false}) {
+    Surface2D s = slanted(0.02F);
+    for (Edge& e : s.edges.edges) e.sigma_px = 0.45F;  // so that none predicts another
+    s.result.still.assign(s.result.still.size(), still ? 1 : 0);
+    WorkerPool pool(1);
+    ConsistencyCheck check;
+    check.check(59, pool, s.result, s.edges);
+    for (std::size_t i = 0; i < s.result.boundary.size(); ++i) {
+      const int b = static_cast<int>(i % 20);
+      if (b > 0 && b < 19) EXPECT_EQ(s.result.boundary[i], still ? b : -1);
+    }
   }
 }
 
