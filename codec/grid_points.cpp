@@ -15,6 +15,7 @@ namespace {
 constexpr int kRayStep = 8;        // columns between ray samples: linear between them is good to 1e-3 px
 constexpr int kSheetSamples = 65;  // over the projector's height and a quarter beyond
 constexpr int kSheetRounds = 4;    // of point -> height -> sheet; each gains about two digits
+constexpr float kFarthest_m = 1e6F;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 bool is_there(const std::int32_t* columns, std::size_t b) {
@@ -33,13 +34,15 @@ RELIEVO_INLINE bool meet_body(const SheetRow& row, const Sheets& sheets, int cou
   const float* __restrict y = row.ray_y;
   float* __restrict slope = row.slope;
   float* __restrict z = row.z;
-  std::int32_t bad = 0;
   for (int i = 0; i < count; ++i) {
     const float denominator = a[i] * x[i] + b[i] * y[i] + c[i];
-    const float depth = numerator[i] / denominator;
-    const bool in_front = (depth > 0) & (depth < 1e6F);
-    z[i] = depth;
-    slope[i] = depth * a[i] / denominator;
+    z[i] = numerator[i] / denominator;
+    slope[i] = z[i] * a[i] / denominator;
+  }
+  // By itself, since compilers do not make such comparisons of floats several at a time.
+  std::int32_t bad = 0;
+  for (int i = 0; i < count; ++i) {
+    const bool in_front = (z[i] > 0) & (z[i] < kFarthest_m);
     bad |= (columns[i] != StripeGrid::kAbsent) & !in_front ? 1 : 0;
   }
   return bad == 0;

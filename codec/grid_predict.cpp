@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/grid_predict.h"
 
+#include <cstring>
+
 #include "base/variants.h"
 #include "codec/rans.h"
 #include "codec/stripe_grid.h"
@@ -49,58 +51,81 @@ RELIEVO_INLINE void contexts_body(const std::uint8_t* sizes, const std::int32_t*
   for (int b = 0; b < places; ++b) out[b] = up1[b] == StripeGrid::kAbsent ? kAloneTable : out[b];
 }
 
+// Eight places at once; a processor with narrower registers takes several for them.
+using Ints = std::int32_t __attribute__((vector_size(32)));  // as a mask: 0 or -1
+using Unsigned = std::uint32_t __attribute__((vector_size(32)));
+using Shorts = std::uint16_t __attribute__((vector_size(16)));
+using Octets = std::uint8_t __attribute__((vector_size(8)));
+
+template <typename Vector, typename T>
+RELIEVO_INLINE void load(const T* from, Vector& to) {
+  std::memcpy(&to, from, sizeof to);
+}
+template <typename Vector, typename T>
+RELIEVO_INLINE void store(const Vector& from, T* to) {
+  std::memcpy(to, &from, sizeof from);
+}
+RELIEVO_INLINE void load_octets(const std::uint8_t* from, Ints& to) {
+  Octets octets;
+  load(from, octets);
+  to = __builtin_convertvector(octets, Ints);
+}
+RELIEVO_INLINE void store_octets(const Ints& from, std::uint8_t* to) {
+  store(__builtin_convertvector(from, Octets), to);
+}
+
 RELIEVO_INLINE void residuals_body(const GridResiduals& line, int count) {
-  const std::int32_t* __restrict up1 = line.up1;
-  const std::int32_t* __restrict expected = line.expected;
-  std::int32_t* __restrict columns = line.columns;
-  std::uint8_t* __restrict sizes = line.sizes;
-  std::uint8_t* __restrict kinds = line.kinds;
-  std::uint16_t* __restrict codes = line.codes;
-  const std::uint8_t* __restrict tables = line.tables;
-  const int places = (count + 7) / 8 * 8;
-  if (line.tolerance != nullptr) {
-    for (int b = 0; b < places; ++b) {
-      const std::int32_t d = columns[b] - expected[b];
-      const std::int32_t tolerance = line.tolerance[b];
-      const bool near = (up1[b] != StripeGrid::kAbsent) & (d <= tolerance) & (d >= -tolerance);
-      columns[b] = near ? expected[b] : columns[b];
+  for (int b = 0; b < count; b += 8) {
+    Ints columns, expected, up1, tables, sizes;
+    load(line.columns + b, columns);
+    load(line.expected + b, expected);
+    load(line.up1 + b, up1);
+    load_octets(line.tables + b, tables);
+    load_octets(line.sizes + b, sizes);
+    const Ints alone = up1 == StripeGrid::kAbsent;
+    if (line.tolerance != nullptr) {
+      Ints tolerance;
+      load_octets(line.tolerance + b, tolerance);
+      const Ints off = columns - expected;
+      const Ints near = ~alone & (off <= tolerance) & (off >= -tolerance);
+      columns = near ? expected : columns;
+      store(columns, line.columns + b);
     }
-  }
-  for (int b = 0; b < places; ++b) {
-    const std::int32_t d = columns[b] - expected[b];
-    const std::int32_t size = d < 0 ? -d : d;
-    const std::uint32_t folded = static_cast<std::uint32_t>(d) << 1 ^ static_cast<std::uint32_t>(d >> 31);
-    const bool absent = columns[b] == StripeGrid::kAbsent;
-    const bool by_itself = (up1[b] == StripeGrid::kAbsent) | (folded >= kDirectSymbols);
-    const int kind = absent ? kNoVertex : by_itself ? kByItself : kDone;
-    kinds[b] = static_cast<std::uint8_t>(kind);
-    sizes[b] = static_cast<std::uint8_t>(kind == kDone ? size : sizes[b]);  // a symbol's is below the largest
-    codes[b] = static_cast<std::uint16_t>(tables[b] * rans::kMostSymbols + static_cast<std::int32_t>(folded));
+    const Ints d = columns - expected;
+    const Ints negative = d >> 31;
+    const Ints folded = reinterpret_cast<Ints>(reinterpret_cast<Unsigned>(d) << 1) ^ negative;
+    const Ints absent = columns == StripeGrid::kAbsent;
+    const Ints by_itself = alone | (folded < 0) | (folded >= kDirectSymbols);
+    const Ints done = ~(absent | by_itself);
+    store_octets((absent & int{kNoVertex}) | (~absent & by_itself & int{kByItself}), line.kinds + b);
+    store_octets(done ? (d ^ negative) - negative : sizes, line.sizes + b);  // below the largest
+    store(__builtin_convertvector(tables * rans::kMostSymbols + folded, Shorts), line.codes + b);
   }
 }
 
 RELIEVO_INLINE bool columns_body(const GridColumns& line, std::int32_t most, int count) {
-  const std::uint8_t* __restrict there = line.there;
-  const std::uint8_t* __restrict symbols = line.symbols;
-  const std::uint8_t* __restrict tables = line.tables;
-  const std::int32_t* __restrict expected = line.expected;
-  std::int32_t* __restrict columns = line.columns;
-  std::uint8_t* __restrict sizes = line.sizes;
-  std::uint8_t* __restrict kinds = line.kinds;
-  const int places = (count + 7) / 8 * 8;
-  std::int32_t unfair = 0;
-  for (int b = 0; b < places; ++b) {
-    const std::int32_t folded = symbols[b];
-    const std::int32_t d = folded >> 1 ^ -(folded & 1);
-    const std::int32_t column = expected[b] + d;
-    const bool by_itself = (tables[b] == kAloneTable) | (folded >= kDirectSymbols);
-    const int kind = there[b] == 0 ? kNoVertex : by_itself ? kByItself : kDone;
-    kinds[b] = static_cast<std::uint8_t>(kind);
-    columns[b] = kind == kDone ? column : StripeGrid::kAbsent;
-    sizes[b] = static_cast<std::uint8_t>(kind == kDone ? (d < 0 ? -d : d) : sizes[b]);
-    unfair |= kind == kDone && (column > most || column < -most) ? 1 : 0;
+  Ints unfair{};
+  for (int b = 0; b < count; b += 8) {
+    Ints there, folded, tables, expected, sizes;
+    load_octets(line.there + b, there);
+    load_octets(line.symbols + b, folded);
+    load_octets(line.tables + b, tables);
+    load_octets(line.sizes + b, sizes);
+    load(line.expected + b, expected);
+    const Ints d = (folded >> 1) ^ -(folded & 1);
+    const Ints column = expected + d;
+    const Ints absent = there == 0;
+    const Ints by_itself = (tables == kAloneTable) | (folded >= kDirectSymbols);
+    const Ints done = ~(absent | by_itself);
+    const Ints negative = d >> 31;
+    store_octets((absent & int{kNoVertex}) | (~absent & by_itself & int{kByItself}), line.kinds + b);
+    store(done ? column : Ints{} + StripeGrid::kAbsent, line.columns + b);
+    store_octets(done ? (d ^ negative) - negative : sizes, line.sizes + b);
+    unfair |= done & ((column > most) | (column < -most));
   }
-  return unfair == 0;
+  std::int32_t any = 0;
+  for (int i = 0; i < 8; ++i) any |= unfair[i];
+  return any == 0;
 }
 
 RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const std::int32_t* __restrict below,
