@@ -17,7 +17,7 @@ export default defineConfig({
   server: {
     proxy: {
       '/api': gateway,
-      '/ws': { target: gateway, ws: true, rewriteWsOrigin: true },
+      '/ws': { target: gateway, ws: true, changeOrigin: true, rewriteWsOrigin: true },
     },
   },
   // Far more than a test needs: a loaded machine may take its time.

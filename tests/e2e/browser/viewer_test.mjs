@@ -3,82 +3,24 @@
 // it is in, and asks no other host for anything. Run as: node viewer_test.mjs GATEWAY_FEEDER [SCREENSHOT_FOLDER],
 // in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
-import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { eventually, launchChromium } from './chromium.mjs';
+import { Feeder, inState, look, pagesOf, shownPast } from './feeder.mjs';
 
 const [feederPath, shotsWanted] = process.argv.slice(2);
-
-const kRate = '8';
-
-class Feeder {
-  static async start(port = 0) {
-    const feeder = new Feeder();
-    feeder.process = spawn(feederPath, [String(port), kRate], { stdio: ['pipe', 'pipe', 'inherit'] });
-    const line = await new Promise((resolve, reject) => {
-      feeder.process.stdout.once('data', resolve);
-      feeder.process.once('exit', () => reject(new Error('the feeder did not start')));
-    });
-    feeder.port = Number(String(line).split(' ')[1]);
-    return feeder;
-  }
-  /** On a port that was just another's, which the kernel may still hold. */
-  static async restart(port) {
-    let feeder;
-    const start = () => Feeder.start(port).then((started) => (feeder = started));
-    await eventually(`port ${port} does not become free`, () => start().catch(() => false));
-    return feeder;
-  }
-  say(line) {
-    this.process.stdin.write(`${line}\n`);
-  }
-  async kill() {
-    if (this.process.exitCode !== null || this.process.signalCode !== null) return;
-    const ended = new Promise((resolve) => this.process.once('exit', resolve));
-    this.process.kill('SIGKILL');
-    await ended;
-  }
-}
 
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-browser-'));
 const shots = shotsWanted ?? join(scratch, 'shots');
 mkdirSync(shots, { recursive: true });
-let feeder = await Feeder.start();
+let feeder = await Feeder.start(feederPath);
 const origin = `http://127.0.0.1:${feeder.port}`;
 const browser = await launchChromium();
 const complaints = [];
 
-async function newPage(options = {}) {
-  const page = await browser.newPage(options);
-  page.setDefaultTimeout(kPatienceMs);
-  return page;
-}
+const { newPage, open } = pagesOf(browser, origin, complaints);
 
-async function open(path = '/', options = {}) {
-  const page = await newPage({ viewport: { width: 800, height: 500 }, ...options });
-  page.on('pageerror', (error) => complaints.push(`page error: ${error.message}`));
-  page.on('console', (message) => {
-    if (message.type() === 'error') complaints.push(`console: ${message.text()}`);
-  });
-  page.on('request', (request) => {
-    const url = request.url();
-    const own = url.startsWith(`${origin}/`) || url.startsWith('data:') || url.startsWith('blob:');
-    if (!own) complaints.push(`request to another host: ${url}`);
-  });
-  page.on('websocket', (socket) => {
-    if (!socket.url().startsWith(origin.replace('http', 'ws'))) complaints.push(`socket to ${socket.url()}`);
-  });
-  await page.goto(origin + path);
-  return page;
-}
-
-const look = (page) => page.evaluate(() => ({ ...window.relievo.diagnostics(), pixels: window.relievo.readPixels() }));
-const inState = (page, state) =>
-  page.waitForFunction((wanted) => window.relievo?.diagnostics().state === wanted, state);
-const shownPast = (page, count) =>
-  page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
 const more = async (page, frames) => shownPast(page, (await look(page)).shown + frames);
 const card = (page) => page.textContent('#card');
 const inMode = (page, mode) =>
@@ -308,7 +250,7 @@ const checks = {
     await page.waitForFunction(() => /in \d+ s/.test(document.querySelector('#card-text').textContent));
     await page.waitForTimeout(600);
     await page.screenshot({ path: join(shots, 'lost.png') });
-    feeder = await Feeder.restart(port);
+    feeder = await Feeder.restart(feederPath, port);
     feeder.say('start ball');
     await page.click('#retry').catch(() => undefined); // it may have tried by itself meanwhile
     await inState(page, 'live');

@@ -1,36 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // One WebSocket to one stream, kept up: credit, clock exchange, silence as loss, retries with backoff.
-import { parseFramePrefix, parseServerMessage, type FramePrefix, type ServerMessage } from './protocol';
+import { parseFramePrefix, parseServerMessage } from './protocol';
+import type { FrameSource, SourceEvents } from './source';
 import { backoffS } from './state';
 
 const kCredit = 2; // frames under way: one being decoded while the next travels (FACTS: 1 or 2 bound the latency)
 const kClockEveryMs = 4000;
 const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
 
-export interface ConnectionEvents {
-  open(): void;
-  lost(): void;
-  message(message: ServerMessage): void;
-  frame(prefix: FramePrefix, message: ArrayBuffer): void;
-  clock(t0: number, serverMs: number, t1: number): void;
-  /** Something the server sent makes no sense; the frame's credit is given back. */
-  nonsense(message: string): void;
-}
-
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
-export class Connection {
+export class Connection implements FrameSource {
   private socket: WebSocket | null = null;
   private attempt = 0;
   private retryAt: number | null = null; // performance.now()
   private lastHeard = 0;
   private lastClock = -Infinity;
+  readonly playback = null; // live
   private stopped = false;
   private readonly timer: number;
 
   constructor(
     private readonly stream: string,
-    private readonly events: ConnectionEvents,
+    private readonly events: SourceEvents,
   ) {
     this.connect();
     this.timer = window.setInterval(() => this.tick(), 250);
@@ -87,7 +79,7 @@ export class Connection {
     this.lastHeard = performance.now();
     try {
       if (typeof data !== 'string') {
-        this.events.frame(parseFramePrefix(data), data);
+        this.events.frame(parseFramePrefix(data), data, false);
         return;
       }
       const message = parseServerMessage(data);

@@ -80,3 +80,10 @@ export function sheetAt(k: Lens['distortion'], column: number, y: number): numbe
   }
   return imaged(k, x, y) ? x : NaN;
 }
+
+/** Where a pinhole without the lens's distortion would have to see a point for its picture to be the same. */
+export function distortPoint(lens: Lens, [x, y, z]: [number, number, number]): [number, number, number] {
+  if (!distorts(lens)) return [x, y, z];
+  const d = distort(lens.distortion, x / z, y / z);
+  return [d.x * z, d.y * z, z];
+}

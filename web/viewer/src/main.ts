@@ -1,73 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
-// The viewer: chooses a stream, feeds its frames through the decoder to the picture, says how it goes.
-import { Connection, utcNow } from './connection';
-import { Decoder } from './decoder';
-import { Meter } from './meter';
-import type { Mode } from './mesh';
+// The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
+import { Connection } from './connection';
+import { loadDisplay, storeDisplay, type Display } from './display';
+import { DisplayPanel } from './displayPanel';
+import { element } from './dom';
+import { FilePicker } from './files';
+import { fillHelp } from './helpPanel';
+import { listenToKeys } from './keys';
+import { Legend } from './legend';
+import { crc32 } from './crc32';
+import { MeasurePanel } from './measurePanel';
+import { openFile } from './openFile';
+import { Panels } from './panels';
+import { Picture } from './picture';
+import { pixelsOf, type PixelReport } from './pixels';
 import type { DecodedFrame } from './messages';
-import type { FramePrefix, ListedStream, ServerMessage, StreamInfo, StreamList, StreamStatus } from './protocol';
+import type { Pose } from './navigator';
+import type { ListedStream, StreamList } from './protocol';
+import { readShared, shareLink } from './share';
+import { Session } from './session';
 import { present, type Presentation } from './state';
+import { text } from './strings';
+import { StatisticsPanel } from './statisticsPanel';
+import { TakePanel } from './takePanel';
+import { Timeline } from './timeline';
 import { Ui } from './ui';
-import { View, type PixelReport } from './view';
+import { View } from './view';
 
 const kListEveryMs = 2000;
 const kRefreshMs = 250;
 
 class Viewer {
   private readonly ui: Ui;
-  private view: View | null = null;
-  private readonly decoder: Decoder;
-  private readonly meter = new Meter();
-  private connection: Connection | null = null;
+  private readonly panels = new Panels();
+  private readonly legend = new Legend();
+  private readonly picture = new Picture();
+  private readonly displayPanel: DisplayPanel;
+  private readonly measure: MeasurePanel | null;
+  private readonly timeline = new Timeline();
+  private readonly session: Session;
+  readonly view: View | null;
+  private display: Display;
+  private sharedPose: Pose | null; // of a link, until there is a surface
 
   private problem: string | null = null;
-  private everConnected = false;
   private listed = false; // the last list arrived
   private listFailed = false;
   private nextListAt = 0;
   private chosenByPerson = false; // the stream, by the address or the picker
   private streams: ListedStream[] = [];
   private hint = '';
+  private note = ''; // on the file shown
   private stream: string | null = null;
-  private info: StreamInfo | null = null; // of the stream while it is announced
-  private status: StreamStatus | null = null;
-  private seen = false;
-  private lastFrameAt = 0;
-  private readonly underway = new Map<number, FramePrefix>(); // in the decoder
-  private ready: { frame: DecodedFrame; prefix: FramePrefix } | null = null; // decoded, not drawn
+  private file: string | null = null; // shown instead of a stream
+  private fileProblem: { name: string; why: string } | null = null;
   private presentation: Presentation | null = null;
 
   constructor() {
     this.ui = new Ui({
-      mode: (mode) => this.setMode(mode),
       stream: (name) => this.choose(name),
-      reset: () => this.view?.reset(),
+      dismiss: () => {
+        this.fileProblem = null;
+        this.refresh();
+      },
       retry: () => {
-        this.connection?.retryNow();
+        this.session.source?.retryNow();
         this.nextListAt = 0;
       },
-      orbit: (right, up) => this.view?.orbit(right, up),
-      pan: (right, up) => this.view?.pan(right, up),
-      zoom: (factor) => this.view?.zoom(factor),
     });
-    try {
-      this.view = new View(this.ui.canvas, {
-        beforeDraw: () => this.draw(),
-        contextLost: (lost) => {
-          this.problem = lost ? 'The graphics driver took the picture away. It should come back by itself.' : null;
-        },
-      });
-    } catch {
-      this.problem =
-        'This browser or its graphics driver has no WebGL 2. Try another browser, or turn on hardware acceleration.';
-    }
-    this.decoder = new Decoder({
-      decoded: (frame) => this.onDecoded(frame),
-      failed: (id, message) => this.onFailed(id, message),
-      unusable: (message) => (this.problem = `The decoder does not start: ${message}.`),
+    const shared = readShared(location.hash, loadDisplay());
+    this.display = shared.display;
+    this.sharedPose = shared.pose;
+    this.view = this.makeView();
+    this.session = new Session({
+      changed: () => this.refresh(),
+      described: (info, seen) => this.view?.restart(info.camera, seen),
+      ready: () => this.view?.invalidate(),
+      hint: (hint) => (this.hint = hint),
+      unusable: (message) => (this.problem = text.noDecoder(message)),
     });
-    this.ui.showMode('textured');
-    document.addEventListener('visibilitychange', () => this.meter.pause());
+    const picker = new FilePicker((file) => void this.openFile(file));
+    this.panels.action('open', () => picker.ask());
+    this.displayPanel = new DisplayPanel(this.panels.panel('display', text.display.title), (part) => this.change(part));
+    this.measure = this.makeMeasure();
+    this.makeStatistics();
+    this.makeTake();
+    this.panels.action('reset', () => this.view?.navigator.reset());
+    if (document.fullscreenEnabled) this.panels.action('fullscreen', () => this.toggleFullscreen());
+    fillHelp(this.panels.panel('help', text.help.title));
+    this.listen();
+    this.change({});
     const asked = new URLSearchParams(location.search).get('stream');
     if (asked !== null && asked !== '') {
       this.chosenByPerson = true;
@@ -77,27 +99,126 @@ class Viewer {
     this.refresh();
   }
 
-  setMode(mode: Mode): void {
-    if (this.view === null) return;
-    this.view.mode = mode;
-    this.decoder.want = this.view.wants;
-    this.ui.showMode(mode);
+  /** From now on; kept for the next visit. */
+  change(part: Partial<Display>): void {
+    this.display = { ...this.display, ...part };
+    if (this.view !== null) this.view.display = this.display;
+    this.wish();
+    this.picture.on = this.display.split;
+    storeDisplay(this.display);
+    this.showDisplay();
   }
 
   diagnostics(): object {
     return {
       state: this.presentation?.state,
       stream: this.stream,
+      file: this.file,
+      playback: this.playbackReport(),
       mode: this.view?.mode,
+      way: this.view?.navigator.way,
       drawn: this.view?.drawn,
       scale: this.view?.movingScale,
+      depthRange: this.view?.depthRange,
+      gridStep: this.view?.gridStep,
+      measurements: this.measure?.measurements,
       problem: this.problem,
-      ...this.meter.report(),
+      ...this.session.meter.report(),
     };
   }
 
-  readPixels(): PixelReport | null {
-    return this.view?.readPixels() ?? null;
+  private playbackReport(): object | null {
+    const p = this.session.source?.playback;
+    if (!p) return null;
+    const keys = Array.from(p.times, (_, i) => p.isKey(i));
+    const { index, position, playing, speed, loop } = p;
+    return { index, position, playing, speed, loop, keys, gaps: keys.map((_, i) => p.gapBefore(i)), times: [...p.times] };
+  }
+
+  private makeView(): View | null {
+    try {
+      return new View(this.ui.canvas, element<HTMLCanvasElement>('overlay'), {
+        beforeDraw: () => this.draw(),
+        contextLost: (lost) => (this.problem = lost ? text.contextLost : null),
+        way: (way) => this.change({ way }),
+      });
+    } catch {
+      this.problem = text.noWebGl;
+      return null;
+    }
+  }
+
+  private makeMeasure(): MeasurePanel | null {
+    if (this.view === null) return null;
+    const body = this.panels.panel('measure', text.measure.title, (open) => {
+      this.measure!.open = open;
+      this.wish();
+    });
+    return new MeasurePanel(body, this.view, (at) => this.picture.point(at));
+  }
+
+  private makeStatistics(): void {
+    const body = this.panels.panel('statistics', text.statistics.title, (open) => (panel.open = open));
+    const panel = new StatisticsPanel(body, this.session.meter, () => this.session.status);
+  }
+
+  private makeTake(): void {
+    if (this.view === null) return;
+    const body = this.panels.panel('take', text.take.title);
+    new TakePanel(body, this.view, () => this.stream ?? this.file, () => this.link());
+  }
+
+  /** To what is seen now. */
+  link(): string {
+    const navigator = this.view?.navigator;
+    const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
+    return shareLink(location.href, this.stream, this.display, pose);
+  }
+
+  // What the decoder should bring along.
+  private wish(): void {
+    if (this.view === null) return;
+    const { wants } = this.view;
+    this.session.decoder.want = { ...wants, quality: wants.quality || this.measure?.isOpen === true };
+  }
+
+  private listen(): void {
+    const navigator = this.view?.navigator;
+    listenToKeys({
+      mode: (mode) => this.change({ mode }),
+      way: (way) => this.change({ way }),
+      orbit: (right, up) => navigator?.orbit(right, up),
+      pan: (right, up) => navigator?.pan(right, up),
+      zoom: (factor) => navigator?.zoom(factor),
+      command: (key) => this.command(key),
+    });
+    this.ui.canvas.addEventListener('dblclick', (event) => {
+      const picked = this.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
+      if (picked !== null) navigator?.setPivot(picked.point);
+    });
+  }
+
+  private command(key: string): boolean {
+    const commands: Record<string, () => void> = {
+      r: () => this.view?.navigator.reset(),
+      f: () => this.toggleFullscreen(),
+      h: () => document.body.classList.toggle('bare'),
+      g: () => this.change({ grid: !this.display.grid }),
+      v: () => this.change({ split: !this.display.split }),
+      b: () => this.panels.toggle('display'),
+      m: () => this.panels.toggle('measure'),
+      i: () => this.panels.toggle('statistics'),
+      t: () => this.panels.toggle('take'),
+      '?': () => this.panels.toggle('help'),
+      escape: () => this.panels.close(),
+    };
+    commands[key]?.();
+    return commands[key] !== undefined || this.timeline.command(key);
+  }
+
+  private toggleFullscreen(): void {
+    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
+    done.catch(() => undefined); // refused by the browser: nothing changes
   }
 
   private choose(name: string): void {
@@ -110,99 +231,65 @@ class Viewer {
 
   private watch(name: string): void {
     if (name === this.stream) return;
-    this.connection?.stop();
-    this.underway.clear();
-    this.discard();
     this.stream = name;
-    this.info = this.status = null;
-    this.seen = false;
-    this.meter.restart();
-    this.connection = new Connection(name, {
-      open: () => {
-        this.everConnected = true;
-        this.underway.clear(); // their credit went with the old connection
-        this.discard();
-        this.meter.restart();
-        this.refresh();
-      },
-      lost: () => {
-        this.info = this.status = null;
-        this.refresh();
-      },
-      message: (message) => this.onMessage(message),
-      frame: (prefix, bytes) => this.onFrame(prefix, bytes),
-      clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
-      nonsense: (message) => this.meter.failed(message),
-    });
+    this.file = null;
+    this.note = '';
+    this.session.watch((events) => new Connection(name, events));
+    this.timeline.show(null);
     this.refresh();
   }
 
-  private onMessage(message: ServerMessage): void {
-    if (message.type === 'info') {
-      if (this.info === null) this.meter.restart();
-      this.info = message;
-      this.view?.restart(message.camera, this.seen);
-      this.lastFrameAt = performance.now();
-    } else if (message.type === 'status') {
-      this.status = message;
-    } else if (message.type === 'waiting' || message.type === 'gone') {
-      this.info = this.status = null;
-      if (message.type === 'waiting') this.hint = message.hint;
+  private async openFile(file: File): Promise<void> {
+    try {
+      const opened = await openFile(file);
+      this.chosenByPerson = true;
+      this.stream = null;
+      this.file = file.name;
+      this.fileProblem = null;
+      this.view?.restart(null, false);
+      this.session.watch(opened.kind === 'recording' ? opened.source : null);
+      this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';
+      if (opened.kind === 'surface') this.show(opened.frame);
+    } catch (error) {
+      this.fileProblem = { name: file.name, why: error instanceof Error ? error.message : String(error) };
     }
+    this.timeline.show(this.session.source?.playback ?? null);
     this.refresh();
   }
 
-  private onFrame(prefix: FramePrefix, bytes: ArrayBuffer): void {
-    this.lastFrameAt = performance.now();
-    this.meter.arrived(prefix, bytes.byteLength, this.lastFrameAt);
-    this.underway.set(this.decoder.decode(bytes, prefix.bytes), prefix);
-  }
-
-  private onDecoded(frame: DecodedFrame): void {
-    const prefix = this.underway.get(frame.id);
-    if (!this.underway.delete(frame.id) || prefix === undefined || this.view === null) {
-      frame.texture?.close(); // of a stream that is no longer watched
-      return;
-    }
-    if (this.discard()) {
-      ++this.meter.skipped;
-      this.connection?.credit();
-    }
-    this.ready = { frame, prefix };
-    this.view.invalidate();
-  }
-
-  private onFailed(id: number, message: string): void {
-    this.meter.failed(message);
-    if (this.underway.delete(id)) this.connection?.credit();
-  }
-
-  // On the screen's beat. Credit goes back only now, so a hidden page receives nothing.
+  // On the screen's beat.
   private draw(): void {
-    if (this.ready === null || this.view === null) return;
-    const { frame, prefix } = this.ready;
-    this.ready = null;
-    this.view.show(frame);
-    this.decoder.want = this.view.wants;
-    this.meter.shown(frame, prefix, utcNow(), performance.now());
-    this.connection?.credit();
-    if (!this.seen) {
-      this.seen = true;
-      this.refresh();
-    }
+    const first = !this.session.seen;
+    const frame = this.view === null ? null : this.session.take();
+    if (frame === null) return;
+    this.show(frame);
+    if (first) this.refresh();
   }
 
-  private discard(): boolean {
-    const had = this.ready !== null;
-    this.ready?.frame.texture?.close();
-    this.ready = null;
-    return had;
+  private show(frame: DecodedFrame): void {
+    if (this.view === null) return;
+    this.view.show(frame);
+    if (this.sharedPose !== null) {
+      if (!this.view.navigator.isRigView) this.view.navigator.pose = this.sharedPose;
+      this.sharedPose = null;
+    }
+    this.view.invalidate();
+    this.picture.show(frame.texture);
+    this.wish();
+    this.measure?.readCursor();
+    this.showDisplay();
+  }
+
+  private showDisplay(): void {
+    this.legend.show(this.display.mode, this.view?.depthRange ?? null);
+    this.displayPanel.show(this.display, this.view?.navigator.rigCamera !== null);
   }
 
   private refresh(): void {
     const now = performance.now();
-    const connection = this.connection;
-    const offline = connection !== null && !connection.connected; // it tries again by itself
+    const { source, info, status, seen } = this.session;
+    const playback = source?.playback ?? null;
+    const offline = source !== null && !source.connected; // it tries again by itself
     if (now >= this.nextListAt && !document.hidden && !offline) {
       this.nextListAt = now + kListEveryMs;
       void this.list();
@@ -210,21 +297,26 @@ class Viewer {
     const listRetryInS = this.listFailed ? Math.ceil(Math.max(0, this.nextListAt - now) / 1000) : null;
     this.presentation = present({
       problem: this.problem,
-      everConnected: this.everConnected,
-      connected: connection === null ? this.listed : connection.connected,
-      retryInS: connection === null ? listRetryInS : connection.retryInS,
+      everConnected: this.session.everConnected,
+      connected: source === null ? this.listed : source.connected,
+      retryInS: source === null ? listRetryInS : source.retryInS,
       stream: this.stream,
-      announced: this.info !== null,
-      seen: this.seen,
-      serverState: this.status?.state ?? null,
-      serverMessage: this.status?.message ?? '',
-      quietMs: now - this.lastFrameAt,
-      frameRate: this.info?.frame_rate ?? 0,
+      announced: info !== null,
+      seen,
+      serverState: status?.state ?? null,
+      serverMessage: status?.message ?? '',
+      quietMs: now - this.session.lastFrameAt,
+      frameRate: info?.frame_rate ?? 0,
       hint: this.hint,
+      file: this.file === null ? null : playback === null ? 'surface' : playback.playing ? 'playing' : 'paused',
     });
-    this.ui.showState(this.presentation, this.seen);
-    this.ui.showStreams(this.streams, this.stream, this.info?.source ?? '');
-    this.ui.showStatistics(this.seen ? this.meter.statistics(now, this.status) : []);
+    if (this.fileProblem !== null) {
+      const { name, why } = this.fileProblem;
+      this.presentation = { ...this.presentation, title: text.file.failed(name), text: `${why}.`, hint: '', dim: seen };
+    }
+    this.ui.showState(this.presentation, seen, this.fileProblem !== null);
+    this.ui.showStreams(this.streams, this.stream, this.file ?? info?.source ?? '', this.note);
+    this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }
 
   private async list(): Promise<void> {
@@ -237,11 +329,11 @@ class Viewer {
       const list = (await response.json()) as StreamList;
       this.listed = true;
       this.listFailed = false;
-      this.everConnected = true;
+      this.session.everConnected = true;
       this.streams = list.streams;
       this.hint = list.hint;
       const first = list.streams[0];
-      const missing = this.info === null && !list.streams.some((s) => s.name === this.stream);
+      const missing = this.session.info === null && !list.streams.some((s) => s.name === this.stream);
       if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);
     } catch {
       this.listed = false;
@@ -254,13 +346,40 @@ class Viewer {
 declare global {
   interface Window {
     /** For tests and bug reports; not a stable interface. */
-    relievo: { diagnostics(): object; readPixels(): PixelReport | null; setMode(mode: Mode): void };
+    relievo: {
+      diagnostics(): object;
+      readPixels(): PixelReport | null;
+      /** RGBA at a place of the canvas, in pixels of the page. */
+      pixelAt(x: number, y: number): number[];
+      pick(x: number, y: number): object | null;
+      toPage(point: [number, number, number]): object | null;
+      pose(): object | null;
+      link(): string;
+      extent(): object | null;
+      /** The surface shown, told apart from others by a hash of its numbers. */
+      surface(): { number: number; hash: number } | null;
+    };
   }
 }
 
 const viewer = new Viewer();
 window.relievo = {
   diagnostics: () => viewer.diagnostics(),
-  readPixels: () => viewer.readPixels(),
-  setMode: (mode) => viewer.setMode(mode),
+  readPixels: () => viewer.view?.readPixels() ?? null,
+  pixelAt: (x, y) => {
+    const { width, height, rgba } = pixelsOf(viewer.view!.still());
+    const { clientWidth, clientHeight } = viewer.view!.canvas;
+    const column = Math.floor((x / clientWidth) * width);
+    const row = height - 1 - Math.floor((y / clientHeight) * height);
+    return [...rgba.slice((row * width + column) * 4, (row * width + column) * 4 + 4)];
+  },
+  pick: (x, y) => viewer.view?.pick({ x, y }) ?? null,
+  toPage: (point) => viewer.view?.navigator.toPage(point) ?? null,
+  extent: () => viewer.view?.shown?.extent ?? null,
+  surface: () => {
+    const frame = viewer.view?.shown ?? null;
+    return frame === null ? null : { number: frame.number, hash: crc32(new Uint8Array(frame.positions.buffer)) };
+  },
+  link: () => viewer.link(),
+  pose: () => viewer.view?.navigator.pose ?? null,
 };

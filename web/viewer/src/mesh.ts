@@ -2,17 +2,13 @@
 // The surface on the graphics card. Buffers only grow, so that a mesh of changing size thirty times a second
 // allocates nothing.
 import * as THREE from 'three';
+import type { Mode } from './display';
+import { Materials } from './materials';
 import type { DecodedFrame } from './messages';
+import type { Range } from './palette';
+import type { Pinhole } from './protocol';
 import { confidenceColours } from './quality';
 import { triangleEdges, vertexNormals } from './surface';
-
-export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points' | 'confidence';
-export const kModes: readonly Mode[] = ['textured', 'shaded', 'wireframe', 'points', 'confidence'];
-
-/** Colours of the surface where the texture is not shown; see style.css for the page's. */
-const kClay = 0xd2ccc2;
-const kWire = 0x86b7ff;
-const kFill = 0x11151b;
 
 class Growing {
   attribute: THREE.BufferAttribute;
@@ -60,22 +56,7 @@ export class SurfaceMesh {
   private readonly lines = new THREE.BufferGeometry();
   private readonly cloud = new THREE.BufferGeometry();
   private readonly texture = new THREE.Texture();
-  private readonly materials = {
-    textured: new THREE.MeshBasicMaterial({ map: this.texture, side: THREE.DoubleSide }),
-    shaded: new THREE.MeshStandardMaterial({ color: kClay, roughness: 0.7, side: THREE.DoubleSide }),
-    // Hides the lines behind the surface without covering those on it.
-    fill: new THREE.MeshBasicMaterial({
-      color: kFill,
-      side: THREE.DoubleSide,
-      polygonOffset: true,
-      polygonOffsetFactor: 1,
-      polygonOffsetUnits: 1,
-    }),
-    confidence: new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide }),
-    wire: new THREE.LineBasicMaterial({ color: kWire }),
-    points: new THREE.PointsMaterial({ map: this.texture, size: 2, sizeAttenuation: false }),
-    plainPoints: new THREE.PointsMaterial({ color: kClay, size: 2, sizeAttenuation: false }),
-  };
+  private readonly materials = new Materials(this.texture);
   private readonly mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.Material>(this.solid, this.materials.textured);
   private readonly wires = new THREE.LineSegments(this.lines, this.materials.wire);
   private readonly points = new THREE.Points<THREE.BufferGeometry, THREE.Material>(this.cloud, this.materials.points);
@@ -86,6 +67,8 @@ export class SurfaceMesh {
   private hasNormals = false;
   private hasEdges = false;
   private hasQuality = false;
+  private hasColours = false;
+  private frame: DecodedFrame | null = null;
 
   constructor() {
     this.object.rotation.x = Math.PI;
@@ -104,7 +87,7 @@ export class SurfaceMesh {
 
   /** Drawn pixels to one of the page's. */
   setPixelRatio(ratio: number): void {
-    this.materials.points.size = this.materials.plainPoints.size = 1.75 * ratio;
+    this.materials.setPointSize(1.75 * ratio);
   }
 
   get mode(): Mode {
@@ -116,9 +99,23 @@ export class SurfaceMesh {
     this.apply();
   }
 
+  /** The lens whose distortion bends what is drawn; null: none. */
+  setLens(camera: Pinhole | null): void {
+    this.materials.setLens(camera);
+  }
+
+  setDepthRange(range: Range): void {
+    this.materials.setDepthRange(range);
+  }
+
+  /** The surface shown, in the rig camera's frame; its picture is open until the next one is shown. */
+  get shown(): DecodedFrame | null {
+    return this.frame;
+  }
+
   /** What the decoder should bring along for the mode. */
   get wants(): { normals: boolean; edges: boolean; quality: boolean } {
-    return { normals: this.mode_ === 'shaded' || this.mode_ === 'confidence' || !this.textured, edges: this.mode_ === 'wireframe', quality: this.mode_ === 'confidence' };
+    return { normals: this.needsNormals, edges: this.mode_ === 'wireframe', quality: this.mode_ === 'confidence' };
   }
 
   show(frame: DecodedFrame): void {
@@ -127,8 +124,10 @@ export class SurfaceMesh {
     if (frame.coordinates !== null) grown = this.uv.set(frame.coordinates) || grown;
     if (frame.normals !== null) grown = this.normal.set(frame.normals) || grown;
     if (frame.edges !== null) grown = this.edge.set(frame.edges) || grown;
-    if (frame.quality !== null) grown = this.colour.set(confidenceColours(frame.quality)) || grown;
+    this.frame = frame;
     this.hasQuality = frame.quality !== null;
+    this.hasColours = (frame.colours ?? null) !== null;
+    grown = this.setColours() || grown;
     this.vertices = frame.positions.length / 3;
     this.triangleIndices = frame.triangles.length;
     this.hasNormals = frame.normals !== null;
@@ -154,10 +153,11 @@ export class SurfaceMesh {
     const triangles = (this.triangle.attribute.array as Uint32Array).subarray(0, this.triangleIndices);
     let grown = false;
     if (this.mode_ === 'wireframe' && !this.hasEdges) {
-      grown = this.edge.set(triangleEdges(triangles));
+      grown = this.edge.set(triangleEdges(triangles)) || grown;
       this.hasEdges = true;
     }
-    if ((this.mode_ === 'shaded' || this.mode_ === 'confidence' || !this.textured) && !this.hasNormals) {
+    if (this.frame !== null && (this.mode_ === 'confidence' || this.hasColours)) grown = this.setColours();
+    if (this.needsNormals && !this.hasNormals) {
       const positions = (this.position.attribute.array as Float32Array).subarray(0, this.vertices * 3);
       grown = this.normal.set(vertexNormals(positions, triangles)) || grown;
       this.hasNormals = true;
@@ -183,14 +183,23 @@ export class SurfaceMesh {
     this.lines.setDrawRange(0, this.triangleIndices * 2);
     this.cloud.setDrawRange(0, this.vertices);
     const points = this.mode_ === 'points' || this.triangleIndices === 0;
-    const wireframe = this.mode_ === 'wireframe' && !points;
     this.points.visible = points && this.vertices > 0;
-    this.wires.visible = wireframe;
+    this.wires.visible = this.mode_ === 'wireframe' && !points;
     this.mesh.visible = !points;
-    this.points.material = this.textured ? this.materials.points : this.materials.plainPoints;
-    if (wireframe) this.mesh.material = this.materials.fill;
-    else if (this.mode_ === 'textured' && this.textured) this.mesh.material = this.materials.textured;
-    else if (this.mode_ === 'confidence' && this.hasQuality) this.mesh.material = this.materials.confidence;
-    else this.mesh.material = this.materials.shaded;
+    const has = { texture: this.textured, quality: this.hasQuality, colours: this.hasColours };
+    this.points.material = this.materials.cloud(this.mode_, has);
+    this.mesh.material = this.materials.solid(this.mode_, has);
+  }
+
+  private get needsNormals(): boolean {
+    const unlit = (this.mode_ === 'textured' && this.textured) || this.mode_ === 'depth' || this.mode_ === 'wireframe';
+    return !unlit && this.mode_ !== 'points';
+  }
+
+  // Of confidence in its mode, else the surface's own.
+  private setColours(): boolean {
+    const { quality, colours } = this.frame!;
+    if (this.mode_ === 'confidence' && quality !== null) return this.colour.set(confidenceColours(quality));
+    return colours ? this.colour.set(colours) : false;
   }
 }

@@ -21,6 +21,7 @@ export interface DecodedFrame {
   triangles: Uint32Array<ArrayBuffer>;
   edges: Uint32Array<ArrayBuffer> | null;
   quality: VertexQuality | null; // null: not wanted or not sent
+  colours?: Float32Array<ArrayBuffer> | null; // linear RGB a vertex, of files without a picture
   texture: ImageBitmap | null;
   extent: Extent | null;
   decodeMs: number;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Gathers what the statistics line says.
+import { Journal } from './journal';
 import type { DecodedFrame } from './messages';
 import type { FramePrefix, StreamStatus } from './protocol';
 import { ClockOffset, DropCounter, Rate, RollingMedian } from './statistics';
@@ -10,6 +11,7 @@ const kLiveMs = 60_000;
 
 export class Meter {
   readonly clock = new ClockOffset();
+  readonly journal = new Journal();
   skipped = 0; // decoded here, replaced before they were drawn
   private readonly drops = new DropCounter();
   private readonly frames = new Rate();
@@ -31,6 +33,7 @@ export class Meter {
     this.frames.clear();
     this.bytes.clear();
     this.latency.clear();
+    this.journal.clear();
   }
 
   /** The page was hidden or shown again: frames it did not ask for meanwhile are no losses. */
@@ -38,13 +41,19 @@ export class Meter {
     this.restart();
   }
 
-  arrived(prefix: FramePrefix, bytes: number, now: number): void {
+  /** `live`: what is missing before it was lost, and its age is a latency. */
+  arrived(prefix: FramePrefix, message: ArrayBuffer, now: number, live: boolean): void {
     ++this.received;
-    this.drops.add(prefix.sequence, prefix.drops);
-    this.bytes.add(now, bytes);
+    this.journal.arrived(prefix, message, performance.timeOrigin + now);
+    if (live) this.drops.add(prefix.sequence, prefix.drops);
+    this.bytes.add(now, message.byteLength);
   }
 
-  shown(frame: DecodedFrame, prefix: FramePrefix, utcMs: number, now: number): void {
+  decoded(prefix: FramePrefix, utcMs: number): void {
+    this.journal.decoded(prefix, utcMs);
+  }
+
+  shown(frame: DecodedFrame, prefix: FramePrefix, utcMs: number, now: number, live: boolean): void {
     ++this.shownFrames;
     this.number = frame.number;
     this.sequence = prefix.sequence;
@@ -53,7 +62,8 @@ export class Meter {
     this.decode.add(frame.decodeMs);
     this.frames.add(now);
     const offset = this.clock.get();
-    if (offset === null) return;
+    if (offset === null || !live) return;
+    this.journal.shown(prefix, utcMs, offset);
     const age = utcMs + offset - prefix.captureMs;
     if (age > -1000 && age < kLiveMs) this.latency.add(age);
     else this.latency.clear();
@@ -62,6 +72,18 @@ export class Meter {
   failed(message: string): void {
     ++this.errors;
     this.lastError = message;
+  }
+
+  figures(now: number): { rate: number; bits: number; vertices: number; triangles: number; decodeMs: number | null; drops: { link: number; viewer: number; gaps: number } } {
+    const { link, gaps } = this.drops;
+    return {
+      rate: this.frames.perSecond(now),
+      bits: this.bytes.perSecond(now) * 8,
+      vertices: this.vertices,
+      triangles: this.triangles,
+      decodeMs: this.decode.get(),
+      drops: { link, viewer: this.skipped, gaps },
+    };
   }
 
   report(): Record<string, unknown> {
@@ -77,6 +99,8 @@ export class Meter {
       triangles: this.triangles,
       latencyMs: this.latency.get(),
       decodeMs: this.decode.get(),
+      parts: this.journal.parts,
+      stages: this.journal.medians(),
     };
   }
 

@@ -8,6 +8,7 @@ export interface Pinhole {
   fy: number;
   cx: number;
   cy: number;
+  distortion?: number[]; // k1 k2 p1 p2 k3; of none where missing
 }
 
 export interface StreamInfo {
@@ -26,6 +27,8 @@ export interface StreamStatus {
   drops_reconstruct: number;
   drops_encode: number;
   drops_publish: number;
+  reconstruct_ms?: number;
+  encode_ms?: number;
 }
 
 export type ServerMessage =

@@ -133,21 +133,28 @@ function byPlace(coordinates: Float32Array, bits: number): { order: Uint32Array;
   return { order, key };
 }
 
-const kBest = 20e-6; // metres: green
-const kWorst = 2e-3; // red, in between yellow
+export const kBestSigma = 20e-6; // metres: green
+export const kWorstSigma = 2e-3; // red, in between yellow
 const kUnknown = [0.45, 0.45, 0.5] as const;
 const kDimmed = 0.6; // of what is interpolated
+const kOctaves = Math.log2(kWorstSigma / kBestSigma);
 
-/** A colour a vertex, linear RGB: green where the depth is known to 20 micrometres, red from 2 mm, grey where unknown. */
+/** Linear RGB of a standard deviation: green where the depth is known to 20 micrometres, red from 2 mm, grey for 0: unknown. */
+export function confidenceColour(sigma: number): readonly [number, number, number] {
+  if (!(sigma > 0)) return kUnknown;
+  const share = Math.min(1, Math.max(0, Math.log2(sigma / kBestSigma) / kOctaves));
+  return [Math.min(1, 2 * share), Math.min(1, 2 - 2 * share), 0.05];
+}
+
+/** A colour a vertex; darker where it is interpolated. */
 export function confidenceColours({ sigmas, interpolated }: VertexQuality): Float32Array<ArrayBuffer> {
   const colours = new Float32Array(sigmas.length * 3);
-  const octaves = Math.log2(kWorst / kBest);
   for (let v = 0; v < sigmas.length; ++v) {
-    const sigma = sigmas[v]!;
-    const share = Math.min(1, Math.max(0, Math.log2(sigma / kBest) / octaves));
-    const [r, g, b] = sigma > 0 ? [Math.min(1, 2 * share), Math.min(1, 2 - 2 * share), 0.05] : kUnknown;
+    const [r, g, b] = confidenceColour(sigmas[v]!);
     const light = interpolated[v] === 1 ? kDimmed : 1;
-    colours.set([r * light, g * light, b * light], 3 * v);
+    colours[3 * v] = r * light;
+    colours[3 * v + 1] = g * light;
+    colours[3 * v + 2] = b * light;
   }
   return colours;
 }

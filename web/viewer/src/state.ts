@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page tells a person, derived from what it knows. Pure.
+import { text } from './strings';
 
 export type State =
   | 'unsupported'
@@ -9,6 +10,7 @@ export type State =
   | 'waiting'
   | 'starting'
   | 'live'
+  | 'file'
   | 'stalled'
   | 'ended';
 
@@ -25,6 +27,7 @@ export interface Facts {
   quietMs: number; // since the last frame arrived
   frameRate: number; // nominal; 0: not known
   hint: string;
+  file: 'playing' | 'paused' | 'surface' | null; // what is shown is no stream
 }
 
 export interface Presentation {
@@ -56,6 +59,10 @@ export function present(facts: Facts): Presentation {
   const name = facts.stream ?? '';
   if (facts.problem !== null) {
     return make('unsupported', 'Not possible', { title: 'Nothing can be shown here', text: facts.problem, dim: true });
+  }
+  if (facts.file !== null) {
+    const { playing, paused, surface } = text.file;
+    return make('file', { playing, paused, surface }[facts.file]);
   }
   if (!facts.connected) {
     if (!facts.everConnected && facts.retryInS === null) {

@@ -73,11 +73,20 @@ export class ClockOffset {
 
   /** Server time minus local time; null before the first exchange. */
   get(): number | null {
+    return this.best()?.offset ?? null;
+  }
+
+  /** Of the exchange that tells the offset, which is true to half of it. */
+  roundTrip(): number | null {
+    return this.best()?.roundTrip ?? null;
+  }
+
+  private best(): { roundTrip: number; offset: number } | null {
     let best: { roundTrip: number; offset: number } | null = null;
     for (const sample of this.samples) {
       if (best === null || sample.roundTrip < best.roundTrip) best = sample;
     }
-    return best?.offset ?? null;
+    return best;
   }
 }
 

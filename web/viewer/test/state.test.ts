@@ -16,11 +16,13 @@ const live: Facts = {
   quietMs: 30,
   frameRate: 30,
   hint: 'relievo-server serve --source sim:face',
+  file: null,
 };
 
 describe('present', () => {
   it.each<[string, Partial<Facts>, string]>([
     ['a running stream', {}, 'live'],
+    ['a paused recording, however old', { file: 'paused', connected: false, quietMs: 1e9 }, 'file'],
     ['no WebGL', { problem: 'no WebGL 2' }, 'unsupported'],
     ['the first attempt', { everConnected: false, connected: false }, 'connecting'],
     ['a server that is not there', { everConnected: false, connected: false, retryInS: 2 }, 'lost'],
@@ -36,7 +38,7 @@ describe('present', () => {
   ])('%s', (_, facts, state) => {
     const shown = present({ ...live, ...facts });
     expect(shown.state).toBe(state);
-    expect(shown.title === '').toBe(state === 'live');
+    expect(shown.title === '').toBe(state === 'live' || state === 'file');
     if (['lost', 'stalled', 'ended', 'unsupported'].includes(state)) expect(shown.dim).toBe(true);
   });
 

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// A gateway with a surface of known shape (tests/support/gateway_feeder.cpp), and pages that show it.
+import { spawn } from 'node:child_process';
+import { eventually, kPatienceMs } from './chromium.mjs';
+
+const kRate = '8';
+
+export class Feeder {
+  static async start(path, port = 0) {
+    const feeder = new Feeder();
+    feeder.process = spawn(path, [String(port), kRate], { stdio: ['pipe', 'pipe', 'inherit'] });
+    const line = await new Promise((resolve, reject) => {
+      feeder.process.stdout.once('data', resolve);
+      feeder.process.once('exit', () => reject(new Error('the feeder did not start')));
+    });
+    feeder.port = Number(String(line).split(' ')[1]);
+    return feeder;
+  }
+  /** On a port that was just another's, which the kernel may still hold. */
+  static async restart(path, port) {
+    let feeder;
+    const start = () => Feeder.start(path, port).then((started) => (feeder = started));
+    await eventually(`port ${port} does not become free`, () => start().catch(() => false));
+    return feeder;
+  }
+  say(line) {
+    this.process.stdin.write(`${line}\n`);
+  }
+  async kill() {
+    if (this.process.exitCode !== null || this.process.signalCode !== null) return;
+    const ended = new Promise((resolve) => this.process.once('exit', resolve));
+    this.process.kill('SIGKILL');
+    await ended;
+  }
+}
+
+/** Depth of the feeder's surface in metres, at a share of the picture's width and height, in a frame of this number. */
+export function depthOf(u, v, number) {
+  const t = (number + 1) * 0.05;
+  const [dx, dy] = [(u - 0.5 - 0.12 * Math.sin(t)) * 1.33, v - 0.5];
+  const r2 = dx * dx + dy * dy;
+  const bump = r2 < 0.09 ? Math.sqrt(0.09 - r2) : 0;
+  return 1.2 - 0.6 * bump - 0.012 * Math.sin(14 * u + 3 * t) * Math.cos(11 * v);
+}
+
+/** Whether the ball's rim is so near, where its slope has no bound, that triangles cannot follow it. */
+export function isRim(u, v, number) {
+  const cx = 0.5 + 0.12 * Math.sin((number + 1) * 0.05);
+  return Math.abs(Math.hypot((u - cx) * 1.33, v - 0.5) - 0.3) < 0.04;
+}
+
+export const kPicture = { width: 640, height: 480, focal: 800 };
+
+/** The point of the surface there, in the rig camera's frame. */
+export function pointOf(u, v, number) {
+  const z = depthOf(u, v, number);
+  return [((u - 0.5) * kPicture.width * z) / kPicture.focal, ((v - 0.5) * kPicture.height * z) / kPicture.focal, z];
+}
+
+/** newPage and open, of a browser; complaints gathers what should not happen. */
+export function pagesOf(browser, origin, complaints) {
+  async function newPage(options = {}) {
+    const page = await browser.newPage(options);
+    page.setDefaultTimeout(kPatienceMs);
+    return page;
+  }
+
+  async function open(path = '/', options = {}) {
+    const page = await newPage({ viewport: { width: 800, height: 500 }, ...options });
+    page.on('pageerror', (error) => complaints.push(`page error: ${error.message}`));
+    page.on('console', (message) => {
+      if (message.type() === 'error') complaints.push(`console: ${message.text()}`);
+    });
+    page.on('request', (request) => {
+      const url = request.url();
+      const own = url.startsWith(`${origin}/`) || url.startsWith('data:') || url.startsWith('blob:');
+      if (!own) complaints.push(`request to another host: ${url}`);
+    });
+    page.on('websocket', (socket) => {
+      if (!socket.url().startsWith(origin.replace('http', 'ws'))) complaints.push(`socket to ${socket.url()}`);
+    });
+    await page.goto(origin + path);
+    return page;
+  }
+
+  return { newPage, open };
+}
+
+export const look = (page) =>
+  page.evaluate(() => ({ ...window.relievo.diagnostics(), pixels: window.relievo.readPixels() }));
+export const inState = (page, state) =>
+  page.waitForFunction((wanted) => window.relievo?.diagnostics().state === wanted, state);
+export const shownPast = (page, count) =>
+  page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
+/** Until nothing is drawn any more: what was under way has arrived, and no motion is left. */
+export async function still(page) {
+  await eventually('the picture does not come to rest', async () => {
+    const before = (await look(page)).drawn;
+    await page.waitForTimeout(700);
+    return (await look(page)).drawn === before;
+  });
+}
+
+/** Runs named checks one after the other; the number of those that failed. */
+export async function runChecks(checks, page) {
+  let failed = 0;
+  for (const [name, check] of Object.entries(checks)) {
+    const start = Date.now();
+    try {
+      await check(page);
+      console.log(`ok    ${name} (${Date.now() - start} ms)`);
+    } catch (error) {
+      ++failed;
+      console.log(`FAIL  ${name}: ${error.stack}`);
+      console.log('      ', JSON.stringify(await page.evaluate(() => window.relievo?.diagnostics()).catch(() => null)));
+    }
+  }
+  console.log(failed === 0 ? 'all checks passed' : `${failed} of ${Object.keys(checks).length} checks failed`);
+  return failed;
+}

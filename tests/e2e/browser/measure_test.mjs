@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: what is measured with the mouse is true. First on the feeder's known surface, then
+// through the whole chain on the simulator's cube of 100 mm, with the standard deviations that the server sends.
+// Run as: in_own_domain node measure_test.mjs GATEWAY_FEEDER RELIEVO_SERVER, in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { launchChromium } from './chromium.mjs';
+import { Feeder, isRim, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Server } from './server.mjs';
+
+const [feederPath, serverPath] = process.argv.slice(2);
+const feeder = await Feeder.start(feederPath);
+const browser = await launchChromium();
+const complaints = [];
+const kPage = { viewport: { width: 1500, height: 800 } }; // the panel covers nothing that is measured
+const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
+
+const click = async (page, point) => {
+  const at = await page.evaluate((p) => window.relievo.toPage(p), point);
+  await page.mouse.click(at.x, at.y);
+};
+const choose = (page, tool) => page.click(`#panel-measure .segments button:text-is("${tool}")`);
+/** Measures with a tool by clicking at these points of the surface. */
+async function measure(page, tool, points) {
+  const count = (await look(page)).measurements.length;
+  await choose(page, tool);
+  for (const point of points) await click(page, point);
+  await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count);
+  return (await look(page)).measurements.at(-1);
+}
+const away = (a, b) => Math.hypot(...a.map((c, i) => c - b[i]));
+const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
+async function saved(page, name) {
+  const [file] = await Promise.all([page.waitForEvent('download'), page.click(`#panel-measure button:text-is("${name}")`)]);
+  return { name: file.suggestedFilename(), text: readFileSync(await file.path(), 'utf8') };
+}
+
+const onFeeder = {
+  async 'distances and angles are true'(page) {
+    feeder.say('start ball');
+    await shownPast(page, 2);
+    feeder.say('stop'); // one surface from here on
+    await still(page);
+    await page.keyboard.press('c');
+    await page.keyboard.press('m');
+    await still(page);
+    const { frame } = await look(page);
+    const [a, b, c] = [pointOf(0.2, 0.2, frame), pointOf(0.52, 0.55, frame), pointOf(0.25, 0.8, frame)];
+    near((await measure(page, 'Distance', [a, b])).value, away(a, b), 0.001, 'distance');
+    near((await measure(page, 'Point', [b])).value, b[2], 0.0006, 'depth');
+    assert.equal((await look(page)).way, 'camera', 'a click has left the camera');
+    const angle = await measure(page, 'Angle', [a, b, c]);
+    const cosine = a.reduce((sum, _, i) => sum + (a[i] - b[i]) * (c[i] - b[i]), 0) / (away(a, b) * away(c, b));
+    near(angle.value, Math.acos(cosine), 0.004, 'angle');
+    assert.equal(angle.sigma, null); // the feeder says nothing of it
+  },
+
+  async 'a section is the profile of the surface'(page) {
+    const { frame } = await look(page);
+    const m = await measure(page, 'Section', [pointOf(0.15, 0.5, frame), pointOf(0.85, 0.5, frame)]);
+    assert.ok(m.profile.length > 100, `${m.profile.length} pieces`);
+    const places = m.profile.map(([{ point: [x, , z] }]) => ({ u: (x * 800) / (640 * z) + 0.5, z }));
+    const smooth = places.filter(({ u }) => !isRim(u, 0.5, frame));
+    assert.ok(smooth.length > places.length / 2, `${smooth.length} of ${places.length} places`);
+    for (const { u, z } of smooth) near(z, pointOf(u, 0.5, frame)[2], 0.002, `depth of the section at ${u}`);
+    assert.ok(await page.isVisible('#panel-measure .plot'));
+    const { name, text } = await saved(page, 'Section CSV');
+    assert.equal(name, 'relievo-section.csv');
+    assert.ok(text.startsWith('along_m,height_m,sigma_m,x_m,y_m,z_m\n') && text.split('\n').length > 100);
+  },
+
+  async 'the table holds them all'(page) {
+    const { text } = await saved(page, 'CSV');
+    assert.deepEqual(text.trim().split('\n').map((line) => line.split(',')[0]), ['tool', 'distance', 'point', 'angle', 'section']);
+    await page.click('#panel-measure button:text-is("Clear")');
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 0);
+  },
+
+  async 'a drag measures nothing, a miss says so'(page) {
+    await choose(page, 'Point');
+    await page.mouse.move(700, 400);
+    await page.mouse.down();
+    await page.mouse.move(740, 410, { steps: 3 });
+    await page.mouse.up();
+    assert.equal((await look(page)).measurements.length, 0);
+    await page.mouse.click(5, 400);
+    await page.waitForFunction(() => /no surface/.test(document.querySelector('#panel-measure').textContent));
+  },
+
+  async 'no error, no request to another host'() {
+    assert.deepEqual(complaints, []);
+  },
+};
+
+/** Of the simulator's cube of 100 mm (capture/source/sim/scenes_simple.cpp), on the face to the camera's left. */
+function onCube(right, down) {
+  const [s, c] = [Math.sin(0.5), Math.cos(0.5)];
+  const local = [right, down, -0.05];
+  return [0.12 + c * local[0] + s * local[2], 0.078 + local[1], 0.95 - s * local[0] + c * local[2]];
+}
+
+const onServer = {
+  async 'a cube of 100 mm reads true, and says how exactly'(page) {
+    await shownPast(page, 2);
+    await page.keyboard.press('c');
+    await page.keyboard.press('m');
+    for (const [from, to] of [
+      [[-0.03, -0.04], [-0.03, 0.04]],
+      [[-0.042, 0], [0.042, 0]],
+      [[-0.04, -0.03], [0.03, 0.04]],
+    ]) {
+      const [a, b] = [onCube(...from), onCube(...to)];
+      const m = await measure(page, 'Distance', [a, b]);
+      console.log(`      ${(away(a, b) * 1000).toFixed(2)} mm reads ${(m.value * 1000).toFixed(2)} ± ${(m.sigma * 1000).toFixed(2)} mm`);
+      near(m.value, away(a, b), 0.0005, 'distance on the cube');
+      assert.ok(m.sigma > 1e-6 && m.sigma < 0.001, `standard deviation ${m.sigma}`);
+    }
+  },
+
+  async 'the readout under the cursor says depth and deviation'(page) {
+    const at = await page.evaluate((p) => window.relievo.toPage(p), onCube(0, 0));
+    await page.mouse.move(at.x, at.y);
+    await page.waitForFunction(() => /depth [\d.]+ ± [\d.]+ mm/.test(document.querySelector('#cursor').textContent));
+    const depth = Number(/depth ([\d.]+)/.exec(await page.textContent('#cursor'))[1]);
+    near(depth, onCube(0, 0)[2] * 1000, 1, 'depth under the cursor');
+  },
+};
+
+let failed = 1;
+let server;
+try {
+  failed = await runChecks(onFeeder, await open('/', kPage));
+  await feeder.kill();
+  server = await Server.start(serverPath, ['--source', 'sim:object,rate=5']);
+  const pages = pagesOf(browser, server.address, complaints);
+  failed += await runChecks(onServer, await pages.open('/', kPage));
+} finally {
+  await browser.close();
+  await feeder.kill();
+  await server?.kill();
+}
+process.exit(failed === 0 ? 0 : 1);

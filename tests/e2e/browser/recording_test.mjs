@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: a recording of this device plays, is scrubbed and stepped through to the right frames
+// with the right surfaces, also where frames build on others; surfaces that were exported are shown where they are.
+// Run as: in_own_domain node recording_test.mjs GATEWAY_FEEDER RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readdirSync, readFileSync, rmSync, truncateSync, writeFileSync, copyFileSync, statSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { eventually, launchChromium } from './chromium.mjs';
+import { Feeder, inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
+
+const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
+const kFrames = 24;
+const kKeyEvery = 6;
+
+const scratch = mkdtempSync(join(tmpdir(), 'relievo-recording-'));
+const recorded = join(scratch, 'object.mcap');
+execFileSync(
+  serverPath,
+  ['serve', '--source', 'sim:object,width=320,height=240,stripes=60', '--frames', String(kFrames + 2), '--fast', '--web', 'none', '--record', recorded,
+    '--key-interval', String(kKeyEvery), '--domain', process.env.RELIEVO_TEST_DOMAIN, '--interface', 'lo'],
+  { stdio: 'ignore' },
+);
+execFileSync(relievoPath, ['export', recorded, '--out', join(scratch, 'ply'), '--format', 'ply'], { stdio: 'ignore' });
+execFileSync(relievoPath, ['export', recorded, '--out', join(scratch, 'glb'), '--format', 'glb'], { stdio: 'ignore' });
+const exported = (format, index) => join(scratch, format, readdirSync(join(scratch, format)).filter((f) => f.endsWith(format)).sort()[index]);
+
+const feeder = await Feeder.start(feederPath);
+const browser = await launchChromium();
+const complaints = [];
+const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
+
+const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
+/** Which camera frame is shown, and what its surface is: exact, as numbers are decoded alike whatever came before. */
+const shownSurface = (page) => page.evaluate(() => window.relievo.surface());
+const onFrame = (page, number) => page.waitForFunction((n) => window.relievo.diagnostics().frame === n, number);
+async function seek(page, index) {
+  const { times } = await playback(page);
+  await page.evaluate((ms) => {
+    const slider = document.querySelector('#timeline input[type=range]');
+    slider.value = String(ms);
+    slider.dispatchEvent(new Event('input', { bubbles: true }));
+  }, times[index] + 1e-3);
+}
+
+const surfaces = new Map(); // by camera frame, as they came one after the other
+let numbers = []; // of the camera frames, in order
+
+const checks = {
+  async 'a recording is opened by the picker, and plays to its end'(page) {
+    await inState(page, 'empty');
+    const [chooser] = await Promise.all([page.waitForEvent('filechooser'), page.click('#tool-open')]);
+    await chooser.setFiles(recorded);
+    await shownPast(page, 1);
+    await inState(page, 'file');
+    await page.waitForFunction(() => !window.relievo.diagnostics().playback.playing);
+    const { times } = await playback(page);
+    assert.ok(times.length >= kFrames - 4, `${times.length} frames`);
+    await eventually('the last frame is not shown', async () => (await playback(page)).index === times.length - 1);
+    assert.equal((await look(page)).errors, 0);
+  },
+
+  async 'it is stepped through frame by frame'(page) {
+    const { times } = await playback(page);
+    const last = (await shownSurface(page)).number;
+    await page.keyboard.press('Home');
+    for (let i = 0; i < times.length; ++i) {
+      if (i > 0) await page.keyboard.press('.');
+      await eventually(`frame ${i} is not shown`, async () => {
+        const now = await shownSurface(page);
+        const isNext = i === 0 ? now.number < last : now.number > numbers[i - 1]; // decoding takes its time
+        if ((await playback(page)).index !== i || !isNext) return false;
+        surfaces.set(now.number, now.hash);
+        numbers.push(now.number);
+        return true;
+      });
+    }
+    assert.deepEqual(numbers, [...numbers].sort((a, b) => a - b));
+    assert.ok(new Set(surfaces.values()).size > times.length / 2, 'the surfaces are all alike');
+    assert.equal((await look(page)).errors, 0, (await look(page)).lastError);
+  },
+
+  async 'key frames are marked, and no frame is missing'(page) {
+    await page.waitForFunction(() => window.relievo.diagnostics().playback.keys.every((k) => k !== null));
+    const { keys, gaps } = await playback(page);
+    const at = keys.flatMap((k, i) => (k ? [i] : []));
+    assert.ok(at.length > 1 && at.length < keys.length, `key frames at ${at}`);
+    assert.ok(at.slice(1).every((k, i) => k - at[i] === kKeyEvery), `key frames at ${at}`);
+    assert.ok(gaps.every((gap) => gap === 0), `gaps ${gaps}`);
+  },
+
+  async 'wherever it is scrubbed to, the surface is that of this frame'(page) {
+    const { keys } = await playback(page);
+    for (const index of [3, 17, 1, keys.length - 1, 8, 7, 0]) {
+      await seek(page, index);
+      await onFrame(page, numbers[index]);
+      assert.equal((await shownSurface(page)).hash, surfaces.get(numbers[index]), `frame ${index}, key: ${keys[index]}`);
+    }
+    await page.keyboard.press(',');
+    assert.equal((await playback(page)).index, 0);
+    assert.equal((await look(page)).errors, 0);
+  },
+
+  async 'a range is repeated, at another speed'(page) {
+    const { times } = await playback(page);
+    await seek(page, 4);
+    await onFrame(page, numbers[4]);
+    await page.keyboard.press('[');
+    await seek(page, 9);
+    await onFrame(page, numbers[9]);
+    await page.keyboard.press(']');
+    await page.selectOption('#timeline select', '4');
+    await page.evaluate(() => document.querySelector('#view').focus());
+    await page.keyboard.press(' ');
+    const { shown } = await look(page);
+    await shownPast(page, shown + 12); // more than the range has
+    const now = await playback(page);
+    assert.equal(now.speed, 4);
+    assert.ok(now.playing);
+    assert.ok(Math.abs(now.loop.from - times[4]) < 1 && Math.abs(now.loop.to - times[9]) < 1, JSON.stringify(now.loop));
+    assert.ok(now.position >= now.loop.from - 1 && now.position <= now.loop.to + 1, `at ${now.position}`);
+    await page.keyboard.press(' ');
+    await page.keyboard.press('\\');
+    assert.equal((await playback(page)).loop, null);
+  },
+
+  async "the rig's camera of a recording is known"(page) {
+    await page.keyboard.press('c');
+    await page.waitForFunction(() => window.relievo.diagnostics().way === 'camera');
+    assert.equal(await page.isDisabled('#ways button:nth-child(3)'), false);
+    await page.keyboard.press('o');
+  },
+
+  async 'a file dropped on the page is opened: an exported PLY'(page) {
+    const index = 5;
+    await seek(page, index);
+    await onFrame(page, numbers[index]);
+    const before = await page.evaluate(() => window.relievo.extent());
+    const bytes = readFileSync(exported('ply', index)).toString('base64');
+    await page.evaluate((data) => {
+      const content = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
+      const transfer = new DataTransfer();
+      transfer.items.add(new File([content], 'surface.ply'));
+      for (const type of ['dragover', 'drop']) {
+        document.body.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+      }
+    }, bytes);
+    await page.waitForFunction(() => window.relievo.diagnostics().file === 'surface.ply');
+    await still(page);
+    assert.equal(await page.isVisible('#timeline'), false);
+    const after = await page.evaluate(() => window.relievo.extent());
+    for (const end of ['min', 'max']) {
+      for (const i of [0, 1, 2]) assert.ok(Math.abs(after[end][i] - before[end][i]) < 2e-3, `${end} ${after[end]}, not ${before[end]}`);
+    }
+    const { pixels } = await look(page);
+    assert.ok(pixels.covered > 0.1 && pixels.deviation > 5, JSON.stringify(pixels));
+  },
+
+  async 'a GLB stands where it stood, with its picture'(page) {
+    const before = await page.evaluate(() => window.relievo.extent());
+    await page.setInputFiles('#file', exported('glb', 5));
+    await page.waitForFunction(() => /glb$/.test(window.relievo.diagnostics().file));
+    await still(page);
+    const after = await page.evaluate(() => window.relievo.extent());
+    for (const end of ['min', 'max']) {
+      for (const i of [0, 1, 2]) assert.ok(Math.abs(after[end][i] - before[end][i]) < 2e-3, `${end} ${after[end]}, not ${before[end]}`);
+    }
+    await page.keyboard.press('v');
+    await page.waitForFunction(() => document.querySelector('#picture').width === 320);
+    await page.keyboard.press('v');
+  },
+
+  async 'a recording that was cut short shows what is left, and says so'(page) {
+    const cut = join(scratch, 'cut.mcap');
+    copyFileSync(recorded, cut);
+    truncateSync(cut, Math.floor(statSync(cut).size * 0.7));
+    await page.setInputFiles('#file', cut);
+    await page.waitForFunction(() => window.relievo.diagnostics().playback?.times.length > 3);
+    assert.ok((await playback(page)).times.length < numbers.length);
+    assert.match(await page.textContent('#source'), /cut short/);
+  },
+
+  async 'what is none is refused with a reason, and the rest goes on'(page) {
+    const bad = join(scratch, 'bad.mcap');
+    writeFileSync(bad, 'not a recording at all, only some words in a file');
+    await page.setInputFiles('#file', bad);
+    await page.waitForFunction(() => /no MCAP file/.test(document.querySelector('#card').textContent));
+    await page.click('#dismiss');
+    assert.equal(await page.isVisible('#card'), false);
+    assert.equal((await look(page)).state, 'file');
+  },
+
+  async 'a stream is chosen again'(page) {
+    feeder.say('start ball');
+    await page.waitForFunction(() => document.querySelectorAll('#streams option').length === 1);
+    await page.selectOption('#streams', 'ball');
+    await inState(page, 'live');
+    assert.equal(await page.isVisible('#timeline'), false);
+  },
+
+  async 'no error, no request to another host'() {
+    assert.deepEqual(complaints, []);
+  },
+};
+
+let failed = 1;
+try {
+  failed = await runChecks(checks, await open());
+} finally {
+  await browser.close();
+  await feeder.kill();
+  rmSync(scratch, { recursive: true, force: true });
+}
+process.exit(failed === 0 ? 0 : 1);

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium and against the feeder's known surface: the rig camera's view, colours that stand for
+// numbers, what is under the cursor, how a person moves, what is remembered, what the page weighs.
+// Run as: node see_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { gzipSync } from 'node:zlib';
+import { eventually, launchChromium } from './chromium.mjs';
+import { depthOf, Feeder, inState, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+
+const kPage = { width: 800, height: 500 };
+const kFirstPictureBytes = 300_000; // gzipped
+const kContrast = 4.5; // WCAG AA
+
+const feeder = await Feeder.start(process.argv[2]);
+const origin = `http://127.0.0.1:${feeder.port}`;
+const browser = await launchChromium();
+const complaints = [];
+const { newPage, open } = pagesOf(browser, origin, complaints);
+
+/** Where a pixel of the camera's picture (its upper left corner) is on the page in the rig camera's view. */
+const onPage = (column, row) => {
+  const scale = Math.min(kPage.width / kPicture.width, kPage.height / kPicture.height);
+  return {
+    x: (kPage.width - kPicture.width * scale) / 2 + column * scale,
+    y: (kPage.height - kPicture.height * scale) / 2 + row * scale,
+  };
+};
+const pixel = (page, { x, y }) => page.evaluate(([px, py]) => window.relievo.pixelAt(px, py), [x, y]);
+const pick = (page, { x, y }) => page.evaluate(([px, py]) => window.relievo.pick(px, py), [x, y]);
+const toPage = (page, point) => page.evaluate((p) => window.relievo.toPage(p), point);
+const press = async (page, key) => {
+  await page.keyboard.press(key);
+  await still(page);
+};
+const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
+/** Shares of the picture with flat ground and with the ball. */
+const kPlaces = [[0.1, 0.15], [0.9, 0.2], [0.15, 0.85], [0.5, 0.5], [0.4, 0.6], [0.85, 0.8]];
+
+const checks = {
+  async 'what comes before the first picture is small'() {
+    feeder.say('start ball');
+    const page = await newPage();
+    const bodies = [];
+    page.on('response', (response) => bodies.push(response.body().catch(() => Buffer.alloc(0))));
+    await page.goto(`${origin}/`);
+    await shownPast(page, 1);
+    const bytes = (await Promise.all(bodies)).reduce((sum, body) => sum + gzipSync(body).length, 0);
+    console.log(`      ${bytes} bytes gzipped to the first picture`);
+    assert.ok(bytes > 50_000 && bytes < kFirstPictureBytes, `${bytes} bytes`);
+    await page.close();
+  },
+
+  async "the rig camera's view shows the picture where the camera saw it"(page) {
+    await shownPast(page, 2);
+    feeder.say('stop'); // one surface from here on
+    await still(page);
+    await press(page, 'c');
+    assert.equal((await look(page)).way, 'camera');
+    const isRed = ([r, g, b]) => r > 180 && g < 90 && b < 90;
+    const isGreen = ([r, g, b]) => r < 90 && g > 150 && b < 90;
+    for (const at of [[4, 30], [57, 30], [30, 4], [30, 57]]) {
+      assert.ok(isRed(await pixel(page, onPage(...at))), `no red at ${at}`);
+      assert.ok(isGreen(await pixel(page, onPage(kPicture.width - at[0], at[1]))), `no green opposite ${at}`);
+    }
+    for (const at of [[63, 30], [30, 63]]) {
+      assert.ok(!isRed(await pixel(page, onPage(...at))), `red at ${at}`);
+      assert.ok(!isGreen(await pixel(page, onPage(kPicture.width - at[0], at[1]))), `green opposite ${at}`);
+    }
+    assert.equal((await pixel(page, onPage(-3, 200)))[3], 0, 'something is drawn beside the picture');
+  },
+
+  async "the depth under the cursor is the surface's"(page) {
+    const { frame } = await look(page);
+    for (const [u, v] of kPlaces) {
+      const picked = await pick(page, onPage(u * kPicture.width, v * kPicture.height));
+      near(picked.point[2], depthOf(u, v, frame), 0.0006, `depth at ${u}, ${v}`);
+    }
+    assert.equal(await pick(page, onPage(-5, 100)), null);
+  },
+
+  async 'depth has the colour that the legend says'(page) {
+    await press(page, '6');
+    const { frame, depthRange } = await look(page);
+    const legend = await page.evaluate(() => {
+      const canvas = document.querySelector('#legend canvas');
+      return [...canvas.getContext('2d').getImageData(0, 0, 1, canvas.height).data];
+    });
+    const rows = legend.length / 4;
+    const depthOfColour = (rgb) => {
+      const away = (row) => rgb.slice(0, 3).reduce((sum, c, i) => sum + (c - legend[row * 4 + i]) ** 2, 0);
+      const row = [...Array(rows).keys()].reduce((best, r) => (away(r) < away(best) ? r : best), 0);
+      assert.ok(away(row) < 30, `${rgb} is not in the legend`);
+      return depthRange.from + ((depthRange.to - depthRange.from) * row) / (rows - 1);
+    };
+    for (const [u, v] of kPlaces) {
+      const rgb = await pixel(page, onPage(u * kPicture.width, v * kPicture.height));
+      const z = Math.min(depthRange.to, Math.max(depthRange.from, depthOf(u, v, frame)));
+      near(depthOfColour(rgb), z, 0.015 * (depthRange.to - depthRange.from), `depth at ${u}, ${v}`);
+    }
+    assert.match(await page.textContent('#legend'), /Depth, m/);
+  },
+
+  async 'normals have the colour of their direction'(page) {
+    await press(page, '5');
+    const { frame } = await look(page);
+    for (const [u, v] of kPlaces) {
+      const [p, right, down] = [pointOf(u, v, frame), pointOf(u + 0.01, v, frame), pointOf(u, v + 0.01, frame)];
+      const [a, b] = [right.map((c, i) => c - p[i]), down.map((c, i) => c - p[i])];
+      const n = [a[2] * b[1] - a[1] * b[2], a[0] * b[2] - a[2] * b[0], a[1] * b[0] - a[0] * b[1]];
+      const size = Math.hypot(...n);
+      const [r, g, bl] = await pixel(page, onPage(u * kPicture.width, v * kPicture.height));
+      const told = [r, g, bl].map((c) => (c / 255) * 2 - 1); // right, up, to the camera
+      const truth = [n[0] / size, -n[1] / size, -n[2] / size];
+      const cosine = told.reduce((sum, c, i) => sum + c * truth[i], 0) / Math.hypot(...told);
+      assert.ok(cosine > 0.985, `${told}, not ${truth} at ${u}, ${v}`);
+    }
+    assert.ok(await page.isVisible('#legend .disc'));
+  },
+
+  async 'a drag leaves the camera, and what is picked is where it is drawn'(page) {
+    await page.mouse.move(400, 250);
+    await page.mouse.down();
+    await page.mouse.move(460, 280, { steps: 4 });
+    await page.mouse.up();
+    await still(page);
+    const { way, frame } = await look(page);
+    assert.equal(way, 'orbit');
+    for (const [u, v] of kPlaces) {
+      const point = pointOf(u, v, frame);
+      const at = await toPage(page, point);
+      const picked = await pick(page, at);
+      for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} at ${u}, ${v}`);
+    }
+  },
+
+  async 'a double-click sets the pivot, which then stays in the middle'(page) {
+    const { frame } = await look(page);
+    const pivot = pointOf(0.4, 0.6, frame);
+    const at = await toPage(page, pivot);
+    await page.mouse.dblclick(at.x, at.y);
+    await still(page);
+    for (const key of [null, 'ArrowLeft', 'ArrowUp']) {
+      if (key !== null) await press(page, key);
+      const now = await toPage(page, pivot);
+      near(now.x, kPage.width / 2, 2, 'pivot x');
+      near(now.y, kPage.height / 2, 2, 'pivot y');
+    }
+  },
+
+  async 'flying moves ahead and looks around'(page) {
+    await press(page, 'y');
+    const before = await page.evaluate(() => window.relievo.pose());
+    await page.keyboard.down('w');
+    await page.waitForTimeout(300);
+    await page.keyboard.up('w');
+    await still(page);
+    const ahead = await page.evaluate(() => window.relievo.pose());
+    const gaze = before.target.map((t, i) => t - before.position[i]);
+    const moved = ahead.position.map((p, i) => p - before.position[i]);
+    const along = moved.reduce((sum, m, i) => sum + m * gaze[i], 0) / (Math.hypot(...moved) * Math.hypot(...gaze));
+    assert.ok(along > 0.99, `W moved by ${moved}, looking along ${gaze}`);
+    await page.mouse.move(400, 250);
+    await page.mouse.down();
+    await page.mouse.move(440, 250, { steps: 4 });
+    await page.mouse.up();
+    await still(page);
+    const looked = await page.evaluate(() => window.relievo.pose());
+    for (const i of [0, 1, 2]) near(looked.position[i], ahead.position[i], 1e-6, 'the place while looking around');
+    assert.ok(Math.hypot(...looked.target.map((t, i) => t - ahead.target[i])) > 0.01, 'looking around did nothing');
+    await press(page, 'o');
+    await press(page, 'r');
+  },
+
+  async 'fingers turn and zoom'() {
+    const page = await open('/', { hasTouch: true });
+    feeder.say('start ball');
+    await shownPast(page, 2);
+    feeder.say('stop');
+    await still(page);
+    const client = await page.context().newCDPSession(page);
+    const touch = (type, ...points) =>
+      client.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+    const pose = () => page.evaluate(() => window.relievo.pose());
+    const distance = ({ position, target }) => Math.hypot(...position.map((p, i) => p - target[i]));
+    const first = await pose();
+    await touch('touchStart', [400, 250]);
+    for (let i = 1; i <= 5; ++i) await touch('touchMove', [400 + i * 14, 250]);
+    await touch('touchEnd');
+    await still(page);
+    const turned = await pose();
+    assert.ok(Math.abs(turned.position[0] - first.position[0]) > 0.05, 'one finger does not turn');
+    near(distance(turned), distance(first), 1e-4, 'distance after turning');
+    await touch('touchStart', [380, 250], [420, 250]);
+    for (let i = 1; i <= 5; ++i) await touch('touchMove', [380 - i * 12, 250], [420 + i * 12, 250]);
+    await touch('touchEnd');
+    await still(page);
+    assert.ok(distance(await pose()) < 0.8 * distance(first), 'spreading two fingers does not zoom');
+    await page.close();
+  },
+
+  async "the camera's picture stands beside the surface"(page) {
+    await press(page, 'r'); // not moved by hand: a new size sets the view anew
+    await press(page, 'c');
+    await press(page, 'v');
+    assert.equal((await look(page)).way, 'camera', 'splitting the page has left the camera');
+    const corner = await page.evaluate(() => {
+      const canvas = document.querySelector('#picture');
+      return [canvas.width, canvas.height, ...canvas.getContext('2d').getImageData(30, 30, 1, 1).data];
+    });
+    assert.deepEqual(corner.slice(0, 2), [kPicture.width, kPicture.height]);
+    assert.ok(corner[2] > 180 && corner[3] < 90, `${corner} is not the picture's red corner`);
+    const { left } = await page.evaluate(() => document.querySelector('#picture').getBoundingClientRect());
+    const { width } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
+    assert.ok(left >= width - 1, 'the picture covers the surface');
+    await press(page, 'v');
+    await press(page, 'o');
+    const ids = await page.evaluate(() => [...document.querySelectorAll('[id]')].map((e) => e.id));
+    assert.equal(new Set(ids).size, ids.length, `an id twice: ${ids}`);
+  },
+
+  async 'what was chosen is remembered'(page) {
+    await page.keyboard.press('6');
+    await page.keyboard.press('g');
+    await page.keyboard.press('b');
+    await page.selectOption('#panel-display select >> nth=0', 'white');
+    assert.equal((await look(page)).gridStep, null);
+    feeder.say('start ball');
+    await page.reload();
+    await inState(page, 'live');
+    const now = await look(page);
+    assert.equal(now.mode, 'depth');
+    assert.equal(now.gridStep, null);
+    assert.equal(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), 'rgb(255, 255, 255)');
+    await page.keyboard.press('g');
+    await page.waitForFunction(() => window.relievo.diagnostics().gridStep === 0.1);
+    await page.evaluate(() => localStorage.clear());
+  },
+
+  async 'words can be read in both themes'() {
+    for (const colorScheme of ['dark', 'light']) {
+      const page = await open('/', { colorScheme });
+      await inState(page, 'live');
+      const contrasts = await page.evaluate(() => {
+        const style = getComputedStyle(document.documentElement);
+        const rgb = (name) => {
+          const probe = document.createElement('i');
+          probe.style.color = style.getPropertyValue(name);
+          document.body.append(probe);
+          const parts = getComputedStyle(probe).color.match(/[\d.]+/g).slice(0, 3).map(Number);
+          probe.remove();
+          return parts;
+        };
+        const luminance = (c) => {
+          const [r, g, b] = c.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
+          return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        };
+        const contrast = (a, b) => {
+          const [x, y] = [luminance(rgb(a)), luminance(rgb(b))].sort((p, q) => q - p);
+          return (x + 0.05) / (y + 0.05);
+        };
+        const pairs = ['text', 'quiet', 'warn', 'bad', 'accent', 'mark', 'axis-x', 'axis-y', 'axis-z'].map((n) => [`--${n}`, '--solid']);
+        pairs.push(['--on-accent', '--accent'], ['--quiet', '--ground']);
+        return pairs.map(([a, b]) => [`${a} on ${b}`, contrast(a, b)]);
+      });
+      const poor = contrasts.filter(([, ratio]) => !(ratio >= kContrast));
+      assert.deepEqual(poor, [], `${colorScheme} theme`);
+      await page.close();
+    }
+  },
+
+  async 'no error, no request to another host'() {
+    assert.deepEqual(complaints, []);
+  },
+};
+
+let failed = 1;
+try {
+  feeder.say('start ball');
+  failed = await runChecks(checks, await open());
+} finally {
+  await browser.close();
+  await feeder.kill();
+}
+process.exit(failed === 0 ? 0 : 1);

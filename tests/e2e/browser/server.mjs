@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// `relievo-server serve` with its viewer, in a DDS domain of its own.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+import { createInterface } from 'node:readline';
+
+export class Server {
+  /** `options`: of serve, beside those for the network. */
+  static async start(path, options) {
+    const domain = process.env.RELIEVO_TEST_DOMAIN;
+    assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
+    const network = ['--web', '127.0.0.1:0', '--domain', domain, '--interface', 'lo'];
+    const server = new Server();
+    server.process = spawn(path, ['serve', ...options, ...network], { stdio: ['ignore', 'pipe', 'inherit'] });
+    server.exited = new Promise((resolve) => server.process.once('exit', (code, signal) => resolve({ code, signal })));
+    const address = await new Promise((resolve, reject) => {
+      createInterface({ input: server.process.stdout }).on('line', (line) => {
+        if (line.startsWith('viewer ')) resolve(line.slice('viewer '.length));
+      });
+      server.exited.then(({ code }) => reject(new Error(`the server ended with status ${code} before it served`)));
+    });
+    server.address = new URL(address).origin;
+    return server;
+  }
+
+  async kill() {
+    this.process.kill('SIGKILL');
+    await this.exited;
+  }
+}

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: what is taken away is what was seen (picture, video, PLY, GLB, link), and the
+// statistics panel says what the page itself measures. Run as: node take_test.mjs GATEWAY_FEEDER, in web/viewer.
+// Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { launchChromium } from './chromium.mjs';
+import { depthOf, Feeder, inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
+
+const feeder = await Feeder.start(process.argv[2]);
+const origin = `http://127.0.0.1:${feeder.port}`;
+const browser = await launchChromium();
+const complaints = [];
+const { open } = pagesOf(browser, origin, complaints);
+let bytesOfPly;
+
+async function saved(page, name) {
+  const [file] = await Promise.all([page.waitForEvent('download'), page.click(`#panel-take button:text-is("${name}")`)]);
+  return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
+}
+
+const checks = {
+  async 'the statistics panel adds up'(page) {
+    await shownPast(page, 4);
+    await page.keyboard.press('i');
+    await page.waitForFunction(() => window.relievo.diagnostics().stages !== null);
+    await page.waitForFunction(() => /ms/.test(document.querySelector('#panel-statistics .stage-4 + dd').textContent));
+    const { parts, stages, latencyMs } = await look(page);
+    assert.ok(parts.geometry > 1000 && parts.texture > 1000 && parts.header === 80, JSON.stringify(parts));
+    const total = Object.values(stages).reduce((sum, ms) => sum + ms, 0);
+    assert.ok(Object.values(stages).every((ms) => ms >= -1), JSON.stringify(stages));
+    assert.ok(total > 0 && total < 3 * latencyMs + 1000, `${total} ms of ${latencyMs}`);
+    const words = await page.textContent('#panel-statistics');
+    assert.match(words, /codecsDraco, JPEG/);
+    assert.match(words, /server's clock ahead by-?[\d.]+ ± [\d.]+ ms/);
+    assert.ok(await page.isVisible('#panel-statistics .plot'));
+  },
+
+  async 'a picture has a transparent ground and the surface on it'(page) {
+    feeder.say('stop');
+    await still(page);
+    await page.keyboard.press('t');
+    const { name, bytes } = await saved(page, 'Picture');
+    assert.match(name, /^relievo-ball-\d{6}\.png$/);
+    const { corner, covered } = await page.evaluate(async (data) => {
+      const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]));
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+      const opaque = rgba.filter((v, i) => i % 4 === 3 && v > 128).length;
+      return { corner: rgba[3], covered: opaque / (bitmap.width * bitmap.height) };
+    }, bytes.toString('base64'));
+    assert.equal(corner, 0);
+    const { pixels } = await look(page);
+    assert.ok(Math.abs(covered - pixels.covered) < 0.01, `${covered}, not ${pixels.covered}`);
+  },
+
+  async 'a video of the view can be played'(page) {
+    feeder.say('start ball');
+    await page.click('#panel-take button:text-is("Video")');
+    const { shown } = await look(page);
+    await shownPast(page, shown + 6);
+    const { name, bytes } = await saved(page, 'Stop video');
+    assert.match(name, /\.(webm|mp4)$/);
+    assert.ok(bytes.length > 2000, `${bytes.length} bytes`);
+    const isWebm = bytes.readUInt32BE(0) === 0x1a45dfa3;
+    const isMp4 = bytes.subarray(4, 8).toString() === 'ftyp';
+    assert.ok(isWebm || isMp4, 'neither WebM nor MP4');
+    assert.ok(await page.isVisible('#panel-take button:text-is("Video")'));
+  },
+
+  async 'the surface is taken away as PLY and GLB'(page) {
+    feeder.say('stop');
+    await still(page);
+    const { frame, vertices, triangles } = await look(page);
+    const ply = await saved(page, 'PLY');
+    bytesOfPly = ply.bytes;
+    const header = ply.bytes.subarray(0, 600).toString('latin1');
+    assert.ok(header.includes(`element vertex ${vertices}\n`) && header.includes(`element face ${triangles}\n`), header);
+    const start = header.indexOf('end_header\n') + 11;
+    for (let v = 0; v < vertices; v += 997) {
+      const [x, y, z] = [0, 4, 8].map((at) => ply.bytes.readFloatLE(start + v * 15 + at));
+      const [u, w] = [(x * 800) / (640 * z) + 0.5, (y * 800) / (480 * z) + 0.5];
+      assert.ok(Math.abs(z - depthOf(u, w, frame)) < 0.003, `vertex ${v}: ${z}, not ${depthOf(u, w, frame)}`);
+    }
+    const glb = await saved(page, 'GLB');
+    assert.equal(glb.bytes.readUInt32LE(0), 0x46546c67);
+    assert.equal(glb.bytes.readUInt32LE(8), glb.bytes.length);
+    const extent = await page.evaluate(() => window.relievo.extent());
+    await page.setInputFiles('#file', { name: 'back.glb', mimeType: 'model/gltf-binary', buffer: glb.bytes });
+    await page.waitForFunction(() => window.relievo.diagnostics().file === 'back.glb');
+    await still(page);
+    const back = await page.evaluate(() => window.relievo.extent());
+    for (const i of [0, 1, 2]) assert.ok(Math.abs(back.max[i] - extent.max[i]) < 1e-4, `${back.max}, not ${extent.max}`);
+    await page.setInputFiles('#file', { name: 'back.ply', mimeType: 'application/octet-stream', buffer: bytesOfPly });
+    await page.waitForFunction(() => window.relievo.diagnostics().file === 'back.ply');
+    await still(page);
+    assert.ok((await look(page)).pixels.covered > 0.1);
+  },
+
+  async 'a link shows somebody else the same'() {
+    feeder.say('start ball');
+    const page = await open('/?stream=ball');
+    await inState(page, 'live');
+    await page.keyboard.press('5');
+    await page.keyboard.press('g');
+    await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('+');
+    await page.waitForTimeout(300);
+    const link = await page.evaluate(() => window.relievo.link());
+    const pose = await page.evaluate(() => window.relievo.pose());
+    await page.close();
+    const other = await open(link.slice(origin.length));
+    await inState(other, 'live');
+    await shownPast(other, 2);
+    const now = await look(other);
+    assert.equal(now.stream, 'ball');
+    assert.equal(now.mode, 'normals');
+    assert.equal(now.gridStep, null);
+    const same = await other.evaluate(() => window.relievo.pose());
+    for (const part of ['position', 'target']) {
+      for (const i of [0, 1, 2]) assert.ok(Math.abs(same[part][i] - pose[part][i]) < 1e-3, `${part} ${same[part]}, not ${pose[part]}`);
+    }
+    await other.close();
+  },
+
+  async 'no error, no request to another host'() {
+    assert.deepEqual(complaints, []);
+  },
+};
+
+let failed = 1;
+try {
+  feeder.say('start ball');
+  failed = await runChecks(checks, await open());
+} finally {
+  await browser.close();
+  await feeder.kill();
+}
+process.exit(failed === 0 ? 0 : 1);

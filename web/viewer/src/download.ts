@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a person takes away: files and the clipboard.
+import { make } from './dom';
+
+export function download(name: string, content: Blob): void {
+  const url = URL.createObjectURL(content);
+  make('a', { href: url, download: name }).click();
+  window.setTimeout(() => URL.revokeObjectURL(url), 10_000); // the browser may still be reading
+}
+
+/** Also on plain http, where the clipboard's own interface is missing. False where the browser refuses. */
+export async function copy(text: string): Promise<boolean> {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    const area = make('textarea', { value: text });
+    document.body.append(area);
+    area.select();
+    const done = document.execCommand('copy');
+    area.remove();
+    return done;
+  }
+}
+
+/** "relievo-face-000123.ply" */
+export function fileName(stream: string | null, number: number | null, extension: string): string {
+  const safe = (stream ?? 'surface').replace(/[^\w.-]+/g, '_');
+  const frame = number === null ? '' : `-${String(number).padStart(6, '0')}`;
+  return `relievo-${safe}${frame}.${extension}`;
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// From where a surface is first seen: the rig's own camera, moved aside and up far enough that relief reads. Pure.
+import type { Vec3 } from './pick';
+import type { Extent } from './surface';
+
+const kAzimuth = (16 * Math.PI) / 180;
+const kElevation = (13 * Math.PI) / 180;
+const kMargin = 1.2;
+
+export interface FirstView {
+  position: Vec3; // in three's frame: y up, z towards the viewer
+  target: Vec3;
+  distance: number;
+}
+
+/** `fov` in radians, upright. */
+export function firstView(extent: Extent, fov: number, aspect: number): FirstView {
+  const tangent = Math.tan(fov / 2);
+  const half = [0, 1, 2].map((i) => (extent.max[i]! - extent.min[i]!) / 2) as Vec3;
+  const middle = [0, 1, 2].map((i) => (extent.max[i]! + extent.min[i]!) / 2) as Vec3;
+  const width = half[0] * Math.cos(kAzimuth) + half[2] * Math.sin(kAzimuth);
+  const height = half[1] * Math.cos(kElevation) + half[2] * Math.sin(kElevation);
+  const distance = kMargin * Math.max(height / tangent, width / (tangent * aspect)) + half[2] * 0.5;
+  const target: Vec3 = [middle[0], -middle[1], -middle[2]];
+  const away: Vec3 = [
+    Math.cos(kElevation) * Math.sin(kAzimuth),
+    Math.sin(kElevation),
+    Math.cos(kElevation) * Math.cos(kAzimuth),
+  ];
+  const position = target.map((t, i) => t + distance * away[i]!) as Vec3;
+  return { position, target, distance };
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keys for everything. What they do is the page's; which key does it stands here alone.
+import { kModes, type Mode, type Way } from './display';
+import { isTyping } from './fly';
+
+const kTurn = 0.06; // radians a key press
+const kMove = 0.03; // of the distance
+const kZoom = 1.08;
+
+export interface KeyActions {
+  mode(mode: Mode): void;
+  way(way: Way): void;
+  orbit(right: number, up: number): void;
+  pan(right: number, up: number): void;
+  zoom(factor: number): void;
+  /** By the key, lower case; false where it means nothing. */
+  command(key: string): boolean;
+}
+
+const kArrows: Record<string, readonly [number, number]> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+const kWayKeys: Record<string, Way> = { o: 'orbit', y: 'fly', c: 'camera' };
+
+export function listenToKeys(actions: KeyActions): void {
+  window.addEventListener('keydown', (event) => {
+    const modified = event.ctrlKey || event.metaKey || event.altKey;
+    if (modified || isTyping(event.target) || belongsToControl(event)) return;
+    if (act(event, actions)) event.preventDefault();
+  });
+}
+
+// Space and Enter press the button that has the focus, arrows move a slider.
+function belongsToControl({ target, key }: KeyboardEvent): boolean {
+  if (target instanceof HTMLButtonElement) return key === ' ' || key === 'Enter';
+  if (target instanceof HTMLInputElement) return key === ' ' || key.startsWith('Arrow');
+  return false;
+}
+
+function act(event: KeyboardEvent, actions: KeyActions): boolean {
+  const arrow = kArrows[event.key];
+  if (arrow !== undefined) {
+    const [x, y] = arrow;
+    if (event.shiftKey) actions.pan(x * kMove, y * kMove);
+    else actions.orbit(x * kTurn, y * kTurn);
+    return true;
+  }
+  const key = event.key.toLowerCase();
+  const mode = kModes[Number(key) - 1];
+  const way = kWayKeys[key];
+  if (mode !== undefined) actions.mode(mode);
+  else if (way !== undefined) actions.way(way);
+  else if (key === '+' || key === '=') actions.zoom(kZoom);
+  else if (key === '-' || key === '_') actions.zoom(1 / kZoom);
+  else return actions.command(key);
+  return true;
+}

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the messages of an MCAP file (https://mcap.dev/spec) are: by its index, or by going through it where there is
+// none, as after a crash. Only uncompressed chunks, which is what recordings have (codec/FORMAT.md). Any input.
+import { crc32 } from './crc32';
+
+/** A file, or anything like it. `read` gives fewer bytes only at the end. */
+export interface Bytes {
+  size: number;
+  read(at: number, length: number): Promise<Uint8Array>;
+}
+
+export const bytesOf = (blob: Blob): Bytes => ({
+  size: blob.size,
+  read: async (at, length) => new Uint8Array(await blob.slice(at, at + length).arrayBuffer()),
+});
+
+export interface McapMessage {
+  channel: number;
+  timeMs: number; // log time, UTC
+  at: number; // of its record in the file
+}
+
+export interface McapFile {
+  topics: Map<number, string>; // of the channels
+  messages: McapMessage[]; // by time
+  /** Why only the beginning is there; null: all is. */
+  damage: string | null;
+}
+
+const kMagic = [0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a];
+const kRecordHead = 9;
+const kFooterBytes = kRecordHead + 20;
+const kMessageHead = 22; // of a message's content, before its data
+const kMaxChunk = 2 ** 30;
+const kTogether = 16; // reads at a time
+const kOp = { footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, dataEnd: 15 };
+
+/** Throws with what a person should know where the file is none of ours. */
+export async function openMcap(file: Bytes): Promise<McapFile> {
+  const start = await file.read(0, kMagic.length);
+  if (!kMagic.every((b, i) => start[i] === b)) throw new Error('it is no MCAP file');
+  const indexed = await readIndexed(file);
+  const found = indexed ?? (await walk(file));
+  found.messages.sort((a, b) => a.timeMs - b.timeMs);
+  return found;
+}
+
+/** The data of a message, whole. */
+export async function readMessage(file: Bytes, { at }: McapMessage): Promise<Uint8Array> {
+  const head = await file.read(at, kRecordHead);
+  const length = lengthOf(head);
+  if (head[0] !== kOp.message || !(length >= kMessageHead && length <= kMaxChunk)) throw new Error('a message is damaged');
+  const data = await file.read(at + kRecordHead + kMessageHead, length - kMessageHead);
+  if (data.length !== length - kMessageHead) throw new Error('a message is cut short');
+  return data;
+}
+
+/** The first bytes of a message's data. */
+export const readMessageHead = (file: Bytes, { at }: McapMessage, length: number): Promise<Uint8Array> =>
+  file.read(at + kRecordHead + kMessageHead, length);
+
+const viewOf = (bytes: Uint8Array): DataView => new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+const u64 = (view: DataView, at: number): number => Number(view.getBigUint64(at, true));
+const timeMs = (view: DataView, at: number): number => Number(view.getBigUint64(at, true) / 1000n) / 1000;
+const lengthOf = (head: Uint8Array): number => (head.length < kRecordHead ? -1 : u64(viewOf(head), 1));
+
+interface Record {
+  op: number;
+  content: Uint8Array;
+  at: number; // of the record in `bytes`
+}
+
+/** Whole records one behind the other; what is cut short at the end is left out. */
+function* records(bytes: Uint8Array): Generator<Record> {
+  for (let at = 0; at + kRecordHead <= bytes.length; ) {
+    const length = u64(viewOf(bytes), at + 1);
+    const end = at + kRecordHead + length;
+    if (!(end <= bytes.length)) return;
+    yield { op: bytes[at]!, content: bytes.subarray(at + kRecordHead, end), at };
+    at = end;
+  }
+}
+
+function readChannel(content: Uint8Array, topics: Map<number, string>): void {
+  const view = viewOf(content);
+  const length = content.length >= 8 ? view.getUint32(4, true) : Infinity;
+  if (8 + length > content.length) throw new Error('its index is damaged');
+  topics.set(view.getUint16(0, true), new TextDecoder().decode(content.subarray(8, 8 + length)));
+}
+
+/** Null where there is no index, or its CRC is wrong. */
+async function readIndexed(file: Bytes): Promise<McapFile | null> {
+  const tail = await file.read(Math.max(0, file.size - kFooterBytes - kMagic.length), kFooterBytes + kMagic.length);
+  if (tail.length < kFooterBytes + kMagic.length || tail[0] !== kOp.footer) return null;
+  if (!kMagic.every((b, i) => tail[kFooterBytes + i] === b)) return null;
+  const view = viewOf(tail);
+  const summaryAt = u64(view, kRecordHead);
+  const crc = view.getUint32(kRecordHead + 16, true);
+  const summaryEnd = file.size - kFooterBytes - kMagic.length;
+  if (summaryAt === 0 || !(summaryAt < summaryEnd)) return null;
+  const summary = await file.read(summaryAt, summaryEnd - summaryAt + kFooterBytes - 4);
+  if (crc !== 0 && crc32(summary) !== crc) return null;
+  const topics = new Map<number, string>();
+  const chunks: { at: number; recordsAt: number; indexAt: number; indexBytes: number }[] = [];
+  try {
+    for (const { op, content } of records(summary)) {
+      if (op === kOp.channel) readChannel(content, topics);
+      if (op === kOp.chunkIndex) chunks.push(readChunkIndex(content));
+    }
+    const messages: McapMessage[] = [];
+    for (let i = 0; i < chunks.length; i += kTogether) {
+      const some = chunks.slice(i, i + kTogether);
+      const indices = await Promise.all(some.map((chunk) => file.read(chunk.indexAt, chunk.indexBytes)));
+      for (const [j, index] of indices.entries()) addIndexed(index, some[j]!.recordsAt, file.size, messages);
+    }
+    return { topics, messages, damage: null };
+  } catch (error) {
+    if (error instanceof Compressed) throw error;
+    return null;
+  }
+}
+
+class Compressed extends Error {}
+
+function readChunkIndex(content: Uint8Array): { at: number; recordsAt: number; indexAt: number; indexBytes: number } {
+  const view = viewOf(content);
+  const [at, length] = [u64(view, 16), u64(view, 24)];
+  const offsets = view.getUint32(32, true); // bytes of the map
+  const indexBytes = u64(view, 36 + offsets);
+  checkCompression(content, 44 + offsets);
+  return { at, recordsAt: at + kRecordHead + kChunkHead, indexAt: at + length, indexBytes };
+}
+
+const kChunkHead = 40; // of an uncompressed chunk's content, before its records
+
+function checkCompression(content: Uint8Array, at: number): void {
+  const length = viewOf(content).getUint32(at, true);
+  if (length === 0) return;
+  const name = new TextDecoder().decode(content.subarray(at + 4, at + 4 + Math.min(length, 16)));
+  throw new Compressed(`its chunks are compressed (${name}), which is not read here`);
+}
+
+function addIndexed(index: Uint8Array, recordsAt: number, size: number, messages: McapMessage[]): void {
+  for (const { op, content } of records(index)) {
+    if (op !== kOp.messageIndex) continue;
+    const view = viewOf(content);
+    const channel = view.getUint16(0, true);
+    const bytes = view.getUint32(2, true);
+    for (let at = 6; at + 16 <= Math.min(6 + bytes, content.length); at += 16) {
+      const message = { channel, timeMs: timeMs(view, at), at: recordsAt + u64(view, at + 8) };
+      if (message.at < size) messages.push(message);
+    }
+  }
+}
+
+/** From the beginning as far as it is sound; half a chunk is not read, since nothing vouches for it. */
+async function walk(file: Bytes): Promise<McapFile> {
+  const found: McapFile = { topics: new Map(), messages: [], damage: 'it has no index: it was cut short' };
+  for (let at = kMagic.length; at < file.size; ) {
+    const head = await file.read(at, kRecordHead);
+    const length = lengthOf(head);
+    if (length < 0 || at + kRecordHead + length > file.size) return found;
+    if (head[0] === kOp.chunk && length <= kMaxChunk) {
+      const content = await file.read(at + kRecordHead, length);
+      if (!addChunk(content, at + kRecordHead, found)) found.damage = 'a part of it is damaged and left out';
+    } else if (head[0] === kOp.channel && length <= kMaxChunk) {
+      readChannel(await file.read(at + kRecordHead, length), found.topics);
+    } else if (head[0] === kOp.dataEnd || head[0] === 0) {
+      return found;
+    }
+    at += kRecordHead + length;
+  }
+  return found;
+}
+
+/** False where its CRC is wrong. */
+function addChunk(content: Uint8Array, at: number, found: McapFile): boolean {
+  if (content.length < kChunkHead) return false;
+  checkCompression(content, 28);
+  const crc = viewOf(content).getUint32(24, true);
+  const inner = content.subarray(kChunkHead);
+  if (crc !== 0 && crc32(inner) !== crc) return false;
+  for (const record of records(inner)) {
+    if (record.op === kOp.channel) readChannel(record.content, found.topics);
+    if (record.op !== kOp.message || record.content.length < kMessageHead) continue;
+    const view = viewOf(record.content);
+    found.messages.push({ channel: view.getUint16(0, true), timeMs: timeMs(view, 6), at: at + kChunkHead + record.at });
+  }
+  return true;
+}

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lengths, angles and cross-sections on a surface, with their standard deviations. Pure; metres, rig camera's frame.
+// An error of depth moves a vertex along its ray from the rig's camera; the errors of two places are independent.
+import type { Surface, Vec3 } from './pick';
+
+export const kTools = ['point', 'distance', 'angle', 'section'] as const;
+export type Tool = (typeof kTools)[number];
+
+/** How many places a tool needs. */
+export const kSpots: Record<Tool, number> = { point: 1, distance: 2, angle: 3, section: 2 };
+
+export interface Spot {
+  point: Vec3;
+  sigma: number | null; // of its depth, metres; null: not known
+}
+
+export interface Measurement {
+  tool: Tool;
+  spots: Spot[];
+  value: number; // point: depth; distance, section: length; metres. Angle at the second spot: radians
+  sigma: number | null;
+  profile: Segment[]; // of a section
+}
+
+const minus = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const dot = (a: Vec3, b: Vec3): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a: Vec3, b: Vec3): Vec3 => [
+  a[1] * b[2] - a[2] * b[1],
+  a[2] * b[0] - a[0] * b[2],
+  a[0] * b[1] - a[1] * b[0],
+];
+const length = (a: Vec3): number => Math.sqrt(dot(a, a));
+const unit = (a: Vec3): Vec3 => {
+  const size = length(a);
+  return [a[0] / size, a[1] / size, a[2] / size];
+};
+
+const values: Record<Tool, (points: Vec3[]) => number> = {
+  point: ([a]) => a![2],
+  distance: ([a, b]) => length(minus(a!, b!)),
+  section: ([a, b]) => length(minus(a!, b!)),
+  angle: ([a, b, c]) => {
+    const [u, v] = [minus(a!, b!), minus(c!, b!)];
+    return Math.atan2(length(cross(u, v)), dot(u, v));
+  },
+};
+
+/** `eye`: from where a section's line was drawn. */
+export function measure(tool: Tool, spots: Spot[], surface: Surface | null, eye: Vec3): Measurement {
+  const points = spots.map((s) => s.point);
+  return {
+    tool,
+    spots,
+    value: values[tool](points),
+    sigma: propagate(values[tool], spots),
+    profile: tool === 'section' && surface !== null ? section(surface, points[0]!, points[1]!, eye) : [],
+  };
+}
+
+// By central differences along each spot's ray.
+function propagate(value: (points: Vec3[]) => number, spots: Spot[]): number | null {
+  const points = spots.map((s) => s.point);
+  let variance = 0;
+  for (const [i, { point, sigma }] of spots.entries()) {
+    if (sigma === null) return null;
+    const step = 1e-4 * Math.abs(point[2]);
+    const moved = (dz: number): number => {
+      const scale = 1 + dz / point[2];
+      return value(points.map((p, j) => (j === i ? (p.map((c) => c * scale) as Vec3) : p)));
+    };
+    variance += (((moved(step) - moved(-step)) / (2 * step)) * sigma) ** 2;
+  }
+  return Math.sqrt(variance);
+}
+
+export interface ProfilePoint {
+  along: number; // metres from the first place towards the second
+  height: number; // metres off the straight line, towards the eye
+  sigma: number | null; // of the height
+  point: Vec3;
+}
+export type Segment = readonly [ProfilePoint, ProfilePoint];
+
+/** Where the plane through `eye` and both places cuts the surface, between the places. */
+export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3): Segment[] {
+  const { positions: p, triangles } = surface;
+  const along = unit(minus(b, a));
+  const normal = unit(cross(minus(a, eye), minus(b, eye)));
+  let up = cross(normal, along);
+  if (dot(up, minus(eye, a)) < 0) up = [-up[0], -up[1], -up[2]];
+  const end = length(minus(b, a));
+  const side = new Float64Array(p.length / 3);
+  for (let v = 0; v < side.length; ++v) {
+    side[v] = (p[3 * v]! - a[0]) * normal[0] + (p[3 * v + 1]! - a[1]) * normal[1] + (p[3 * v + 2]! - a[2]) * normal[2];
+  }
+  const cut = (v: number, w: number): ProfilePoint => {
+    const t = side[v]! / (side[v]! - side[w]!);
+    const point = [0, 1, 2].map((i) => p[3 * v + i]! + t * (p[3 * w + i]! - p[3 * v + i]!)) as Vec3;
+    const off = minus(point, a);
+    const ray: Vec3 = [point[0] / point[2], point[1] / point[2], 1];
+    const s = sigmaBetween(surface, v, w, t);
+    return { along: dot(off, along), height: dot(off, up), sigma: s === null ? null : Math.abs(dot(ray, up)) * s, point };
+  };
+  const segments: Segment[] = [];
+  for (let t = 0; t < triangles.length; t += 3) {
+    const corners = [triangles[t]!, triangles[t + 1]!, triangles[t + 2]!];
+    const ends: ProfilePoint[] = [];
+    for (let i = 0; i < 3; ++i) {
+      const [v, w] = [corners[i]!, corners[(i + 1) % 3]!];
+      if (side[v]! < 0 !== side[w]! < 0) ends.push(cut(v, w));
+    }
+    if (ends.length !== 2) continue;
+    const [from, to] = ends[0]!.along <= ends[1]!.along ? [ends[0]!, ends[1]!] : [ends[1]!, ends[0]!];
+    if (to.along >= 0 && from.along <= end) segments.push([from, to]);
+  }
+  return segments.sort((x, y) => x[0].along - y[0].along);
+}
+
+function sigmaBetween({ quality }: Surface, v: number, w: number, t: number): number | null {
+  const [a, b] = [quality?.sigmas[v] ?? 0, quality?.sigmas[w] ?? 0];
+  return a > 0 && b > 0 ? Math.hypot((1 - t) * a, t * b) : null;
+}
+
+/** "101.24 ± 0.31 mm": as many digits as are known. */
+export function lengthText(value: number, sigma: number | null): string {
+  const mm = value * 1000;
+  if (sigma === null) return `${mm.toFixed(2)} mm`;
+  const digits = Math.min(3, Math.max(0, 1 - Math.floor(Math.log10(Math.max(sigma * 1000, 1e-3)))));
+  return `${mm.toFixed(digits)} ± ${(sigma * 1000).toFixed(digits)} mm`;
+}
+
+export function angleText(value: number, sigma: number | null): string {
+  const degrees = (v: number): string => ((v * 180) / Math.PI).toFixed(2);
+  return sigma === null ? `${degrees(value)}°` : `${degrees(value)} ± ${degrees(sigma)}°`;
+}
+
+export function valueText({ tool, value, sigma }: Measurement): string {
+  return tool === 'angle' ? angleText(value, sigma) : lengthText(value, sigma);
+}
+
+const number = (value: number | null | undefined): string => (value === null || value === undefined ? '' : value.toPrecision(9));
+
+/** A line a measurement; metres and radians. */
+export function measurementsCsv(measurements: readonly Measurement[]): string {
+  const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`].join(',');
+  const lines = [`tool,value,unit,sigma,${[1, 2, 3].map(spot).join(',')}`];
+  for (const m of measurements) {
+    const spots = [0, 1, 2].flatMap((i) => {
+      const s = m.spots[i];
+      return s === undefined ? ['', '', '', ''] : [...s.point.map(number), number(s.sigma)];
+    });
+    lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), ...spots].join(','));
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+/** A line a point; an empty line where the surface has a gap. */
+export function sectionCsv(profile: readonly Segment[]): string {
+  const line = (p: ProfilePoint): string =>
+    [p.along, p.height, p.sigma, ...p.point].map(number).join(',');
+  const lines = ['along_m,height_m,sigma_m,x_m,y_m,z_m'];
+  let last: ProfilePoint | null = null;
+  for (const [from, to] of profile) {
+    if (last === null || !isSame(last, from)) {
+      if (last !== null) lines.push('');
+      lines.push(line(from));
+    }
+    lines.push(line(to));
+    last = to;
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+const isSame = (a: ProfilePoint, b: ProfilePoint): boolean =>
+  Math.abs(a.along - b.along) < 1e-9 && Math.abs(a.height - b.height) < 1e-9;

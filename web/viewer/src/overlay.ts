@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Text and marks over the picture, at places of the scene: drawn after it, in the page's own resolution.
+import type { Label } from './ground';
+import type { Vec3 } from './pick';
+
+export interface Mark {
+  points: Vec3[]; // rig camera's frame; joined by lines
+  text: string; // at the middle of the points
+  closed?: boolean;
+}
+
+type Project = (point: Vec3) => { x: number; y: number } | null;
+
+const kFont = '11px system-ui, sans-serif';
+
+export class Overlay {
+  private readonly context: CanvasRenderingContext2D;
+  marks: readonly Mark[] = [];
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    this.context = canvas.getContext('2d')!;
+  }
+
+  draw(project: Project, labels: readonly Label[]): void {
+    const ratio = Math.min(window.devicePixelRatio, 2);
+    const { clientWidth, clientHeight } = this.canvas;
+    const [width, height] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+    }
+    const c = this.context;
+    c.setTransform(ratio, 0, 0, ratio, 0, 0);
+    c.clearRect(0, 0, clientWidth, clientHeight);
+    c.font = kFont;
+    c.textBaseline = 'middle';
+    c.textAlign = 'center';
+    const style = getComputedStyle(this.canvas);
+    const halo = style.getPropertyValue('--halo');
+    const accent = style.getPropertyValue('--mark');
+    for (const { at, text, colour } of labels) {
+      const place = project(at);
+      if (place !== null) this.text(text, place.x, place.y + 9, style.getPropertyValue(colour), halo);
+    }
+    for (const mark of this.marks) this.mark(mark, project, accent, halo);
+  }
+
+  private mark({ points, text }: Mark, project: Project, accent: string, halo: string): void {
+    const places = points.map(project);
+    const seen = places.filter((p) => p !== null);
+    if (seen.length === 0) return;
+    const c = this.context;
+    c.lineJoin = 'round';
+    if (seen.length === places.length && seen.length > 1) {
+      for (const [colour, width] of [[halo, 4], [accent, 1.75]] as const) {
+        c.strokeStyle = colour;
+        c.lineWidth = width;
+        c.beginPath();
+        for (const [i, p] of seen.entries()) i === 0 ? c.moveTo(p.x, p.y) : c.lineTo(p.x, p.y);
+        c.stroke();
+      }
+    }
+    const ends = points.length > 3 ? [seen[0]!, seen[seen.length - 1]!] : seen;
+    for (const { x, y } of ends) {
+      c.beginPath();
+      c.arc(x, y, 4, 0, 2 * Math.PI);
+      c.fillStyle = accent;
+      c.strokeStyle = halo;
+      c.lineWidth = 1.5;
+      c.fill();
+      c.stroke();
+    }
+    const x = seen.reduce((sum, p) => sum + p.x, 0) / seen.length;
+    const y = seen.reduce((sum, p) => sum + p.y, 0) / seen.length;
+    if (text !== '') this.text(text, x, y - 14, accent, halo);
+  }
+
+  private text(text: string, x: number, y: number, colour: string, halo: string): void {
+    const c = this.context;
+    c.lineWidth = 3;
+    c.lineJoin = 'round';
+    c.strokeStyle = halo;
+    c.fillStyle = colour;
+    c.strokeText(text, x, y);
+    c.fillText(text, x, y);
+  }
+}

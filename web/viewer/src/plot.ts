@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small plots in panels, in the page's colours and the screen's resolution.
+import { metres, niceStep, ticks, type Range } from './palette';
+
+const kMargin = { left: 38, right: 8, top: 8, bottom: 20 };
+
+export interface Line {
+  points: readonly (readonly [number, number])[]; // NaN ends a stretch
+  colour: string; // a property of style.css
+}
+
+export interface Axes {
+  x: Range;
+  y: Range;
+  unit: string; // of both, at the corner
+}
+
+export function plot(canvas: HTMLCanvasElement, { x, y, unit }: Axes, lines: readonly Line[]): void {
+  const ratio = Math.min(window.devicePixelRatio, 2);
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  const c = canvas.getContext('2d')!;
+  c.scale(ratio, ratio);
+  const style = getComputedStyle(canvas);
+  const inner = { width: width - kMargin.left - kMargin.right, height: height - kMargin.top - kMargin.bottom };
+  const atX = (v: number): number => kMargin.left + ((v - x.from) / (x.to - x.from)) * inner.width;
+  const atY = (v: number): number => kMargin.top + (1 - (v - y.from) / (y.to - y.from)) * inner.height;
+  c.font = '10px system-ui, sans-serif';
+  c.fillStyle = style.getPropertyValue('--quiet');
+  c.strokeStyle = style.getPropertyValue('--line');
+  c.textBaseline = 'middle';
+  c.textAlign = 'right';
+  const stepY = niceStep(y.to - y.from, 4);
+  for (const v of ticks(y, stepY)) {
+    rule(c, [kMargin.left, atY(v)], [width - kMargin.right, atY(v)]);
+    c.fillText(metres(v, stepY), kMargin.left - 5, atY(v));
+  }
+  c.textAlign = 'center';
+  const stepX = niceStep(x.to - x.from, 5);
+  for (const v of ticks(x, stepX)) {
+    rule(c, [atX(v), kMargin.top], [atX(v), height - kMargin.bottom]);
+    c.fillText(metres(v, stepX), atX(v), height - kMargin.bottom + 10);
+  }
+  c.textAlign = 'left';
+  c.fillText(unit, 2, height - kMargin.bottom + 10);
+  c.lineWidth = 1.5;
+  c.lineJoin = 'round';
+  for (const line of lines) {
+    c.strokeStyle = style.getPropertyValue(line.colour);
+    c.beginPath();
+    let down = false;
+    for (const [px, py] of line.points) {
+      if (Number.isNaN(py)) down = false;
+      else if (down) c.lineTo(atX(px), atY(py));
+      else {
+        c.moveTo(atX(px), atY(py));
+        down = true;
+      }
+    }
+    c.stroke();
+  }
+}
+
+function rule(c: CanvasRenderingContext2D, from: [number, number], to: [number, number]): void {
+  c.lineWidth = 1;
+  c.beginPath();
+  c.moveTo(...from);
+  c.lineTo(...to);
+  c.stroke();
+}

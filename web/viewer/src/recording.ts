@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording of this device: which frames it has, and each one's bytes. Nothing of it leaves the page.
+import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
+import { openMcap, readMessage, readMessageHead, type Bytes, type McapFile, type McapMessage } from './mcap';
+import type { StreamInfo } from './protocol';
+
+const kFrameTopic = 'relievo/frame';
+const kInfoTopic = 'relievo/info';
+const kTogether = 64; // heads read at a time
+
+export class Recording {
+  readonly times: Float64Array; // of the frames, ms from the first
+  readonly startMs: number; // UTC of the first
+  /** Of each frame whose head was read. */
+  readonly heads: (FrameHead | undefined)[];
+
+  private constructor(
+    private readonly file: Bytes,
+    private readonly frames: McapMessage[],
+    readonly info: StreamInfo | null,
+    readonly damage: string | null,
+  ) {
+    this.startMs = frames[0]!.timeMs;
+    this.times = Float64Array.from(frames, (m) => m.timeMs - this.startMs);
+    this.heads = new Array<FrameHead | undefined>(frames.length);
+  }
+
+  /** Throws with what a person should know. */
+  static async open(file: Bytes): Promise<Recording> {
+    const found = await openMcap(file);
+    const frames = ofTopic(found, kFrameTopic);
+    if (frames.length === 0) throw new Error('there is no frame of 3D video in it');
+    const described = ofTopic(found, kInfoTopic)[0];
+    const info = described === undefined ? null : readStreamInfo(await readMessage(file, described));
+    const one = readFrameHead(await readMessageHead(file, frames[0]!, kFrameHeadBytes)).stream;
+    // A channel is a stream's; a file of several shows the first.
+    const own = frames.filter((m) => m.channel === frames[0]!.channel);
+    return new Recording(file, own, info?.stream === one ? info : null, found.damage);
+  }
+
+  get count(): number {
+    return this.frames.length;
+  }
+
+  async head(index: number): Promise<FrameHead> {
+    return (this.heads[index] ??= readFrameHead(await readMessageHead(this.file, this.frames[index]!, kFrameHeadBytes)));
+  }
+
+  /** All heads, for marks on the time line. `progress` after some of them; stops where it returns false. */
+  async readHeads(progress: () => boolean): Promise<void> {
+    for (let i = 0; i < this.count; i += kTogether) {
+      const some = Array.from({ length: Math.min(kTogether, this.count - i) }, (_, j) => this.head(i + j));
+      await Promise.allSettled(some); // what is damaged has no mark
+      if (!progress()) return;
+    }
+  }
+
+  /** The message, and where in it the frame begins. */
+  async read(index: number): Promise<{ head: FrameHead; message: Uint8Array }> {
+    const message = await readMessage(this.file, this.frames[index]!);
+    const head = readFrameHead(message);
+    this.heads[index] = head;
+    return { head, message };
+  }
+
+  /** The last frame up to this one that decodes alone; null where there is none. */
+  async keyBefore(index: number): Promise<number | null> {
+    for (let i = index; i >= 0; --i) {
+      if ((await this.head(i)).isKey) return i;
+    }
+    return null;
+  }
+
+  /** Frames lost before this one was written. */
+  gapBefore(index: number): number {
+    const [before, here] = [this.heads[index - 1], this.heads[index]];
+    if (before === undefined || here === undefined) return 0;
+    return Math.max(0, here.sequence - before.sequence - 1);
+  }
+}
+
+function ofTopic({ topics, messages }: McapFile, topic: string): McapMessage[] {
+  return messages.filter((m) => topics.get(m.channel) === topic);
+}

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// One source being watched: its frames through the decoder to the picture, and what it says of itself.
+import { utcNow } from './connection';
+import { Decoder } from './decoder';
+import type { DecodedFrame } from './messages';
+import { Meter } from './meter';
+import type { FramePrefix, ServerMessage, StreamInfo, StreamStatus } from './protocol';
+import type { FrameSource, SourceEvents } from './source';
+
+export interface SessionEvents {
+  /** What is known of the source has changed. */
+  changed(): void;
+  /** The description of a stream came; `seen`: a frame of it was shown before. */
+  described(info: StreamInfo, seen: boolean): void;
+  /** A frame waits to be drawn: take() it. */
+  ready(): void;
+  hint(text: string): void;
+  unusable(message: string): void;
+}
+
+interface Waiting {
+  frame: DecodedFrame;
+  prefix: FramePrefix;
+}
+
+export class Session {
+  readonly decoder: Decoder;
+  readonly meter = new Meter();
+  source: FrameSource | null = null;
+  info: StreamInfo | null = null; // while the stream is announced
+  status: StreamStatus | null = null;
+  seen = false; // a frame was shown
+  lastFrameAt = 0;
+  everConnected = false;
+  private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
+  private waiting: Waiting | null = null; // decoded, not drawn
+
+  constructor(private readonly events: SessionEvents) {
+    this.decoder = new Decoder({
+      decoded: (frame) => this.onDecoded(frame),
+      failed: (id, message) => this.onFailed(id, message),
+      unusable: (message) => events.unusable(message),
+    });
+    document.addEventListener('visibilitychange', () => this.meter.pause());
+  }
+
+  /** From now on, instead of what was watched before; null: nothing. */
+  watch(open: ((events: SourceEvents) => FrameSource) | null): void {
+    this.source?.stop();
+    this.forget();
+    this.info = this.status = null;
+    this.seen = false;
+    this.meter.restart();
+    this.source = null;
+    if (open === null) return;
+    this.source = open({
+      open: () => {
+        this.everConnected = true;
+        this.forget(); // their credit went with the old connection
+        this.meter.restart();
+        this.events.changed();
+      },
+      lost: () => {
+        this.info = this.status = null;
+        this.events.changed();
+      },
+      message: (message) => this.onMessage(message),
+      frame: (prefix, bytes, forLater) => this.onFrame(prefix, bytes, forLater),
+      clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
+      nonsense: (message) => this.meter.failed(message),
+    });
+  }
+
+  /** The frame to draw now, if there is one. Its credit goes back only here, so a hidden page receives nothing. */
+  take(): DecodedFrame | null {
+    if (this.waiting === null) return null;
+    const { frame, prefix } = this.waiting;
+    this.waiting = null;
+    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.playback === null);
+    this.source?.credit();
+    this.seen = true;
+    return frame;
+  }
+
+  private onMessage(message: ServerMessage): void {
+    if (message.type === 'info') {
+      if (this.info === null) this.meter.restart();
+      this.info = message;
+      this.lastFrameAt = performance.now();
+      this.events.described(message, this.seen);
+    } else if (message.type === 'status') {
+      this.status = message;
+    } else if (message.type === 'waiting' || message.type === 'gone') {
+      this.info = this.status = null;
+      if (message.type === 'waiting') this.events.hint(message.hint);
+    }
+    this.events.changed();
+  }
+
+  private onFrame(prefix: FramePrefix, bytes: ArrayBuffer, forLater: boolean): void {
+    this.lastFrameAt = performance.now();
+    if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, this.source?.playback === null);
+    this.underway.set(this.decoder.decode(bytes, prefix.bytes), { prefix, forLater });
+  }
+
+  private onDecoded(frame: DecodedFrame): void {
+    const known = this.underway.get(frame.id);
+    this.underway.delete(frame.id);
+    if (known === undefined || known.forLater) {
+      frame.texture?.close(); // of a stream that is no longer watched, or wanted only by the decoder
+      return;
+    }
+    if (this.discard()) {
+      ++this.meter.skipped;
+      this.source?.credit();
+    }
+    this.meter.decoded(known.prefix, utcNow());
+    this.waiting = { frame, prefix: known.prefix };
+    this.events.ready();
+  }
+
+  private onFailed(id: number, message: string): void {
+    this.meter.failed(message);
+    if (this.underway.get(id)?.forLater === false) this.source?.credit();
+    this.underway.delete(id);
+  }
+
+  private forget(): void {
+    this.underway.clear();
+    this.discard();
+  }
+
+  private discard(): boolean {
+    const had = this.waiting !== null;
+    this.waiting?.frame.texture?.close();
+    this.waiting = null;
+    return had;
+  }
+}

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: what an independent writer wrote is found, by its index and without; damage is told and does no harm.
+import { McapWriter } from '@mcap/core';
+import { describe, expect, it } from 'vitest';
+import { kFrameHeadBytes, readFrameHead } from '../src/cdr';
+import { crc32 } from '../src/crc32';
+import { openMcap, readMessage, readMessageHead, type Bytes } from '../src/mcap';
+import { Recording } from '../src/recording';
+
+const kChannels = ['relievo/frame', 'relievo/status'];
+
+/** A relievo::Frame as CDR; every `keyEvery`th is a key frame. */
+function frameCdr(sequence: number, isKey: boolean): Uint8Array {
+  const payload = new Uint8Array(70 + sequence);
+  payload.set([0x52, 0x4c, 0x56, 0x46, 1, isKey ? 1 : 0]);
+  const out = new DataView(new ArrayBuffer(4 + 4 + 12 + 32 + 4 + payload.length));
+  out.setUint8(1, 9);
+  out.setUint32(4, out.byteLength - 8, true);
+  out.setUint32(8, 5, true);
+  for (const [i, c] of [...'face\0'].entries()) out.setUint8(12 + i, c.charCodeAt(0));
+  out.setBigUint64(20, BigInt(sequence), true);
+  out.setBigUint64(28, BigInt(sequence + 100), true);
+  out.setBigInt64(36, 1_700_000_000_000_000_000n + BigInt(sequence) * 33_000_000n, true);
+  out.setBigInt64(44, 1_700_000_000_020_000_000n + BigInt(sequence) * 33_000_000n, true);
+  out.setUint32(52, payload.length, true);
+  new Uint8Array(out.buffer).set(payload, 56);
+  return new Uint8Array(out.buffer);
+}
+
+class Memory implements Bytes {
+  private parts: Uint8Array[] = [];
+  bytes = new Uint8Array(0);
+  get size(): number {
+    return this.bytes.length;
+  }
+  position = (): bigint => BigInt(this.parts.reduce((sum, p) => sum + p.length, 0));
+  write = async (part: Uint8Array): Promise<void> => void this.parts.push(part.slice());
+  finish(): void {
+    this.bytes = new Uint8Array(Buffer.concat(this.parts));
+  }
+  read = async (at: number, length: number): Promise<Uint8Array> => this.bytes.slice(at, at + length);
+}
+
+async function write(frames: number[], options = {}): Promise<Memory> {
+  const file = new Memory();
+  const writer = new McapWriter({ writable: file, chunkSize: 700, ...options });
+  await writer.start({ profile: '', library: 'test' });
+  const schemaId = await writer.registerSchema({ name: 'x', encoding: 'omgidl', data: new Uint8Array(0) });
+  const ids: number[] = [];
+  for (const topic of kChannels) {
+    ids.push(await writer.registerChannel({ topic, schemaId, messageEncoding: 'cdr', metadata: new Map() }));
+  }
+  for (const sequence of frames) {
+    const time = 1_700_000_000_000_000_000n + BigInt(sequence) * 33_000_000n;
+    const message = { sequence, logTime: time, publishTime: time };
+    await writer.addMessage({ channelId: ids[0]!, ...message, data: frameCdr(sequence, sequence % 5 === 0) });
+    await writer.addMessage({ channelId: ids[1]!, ...message, data: new Uint8Array([1, 2, 3]) });
+  }
+  await writer.end();
+  file.finish();
+  return file;
+}
+
+const kFrames = Array.from({ length: 23 }, (_, i) => i);
+
+describe('openMcap', () => {
+  it('finds every message by the index, in order', async () => {
+    const file = await write(kFrames);
+    const found = await openMcap(file);
+    expect(found.damage).toBeNull();
+    expect([...found.topics.values()].sort()).toEqual(kChannels);
+    const frames = found.messages.filter((m) => found.topics.get(m.channel) === kChannels[0]);
+    expect(frames.length).toBe(kFrames.length);
+    for (const [i, frame] of frames.entries()) {
+      expect(frame.timeMs).toBeCloseTo(1.7e12 + i * 33, 3);
+      const data = await readMessage(file, frame);
+      expect(data).toEqual(frameCdr(i, i % 5 === 0));
+      expect(readFrameHead(data)).toMatchObject({ stream: 'face', sequence: i, number: i + 100, isKey: i % 5 === 0, length: 70 + i });
+      expect(readFrameHead(await readMessageHead(file, frame, kFrameHeadBytes)).sequence).toBe(i);
+    }
+  });
+
+  it('goes through a file that was cut short, whole chunks only', async () => {
+    const file = await write(kFrames);
+    const all = (await openMcap(file)).messages.length;
+    let last = 0;
+    for (const share of [0.3, 0.5, 0.8]) {
+      const cut = new Memory();
+      cut.bytes = file.bytes.slice(0, Math.floor(file.size * share));
+      const { messages, damage } = await openMcap(cut);
+      expect(damage).toMatch(/cut short/);
+      expect(messages.length).toBeGreaterThan(last);
+      expect(messages.length).toBeLessThan(all);
+      for (const m of messages) expect((await readMessage(cut, m)).length).toBeGreaterThan(0);
+      last = messages.length;
+    }
+  });
+
+  it('leaves out a chunk whose bytes have changed, where it has to go through', async () => {
+    const file = await write(kFrames);
+    const sound = (await openMcap(file)).messages;
+    const cut = new Memory();
+    cut.bytes = file.bytes.slice(0, file.size - 20);
+    cut.bytes[sound[4]!.at + 40]! ^= 1;
+    const { messages, damage } = await openMcap(cut);
+    expect(damage).toMatch(/damaged/);
+    expect(messages.length).toBeLessThan(sound.length);
+    expect(messages.length).toBeGreaterThan(0);
+  });
+
+  it('refuses what it cannot read, and says why', async () => {
+    const none = new Memory();
+    none.bytes = new TextEncoder().encode('no recording at all, but long enough to look at');
+    await expect(openMcap(none)).rejects.toThrow(/no MCAP file/);
+    const compressed = await write(kFrames, {
+      compressChunk: (bytes: Uint8Array) => ({ compression: 'zstd', compressedData: bytes }),
+    });
+    await expect(openMcap(compressed)).rejects.toThrow(/compressed \(zstd\)/);
+  });
+
+  it('survives any bytes', async () => {
+    const file = await write(kFrames.slice(0, 6));
+    let seed = 7;
+    const random = (below: number): number => (seed = (seed * 48271) % 2147483647) % below;
+    for (let round = 0; round < 300; ++round) {
+      const broken = new Memory();
+      broken.bytes = file.bytes.slice(0, random(4) === 0 ? random(file.size) : file.size);
+      for (let i = 0; i < 1 + random(4) && broken.size > 0; ++i) broken.bytes[random(broken.size)] = random(256);
+      try {
+        for (const m of (await openMcap(broken)).messages) await readMessage(broken, m).then(readFrameHead);
+      } catch (error) {
+        expect(error).toBeInstanceOf(Error);
+      }
+    }
+  });
+});
+
+describe('Recording', () => {
+  it('knows its key frames and what is missing', async () => {
+    const recording = await Recording.open(await write(kFrames.filter((i) => i < 7 || i > 9)));
+    await recording.readHeads(() => true);
+    expect(recording.count).toBe(20);
+    expect(await recording.keyBefore(6)).toBe(5);
+    expect(await recording.keyBefore(7)).toBe(7); // number 10
+    expect(recording.gapBefore(7)).toBe(3);
+    expect(recording.gapBefore(8)).toBe(0);
+    expect(recording.times[7]! - recording.times[6]!).toBeCloseTo(4 * 33, 3);
+  });
+
+  it('without a frame is none', async () => {
+    await expect(Recording.open(await write([]))).rejects.toThrow(/no frame/);
+  });
+});
+
+describe('crc32', () => {
+  it('is the usual one', () => expect(crc32(new TextEncoder().encode('123456789'))).toBe(0xcbf43926));
+});

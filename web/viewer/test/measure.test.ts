@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: lengths, angles and sections of known shapes are true, and errors of depth go into them as they should.
+import { describe, expect, it } from 'vitest';
+import { lengthText, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
+import type { Surface, Vec3 } from '../src/pick';
+
+const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma });
+const eye: Vec3 = [0, 0, 0];
+
+/** A roof: z = 2 + |x| / 2 for x, y in -1..1. */
+const roof: Surface = {
+  positions: new Float32Array([-1, -1, 2.5, -1, 1, 2.5, 0, -1, 2, 0, 1, 2, 1, -1, 2.5, 1, 1, 2.5]),
+  coordinates: null,
+  triangles: new Uint32Array([0, 1, 3, 0, 3, 2, 2, 3, 5, 2, 5, 4]),
+  quality: { sigmas: new Float32Array(6).fill(1e-3), interpolated: new Uint8Array(6) },
+};
+
+describe('measure', () => {
+  it('tells distances and angles', () => {
+    expect(measure('distance', [spot([0, 0, 1]), spot([0.3, 0.4, 1])], null, eye).value).toBeCloseTo(0.5, 12);
+    expect(measure('angle', [spot([1, 0, 1]), spot([0, 0, 1]), spot([0, 2, 1])], null, eye).value).toBeCloseTo(Math.PI / 2, 12);
+    expect(measure('point', [spot([0.1, 0.2, 1.3], 1e-4)], null, eye)).toMatchObject({ value: 1.3, sigma: expect.closeTo(1e-4, 9) });
+  });
+
+  it('takes errors along the rays of the camera', () => {
+    // Along the axis depth errors count in full, across it only by how far off the axis the places are.
+    const along = measure('distance', [spot([0, 0, 1], 3e-4), spot([0, 0, 2], 4e-4)], null, eye);
+    expect(along.sigma).toBeCloseTo(5e-4, 9);
+    const across = measure('distance', [spot([-0.5, 0, 1], 1e-3), spot([0.5, 0, 1], 1e-3)], null, eye);
+    expect(across.sigma).toBeCloseTo(Math.SQRT2 * 0.5e-3, 7);
+    expect(measure('distance', [spot([0, 0, 1], 1e-3), spot([1, 0, 1])], null, eye).sigma).toBeNull();
+  });
+
+  it('agrees with drawing errors at random', () => {
+    let seed = 1;
+    const random = (): number => (seed = (seed * 48271) % 2147483647) / 2147483647;
+    const normal = (): number => Math.sqrt(-2 * Math.log(random())) * Math.cos(2 * Math.PI * random());
+    const spots = [spot([-0.3, 0.1, 1], 1e-3), spot([0.2, -0.2, 1.2], 2e-3), spot([0.3, 0.3, 0.9], 1.5e-3)];
+    const told = measure('angle', spots, null, eye);
+    const drawn = Array.from({ length: 20_000 }, () => {
+      const moved = spots.map(({ point, sigma }) => {
+        const scale = 1 + (normal() * sigma!) / point[2];
+        return spot(point.map((c) => c * scale) as Vec3);
+      });
+      return measure('angle', moved, null, eye).value - told.value;
+    });
+    const deviation = Math.sqrt(drawn.reduce((sum, d) => sum + d * d, 0) / drawn.length);
+    expect(deviation / told.sigma!).toBeGreaterThan(0.95);
+    expect(deviation / told.sigma!).toBeLessThan(1.05);
+  });
+});
+
+describe('section', () => {
+  const [a, b]: [Vec3, Vec3] = [[-0.8, 0, 2.4], [0.8, 0, 2.4]];
+
+  it('is the profile of a roof', () => {
+    const profile = section(roof, a, b, eye);
+    for (const [from, to] of profile) {
+      for (const p of [from, to]) {
+        expect(p.point[1]).toBeCloseTo(0, 6);
+        expect(p.along).toBeCloseTo(p.point[0] + 0.8, 6);
+        expect(p.height).toBeCloseTo(2.4 - (2 + Math.abs(p.point[0]) / 2), 6); // off the line, to the eye
+        expect(p.sigma).toBeGreaterThan(0);
+      }
+    }
+    expect(Math.max(...profile.map(([, to]) => to.height))).toBeCloseTo(0.4, 6);
+  });
+
+  it('ends where the line ends', () => {
+    expect(section(roof, [-0.8, 0, 2.4], [-0.4, 0, 2.2], eye).every(([from]) => from.along < 0.45)).toBe(true);
+    expect(section(roof, [-0.8, 3, 2.4], [0.8, 3, 2.4], eye)).toEqual([]);
+  });
+
+  it('is a table with a point a line', () => {
+    const lines = sectionCsv(section(roof, a, b, eye)).trim().split('\n');
+    expect(lines[0]).toBe('along_m,height_m,sigma_m,x_m,y_m,z_m');
+    expect(lines.length).toBe(6); // the roof's four triangles meet: five points
+  });
+});
+
+describe('text', () => {
+  it('has as many digits as are known', () => {
+    expect(lengthText(0.1012412, 0.000312)).toBe('101.24 ± 0.31 mm');
+    expect(lengthText(0.1012412, 0.0123)).toBe('101 ± 12 mm');
+    expect(lengthText(1.5, null)).toBe('1500.00 mm');
+    expect(lengthText(1, 0)).toBe('1000.000 ± 0.000 mm');
+  });
+  it('makes a table', () => {
+    const csv = measurementsCsv([measure('distance', [spot([0, 0, 1], 1e-4), spot([0, 0, 2])], null, eye)]);
+    const [head, line] = csv.trim().split('\n').map((l) => l.split(','));
+    expect(line!.length).toBe(head!.length);
+    expect(line!.slice(0, 3)).toEqual(['distance', '1.00000000', 'm']);
+    expect(line![head!.indexOf('sigma2_m')]).toBe('');
+  });
+});

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: a link brings back what it was made of, whatever else is in it; what is written can be read again.
+import { describe, expect, it } from 'vitest';
+import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
+import { kDefaultDisplay } from '../src/display';
+import { writeGlb } from '../src/exportGlb';
+import { writePly } from '../src/exportPly';
+import type { Surface } from '../src/pick';
+import { readShared, shareLink } from '../src/share';
+
+const surface: Surface = {
+  positions: new Float32Array([0, 0, 1, 0.5, 0, 1, 0.5, 0.5, 2]),
+  coordinates: new Float32Array([0, 0, 1, 0, 1, 1]),
+  triangles: new Uint32Array([0, 1, 2]),
+  quality: { sigmas: new Float32Array([1e-4, 2e-4, 0]), interpolated: new Uint8Array([0, 1, 0]) },
+};
+const picture = { width: 2, height: 1, rgba: new Uint8ClampedArray([255, 0, 0, 255, 0, 0, 255, 255]) };
+
+describe('a link', () => {
+  const display = { ...kDefaultDisplay, mode: 'depth' as const, grid: false, fov: 30, theme: 'light' as const };
+  const pose = { position: [0.1, -0.25, 1.5], target: [0, 0, -1] } as { position: [number, number, number]; target: [number, number, number] };
+
+  it('brings back stream, display and view, but not the theme', () => {
+    const link = new URL(shareLink('http://host:8080/?stream=old&x=1#mode=points', 'face', display, pose));
+    expect(link.searchParams.get('stream')).toBe('face');
+    expect([...link.searchParams.keys()]).toEqual(['stream']);
+    const shared = readShared(link.hash, kDefaultDisplay);
+    expect(shared.display).toEqual({ ...display, theme: 'auto' });
+    expect(shared.pose).toEqual(pose);
+  });
+
+  it.each(['', '#', '#eye=1_2&at=0_0_0', '#eye=1_2_x&at=0_0_0', '#eye=1__2&at=0_0_0', '#eye=1_1_1&at=1_1_1', '#eye=1e99_0_0&at=0_0_0', '#eye=0_0_1'])(
+    'without a whole view shows the first one: %s',
+    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null }),
+  );
+});
+
+describe('PLY', () => {
+  it('is read by others', () => {
+    const loader = new PLYLoader();
+    loader.setCustomPropertyNameMapping({ sigma: ['sigma'], interpolated: ['interpolated'] });
+    const read = loader.parse(writePly(surface, picture).buffer);
+    expect([...read.getAttribute('position').array]).toEqual([...surface.positions]);
+    expect([...read.getIndex()!.array]).toEqual([0, 1, 2]);
+    expect([...read.getAttribute('color').array].map(Math.round)).toEqual([1, 0, 0, 0, 0, 1, 0, 0, 1]);
+    expect([...read.getAttribute('sigma').array]).toEqual([...surface.quality!.sigmas]);
+    expect([...read.getAttribute('interpolated').array]).toEqual([0, 1, 0]);
+  });
+});
+
+describe('GLB', () => {
+  it('is laid out as glTF says', () => {
+    const jpeg = new Uint8Array([1, 2, 3, 4, 5]);
+    const bytes = writeGlb(surface, jpeg);
+    const view = new DataView(bytes.buffer);
+    expect([view.getUint32(0, true), view.getUint32(4, true), view.getUint32(8, true)]).toEqual([0x46546c67, 2, bytes.length]);
+    const jsonBytes = view.getUint32(12, true);
+    const json = JSON.parse(new TextDecoder().decode(bytes.subarray(20, 20 + jsonBytes)));
+    const bin = bytes.subarray(28 + jsonBytes);
+    expect(json.buffers[0].byteLength).toBe(bin.length);
+    for (const { byteOffset } of json.bufferViews) expect(byteOffset % 4).toBe(0);
+    const floats = (accessor: number): number[] => {
+      const { byteOffset, byteLength } = json.bufferViews[json.accessors[accessor].bufferView];
+      return [...new Float32Array(bin.slice(byteOffset, byteOffset + byteLength).buffer)];
+    };
+    const { attributes } = json.meshes[0].primitives[0];
+    expect(floats(attributes.POSITION).map((c) => c + 0)).toEqual([0, 0, -1, 0.5, 0, -1, 0.5, -0.5, -2]);
+    expect(json.accessors[attributes.POSITION]).toMatchObject({ min: [0, -0.5, -2], max: [0.5, 0, -1] });
+    expect(floats(attributes.TEXCOORD_0)).toEqual([...surface.coordinates!]);
+    const image = json.bufferViews[json.images[0].bufferView];
+    expect([...bin.subarray(image.byteOffset, image.byteOffset + image.byteLength)]).toEqual([...jpeg]);
+  });
+});
