@@ -183,6 +183,7 @@ class Viewer {
     const { frame, prefix } = this.ready;
     this.ready = null;
     this.view.show(frame);
+    this.ui.showNotice(frame.notice);
     this.decoder.want = this.view.wants;
     this.meter.shown(frame, prefix, utcNow(), performance.now());
     this.connection?.credit();

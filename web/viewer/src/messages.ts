@@ -22,6 +22,7 @@ export interface DecodedFrame {
   edges: Uint32Array<ArrayBuffer> | null;
   quality: VertexQuality | null; // null: not wanted or not sent
   texture: ImageBitmap | null;
+  notice: string | null; // for the person, while frames are like this one
   extent: Extent | null;
   decodeMs: number;
 }

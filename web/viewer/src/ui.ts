@@ -80,6 +80,13 @@ export class Ui {
     element('retry').hidden = state.state !== 'lost';
   }
 
+  /** A line over the picture, which stays visible; null: none. */
+  showNotice(text: string | null): void {
+    const line = element('notice');
+    line.hidden = text === null;
+    if (text !== null) setText('notice', `${text}.`);
+  }
+
   showStreams(streams: ListedStream[], chosen: string | null, source: string): void {
     const names = streams.map((s) => s.name);
     if (chosen !== null && !names.includes(chosen)) names.push(chosen);
