@@ -79,8 +79,11 @@ struct ServerStatus {
   double reconstruct_ms = 0;            // medians over the last few seconds
   double encode_ms = 0;
   double latency_ms = 0;  // capture to publish
-  FilterCounts filters;   // since the start
-  StepStatus step;        // its mixed frames are among drops_capture
+  double bit_rate = 0;    // bits a second published over the last few seconds
+  std::uint32_t rate_level =
+      0;                 // of a stream that keeps a bit rate: how much coarser than asked for, 0 not at all
+  FilterCounts filters;  // since the start
+  StepStatus step;       // its mixed frames are among drops_capture
 };
 
 /// True where `name` may name a stream: [A-Za-z0-9_.-]{1,64}, not starting with a dot.

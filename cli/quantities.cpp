@@ -17,6 +17,8 @@ struct Unit {
 
 constexpr Unit kBytes[] = {{"", 1},      {"b", 1},      {"kb", 1e3},      {"mb", 1e6},     {"gb", 1e9},
                            {"tb", 1e12}, {"kib", 1024}, {"mib", 1 << 20}, {"gib", 1 << 30}};
+constexpr Unit kBitRates[] = {{"", 1},         {"k", 1e3},      {"m", 1e6},     {"g", 1e9},
+                              {"kbit/s", 1e3}, {"mbit/s", 1e6}, {"gbit/s", 1e9}};
 constexpr Unit kSeconds[] = {{"", 1}, {"s", 1}, {"min", 60}, {"h", 3600}, {"d", 86400}};
 
 /// A positive number and one of the units, a space between them or none.
@@ -54,6 +56,17 @@ Result<double> parse_duration_s(const std::string& text) {
   const auto s = quantity(text, kSeconds);
   if (!s || *s > 1e10) return Error{"'" + text + "' is no duration such as 90s, 10min, 2h or 30d"};
   return *s;
+}
+
+Result<double> parse_bit_rate(const std::string& text) {
+  const auto bits = quantity(text, kBitRates);
+  if (!bits || *bits < 1e5 || *bits > 1e9)
+    return Error{"'" + text + "' is no bit rate such as 800k or 4M, from 100k to 1G"};
+  return *bits;
+}
+
+ValueCheck bit_rate() {
+  return check_of(parse_bit_rate);
 }
 
 ValueCheck byte_count() {

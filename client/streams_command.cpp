@@ -64,6 +64,8 @@ nlohmann::json to_json(const Found& found) {
     j["drops"] = found.status->drops_capture + found.status->drops_reconstruct + found.status->drops_encode +
                  found.status->drops_publish;
     j["latency_ms"] = found.status->latency_ms;
+    j["bit_rate"] = found.status->bit_rate;
+    j["rate_level"] = found.status->rate_level;
     j["mixed"] = found.status->step.mixed;
   }
   return j;

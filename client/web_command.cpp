@@ -15,6 +15,7 @@
 #include "client/recorded_stream.h"
 #include "idl/cdr.h"
 #include "web/gateway/gateway.h"
+#include "web/gateway/key_frame_wishes.h"
 
 namespace relievo {
 namespace {
@@ -120,11 +121,13 @@ Status run(const Options& options, StopSignal& stop) {
   if (!address) return address.error();
   auto inputs = sort_inputs(options.inputs);
   if (!inputs) return inputs.error();
+  KeyFrameWishes wishes;  // outlives the gateway
   auto gateway =
       Gateway::start({.host = address->host,
                       .port = address->port,
                       .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
-                                    " yet: start relievo-server serve there."});
+                                    " yet: start relievo-server serve there.",
+                      .key_frame_wanted = [&](const std::string& stream) { wishes.wish(stream); }});
   if (!gateway) return gateway.error();
 
   std::vector<std::unique_ptr<Subscriber>> subscribers;
@@ -133,6 +136,10 @@ Status run(const Options& options, StopSignal& stop) {
     if (!subscriber) return subscriber.error();
     subscribers.push_back(std::move(*subscriber));
   }
+  wishes.answer_with([&](const std::string& stream) {
+    for (std::size_t i = 0; i < subscribers.size(); ++i)
+      if (inputs->live[i].empty() || inputs->live[i] == stream) subscribers[i]->request_key_frame(stream);
+  });
   std::vector<std::unique_ptr<LoopedFile>> files;
   for (auto& [file, recorded] : inputs->files) {
     files.push_back(std::make_unique<LoopedFile>(file, std::move(recorded), **gateway, stop));
@@ -140,6 +147,7 @@ Status run(const Options& options, StopSignal& stop) {
   std::printf("viewer %s\n", browser_address({address->host, (*gateway)->port()}).c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
   stop.wait();
+  wishes.answer_with({});
   return {};
 }
 

@@ -345,9 +345,11 @@ Status FrameDecoder::remember(std::span<const std::uint8_t> bytes, const DecodeL
     const auto grid = state_->decode_grid(layout->sections.geometry, header);
     if (!grid) return grid.error();
   }
+  if (layout->sections.texture.empty()) return {};
   TextureDecoder* texture = state_->texture_decoder(header.texture);
-  if (layout->sections.texture.empty() || texture == nullptr) return {};
-  return texture->remember(layout->sections.texture, header.texture_width, header.texture_height);
+  return texture == nullptr
+             ? Status()
+             : texture->remember(layout->sections.texture, header.texture_width, header.texture_height);
 }
 
 Result<Frame3D> FrameDecoder::decode(std::span<const std::uint8_t> bytes, const DecodeLimits& limits) {
@@ -364,7 +366,9 @@ Status FrameDecoder::decode(std::span<const std::uint8_t> bytes, Frame3D& frame,
   if (header.geometry != GeometryCodec::kDracoMesh && header.geometry != GeometryCodec::kGrid)
     return Error{"frame has geometry of codec " + std::to_string(static_cast<int>(header.geometry)) +
                  " that this version does not know: update relievo"};
-  TextureDecoder* texture = state_->texture_decoder(header.texture);
+  // Frames without a texture may come between those that build on each other.
+  TextureDecoder* texture =
+      header.texture == TextureCodec::kNone ? nullptr : state_->texture_decoder(header.texture);
   if (header.texture != TextureCodec::kNone && texture == nullptr)
     return Error{"frame has a texture of codec " + texture_codec_name(header.texture) +
                  " that this version does not know: update relievo"};

@@ -168,6 +168,15 @@ bool is_key_frame(std::span<const std::uint8_t> bytes) {
          bytes[4] == kVersion && (bytes[5] & kKeyFrame) != 0;
 }
 
+BuildsOn what_it_builds_on(std::span<const std::uint8_t> bytes) {
+  if (is_key_frame(bytes)) return BuildsOn::kNothing;
+  const auto layout = read_frame_layout(bytes);
+  if (!layout) return BuildsOn::kNothing;
+  const auto texture = layout->sections.texture;
+  const bool is_chained = !texture.empty() && !texture_is_key(layout->header.texture, texture);
+  return is_chained ? BuildsOn::kFrameBefore : BuildsOn::kKeyFrame;
+}
+
 Bytes write_frame(const FrameHeader& header, const FrameSections& sections) {
   const bool has_texture = !sections.texture.empty();
   const bool has_quality = !sections.quality.empty();

@@ -27,6 +27,11 @@ struct FrameLayout {
 /// Checks the whole layout and that counts and sizes fit each other, not the payloads. Any input.
 Result<FrameLayout> read_frame_layout(std::span<const std::uint8_t> bytes);
 
+/// Which frames before it a frame needs (FORMAT.md, "What builds on what").
+enum class BuildsOn : std::uint8_t { kNothing, kKeyFrame, kFrameBefore };
+/// Any input; nothing for what is no frame.
+BuildsOn what_it_builds_on(std::span<const std::uint8_t> bytes);
+
 /// Fails where one of the counts is above its limit.
 Status check_limits(const DecodeLimits& limits, std::uint64_t vertices, std::uint64_t triangles,
                     std::uint64_t texture_pixels);

@@ -313,6 +313,9 @@ Result<ServerStatus> read_status_cdr(std::span<const std::uint8_t> cdr) {
       const auto length = in.get<std::uint32_t>();
       for (std::uint32_t i = 0; i < length && in.ok(); ++i) *value = in.number();
     }
+    if (!in.more()) return;  // of a server that did not count bytes
+    status.bit_rate = in.number();
+    status.rate_level = in.get<std::uint32_t>();
   });
   if (!in.ok()) return truncated("status");
   if (auto bad = bad_stream(status.stream)) return *bad;

@@ -149,6 +149,8 @@ class DdsPublisher final : public Publisher {
     sample.reconstruct_ms = status.reconstruct_ms;
     sample.encode_ms = status.encode_ms;
     sample.latency_ms = status.latency_ms;
+    sample.bit_rate = status.bit_rate;
+    sample.rate_level = status.rate_level;
     std::array<std::uint64_t, kFilters.size()> filters{};
     for (std::size_t i = 0; i < kFilters.size(); ++i) filters[i] = status.filters.*kFilters[i].count;
     sample.filters._length = sample.filters._maximum = static_cast<std::uint32_t>(filters.size());

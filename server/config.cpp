@@ -262,6 +262,8 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.texture("texture", config.texture);
   reader.integer("texture_quality", 1, 100, config.texture_quality);
+  if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))
+    config.bit_rate = static_cast<double>(*bits);
   reader.geometry("geometry", config.geometry);
   reader.integer("step_bits", 0, 8, config.step_bits);
   reader.bound("bound", config.bound_px);

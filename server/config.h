@@ -16,6 +16,8 @@
 namespace relievo {
 
 inline constexpr double kLeastBound_px = 0.01, kMostBound_px = 8;  // of ServeConfig::bound_px
+/// Of --bitrate; below it the coarsest pictures are not worth showing.
+inline constexpr std::int64_t kLeastBitRate = 100'000, kMostBitRate = 1'000'000'000;
 
 struct ServeConfig {
   std::string source = "sim:face";
@@ -36,6 +38,7 @@ struct ServeConfig {
   SurfaceBuilderOptions surface;
   TextureCodec texture = TextureCodec::kJpeg;
   int texture_quality = 80;
+  double bit_rate = 0;            // bits a second at most; 0: as the qualities make it
   std::string geometry = "grid";  // a name of codec/geometry_profile.h
   int step_bits = 6;
   // Not said: every frame a key frame, but of metric, visual and H.264 every 30th.

@@ -12,6 +12,7 @@
 #include "base/bounded_queue.h"
 #include "base/log.h"
 #include "base/time.h"
+#include "server/rate_control.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
 #include "server/working_volume.h"
@@ -21,6 +22,7 @@ namespace {
 
 constexpr std::size_t kQueueFrames = 3;
 constexpr std::int64_t kStatusInterval_ns = kNanosecondsPerSecond;
+constexpr std::int64_t kKeyInterval_ns = 250'000'000;  // between key frames that readers wish for
 constexpr std::int64_t kMaxLate_ns =
     100'000'000;                      // behind its own time stamps before a source's clock is set back
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
@@ -76,6 +78,8 @@ class ThreadedPipeline final : public Pipeline {
     stopped_.notify_all();
     source_.request_stop();
   }
+
+  void request_key_frame() override { key_wanted_ = true; }
 
   ServerStatus status() const override {
     ServerStatus s = stats_.snapshot(utc_now_ns());
@@ -233,15 +237,26 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   void encode_stage() {
+    std::int64_t key_ns = steady_now_ns() - kKeyInterval_ns;  // of the last key frame
+    std::optional<RateControl> rate;
+    if (options_.bit_rate > 0) rate.emplace(options_.bit_rate, source_.info().rig.frame_rate);
     while (auto item = to_encode_.pop()) {
       const std::int64_t begin = steady_now_ns();
+      if (begin - key_ns >= kKeyInterval_ns && key_wanted_.exchange(false)) encoder_.request_key_frame();
       EncodeOptions encode = options_.encode;
       encode.volume = volume_.fit(item->frame.surface.positions);
       if (const int bits = volume_.bits(options_.depth_resolution); bits > 0) encode.position_bits = bits;
+      if (rate) rate->apply(encode);
       auto bytes = encoder_.encode(item->frame, encode);
       if (!bytes) {
         fail(bytes.error());
         continue;
+      }
+      const bool is_key = is_key_frame(*bytes);
+      if (is_key) key_ns = begin;
+      if (rate) {
+        rate->add(bytes->size(), is_key, encode.key_interval);
+        stats_.rate_level(static_cast<std::uint32_t>(rate->level()));
       }
       stats_.encoded(milliseconds(steady_now_ns() - begin));
       FrameMessage message;
@@ -263,7 +278,7 @@ class ThreadedPipeline final : public Pipeline {
       if (auto message = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns))) {
         message->sequence = sequence++;
         message->publish_time_ns = utc_now_ns();
-        stats_.published(message->capture_time_ns, message->publish_time_ns);
+        stats_.published(message->capture_time_ns, message->publish_time_ns, message->data->size());
         to_sinks(*message);
       }
       if (steady_now_ns() < status_due_ns) continue;
@@ -309,6 +324,7 @@ class ThreadedPipeline final : public Pipeline {
   Reconstructor reconstructor_;
   FrameEncoder encoder_;
   WorkingVolume volume_;
+  std::atomic<bool> key_wanted_{false};
   BoundedQueue<Captured> to_reconstruct_{kQueueFrames};
   BoundedQueue<Reconstructed> to_encode_{kQueueFrames};
   BoundedQueue<FrameMessage> to_publish_{kQueueFrames};

@@ -36,6 +36,7 @@ struct PipelineOptions {
   EncodeOptions encode;  // volume.size_m 0: fitted to the first frame, grown when a frame leaves it
   // Step of coded positions, of the distance to the nearest part of the scene; overrides position_bits.
   double depth_resolution = 1e-4;
+  double bit_rate = 0;  // bits a second that frames may take; 0: as `encode` says
 };
 
 class Pipeline {
@@ -51,6 +52,10 @@ class Pipeline {
 
   /// Ends run() soon. Any thread, any number of times.
   virtual void stop() = 0;
+
+  /// Some reader cannot decode what comes: a key frame follows soon. Wishes within 0.25 s of one are met
+  /// together. Any thread, any number of times; returns at once.
+  virtual void request_key_frame() = 0;
 
   /// Counts so far. Any thread.
   virtual ServerStatus status() const = 0;

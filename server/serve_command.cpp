@@ -12,6 +12,7 @@
 #include "capture/source/field_source.h"
 #include "cli/checks.h"
 #include "cli/listen_address.h"
+#include "cli/quantities.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "idl/recorder.h"
@@ -23,6 +24,7 @@
 #include "server/pipeline.h"
 #include "server/sinks.h"
 #include "web/gateway/gateway.h"
+#include "web/gateway/key_frame_wishes.h"
 
 namespace relievo {
 namespace {
@@ -114,10 +116,13 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
     web = *std::move(address);
   }
 
+  KeyFrameWishes wishes;  // of DDS readers and browsers; outlives both
   // The gateway first: a port in use should fail before anything is opened or announced.
   std::unique_ptr<Gateway> gateway;
   if (web) {
-    auto started = Gateway::start({.host = web->host, .port = web->port});
+    auto started = Gateway::start({.host = web->host,
+                                   .port = web->port,
+                                   .key_frame_wanted = [&](const std::string& name) { wishes.wish(name); }});
     if (!started) return started.error();
     gateway = *std::move(started);
   }
@@ -131,7 +136,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   info.started_ns = utc_now_ns();
   info.rig = (*source)->info().rig;
   info.pattern = (*source)->info().pattern;
-  auto publisher = Publisher::create(domain_options(config), info);
+  auto publisher = Publisher::create(domain_options(config), info, [&] { wishes.wish(info.stream); });
   if (!publisher) return publisher.error();
   Recording recording;
   if (!config.record.empty()) {
@@ -158,6 +163,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   options.reconstruct.decoder = config.decoder;
   options.reconstruct.surface = config.surface;
   options.encode = encode_options(config);
+  options.bit_rate = config.bit_rate;
   auto pipeline = Pipeline::create(**source, sinks, options);
   if (!pipeline) return pipeline.error();
 
@@ -166,7 +172,9 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   std::fflush(stdout);  // whoever waits for the address reads a pipe
 
   stop.on_stop([&] { (*pipeline)->stop(); });
+  wishes.answer_with([&](const std::string&) { (*pipeline)->request_key_frame(); });
   const Status done = (*pipeline)->run();
+  wishes.answer_with({});
   stop.clear_on_stop();
   if (gateway) gateway->withdraw(info.stream);
   say_drops((*pipeline)->status());
@@ -190,7 +198,7 @@ std::string stream_name(const std::string& name) {
 /// Flags as given; what is not given leaves the file's or the default value.
 struct Flags {
   std::optional<std::string> config, source, stream, interface, keys, web, record;
-  std::optional<std::string> decoder, geometry, texture;
+  std::optional<std::string> decoder, geometry, texture, bit_rate;
   std::string scheme;
   std::shared_ptr<RecordingTexts> recording;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
@@ -221,6 +229,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
   if (flags.texture) config.texture = texture_codec_named(*flags.texture).value_or(config.texture);
   set(flags.texture_quality, config.texture_quality);
+  if (flags.bit_rate) config.bit_rate = parse_bit_rate(*flags.bit_rate).value();  // the option is checked
   set(flags.geometry, config.geometry);
   set(flags.step_bits, config.step_bits);
   set(flags.key_interval, config.key_interval);
@@ -293,6 +302,12 @@ Command serve_command() {
                        "1 to 100, of png without effect (default 80: about 37 dB)")
             ->check(CLI::Range(1, 100))
             ->type_name("N");
+        app.add_option("--bitrate", f->bit_rate,
+                       "Keep the stream below so many bits a second, such as 4M: texture quality and steps "
+                       "of grid become "
+                       "coarser than asked for where it needs that, and fine again")
+            ->type_name("BITS")
+            ->check(bit_rate());
         app.add_option("--geometry", f->geometry,
                        "How the surface is sent: grid (default: as measured, for relievo's own receivers), "
                        "metric (the same estimated from all frames so far: smaller and exacter), visual (the "
@@ -327,7 +342,7 @@ Command serve_command() {
             "  relievo-server serve                                        the simulated face\n"
             "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for every machine around\n"
             "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n"
-            "  relievo-server serve --source sim:walk --texture h264 --step-bits 4   less than 4 Mbit/s\n"
+            "  relievo-server serve --source sim:walk --texture h264 --bitrate 4M\n"
             "  relievo-server serve --source v4l2:/dev/video0 --rig rig.yaml --control gain=20\n\n" +
             std::string(scheme_help()));
         return [f](StopSignal& stop) { return run(*f, stop); };

@@ -2,6 +2,7 @@
 #include "server/stats.h"
 
 #include <algorithm>
+#include <numeric>
 #include <vector>
 
 #include "base/time.h"
@@ -42,8 +43,14 @@ void PipelineStats::encoded(double ms) {
   encode_ms_.add(ms);
 }
 
-void PipelineStats::published(std::int64_t capture_time_ns, std::int64_t publish_time_ns) {
+void PipelineStats::rate_level(std::uint32_t level) {
   std::lock_guard lock(mutex_);
+  rate_level_ = level;
+}
+
+void PipelineStats::published(std::int64_t capture_time_ns, std::int64_t publish_time_ns, std::size_t bytes) {
+  std::lock_guard lock(mutex_);
+  publish_bytes_[published_ % publish_bytes_.size()] = bytes;
   publish_times_[published_++ % publish_times_.size()] = publish_time_ns;
   latency_ms_.add(milliseconds(publish_time_ns - capture_time_ns));
 }
@@ -59,6 +66,7 @@ ServerStatus PipelineStats::snapshot(std::int64_t now_ns) const {
   s.encode_ms = encode_ms_.median();
   s.latency_ms = latency_ms_.median();
   s.filters = filters_;
+  s.rate_level = rate_level_;
   // Rate over the ring, but falling at once when frames stop coming: the time since the last one counts too.
   const std::uint64_t n = std::min<std::uint64_t>(published_, publish_times_.size());
   if (n >= 2) {
@@ -68,6 +76,9 @@ ServerStatus PipelineStats::snapshot(std::int64_t now_ns) const {
     const double since_last_s = seconds(s.time_ns - last);
     const double span_s = seconds(last - first) + std::max(0.0, since_last_s - mean_gap_s);
     if (span_s > 0) s.frame_rate = static_cast<double>(n - 1) / span_s;
+    const auto bytes = std::accumulate(
+        publish_bytes_.begin(), publish_bytes_.begin() + static_cast<std::ptrdiff_t>(n), std::size_t{0});
+    s.bit_rate = 8 * static_cast<double>(bytes) / static_cast<double>(n) * s.frame_rate;
   }
   return s;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <mutex>
 
@@ -28,7 +29,8 @@ class PipelineStats {
   void lost_in_capture(std::uint64_t frames);
   void reconstructed(double ms, const FilterCounts& filters = {});
   void encoded(double ms);
-  void published(std::int64_t capture_time_ns, std::int64_t publish_time_ns);
+  void published(std::int64_t capture_time_ns, std::int64_t publish_time_ns, std::size_t bytes = 0);
+  void rate_level(std::uint32_t level);
 
   /// All but `stream`, `state`, `message` and the queues' drops; `now_ns` in UTC.
   ServerStatus snapshot(std::int64_t now_ns) const;
@@ -39,6 +41,8 @@ class PipelineStats {
   std::uint64_t lost_ = 0;
   std::uint64_t published_ = 0;
   std::array<std::int64_t, 64> publish_times_{};  // ring of the last publish times, UTC ns
+  std::array<std::size_t, 64> publish_bytes_{};   // and sizes
+  std::uint32_t rate_level_ = 0;
   FilterCounts filters_;
   RollingMedian reconstruct_ms_, encode_ms_, latency_ms_;
 };

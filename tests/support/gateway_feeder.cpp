@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A gateway with a synthetic moving surface, for the browser test: what it serves is encoded by the real
 // codec. Prints "listening PORT" and obeys lines on stdin: start NAME, stop, corrupt (one frame), status
-// STATE TEXT, gone. Ends when stdin does, so that no test leaves it behind.
+// STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every 8th). Ends when stdin does, so that
+// no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -15,6 +16,7 @@
 
 #include "base/time.h"
 #include "codec/frame3d_codec.h"
+#include "codec/texture_codec.h"
 #include "web/gateway/gateway.h"
 
 namespace relievo {
@@ -99,6 +101,7 @@ struct Orders {
   std::string stream;  // feeding this one; empty: none
   bool announce = false, withdraw = false, feeding = false, corrupt = false, quit = false;
   std::string state, text;
+  TextureCodec texture = TextureCodec::kJpeg;
 };
 
 void read_orders(Orders& orders) {
@@ -119,6 +122,9 @@ void read_orders(Orders& orders) {
     } else if (verb == "gone") {
       orders.withdraw = true;
       orders.feeding = false;
+    } else if (verb == "texture") {
+      words >> name;
+      orders.texture = texture_codec_named(name).value_or(TextureCodec::kJpeg);
     } else if (verb == "status") {
       words >> orders.state >> std::ws;
       std::getline(words, orders.text);
@@ -149,6 +155,8 @@ int feed(std::uint16_t port, double rate) {
   reader.detach();  // blocked in stdin; the program ends with it
   EncodeOptions options;
   options.volume = {{-1, -1, 0}, 2};
+  options.key_interval = 8;
+  FrameEncoder encoder(make_info("").rig, make_info("").pattern);
   std::uint64_t sequence = 0;
   auto next = std::chrono::steady_clock::now();
   for (;;) {
@@ -169,8 +177,9 @@ int feed(std::uint16_t port, double rate) {
     FrameMessage message;
     message.capture_time_ns = utc_now_ns();
     message.sequence = message.number = sequence++;
+    options.texture = orders.texture;
     const auto bytes =
-        encode_frame(make_frame(message.number, static_cast<float>(sequence) * 0.05f), options);
+        encoder.encode(make_frame(message.number, static_cast<float>(sequence) * 0.05f), options);
     if (!bytes.ok()) {
       std::fprintf(stderr, "%s\n", bytes.error().message.c_str());
       return 1;

@@ -118,7 +118,8 @@ class HttpConnection : public Connection, public std::enable_shared_from_this<Ht
 
 class Server : public Gateway {
  public:
-  explicit Server(const GatewayOptions& options) : options_(options), hub_(options.empty_hint) {}
+  explicit Server(const GatewayOptions& options)
+      : options_(options), hub_(options.empty_hint, options.key_frame_wanted) {}
   ~Server() override;
 
   Status listen();

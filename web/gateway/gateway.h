@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -17,11 +18,14 @@ struct GatewayOptions {
   std::uint16_t port = 8080;  // 0: any free one, see Gateway::port()
   int max_clients = 64;       // WebSocket clients; more are refused with 503
   std::string empty_hint{};   // what the viewer says while there are no streams
+  // A client has to wait for a key frame of the stream; at most once a second a stream, from any thread. Must
+  // return at once and not call back.
+  std::function<void(const std::string& stream)> key_frame_wanted{};
 };
 
 /// Runs on a thread of its own from start() to destruction. Every function may be called from any thread and
 /// returns without waiting for a client: each client has a credit and a latest-frame slot, and frames it has
-/// no credit for are dropped there and counted.
+/// no credit for are dropped there and counted; so are those that build on a dropped one.
 class Gateway {
  public:
   /// Fails where the address cannot be had (port in use), saying which and what to do.

@@ -4,15 +4,27 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/time.h"
+#include "codec/frame_layout.h"
 #include "web/gateway/protocol.h"
 
 namespace relievo {
+namespace {
+
+constexpr std::int64_t kKeyRequestInterval_ns = kNanosecondsPerSecond;
+
+BuildsOn builds_on(const FrameMessage& frame) {
+  return what_it_builds_on(*frame.data);
+}
+
+}  // namespace
 
 struct Hub::Watcher {
   std::string stream;
   std::function<void()> wake;
   bool woken = false;                  // since it last found nothing
   std::optional<FrameMessage> latest;  // the slot
+  bool needs_key = false;              // it lacks a frame that others build on
   std::uint64_t drops = 0;
   std::uint64_t seen_info = 0;  // versions it has been sent; 0: none
   std::uint64_t seen_status = 0;
@@ -25,11 +37,15 @@ struct Hub::Entry {
   bool live = false;  // announced and not withdrawn
   std::shared_ptr<const std::string> info_text, status_text;
   std::uint64_t info_version = 0, status_version = 0;
-  std::optional<FrameMessage> latest;  // so that a late joiner sees a stalled stream's last picture
+  // So that a late joiner sees a stalled stream's last picture: the last frame, and where that builds on
+  // others the last one that does not.
+  std::optional<FrameMessage> latest, latest_key;
+  std::optional<std::int64_t> key_asked_ns;
   std::vector<std::shared_ptr<Watcher>> watchers;
 };
 
-Hub::Hub(std::string empty_hint) : empty_hint_(std::move(empty_hint)) {}
+Hub::Hub(std::string empty_hint, std::function<void(const std::string&)> key_frame_wanted)
+    : empty_hint_(std::move(empty_hint)), key_frame_wanted_(std::move(key_frame_wanted)) {}
 Hub::~Hub() = default;
 
 void Hub::wake_all(Entry& entry) {
@@ -63,15 +79,43 @@ void Hub::publish(const std::string& stream, const FrameMessage& frame) {
   if (it == streams_.end() || !it->second->live || !frame.data) return;
   Entry& entry = *it->second;
   ++entry.facts.published;
+  // Lost on its way here: what builds on it is of no use to anybody.
+  const bool has_gap = entry.latest && frame.sequence != entry.latest->sequence + 1;
+  const bool is_broken = has_gap && builds_on(frame) == BuildsOn::kFrameBefore;
   entry.latest = frame;
+  if (builds_on(frame) == BuildsOn::kNothing) entry.latest_key = frame;
+  bool key_needed = false;
   for (const auto& watcher : entry.watchers) {
-    if (watcher->latest) {
-      ++watcher->drops;
-      ++entry.facts.client_drops;
-    }
-    watcher->latest = frame;
+    watcher->needs_key = watcher->needs_key || is_broken;
+    offer(entry, *watcher, frame);
+    key_needed = key_needed || watcher->needs_key;
   }
+  if (key_needed) ask_for_key_frame(entry);
   wake_all(entry);
+}
+
+/// Into the watcher's slot, unless the frame there or one that it never got is what this one builds on.
+void Hub::offer(Entry& entry, Watcher& watcher, const FrameMessage& frame) {
+  const BuildsOn needed = builds_on(frame);
+  const bool slot_is_key = watcher.latest && builds_on(*watcher.latest) == BuildsOn::kNothing;
+  if (needed == BuildsOn::kNothing) watcher.needs_key = false;
+  const bool useless = watcher.needs_key || (needed == BuildsOn::kFrameBefore && watcher.latest) ||
+                       (needed == BuildsOn::kKeyFrame && slot_is_key);
+  if (useless || watcher.latest) {
+    ++watcher.drops;
+    ++entry.facts.client_drops;
+  }
+  if (!useless) watcher.latest = frame;
+  if (useless && needed == BuildsOn::kFrameBefore) watcher.needs_key = true;
+}
+
+void Hub::ask_for_key_frame(Entry& entry) {
+  const std::int64_t now_ns = steady_now_ns();
+  if (!key_frame_wanted_ || (entry.key_asked_ns && now_ns - *entry.key_asked_ns < kKeyRequestInterval_ns))
+    return;
+  entry.key_asked_ns = now_ns;
+  ++entry.facts.key_requests;
+  key_frame_wanted_(entry.facts.info.stream);
 }
 
 void Hub::publish(const ServerStatus& status) {
@@ -92,9 +136,11 @@ void Hub::withdraw(const std::string& stream) {
   Entry& entry = *it->second;
   entry.live = false;
   entry.latest.reset();
+  entry.latest_key.reset();
   entry.facts.status.reset();
   entry.status_version = 0;
   for (const auto& watcher : entry.watchers) {
+    watcher->needs_key = true;  // whatever comes next
     if (!watcher->latest) continue;
     watcher->latest.reset();
     ++watcher->drops;
@@ -111,7 +157,10 @@ std::shared_ptr<Hub::Watcher> Hub::watch(const std::string& stream, std::functio
   const std::lock_guard lock(mutex_);
   auto& entry = streams_[stream];
   if (!entry) entry = std::make_unique<Entry>();
-  watcher->latest = entry->latest;
+  const BuildsOn needed = entry->latest ? builds_on(*entry->latest) : BuildsOn::kNothing;
+  watcher->latest = needed == BuildsOn::kNothing ? entry->latest : entry->latest_key;
+  watcher->needs_key = !watcher->latest || needed == BuildsOn::kFrameBefore;
+  if (watcher->needs_key && entry->latest) ask_for_key_frame(*entry);
   entry->watchers.push_back(watcher);
   return watcher;
 }

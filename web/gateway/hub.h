@@ -24,7 +24,8 @@ struct StreamSnapshot {
   std::uint64_t published = 0;     // frames handed to the gateway
   std::uint64_t sent = 0;          // frames written to clients, all of them together
   std::uint64_t sent_bytes = 0;    // of those frames
-  std::uint64_t client_drops = 0;  // frames replaced in a client's slot before it had credit
+  std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
+  std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
 };
 
@@ -40,7 +41,8 @@ class Hub {
     std::uint64_t drops = 0;                    // with a frame: this watcher's so far
   };
 
-  explicit Hub(std::string empty_hint);
+  /// `key_frame_wanted`, which may be empty: see GatewayOptions; called with the hub locked.
+  explicit Hub(std::string empty_hint, std::function<void(const std::string& stream)> key_frame_wanted = {});
   Hub(const Hub&) = delete;
   Hub& operator=(const Hub&) = delete;
   ~Hub();
@@ -67,9 +69,12 @@ class Hub {
  private:
   struct Entry;
   void wake_all(Entry& entry);
+  void offer(Entry& entry, Watcher& watcher, const FrameMessage& frame);
+  void ask_for_key_frame(Entry& entry);
   void erase_if_unused(const std::string& stream);
 
   const std::string empty_hint_;
+  const std::function<void(const std::string& stream)> key_frame_wanted_;
   mutable std::mutex mutex_;
   std::map<std::string, std::unique_ptr<Entry>> streams_;
   std::uint64_t next_version_ = 1;

@@ -61,6 +61,8 @@ Json status_json(const ServerStatus& status) {
           {"reconstruct_ms", status.reconstruct_ms},
           {"encode_ms", status.encode_ms},
           {"latency_ms", status.latency_ms},
+          {"bit_rate", status.bit_rate},
+          {"rate_level", status.rate_level},
           {"filters", filters},
           {"step", step}};
 }
@@ -212,6 +214,8 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
              [](S s) { return s.sent_bytes; });
   per_stream("relievo_gateway_client_drops_total", "counter", "Frames a client had no credit for.",
              [](S s) { return s.client_drops; });
+  per_stream("relievo_gateway_key_requests_total", "counter",
+             "Key frames asked for, for clients that wait for one.", [](S s) { return s.key_requests; });
 
   const auto per_status = [&](const char* name, const char* type, const char* help, auto value) {
     out.family(name, type, help);
@@ -233,6 +237,11 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
              [](T s) { return s.encode_ms * 1e-3; });
   per_status("relievo_stream_latency_seconds", "gauge", "Median time from capture to publication.",
              [](T s) { return s.latency_ms * 1e-3; });
+  per_status("relievo_stream_bits_per_second", "gauge", "Of frames, over the last few seconds.",
+             [](T s) { return s.bit_rate; });
+  per_status("relievo_stream_rate_level", "gauge",
+             "How much coarser than asked for, to keep a bit rate; 0 not at all.",
+             [](T s) { return s.rate_level; });
 
   out.family("relievo_stream_drops_total", "counter", "Frames the server lost, by place.");
   for (const auto& s : streams) {

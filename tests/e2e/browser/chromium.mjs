@@ -24,8 +24,8 @@ const kFlags = [
 export const kPatienceMs = 60_000;
 
 /** A browser of its own; who starts it closes it. */
-export const launchChromium = () =>
-  chromium.launch({ executablePath, headless: true, args: kFlags, timeout: kPatienceMs });
+export const launchChromium = (flags = []) =>
+  chromium.launch({ executablePath, headless: true, args: [...kFlags, ...flags], timeout: kPatienceMs });
 
 /** Waits until `condition()`, which may be asynchronous, is true; fails with `what` where it does not come true. */
 export async function eventually(what, condition) {

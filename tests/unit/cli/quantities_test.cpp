@@ -21,6 +21,17 @@ TEST(Quantities, SizesAsPeopleWriteThem) {
   EXPECT_EQ(byte_count()("2GB"), "");
 }
 
+TEST(Quantities, BitRatesAsPeopleWriteThem) {
+  EXPECT_EQ(parse_bit_rate("4M").value(), 4e6);
+  EXPECT_EQ(parse_bit_rate("2.5 Mbit/s").value(), 2.5e6);
+  EXPECT_EQ(parse_bit_rate("800k").value(), 8e5);
+  EXPECT_EQ(parse_bit_rate("4000000").value(), 4e6);
+  for (const char* wrong : {"", "M", "-4M", "0", "4", "99k", "2G", "4MB", "nan"}) {
+    EXPECT_FALSE(parse_bit_rate(wrong).ok()) << wrong;
+    EXPECT_NE(bit_rate()(wrong), "") << wrong;
+  }
+}
+
 TEST(Quantities, DurationsAsPeopleWriteThem) {
   EXPECT_EQ(parse_duration_s("90").value(), 90);
   EXPECT_EQ(parse_duration_s("0.5s").value(), 0.5);

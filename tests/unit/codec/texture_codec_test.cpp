@@ -274,6 +274,17 @@ TEST_F(VideoTexture, AFrameThatLiesAboutItsKeyIsRefused) {
   EXPECT_FALSE(decoder.decode(delta).ok());
 }
 
+TEST_F(VideoTexture, AFrameWithoutATextureMayComeBetween) {
+  FrameDecoder decoder;
+  ASSERT_TRUE(decoder.decode(next(0)).ok());
+  Frame3D bare = test::grid_frame({});
+  const auto between = encoder_.encode(bare, options_);
+  ASSERT_TRUE(between.ok());
+  EXPECT_TRUE(decoder.decode(*between).ok());
+  const auto after = decoder.decode(next(1));
+  EXPECT_TRUE(after.ok()) << after.error().message;
+}
+
 TEST_F(VideoTexture, DeltasOfMeshesAreFramesToo) {
   options_.geometry = GeometryCodec::kDracoMesh;
   FrameDecoder decoder;

@@ -120,6 +120,8 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   status.message = "no camera";
   status.drops_encode = 7;
   status.latency_ms = 12.5;
+  status.bit_rate = 3.5e6;
+  status.rate_level = 4;
   status.step = {.mixed = 7, .regrouped = 5'000'000'000, .phase = 1.25, .drift_fields_s = -0.06};
   status.filters.unsupported = 3;
   status.filters.small_component = 5'000'000'000;
@@ -138,6 +140,8 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   EXPECT_EQ(inbox.now().statuses[0].message, "no camera");
   EXPECT_EQ(inbox.now().statuses[0].drops_encode, 7u);
   EXPECT_EQ(inbox.now().statuses[0].latency_ms, 12.5);
+  EXPECT_EQ(inbox.now().statuses[0].bit_rate, 3.5e6);
+  EXPECT_EQ(inbox.now().statuses[0].rate_level, 4u);
   EXPECT_EQ(inbox.now().statuses[0].filters, status.filters);
   EXPECT_EQ(inbox.now().statuses[0].step, status.step);
 }

@@ -2,17 +2,21 @@
 // Decodes frames off the main thread, one after the other.
 import wasmUrl from 'draco3d/draco_decoder.wasm?url';
 import { DracoDecoder, type Geometry } from './draco';
-import { kGeometryGrid, kTextureJpeg, parseFrame, type Frame } from './frame';
+import { kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
 import { GridFrames } from './grid';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
+import { kNoVideoHere, VideoTextures } from './videoTexture';
 import { robustExtent, triangleEdges, vertexNormals } from './surface';
 
 const post = (reply: DecodeReply, transfer: Transferable[] = []): void => {
   self.postMessage(reply, { transfer });
 };
 
+const kStills: Record<number, string> = { [kTextureJpeg]: 'image/jpeg', [kTextureWebp]: 'image/webp', [kTexturePng]: 'image/png' };
+
 const grids = new GridFrames();
+const videos = new VideoTextures();
 const decoder = load();
 let queue: Promise<void> = decoder.then(
   () => post({ type: 'ready' }),
@@ -62,6 +66,7 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
     quality: geometry.quality,
     texture: await picture,
+    notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? kNoVideoHere : null,
     extent: robustExtent(positions),
     decodeMs: performance.now() - start,
   };
@@ -77,9 +82,14 @@ function decodeGeometry(draco: DracoDecoder, frame: Frame, wantQuality: boolean)
 
 async function decodeTexture(frame: Frame): Promise<ImageBitmap | null> {
   if (frame.texture.length === 0) return null;
-  if (frame.textureCodec !== kTextureJpeg) throw new Error(`texture codec ${frame.textureCodec} is not known here`);
+  if (frame.textureCodec === kTextureH264) {
+    if (!VideoTextures.possible) return null;
+    return videos.decode(frame.texture, frame.header.textureWidth, frame.header.textureHeight);
+  }
+  const type = kStills[frame.textureCodec];
+  if (type === undefined) throw new Error(`texture codec ${frame.textureCodec} is not known here`);
   // Copied into the Blob by the browser; nothing here keeps the bytes.
-  const blob = new Blob([frame.texture as Uint8Array<ArrayBuffer>], { type: 'image/jpeg' });
+  const blob = new Blob([frame.texture as Uint8Array<ArrayBuffer>], { type });
   const bitmap = await createImageBitmap(blob, { colorSpaceConversion: 'none', premultiplyAlpha: 'none' });
   const { textureWidth, textureHeight } = frame.header;
   if (bitmap.width !== textureWidth || bitmap.height !== textureHeight) {

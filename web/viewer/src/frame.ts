@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One frame of 3D video as bytes: codec/FORMAT.md. Checks everything it says before anything is decoded.
+import { videoTextureIsKey } from './videoTexture';
 
 export interface FrameHeader {
   version: number;
@@ -27,6 +28,9 @@ export const kGeometryDraco = 1;
 export const kGeometryGrid = 2;
 const kGeometryDracoGrid = 3;
 export const kTextureJpeg = 1;
+export const kTextureWebp = 2;
+export const kTexturePng = 3;
+export const kTextureH264 = 4;
 const kQualityCodec = 1;
 
 const kFixedBytes = 64;
@@ -61,10 +65,11 @@ export function parseFrame(bytes: Uint8Array): Frame {
   const volumeOk = [...header.volumeMin, header.volumeSize].every(Number.isFinite) && header.volumeSize >= 0;
   if (!volumeOk) throw new Error('frame has a volume that is not finite');
   const sections = readSections(bytes, view, headerBytes);
-  if (flags === 0 && sections.geometryCodec !== kGeometryGrid) {
-    throw new Error('frame has flags that this viewer does not know (0)');
+  const textureIsKey = sections.textureCodec !== kTextureH264 || videoTextureIsKey(sections.texture);
+  if (flags === 0 ? sections.geometryCodec !== kGeometryGrid && textureIsKey : !textureIsKey) {
+    throw new Error('frame and its sections do not agree whether this is a key frame');
   }
-  checkCounts(header, sections.geometryCodec, sections.geometry.length, sections.texture.length);
+  checkCounts(header, sections);
   return { header, isKey: flags === 1, ...sections };
 }
 
@@ -115,13 +120,11 @@ function readSections(bytes: Uint8Array, view: DataView, headerBytes: number): O
 }
 
 /** FORMAT.md, "Sizes": what a frame may ask for is bounded by the bytes it brings. */
-function checkCounts(
-  header: FrameHeader,
-  geometryCodec: number,
-  geometryBytes: number,
-  textureBytes: number,
-): void {
+function checkCounts(header: FrameHeader, sections: Omit<Frame, 'header' | 'isKey'>): void {
   const { vertices, triangles } = header;
+  const geometryCodec = sections.geometryCodec;
+  const geometryBytes = sections.geometry.length;
+  const textureBytes = sections.texture.length;
   const pixels = header.textureWidth * header.textureHeight;
   if (vertices > kLimits.vertices) throw new Error(`frame has ${vertices} vertices, more than the limit`);
   if (triangles > kLimits.triangles) throw new Error(`frame has ${triangles} triangles, more than the limit`);
@@ -134,7 +137,7 @@ function checkCounts(
   if ((vertices === 0) !== (geometryBytes === 0) || tooMany) {
     throw new Error(`frame declares ${vertices} vertices and ${triangles} triangles in ${geometryBytes} bytes`);
   }
-  if ((pixels === 0) !== (textureBytes === 0) || pixels > 256 * textureBytes) {
+  if ((pixels === 0) !== (textureBytes === 0) || pixels > (sections.textureCodec === kTextureH264 ? 16_384 : 256) * textureBytes) {
     throw new Error(
       `frame declares a texture of ${header.textureWidth}x${header.textureHeight} in ${textureBytes} bytes`,
     );

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Geometry codec 2 of codec/FORMAT.md, frame after frame. Runs in the worker.
-import type { Frame } from './frame';
+import { kTextureH264, type Frame } from './frame';
 import { decodeGrid, type KeyGrid } from './gridDecoder';
 import { gridId } from './gridHead';
 import { GridPoints, type GridSurface } from './gridPoints';
+import { videoTextureIsKey } from './videoTexture';
 
 /** Keeps the last key frame and what its calibration costs to work out. */
 export class GridFrames {
@@ -19,7 +20,8 @@ export class GridFrames {
       return { positions: none, coordinates: new Float32Array(0), triangles: new Uint32Array(0), quality: null };
     }
     const { head, grid } = decodeGrid(frame.geometry, vertices, triangles, this.key);
-    if (head.isKey !== frame.isKey) throw new Error('frame and geometry do not agree whether this is a key frame');
+    const isDelta = !head.isKey || (frame.textureCodec === kTextureH264 && !videoTextureIsKey(frame.texture));
+    if (isDelta === frame.isKey) throw new Error('frame and geometry do not agree whether this is a key frame');
     if (head.calibration !== null) {
       this.key = { id: gridId(frame.geometry), grid };
       const bytes = head.calibrationBytes;

@@ -269,6 +269,7 @@ class Viewer {
   private show(frame: DecodedFrame): void {
     if (this.view === null) return;
     this.view.show(frame);
+    this.ui.showNotice(frame.notice);
     if (this.sharedPose !== null) {
       if (!this.view.navigator.isRigView) this.view.navigator.pose = this.sharedPose;
       this.sharedPose = null;

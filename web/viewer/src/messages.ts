@@ -23,6 +23,7 @@ export interface DecodedFrame {
   quality: VertexQuality | null; // null: not wanted or not sent
   colours?: Float32Array<ArrayBuffer> | null; // linear RGB a vertex, of files without a picture
   texture: ImageBitmap | null;
+  notice: string | null; // for the person, while frames are like this one
   extent: Extent | null;
   decodeMs: number;
 }

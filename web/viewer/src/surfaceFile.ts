@@ -114,6 +114,7 @@ function toFrame(parts: Part[]): DecodedFrame {
     quality: null,
     texture: null,
     extent: robustExtent(positions) ?? box(positions),
+    notice: null,
     decodeMs: 0,
   };
 }

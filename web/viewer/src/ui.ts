@@ -48,6 +48,13 @@ export class Ui {
     element('dismiss').hidden = !dismissible;
   }
 
+  /** A line over the picture, which stays visible; null: none. */
+  showNotice(text: string | null): void {
+    const line = element('notice');
+    line.hidden = text === null;
+    if (text !== null) setText(line, `${text}.`);
+  }
+
   showStreams(streams: ListedStream[], chosen: string | null, source: string, note: string): void {
     const names = streams.map((s) => s.name);
     if (chosen !== null && !names.includes(chosen)) names.push(chosen);

@@ -84,7 +84,7 @@ describe('parseFrame', () => {
   it.each([
     ['no magic', changed(0, 0x51), /does not start with RLVF/],
     ['another version', changed(4, 2), /version 2/],
-    ['a delta frame', changed(5, 0), /flags/],
+    ['a delta frame', changed(5, 0), /agree/],
     ['an unknown flag', changed(5, 3), /flags/],
     ['a header behind the end', changed(6, 0xff, 0xff), /cut short/],
     ['a volume that is not finite', changed(36, 0, 0, 0xc0, 0x7f), /volume/],

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// serve --texture NAME --record, then info and export of what was recorded, every program real.
+#include <nlohmann/json.hpp>
+
+#include "tests/e2e/server/server_process.h"
+
+namespace relievo::test {
+namespace {
+
+using nlohmann::json;
+
+class ServerTextures : public TakeTest, public testing::WithParamInterface<std::string> {
+ protected:
+  Finished client(const std::vector<std::string>& arguments) {
+    std::vector<std::string> command{program("relievo").string()};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    return run(command);
+  }
+
+  const std::string file_ = (folder_.path() / "out.mcap").string();
+};
+
+TEST_P(ServerTextures, AreRecordedDescribedAndExported) {
+  const Finished served =
+      run(serve(source_, {"--loop", "--frames", "40", "--texture", GetParam(), "--texture-quality", "90",
+                          "--key-interval", "6", "--record", file_}));
+  if (served.err.find("this build has no H.264") != std::string::npos) GTEST_SKIP() << served.err;
+  ASSERT_EQ(served.status, 0) << served.err;
+  const Finished described = client({"info", file_, "--json"});
+  ASSERT_EQ(described.status, 0) << described.err;
+  const json told = json::parse(described.out);
+  EXPECT_EQ(told["texture_codecs"], json({GetParam()}));
+  EXPECT_EQ(told["unreadable"], 0);
+  const int frames = told["frames"];
+  ASSERT_GT(frames, 12);
+  for (const std::string format : {"png", "glb", "obj"}) {
+    const std::string out = (folder_.path() / format).string();
+    // From the middle on: what those build on is not asked for.
+    const Finished exported =
+        client({"export", file_, "--out", out, "--format", format, "--frames", "9:", "--json"});
+    ASSERT_EQ(exported.status, 0) << exported.err;
+    // All of them, unless the recorder lost one on the way and the others waited for the next key frame.
+    EXPECT_GE(json::parse(exported.out)["frames"].get<int>(), told["lost"] == 0 ? frames - 9 : 1)
+        << exported.err;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Codecs, ServerTextures, testing::Values("jpeg", "webp", "png", "h264"),
+                         [](const auto& test) { return test.param; });
+
+TEST_F(TakeTest, ABitRateIsKept) {
+  const std::string file = (folder_.path() / "rate.mcap").string();
+  const Finished served = run(serve(source_, {"--loop", "--frames", "120", "--fast", "--texture-quality",
+                                              "95", "--bitrate", "500k", "--record", file}));
+  ASSERT_EQ(served.status, 0) << served.err;
+  const Finished described = run({program("relievo").string(), "info", file, "--json"});
+  ASSERT_EQ(described.status, 0) << described.err;
+  const json told = json::parse(described.out);
+  const double bytes = told["bytes"]["geometry"].get<double>() + told["bytes"]["texture"].get<double>() +
+                       told["bytes"]["other"].get<double>();
+  const double frame_rate = 29.97;
+  // The first frames, before the controller knows the scene, are among them.
+  EXPECT_LT(8 * bytes / told["frames"].get<double>() * frame_rate, 1.3 * 500e3) << described.out;
+}
+
+}  // namespace
+}  // namespace relievo::test
