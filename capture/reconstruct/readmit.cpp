@@ -12,13 +12,13 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMargin = 2;
 
 // Measured on simulated scenes: of what these let through, nine out of ten are right.
-constexpr float kAlong_px = 0.75F;        // off what the line above or below predicts
-constexpr float kRegular = 1.4F;          // times a distance of boundaries, the one next to it
-constexpr float kLeastRoom_px = 1.F;      // to the boundaries beside it
-constexpr float kWidest_px = 40.F;        // of a stripe
-constexpr float kPredicted_px = 0.2F;     // standard deviation of a prediction
-constexpr float kWorst_px = 0.5F;         // standard deviation of a boundary where the scene holds still,
-constexpr float kWorstMoving_px = 0.25F;  // and where it moves
+constexpr float kAlong_px = 0.6F;        // off what the line above or below predicts
+constexpr float kRegular = 1.4F;         // times a distance of boundaries, the one next to it
+constexpr float kLeastRoom_px = 1.F;     // to the boundaries beside it
+constexpr float kWidest_px = 40.F;       // of a stripe
+constexpr float kPredicted_px = 0.2F;    // standard deviation of a prediction
+constexpr float kWorst_px = 0.4F;        // standard deviation of a boundary where the scene holds still,
+constexpr float kWorstMoving_px = 0.2F;  // and where it moves
 // Where the scene holds still, what is against a boundary is as good as what is for it, unless contrast
 // spoils both; and a step's own edge goes on from a true boundary over many lines.
 constexpr float kPlain = 0.2F;
@@ -48,6 +48,8 @@ Readmission::Place* Readmission::row(int line) {
 void Readmission::fill(const std::vector<RecoveredBoundary>& recovered, const SequenceResult& result,
                        const EdgeImage& edges) {
   candidates_.clear();
+  std::size_t decoded = 0;
+  std::size_t still = 0;
   for (int line = 0; line < lines_; ++line) {
     Place* here = row(line);
     std::fill_n(here, boundaries_, Place{kNone, 0});
@@ -55,12 +57,15 @@ void Readmission::fill(const std::vector<RecoveredBoundary>& recovered, const Se
          e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
       if (result.boundary[e] >= 0) {
         here[result.boundary[e]].column_px = edges.edges[e].column_px;
+        ++decoded;
+        still += result.still[e];
       } else if (result.doubted[e] >= 0) {
         candidates_.push_back({line, e});
       }
     }
   }
   for (const RecoveredBoundary& r : recovered) row(r.line)[r.boundary].column_px = r.column_px;
+  mostly_still_ = 2 * still > decoded;
 }
 
 /// Of neighbours whose surface goes on to the edge, straight or not.
@@ -89,6 +94,7 @@ bool Readmission::take_back(const Candidate& candidate, SequenceResult& result, 
   if (result.boundary[candidate.edge] >= 0 || known(here->column_px)) return false;
   Edge& edge = edges.edges[candidate.edge];
   const bool still = result.still[candidate.edge] != 0;
+  if (!still && !mostly_still_) return false;  // what is around it moves, too, and is as wrong
   if (edge.sigma_px > (still ? kWorst_px : kWorstMoving_px)) return false;
   if (still && edge.contrast < kPlain) return false;
   const float own = edge.column_px;

@@ -51,6 +51,7 @@ class Readmission {
   std::size_t stride_;
   std::vector<Place> places_;  // [line][boundary] with a margin
   std::vector<Candidate> candidates_;
+  bool mostly_still_ = false;  // the scene, but for what moves in it
 };
 
 }  // namespace relievo

@@ -192,18 +192,7 @@ class Grid {
     return out;
   }();
 
-  /// Whether the vertex has none beside it on its line: it is in no triangle.
-  bool alone(int line, int b) const {
-    return (b == 0 || places_[cell(line, b - 1)] < 0) &&
-           (b + 1 == boundaries_ || places_[cell(line, b + 1)] < 0);
-  }
-  /// Whether a strip of surface that shows one boundary goes on from the line above.
-  bool strip_goes_on(int line, int b) const {
-    return options_.links != nullptr && line > 0 && options_.links->along[cell(line - 1, b)] != 0 &&
-           alone(line, b) && alone(line - 1, b);
-  }
-
-  /// Runs of vertices that triangles join along a line, and those that they, or strips, join across lines.
+  /// Runs of vertices that triangles join along a line, and those that they join across lines.
   void find_components() {
     std::int32_t* run = scratch_.index.data();
     scratch_.parent.clear();
@@ -235,7 +224,7 @@ class Grid {
           }
           run[at] = now;
           ++length;
-          if (down || (sides_above & 1) || strip_goes_on(line, b)) {
+          if (down || (sides_above & 1)) {
             const std::int32_t other = run[at - static_cast<std::size_t>(boundaries_)];
             if (other != joined_above) join(now, other);
             joined_above = other;

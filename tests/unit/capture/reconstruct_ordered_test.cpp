@@ -323,7 +323,8 @@ TEST(Consistency, AmidASurfaceThatHoldsStillMoreDoubtIsLeftThanWhereItMoves) {
     check.check(59, pool, s.result, s.edges);
     for (std::size_t i = 0; i < s.result.boundary.size(); ++i) {
       const int b = static_cast<int>(i % 20);
-      if (b > 0 && b < 19) EXPECT_EQ(s.result.boundary[i], still ? b : -1);
+      if (b == 0 || b == 19) continue;  // at an end, where less is allowed
+      EXPECT_EQ(s.result.boundary[i], still ? b : -1);
     }
   }
 }

@@ -107,6 +107,13 @@ TEST(Readmission, AndForAllWhereItMoves) {
   EXPECT_EQ(f.readmit(), 12U);
 }
 
+TEST(Readmission, ButNotWhereAllMoves) {
+  Frame f;
+  f.result.still.assign(f.result.still.size(), 0);
+  f.doubt(7, 0);
+  EXPECT_EQ(f.readmit(), 0U);
+}
+
 TEST(Readmission, WhereNothingSpoilsABoundaryWhatIsAgainstItIsBelieved) {
   Frame f;
   f.doubt(7, 0);

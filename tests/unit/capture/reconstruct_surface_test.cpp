@@ -208,26 +208,6 @@ TEST(Surface, SmallPiecesGoAndAreCounted) {
   EXPECT_EQ(with.normals.back(), (Vec3f{0, 0, -1}));
 }
 
-TEST(Surface, AStripThatShowsOneBoundaryIsAPieceByItsLinks) {
-  std::vector<GridVertex> vertices;
-  for (int line = 0; line < 12; ++line) vertices.push_back(vertex(3, line));
-  for (int line = 0; line < 6; ++line) vertices.push_back(vertex(7, line));
-  GridLinks links;
-  links.across.assign(10 * 12, 0);
-  links.along.assign(10 * 12, 1);
-  SurfaceScratch scratch;
-  Surface strip;
-  const SurfaceCounts counts =
-      build_surface(vertices, 10, 12, {.least_component = 10, .links = &links}, scratch, strip);
-  EXPECT_EQ(counts.small_component, 6U) << "the shorter one";
-  expect_sound(strip);
-  EXPECT_EQ(strip.positions.size(), 12U);
-  links.along.assign(10 * 12, 0);
-  EXPECT_EQ(build_surface(vertices, 10, 12, {.least_component = 10, .links = &links}, scratch, strip)
-                .small_component,
-            18U);
-}
-
 TEST(Surface, OfTwoAtOnePlaceTheSteeperStays) {
   for (const bool first : {true, false}) {
     std::vector<GridVertex> vertices = wall(3, 3);
