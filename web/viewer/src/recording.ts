@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording of this device: which frames it has, and each one's bytes. Nothing of it leaves the page.
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
+import { kTextureH264, parseFrame } from './frame';
 import { openMcap, readMessage, readMessageHead, type Bytes, type McapFile, type McapMessage } from './mcap';
 import type { StreamInfo } from './protocol';
+import { videoTextureIsKey } from './videoTexture';
 
 const kFrameTopic = 'relievo/frame';
 const kInfoTopic = 'relievo/info';
@@ -61,6 +63,13 @@ export class Recording {
     const head = readFrameHead(message);
     this.heads[index] = head;
     return { head, message };
+  }
+
+  /** Whether it holds video that builds on the frame before it. */
+  async buildsOnFrameBefore(index: number): Promise<boolean> {
+    const { head, message } = await this.read(index);
+    const frame = parseFrame(message.subarray(head.at, head.at + head.length));
+    return frame.textureCodec === kTextureH264 && !videoTextureIsKey(frame.texture);
   }
 
   /** The last frame up to this one that decodes alone; null where there is none. */

@@ -5,6 +5,24 @@ import { PlayClock, type Loop } from './playback';
 import type { Recording } from './recording';
 import type { FrameSource, Playback, SourceEvents } from './source';
 
+/** What the decoder holds: the key frame, and the last frame that was decoded after it. */
+export interface Decoded {
+  key: number;
+  last: number;
+}
+
+/**
+ * What has to be decoded before a frame whose key frame is `key`. Grids build on the key frame alone, video (`onBefore`)
+ * on the frame before and so on all since the key frame.
+ */
+export function framesBefore(index: number, key: number, decoded: Decoded, onBefore: boolean): number[] {
+  if (key === index) return [];
+  const known = decoded.key === key;
+  if (!onBefore) return known ? [] : [key];
+  const first = known && decoded.last < index ? decoded.last + 1 : key;
+  return Array.from({ length: index - first }, (_, i) => first + i);
+}
+
 export class RecordingSource implements FrameSource, Playback {
   readonly connected = true;
   readonly retryInS = null;
@@ -13,7 +31,7 @@ export class RecordingSource implements FrameSource, Playback {
   private credits = 1;
   private wanted: number | null = 0; // to be shown whether it plays or not
   private sent = -1;
-  private keyInDecoder = -1;
+  private decoded: Decoded = { key: -1, last: -1 };
   private sending = false;
   private timer = 0;
   private stopped = false;
@@ -134,9 +152,13 @@ export class RecordingSource implements FrameSource, Playback {
     try {
       const key = await this.recording.keyBefore(index);
       if (key === null) throw new Error('this frame builds on one that the recording does not have');
-      if (key !== index && key !== this.keyInDecoder) await this.hand(key, true);
+      for (const before of framesBefore(index, key, this.decoded, await this.recording.buildsOnFrameBefore(index))) {
+        await this.hand(before, true);
+        if (this.stopped) return;
+        this.decoded = { key, last: before };
+      }
       await this.hand(index, false);
-      this.keyInDecoder = key;
+      this.decoded = { key, last: index };
     } catch (error) {
       ++this.credits;
       if (!this.stopped) this.events.nonsense(error instanceof Error ? error.message : String(error));
