@@ -16,9 +16,10 @@ const kKeyEvery = 6;
 
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-recording-'));
 const recorded = join(scratch, 'object.mcap');
+// At 6 frames a second, so that it takes several chunks of half a second, of which some are left where it is cut short.
 execFileSync(
   serverPath,
-  ['serve', '--source', 'sim:object,width=320,height=240,stripes=60', '--frames', String(kFrames + 2), '--fast', '--web', 'none', '--record', recorded,
+  ['serve', '--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--frames', String(kFrames + 2), '--web', 'none', '--record', recorded,
     '--key-interval', String(kKeyEvery), '--domain', process.env.RELIEVO_TEST_DOMAIN, '--interface', 'lo'],
   { stdio: 'ignore' },
 );
