@@ -9,10 +9,10 @@ namespace {
 
 // Measured by scripts/rate_table: sim:walk with h264. Other scenes and codecs differ, which the feedback
 // takes up.
-constexpr std::array kLevels{RateLevel{90, 6, 1.0},  RateLevel{85, 6, 0.80}, RateLevel{80, 5, 0.63},
-                             RateLevel{75, 5, 0.52}, RateLevel{70, 4, 0.42}, RateLevel{64, 4, 0.35},
-                             RateLevel{57, 3, 0.28}, RateLevel{50, 3, 0.23}, RateLevel{42, 2, 0.18},
-                             RateLevel{34, 2, 0.15}, RateLevel{25, 1, 0.12}, RateLevel{15, 0, 0.10}};
+constexpr std::array kLevels{RateLevel{90, 6, 1.00}, RateLevel{85, 6, 0.66}, RateLevel{80, 5, 0.49},
+                             RateLevel{75, 5, 0.42}, RateLevel{70, 4, 0.35}, RateLevel{64, 4, 0.32},
+                             RateLevel{57, 3, 0.27}, RateLevel{50, 3, 0.25}, RateLevel{42, 2, 0.21},
+                             RateLevel{34, 2, 0.20}, RateLevel{25, 1, 0.19}, RateLevel{15, 0, 0.17}};
 
 constexpr int kFirstLevel = 4;    // until the first frames have been seen
 constexpr double kRising = 0.4;   // share of a new size that is larger than expected: in 0.2 s it is believed

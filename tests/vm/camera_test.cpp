@@ -169,9 +169,12 @@ TEST(CameraInGuest, TheRigsFramesThroughTheKernelGiveTheSameSurfaces) {
   std::string why;
   if (!guest_tests_pass("Chain.*", folder.path(), why)) GTEST_SKIP() << why;
   const Loaded interlaced = load(folder / "interlaced"), progressive = load(folder / "progressive");
-  expect_same_surfaces(interlaced, load(folder / "captured_interlaced"));
-  expect_same_surfaces(interlaced, load(folder / "captured_alternate"));
-  expect_same_surfaces(progressive, load(folder / "captured_progressive"));
+  for (const auto& [rendered, captured] : {std::pair{&interlaced, "captured_interlaced"},
+                                           {&interlaced, "captured_alternate"},
+                                           {&progressive, "captured_progressive"}}) {
+    SCOPED_TRACE(captured);
+    expect_same_surfaces(*rendered, load(folder / captured));
+  }
 }
 
 }  // namespace

@@ -16,17 +16,19 @@ void FrameAssembler::restart() {
   placed_ = false;
 }
 
-void FrameAssembler::count(std::uint32_t sequence) {
+bool FrameAssembler::count(std::uint32_t sequence) {
   if (last_sequence_) {
     std::uint32_t step = sequence - *last_sequence_;  // past the wrap too
-    // A driver that does not count, or begins again.
     const bool shared = step == 0 && format_.layout == FieldLayout::kAlternate;
+    if (step == 0 && !shared && sequence != 0) return false;
+    // A driver that does not count, or begins again.
     if (!shared && (step == 0 || step > UINT32_MAX / 2)) step = 1;
     position_ += step;
   } else {
     position_ = sequence;  // not 0: even numbers stay even, whichever came first
   }
   last_sequence_ = sequence;
+  return true;
 }
 
 void FrameAssembler::begin(std::uint64_t index, std::int64_t time_ns) {
@@ -40,8 +42,8 @@ void FrameAssembler::begin(std::uint64_t index, std::int64_t time_ns) {
 }
 
 Place FrameAssembler::place(const BufferHeader& header) {
-  count(header.sequence);
   placed_ = false;
+  if (!count(header.sequence)) return {};
   second_ = false;
   switch (format_.layout) {
     case FieldLayout::kInterlaced:

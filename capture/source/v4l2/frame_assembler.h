@@ -43,7 +43,8 @@ class FrameAssembler {
   void restart();
 
  private:
-  void count(std::uint32_t sequence);
+  /// False where it is the buffer before once more.
+  bool count(std::uint32_t sequence);
   void begin(std::uint64_t index, std::int64_t time_ns);
   Place place_field(const BufferHeader& header);
 
