@@ -99,7 +99,10 @@ RELIEVO_INLINE void residuals_body(const GridResiduals& line, int count) {
     const Ints done = ~(absent | by_itself);
     store_octets((absent & int{kNoVertex}) | (~absent & by_itself & int{kByItself}), line.kinds + b);
     store_octets(done ? (d ^ negative) - negative : sizes, line.sizes + b);  // below the largest
-    store(__builtin_convertvector(tables * rans::kMostSymbols + folded, Shorts), line.codes + b);
+    // Unsigned: of places without a vertex it may be anything.
+    const Unsigned codes =
+        reinterpret_cast<Unsigned>(tables * rans::kMostSymbols) + reinterpret_cast<Unsigned>(folded);
+    store(__builtin_convertvector(codes, Shorts), line.codes + b);
   }
 }
 

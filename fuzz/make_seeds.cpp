@@ -40,8 +40,9 @@ void frames(const fs::path& conformance, const fs::path& out) {
         write(out / (std::string(folder) + "_" + entry.path().filename().string()), read(entry.path()));
   }
   std::ifstream expected(conformance / "grid_v1" / "expected.json");
+  const nlohmann::json told = nlohmann::json::parse(expected);
   int number = 0;
-  for (const auto& sequence : nlohmann::json::parse(expected)["sequences"]) {
+  for (const auto& sequence : told["sequences"]) {
     Bytes all;
     for (const auto& frame : sequence)
       append_bytes(all, read(conformance / "grid_v1" / frame["file"].get<std::string>()));
