@@ -299,7 +299,7 @@ Command serve_command() {
             })
             ->type_name("NAME");
         app.add_option("--texture-quality", f->texture_quality,
-                       "1 to 100, of png without effect (default 80: about 37 dB)")
+                       "1 to 100, of png without effect (default 80: 37 to 40 dB)")
             ->check(CLI::Range(1, 100))
             ->type_name("N");
         app.add_option("--bitrate", f->bit_rate,
