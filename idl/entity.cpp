@@ -18,4 +18,20 @@ Error dds_error(std::int32_t code, const std::string& what) {
   return {what + ": " + dds_strretcode(code)};
 }
 
+void DdsFree::operator()(dds_qos* qos) const {
+  dds_delete_qos(qos);
+}
+void DdsFree::operator()(dds_listener* listener) const {
+  dds_delete_listener(listener);
+}
+
+void take_all(std::int32_t reader, const std::function<void(const void*)>& use) {
+  void* sample = nullptr;  // lent by Cyclone
+  dds_sample_info_t info;
+  while (dds_take(reader, &sample, &info, 1, 1) == 1) {
+    if (info.valid_data) use(sample);
+    dds_return_loan(reader, &sample, 1);
+  }
+}
+
 }  // namespace relievo

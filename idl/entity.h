@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Owns one Cyclone DDS entity. Internal to idl/.
+// Owns what Cyclone DDS gives out. Internal to idl/.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "base/result.h"
+
+struct dds_qos;
+struct dds_listener;
 
 namespace relievo {
 
@@ -30,6 +35,16 @@ class Entity {
 
 /// Wraps what a dds_create_* returned: an entity, or an error that says what was to be made and why not.
 Result<Entity> take_entity(std::int32_t handle_or_error, const std::string& what);
+
+struct DdsFree {
+  void operator()(dds_qos* qos) const;
+  void operator()(dds_listener* listener) const;
+};
+using Qos = std::unique_ptr<dds_qos, DdsFree>;
+using Listener = std::unique_ptr<dds_listener, DdsFree>;
+
+/// Takes all samples of a reader, each lent to `use` as the topic's C type while it is called.
+void take_all(std::int32_t reader, const std::function<void(const void*)>& use);
 
 /// "what: reason" of a negative dds_return_t.
 Error dds_error(std::int32_t code, const std::string& what);

@@ -182,10 +182,6 @@ class DdsPublisher final : public Publisher {
   }
 
  private:
-  struct ListenerDeleter {
-    void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
-  };
-
   Status listen(std::function<void()> key_frame_wanted) {
     wanted_ = std::move(key_frame_wanted);
     const std::int32_t participant = domain_->participant();
@@ -195,7 +191,7 @@ class DdsPublisher final : public Publisher {
     auto reader = create_reader(participant, request_group_.get(), SideTopic::kKeyFrameRequest);
     if (!reader) return reader.error();
     requests_ = std::move(reader).value();
-    const std::unique_ptr<dds_listener_t, ListenerDeleter> listener(dds_create_listener(this));
+    const Listener listener(dds_create_listener(this));
     dds_lset_publication_matched(listener.get(),
                                  [](auto, const dds_publication_matched_status_t status, void* self) {
                                    if (status.current_count_change > 0)
@@ -210,14 +206,9 @@ class DdsPublisher final : public Publisher {
   }
 
   void take_requests() const {
-    void* sample = nullptr;  // lent by Cyclone
-    dds_sample_info_t info;
-    while (dds_take(requests_.get(), &sample, &info, 1, 1) == 1) {
-      const auto* request = static_cast<const relievo_KeyFrameRequest*>(sample);
-      const bool ours = info.valid_data && request->stream == stream_;
-      dds_return_loan(requests_.get(), &sample, 1);
-      if (ours) wanted_();
-    }
+    take_all(requests_.get(), [this](const void* sample) {
+      if (static_cast<const relievo_KeyFrameRequest*>(sample)->stream == stream_) wanted_();
+    });
   }
 
   Status publish(const StreamInfo& info) {

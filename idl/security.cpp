@@ -17,28 +17,10 @@ namespace {
 
 constexpr std::size_t kMaxSaid = 256;  // what a hostile peer can make us say
 
-struct QosDeleter {
-  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
-};
-struct ListenerDeleter {
-  void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
-};
-
-/// Each sample that is there, once.
-template <typename Sample, typename Use>
-void take_all(std::int32_t reader, Use use) {
-  void* sample = nullptr;  // lent by Cyclone
-  dds_sample_info_t info;
-  while (dds_take(reader, &sample, &info, 1, 1) == 1) {
-    if (info.valid_data) use(*static_cast<const Sample*>(sample));
-    dds_return_loan(reader, &sample, 1);
-  }
-}
-
 }  // namespace
 
 Result<Entity> create_secured_participant(int domain, const Keys& keys) {
-  const std::unique_ptr<dds_qos_t, QosDeleter> qos(dds_create_qos());
+  const Qos qos(dds_create_qos());
   const auto set = [&](const char* name, const std::string& value) {
     dds_qset_prop(qos.get(), name, value.c_str());
   };
@@ -115,7 +97,7 @@ Result<std::unique_ptr<SecuredNoticeListener>> SecuredNoticeListener::create(con
     if (!streams) return streams.error();
     self->plain_streams_ = std::move(streams).value();
   }
-  const std::unique_ptr<dds_listener_t, ListenerDeleter> listener(dds_create_listener(self.get()));
+  const Listener listener(dds_create_listener(self.get()));
   const auto listen = [&](const Entity& reader, dds_on_data_available_fn call) {
     if (reader.get() == 0) return;
     dds_lset_data_available(listener.get(), call);
@@ -134,7 +116,8 @@ SecuredNoticeListener::~SecuredNoticeListener() {
 }
 
 void SecuredNoticeListener::take_notices() {
-  take_all<relievo_SecuredNotice>(notices_.get(), [this](const relievo_SecuredNotice& notice) {
+  take_all(notices_.get(), [this](const void* sample) {
+    const auto& notice = *static_cast<const relievo_SecuredNotice*>(sample);
     const Keys* keys = domain_.keys();
     const auto is_ours = [&](const char* serial) { return keys->serial == serial; };
     if (keys == nullptr) {
@@ -155,7 +138,8 @@ void SecuredNoticeListener::take_notices() {
 }
 
 void SecuredNoticeListener::take_plain_streams() {
-  take_all<relievo_StreamInfo>(plain_streams_.get(), [this](const relievo_StreamInfo& info) {
+  take_all(plain_streams_.get(), [this](const void* sample) {
+    const auto& info = *static_cast<const relievo_StreamInfo*>(sample);
     say(info.stream, "is not secured, and with keys only secured streams are read: --keys none reads it");
   });
 }

@@ -35,11 +35,6 @@ const TopicRow& row(Topic topic) {
   return rows[static_cast<std::size_t>(topic)];
 }
 
-struct QosDeleter {
-  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
-};
-using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
-
 Qos reliable_qos(dds_durability_kind_t durability) {
   Qos qos(dds_create_qos());
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking_ns);
