@@ -37,7 +37,7 @@ struct GridEncoder::Slice {
   Counts<kControlTables> control_counts;
   Counts<kResidualTables> residual_counts;
   Counts<kSigmaTables> sigma_counts;
-  std::vector<std::uint8_t> there[2], key_there, good[2], sizes, contexts, kinds;
+  std::vector<std::uint8_t> there[2], there_after, key_there, good[2], sizes, contexts, kinds;
   std::vector<std::uint16_t> line_codes, words;
   std::vector<std::int32_t> expected, absent;
   Bytes bytes;
@@ -49,6 +49,7 @@ struct GridEncoder::Slice {
     std::span<const std::uint8_t> tolerance;
   };
 
+  /// Before any slice of `grid` is read.
   void start(int first, int last, const StripeGrid& grid);
   void read(const Input& in);
   /// `sigma_tables` null: without sigmas.
@@ -79,7 +80,9 @@ void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
   residual_counts.fill(0);
   sigma_counts.fill(0);
   const auto size = static_cast<std::size_t>(grid.stride());
-  for (auto* buffer : {&there[0], &there[1], &key_there}) buffer->assign(size, 0);
+  for (auto* buffer : {&there[0], &there[1], &there_after, &key_there}) buffer->assign(size, 0);
+  // read() of the slice below writes that line's columns.
+  if (end < grid.lines) fill_there(grid, end, there_after);
   for (auto& buffer : good) buffer.assign(size, 1);
   sizes.assign(size, kFirstSize);
   contexts.assign(size, 0);
@@ -265,7 +268,11 @@ void GridEncoder::Slice::read(const Input& in) {
     if (!in.grid.interpolated.empty()) read_marks(in, line, here);
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
-      fill_there(in.grid, line + 1, there[1]);
+      if (line + 1 < end) {
+        fill_there(in.grid, line + 1, there[1]);
+      } else {
+        there[1].swap(there_after);
+      }
       read_places(in, line + 1, here, below);
       read_cells(in, line, here, below);
     }
@@ -375,8 +382,8 @@ Bytes GridEncoder::encode(StripeGrid& grid, const GridCalibration& calibration, 
   const Slice::Input in{grid, key != nullptr ? &key->grid : nullptr, head.model, tolerance};
   for_slices([&](int s, Slice& slice) {
     slice.start(s * head.slice_lines, std::min((s + 1) * head.slice_lines, grid.lines), grid);
-    slice.read(in);
   });
+  for_slices([&](int, Slice& slice) { slice.read(in); });
 
   Slice& total = slices_.front();
   // Tables are of all slices; the first slice's counts become the sums.
