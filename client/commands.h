@@ -15,5 +15,6 @@ Command export_command();
 Command convert_command();
 Command web_command();
 Command keys_command();
+Command doctor_command();
 
 }  // namespace relievo

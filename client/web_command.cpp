@@ -9,6 +9,7 @@
 #include "base/time.h"
 #include "cli/checks.h"
 #include "cli/listen_address.h"
+#include "cli/service_manager.h"
 #include "client/commands.h"
 #include "client/options.h"
 #include "client/player.h"
@@ -146,7 +147,9 @@ Status run(const Options& options, StopSignal& stop) {
   }
   std::printf("viewer %s\n", browser_address({address->host, (*gateway)->port()}).c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
+  tell_ready();
   stop.wait();
+  tell_stopping();
   wishes.answer_with({});
   return {};
 }

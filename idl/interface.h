@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which network interface a domain uses, and the Cyclone DDS configuration that follows from it. Internal to
-// idl/.
+// Which network interface a domain uses, and the Cyclone DDS configuration that follows from it.
 #pragma once
 
 #include <optional>

@@ -13,6 +13,7 @@
 #include "cli/checks.h"
 #include "cli/listen_address.h"
 #include "cli/quantities.h"
+#include "cli/service_manager.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "idl/recorder.h"
@@ -151,6 +152,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
     owned.push_back(make_gateway_sink(*gateway, info.stream));
   }
   if (recording.recorder) owned.push_back(make_recorder_sink(*recording.recorder));
+  owned.push_back(make_service_sink());
   std::vector<FrameSink*> sinks;
   for (const auto& sink : owned) sinks.push_back(sink.get());
 
@@ -171,7 +173,11 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   if (gateway) std::printf("viewer %s\n", browser_address({web->host, gateway->port()}).c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
 
-  stop.on_stop([&] { (*pipeline)->stop(); });
+  tell_ready();
+  stop.on_stop([&] {
+    tell_stopping();
+    (*pipeline)->stop();
+  });
   wishes.answer_with([&](const std::string&) { (*pipeline)->request_key_frame(); });
   const Status done = (*pipeline)->run();
   wishes.answer_with({});

@@ -3,6 +3,7 @@
 
 #include "base/log.h"
 #include "base/time.h"
+#include "cli/service_manager.h"
 
 namespace relievo {
 namespace {
@@ -55,7 +56,29 @@ class RecorderSink final : public FrameSink {
   bool said_ = false;
 };
 
+class ServiceSink final : public FrameSink {
+ public:
+  Status consume(const FrameMessage&) override { return {}; }
+  Status consume(const ServerStatus& status) override {
+    const std::uint64_t dropped = status.drops_reconstruct + status.drops_encode + status.drops_publish;
+    const bool stuck = status.frames_published == published_ && dropped > dropped_;
+    published_ = status.frames_published;
+    dropped_ = dropped;
+    std::string line = std::string(to_string(status.state)) + ", " + std::to_string(published_) + " frames";
+    if (!status.message.empty()) line += ": " + status.message;
+    tell_state(line, !stuck);
+    return {};
+  }
+
+ private:
+  std::uint64_t published_ = 0, dropped_ = 0;
+};
+
 }  // namespace
+
+std::unique_ptr<FrameSink> make_service_sink() {
+  return std::make_unique<ServiceSink>();
+}
 
 std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder) {
   return std::make_unique<RecorderSink>(recorder);

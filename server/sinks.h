@@ -21,4 +21,8 @@ std::unique_ptr<FrameSink> make_gateway_sink(Gateway& gateway, const std::string
 /// failing recording is logged once and does not end the stream. `recorder` must outlive it.
 std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder);
 
+/// Tells the service manager that the stream lives, and what it does; not alive is one that gives up frames
+/// before a stage while nothing comes out of the last one.
+std::unique_ptr<FrameSink> make_service_sink();
+
 }  // namespace relievo

@@ -56,7 +56,7 @@ TEST(Client, WrongUsageIsExitTwoAndOneLine) {
 }
 
 TEST(Client, EveryVerbHasHelpAndVersion) {
-  for (const std::string verb : {"streams", "record", "play", "info", "export", "web"}) {
+  for (const std::string verb : {"streams", "record", "play", "info", "export", "web", "doctor"}) {
     const auto help = test::run(relievo({verb, "--help"}));
     EXPECT_EQ(help.status, 0) << verb;
     EXPECT_THAT(help.out, HasSubstr("--quiet"));
@@ -64,6 +64,26 @@ TEST(Client, EveryVerbHasHelpAndVersion) {
     EXPECT_EQ(version.status, 0) << verb;
     EXPECT_THAT(version.out, HasSubstr("relievo "));
   }
+}
+
+TEST(Client, DoctorSaysWhatItFoundAndFailsWhereThereIsTrouble) {
+  const test::TempFolder folder;
+  const auto doctor = [&](const std::string& where) {
+    return test::run(relievo({"doctor", "--json", "--interface", "lo", "--domain", kDomain, "--keys", "none",
+                              "--wait", "0.2", "--folder", where}));
+  };
+  const auto found = nlohmann::json::parse(doctor(folder.path()).out);
+  std::vector<std::string> checks;
+  for (const auto& finding : found) checks.push_back(finding["check"]);
+  EXPECT_THAT(checks,
+              testing::IsSupersetOf({"interface", "receive buffer", "streams", "keys", "disk", "clock"}));
+  const auto streams = std::find(checks.begin(), checks.end(), "streams") - checks.begin();
+  EXPECT_EQ(found[static_cast<std::size_t>(streams)]["grade"], "good");
+  const auto failed = doctor(folder / "missing");
+  EXPECT_EQ(failed.status, 1);
+  expect_one_line(failed.err);
+  EXPECT_THAT(failed.err, HasSubstr("trouble"));
+  EXPECT_THAT(failed.out, HasSubstr("--folder"));
 }
 
 TEST(Client, FailuresAreExitOneAndOneLine) {

@@ -5,6 +5,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
 
 #include "server/camera_flags.h"
 #include "tests/support/temp_folder.h"
@@ -26,6 +29,35 @@ Read read(const std::string& text) {
   out.file = file.string();
   out.status = read_config(file, out.config);
   return out;
+}
+
+// The file that is installed is the manual: each setting is in it, and each line of it is one.
+TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
+  const std::regex setting(R"(#?((\w+) = .*|\[\w+\]))");
+  std::ifstream in(std::string(RELIEVO_SOURCE_DIR) + "/packaging/server.toml");
+  std::string all;
+  std::set<std::string> named;
+  for (std::string line; std::getline(in, line);) {
+    std::smatch match;
+    if (!std::regex_match(line, match, setting)) continue;
+    all += match[1].str() + "\n";
+    named.insert(match[2]);
+  }
+  const Read whole = read(all);
+  ASSERT_TRUE(whole.status) << whole.status.error().message;
+  EXPECT_EQ(whole.config.camera.controls.size(), 3U);
+
+  for (const std::string table : {"", "[recording]\n", "[camera]\n"}) {
+    const Read wrong = read(table + "nonsense = 1\n");
+    ASSERT_FALSE(wrong.status);
+    std::istringstream known(wrong.status.error().message);
+    std::string word;
+    while (known >> word && word != "are:") continue;
+    int count = 0;
+    for (; known >> word; ++count)
+      EXPECT_TRUE(named.contains(word) || all.find("[" + word + "]") != std::string::npos) << word;
+    EXPECT_GT(count, 0);
+  }
 }
 
 TEST(Config, EverySetting) {

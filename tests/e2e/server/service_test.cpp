@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// relievo-server under a service manager: what it says on the socket in NOTIFY_SOCKET (sd_notify(3)).
+#include <signal.h>
+
+#include "tests/e2e/server/server_process.h"
+#include "tests/support/service_manager.h"
+
+namespace relievo::test {
+namespace {
+
+TEST(Service, SaysThatItIsReadyAliveAndStopping) {
+  const TempFolder folder;
+  const auto path = folder / "notify";
+  ServiceManager manager(path);
+  ASSERT_TRUE(manager.bound());
+  Process serving(serve("sim:face", {}), {"NOTIFY_SOCKET=" + path.string()});
+  EXPECT_TRUE(manager.hears("READY=1")) << serving.err();
+  EXPECT_TRUE(manager.hears("WATCHDOG=1"));
+  EXPECT_TRUE(manager.hears("STATUS=running"));
+  EXPECT_EQ(manager.said().find("STOPPING=1"), std::string::npos);
+  serving.signal(SIGTERM);
+  EXPECT_EQ(serving.wait(), 0) << serving.err();
+  EXPECT_TRUE(manager.hears("STOPPING=1"));
+}
+
+}  // namespace
+}  // namespace relievo::test

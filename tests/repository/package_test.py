@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The Debian packages of a build: makes them, unpacks them as dpkg would, and runs what is in them.
+
+usage: package_test.py BUILD_FOLDER
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+build = Path(sys.argv.pop())
+
+
+def output(*command, **more):
+    return subprocess.run(command, check=True, capture_output=True, text=True, **more).stdout
+
+
+class Package(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        made = Path(cls.folder.name) / 'made'
+        subprocess.run(['cpack', '-G', 'DEB', '-B', made], cwd=build, check=True, capture_output=True)
+        cls.packages = {output('dpkg-deb', '-f', file, 'Package').strip(): file for file in made.glob('*.deb')}
+        cls.root = Path(cls.folder.name) / 'root'
+        for file in cls.packages.values():
+            subprocess.run(['dpkg-deb', '-x', file, cls.root], check=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_the_server_brings_the_client_and_neither_more_than_debian_has(self):
+        self.assertEqual(set(self.packages), {'relievo', 'relievo-server'})
+        depends = output('dpkg-deb', '-f', self.packages['relievo-server'], 'Depends')
+        self.assertIn('relievo (=', depends)
+        self.assertNotIn('opencv', output('dpkg-deb', '-f', self.packages['relievo'], 'Depends'))
+
+    def test_everything_lies_where_debian_wants_it(self):
+        files = {str(path.relative_to(self.root)) for path in self.root.rglob('*') if path.is_file()}
+        self.assertLessEqual({'usr/bin/relievo', 'usr/bin/relievo-server', 'etc/relievo/server.toml',
+                              'usr/lib/systemd/system/relievo-server.service',
+                              'usr/lib/systemd/system/relievo-web.service', 'usr/lib/sysusers.d/relievo.conf',
+                              'usr/lib/sysctl.d/60-relievo.conf'}, files)
+        self.assertEqual([f for f in files if not re.match('usr/(bin|lib|share)/|etc/relievo/', f)], [])
+        for name in self.packages:
+            self.assertIn(f'usr/share/doc/{name}/copyright', files)
+
+    def test_settings_that_a_person_changed_survive_an_upgrade(self):
+        control = Path(self.folder.name) / 'control'
+        subprocess.run(['dpkg-deb', '-e', self.packages['relievo-server'], control], check=True)
+        self.assertEqual((control / 'conffiles').read_text().split(), ['/etc/relievo/server.toml'])
+
+    def test_the_programs_run(self):
+        for name in self.packages:
+            self.assertTrue(output(self.root / 'usr/bin' / name, '--version').startswith(name + ' '))
+        served = output(self.root / 'usr/bin/relievo-server', 'serve', '--config',
+                        self.root / 'etc/relievo/server.toml', '--web', 'none', '--interface', 'lo', '--keys', 'none',
+                        '--domain', os.environ.get('RELIEVO_TEST_DOMAIN', '229'), '--frames', '3', '--fast')
+        self.assertIn('stream face', served)
+
+    def test_systemd_takes_the_units(self):
+        if shutil.which('systemd-analyze') is None:
+            self.skipTest('no systemd-analyze here')
+        for unit in (self.root / 'usr/lib/systemd/system').iterdir():
+            # With the program where it was unpacked, since verify looks for it.
+            here = Path(self.folder.name) / unit.name
+            here.write_text(unit.read_text().replace('ExecStart=/usr', f'ExecStart={self.root}/usr'))
+            said = subprocess.run(['systemd-analyze', 'verify', '--man=no', here], capture_output=True, text=True)
+            self.assertEqual((said.returncode, said.stderr), (0, ''), unit.name)
+
+
+if __name__ == '__main__':
+    unittest.main()
