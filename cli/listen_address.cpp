@@ -24,12 +24,13 @@ Result<ListenAddress> parse_listen_address(const std::string& text) {
   return out;
 }
 
-std::string browser_address(const ListenAddress& address) {
+std::string browser_address(const ListenAddress& address, bool https, const std::string& token) {
   std::string host = address.host;
   if (host == "0.0.0.0") host = "127.0.0.1";
   if (host == "::") host = "::1";
   if (host.find(':') != std::string::npos) host = '[' + host + ']';
-  return "http://" + host + ':' + std::to_string(address.port) + '/';
+  return (https ? "https://" : "http://") + host + ':' + std::to_string(address.port) + '/' +
+         (token.empty() ? "" : "?token=" + token);
 }
 
 }  // namespace relievo

@@ -10,6 +10,7 @@
 #include "cli/checks.h"
 #include "cli/listen_address.h"
 #include "cli/service_manager.h"
+#include "cli/web_flags.h"
 #include "client/commands.h"
 #include "client/options.h"
 #include "client/player.h"
@@ -25,6 +26,7 @@ struct Options {
   std::shared_ptr<DomainOptions> domain;
   std::vector<std::string> inputs;
   std::string listen = "127.0.0.1:8080";
+  std::shared_ptr<WebOptions> web;
 };
 
 Subscriber::Callbacks forward_to(Gateway& gateway) {
@@ -120,12 +122,14 @@ Result<Inputs> sort_inputs(const std::vector<std::string>& names) {
 Status run(const Options& options, StopSignal& stop) {
   auto address = parse_listen_address(options.listen);
   if (!address) return address.error();
+  if (const Status sound = check_web_options(*options.web); !sound) return sound.error();
   auto inputs = sort_inputs(options.inputs);
   if (!inputs) return inputs.error();
   KeyFrameWishes wishes;  // outlives the gateway
   auto gateway =
       Gateway::start({.host = address->host,
                       .port = address->port,
+                      .web = *options.web,
                       .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
                                     " yet: start relievo-server serve there.",
                       .key_frame_wanted = [&](const std::string& stream) { wishes.wish(stream); }});
@@ -145,7 +149,9 @@ Status run(const Options& options, StopSignal& stop) {
   for (auto& [file, recorded] : inputs->files) {
     files.push_back(std::make_unique<LoopedFile>(file, std::move(recorded), **gateway, stop));
   }
-  std::printf("viewer %s\n", browser_address({address->host, (*gateway)->port()}).c_str());
+  std::printf("viewer %s\n", browser_address({address->host, (*gateway)->port()},
+                                             !options.web->tls_cert.empty(), (*gateway)->made_token())
+                                 .c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
   tell_ready();
   stop.wait();
@@ -157,20 +163,26 @@ Status run(const Options& options, StopSignal& stop) {
 }  // namespace
 
 Command web_command() {
-  return {"web", "Serve the viewer for live streams and recordings", [](CLI::App& app) {
-            auto options = std::make_shared<Options>();
-            options->domain = add_domain_options(app);
-            app.add_option("inputs", options->inputs,
-                           "Recordings, played in a loop, and live streams (default: all of the domain)")
-                ->type_name("FILE|STREAM");
-            app.add_option("--listen", options->listen,
-                           "Where browsers find the viewer; :PORT for every interface")
-                ->type_name("HOST:PORT")
-                ->check(listen_address())
-                ->capture_default_str();
-            app.footer("Examples:\n  relievo web face.mcap\n  relievo web --listen :8080");
-            return [options](StopSignal& stop) { return run(*options, stop); };
-          }};
+  return {
+      "web", "Serve the viewer for live streams and recordings", [](CLI::App& app) {
+        auto options = std::make_shared<Options>();
+        options->domain = add_domain_options(app);
+        app.add_option("inputs", options->inputs,
+                       "Recordings, played in a loop, and live streams (default: all of the domain)")
+            ->type_name("FILE|STREAM");
+        app.add_option("--listen", options->listen,
+                       "Where browsers find the viewer; :PORT for every interface")
+            ->type_name("HOST:PORT")
+            ->check(listen_address())
+            ->capture_default_str();
+        options->web = add_web_flags(app);
+        app.footer(
+            "Examples:\n"
+            "  relievo web face.mcap\n"
+            "  relievo web --listen :8080                      prints the address with the token it needs\n"
+            "  relievo web --listen :8443 --tls-cert rig.pem --tls-key rig.key --token-file tokens");
+        return [options](StopSignal& stop) { return run(*options, stop); };
+      }};
 }
 
 }  // namespace relievo

@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "cli/quantities.h"
+#include "cli/web_flags.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "server/camera_flags.h"
@@ -45,6 +47,21 @@ class Reader {
     if (const std::string wrong = check(*value); !wrong.empty())
       return refuse(*node, key, "is wrong: " + wrong);
     out = *value;
+  }
+  /// A list of such texts.
+  void checked(std::string_view key, const ValueCheck& check, std::vector<std::string>& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const toml::array* list = node->as_array();
+    if (list == nullptr) return refuse(*node, key, "must be a list of strings in quotes");
+    out.clear();
+    for (const toml::node& entry : *list) {
+      const auto value = entry.value_exact<std::string>();
+      if (!value) return refuse(entry, key, "must be a list of strings in quotes");
+      if (const std::string wrong = check(*value); !wrong.empty())
+        return refuse(entry, key, "is wrong: " + wrong);
+      out.push_back(*value);
+    }
   }
   void decoder(std::string_view key, Decoder& out) {
     const toml::node* node = take(key);
@@ -213,6 +230,21 @@ void read_recording(Reader& reader, RecordingTexts& recording) {
   reader.checked("sync", sync_policy(), recording.sync);
 }
 
+void read_gateway(Reader& reader, WebOptions& gateway) {
+  reader.text("tls_cert", gateway.tls_cert);
+  reader.text("tls_key", gateway.tls_key);
+  reader.text("token_file", gateway.token_file);
+  reader.flag("open", gateway.open);
+  reader.checked("allow_origins", web_origin(), gateway.origins);
+  const auto count = [&](std::string_view key, std::optional<int>& out) {
+    if (const auto value = reader.integer(key, 1, kMostClients)) out = static_cast<int>(*value);
+  };
+  count("max_clients", gateway.max_clients);
+  count("max_per_address", gateway.max_per_address);
+  if (const auto rate = reader.integer("max_rate", std::lround(kLeastWebRate), std::lround(kMostWebRate)))
+    gateway.max_rate = static_cast<double>(*rate);
+}
+
 }  // namespace
 
 EncodeOptions encode_options(const ServeConfig& config) {
@@ -271,6 +303,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
     config.key_interval = static_cast<int>(*frames);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
   reader.table("recording", [&](Reader& recording) { read_recording(recording, config.recording); });
+  reader.table("gateway", [&](Reader& gateway) { read_gateway(gateway, config.gateway); });
   reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
   return reader.finish();
 }

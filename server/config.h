@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/result.h"
+#include "base/web_options.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/camera_options.h"
 #include "cli/recording_flags.h"
@@ -28,6 +29,7 @@ struct ServeConfig {
   std::string interface;               // empty: Cyclone DDS chooses
   std::string keys;                    // as DomainOptions::keys
   std::string web = "127.0.0.1:8080";  // "none": no gateway
+  WebOptions gateway;                  // in the table [gateway]
   std::string record;                  // empty: not recorded
   RecordingTexts recording;            // in the table [recording]
   std::optional<std::uint64_t> frames;

@@ -14,6 +14,7 @@
 #include "cli/listen_address.h"
 #include "cli/quantities.h"
 #include "cli/service_manager.h"
+#include "cli/web_flags.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "idl/recorder.h"
@@ -110,6 +111,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
                  "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.'"};
   }
   if (const Status usable = check_texture_codec(config.texture); !usable) return usable.error();
+  if (const Status sound = check_web_options(config.gateway); !sound) return sound.error();
   std::optional<ListenAddress> web;
   if (config.web != "none") {
     auto address = parse_listen_address(config.web);
@@ -123,6 +125,7 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   if (web) {
     auto started = Gateway::start({.host = web->host,
                                    .port = web->port,
+                                   .web = config.gateway,
                                    .key_frame_wanted = [&](const std::string& name) { wishes.wish(name); }});
     if (!started) return started.error();
     gateway = *std::move(started);
@@ -170,7 +173,10 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   if (!pipeline) return pipeline.error();
 
   std::printf("stream %s on DDS domain %d\n", info.stream.c_str(), config.domain);
-  if (gateway) std::printf("viewer %s\n", browser_address({web->host, gateway->port()}).c_str());
+  if (gateway)
+    std::printf("viewer %s\n", browser_address({web->host, gateway->port()}, !config.gateway.tls_cert.empty(),
+                                               gateway->made_token())
+                                   .c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
 
   tell_ready();
@@ -207,6 +213,7 @@ struct Flags {
   std::optional<std::string> decoder, geometry, texture, bit_rate;
   std::string scheme;
   std::shared_ptr<RecordingTexts> recording;
+  std::shared_ptr<WebOptions> gateway;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<double> bound_px;
   std::optional<std::uint64_t> frames;
@@ -229,6 +236,7 @@ Status run(const Flags& flags, StopSignal& stop) {
   set(flags.web, config.web);
   set(flags.record, config.record);
   config.recording = merged(*flags.recording, std::move(config.recording));
+  config.gateway = merged(*flags.gateway, std::move(config.gateway));
   set(flags.domain, config.domain);
   set(flags.threads, config.threads);
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
@@ -280,6 +288,7 @@ Command serve_command() {
                        "(default 127.0.0.1:8080)")
             ->type_name("HOST:PORT")
             ->check(listen_address(true));
+        f->gateway = add_web_flags(app);
         app.add_option("--record", f->record, "Record the stream into this new .mcap file")
             ->type_name("FILE");
         f->recording = add_recording_flags(app);
@@ -346,7 +355,8 @@ Command serve_command() {
         app.footer(
             "Examples:\n"
             "  relievo-server serve                                        the simulated face\n"
-            "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for every machine around\n"
+            "  relievo-server serve --source take:TAKE --loop --web :8080  a take, for other machines too\n"
+            "  relievo-server serve --web :8443 --tls-cert rig.pem --tls-key rig.key --token-file tokens\n"
             "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n"
             "  relievo-server serve --source sim:walk --texture h264 --bitrate 4M\n"
             "  relievo-server serve --source v4l2:/dev/video0 --rig rig.yaml --control gain=20\n\n" +

@@ -55,15 +55,19 @@ bool TcpClient::send(const std::string& bytes) {
 bool TcpClient::receive(std::chrono::milliseconds timeout) {
   if (fd_ < 0 || at_end_) return false;
   pollfd waiting{fd_, POLLIN, 0};
-  if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) return false;
+  if (!has_more() && poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) return false;
   std::string chunk(65536, '\0');
-  const auto n = recv(fd_, chunk.data(), chunk.size(), 0);
+  const auto n = read(chunk.data(), chunk.size());
   if (n <= 0) {
     at_end_ = true;
     return false;
   }
   buffer_.append(chunk, 0, static_cast<std::size_t>(n));
   return true;
+}
+
+long TcpClient::read(char* into, std::size_t bytes) {
+  return recv(fd_, into, bytes, 0);
 }
 
 Response read_response(TcpClient& client, bool head) {
@@ -99,6 +103,11 @@ Response read_response(TcpClient& client, bool head) {
 Response request(std::uint16_t port, const std::string& method, const std::string& target,
                  const std::string& headers) {
   TcpClient client(port);
+  return request(client, port, method, target, headers);
+}
+
+Response request(TcpClient& client, std::uint16_t port, const std::string& method, const std::string& target,
+                 const std::string& headers) {
   if (!client.connected()) return {};
   client.send(method + " " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
               "\r\nConnection: close\r\n" + headers + "\r\n");
@@ -107,13 +116,18 @@ Response request(std::uint16_t port, const std::string& method, const std::strin
 
 WsClient::WsClient(std::uint16_t port, const std::string& stream, const std::string& headers,
                    int receive_buffer_bytes)
-    : tcp_(port, receive_buffer_bytes) {
-  if (!tcp_.connected()) return;
-  tcp_.send("GET /ws/" + stream + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
-            "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-            "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n" +
-            headers + "\r\n");
-  const Response response = read_response(tcp_);
+    : WsClient(std::make_unique<TcpClient>(port, receive_buffer_bytes), port, "/ws/" + stream, headers) {}
+
+WsClient::WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std::string& target,
+                   const std::string& headers)
+    : tcp_(std::move(tcp)) {
+  if (!tcp_->connected()) return;
+  tcp_->send(
+      "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+      "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n" +
+      headers + "\r\n");
+  const Response response = read_response(*tcp_);
   status_ = response.status;
   if (response.headers.count("sec-websocket-extensions") != 0) status_ = -1;  // nobody asked for deflate here
 }
@@ -130,16 +144,16 @@ bool WsClient::send(const std::string& text, int opcode) {
   const char mask[4] = {0x11, 0x22, 0x33, 0x44};
   frame.append(mask, 4);
   for (std::size_t i = 0; i < text.size(); ++i) frame += static_cast<char>(text[i] ^ mask[i % 4]);
-  return tcp_.send(frame);
+  return tcp_->send(frame);
 }
 
 std::optional<WsMessage> WsClient::next(std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
-  std::string& buffer = tcp_.buffer();
+  std::string& buffer = tcp_->buffer();
   const auto need = [&](std::size_t bytes) {
     while (buffer.size() < bytes) {
       const auto left = left_until(deadline);
-      if (left < 0ms || !tcp_.receive(left)) return false;
+      if (left < 0ms || !tcp_->receive(left)) return false;
     }
     return true;
   };

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,16 +20,21 @@ class TcpClient {
   explicit TcpClient(std::uint16_t port, int receive_buffer_bytes = 0);
   TcpClient(TcpClient&& other) noexcept;
   TcpClient& operator=(TcpClient&&) = delete;
-  ~TcpClient();
+  virtual ~TcpClient();
 
   bool connected() const { return fd_ >= 0; }
-  bool send(const std::string& bytes);
+  virtual bool send(const std::string& bytes);
   /// Waits until at least one byte more is there; false at the end of the stream or after the time.
   bool receive(std::chrono::milliseconds timeout = kPatience);
   bool at_end() const { return at_end_; }  // the server closed
   std::string& buffer() { return buffer_; }
 
- private:
+ protected:
+  int descriptor() const { return fd_; }
+  /// As recv(2), when there is something to read.
+  virtual long read(char* into, std::size_t bytes);
+  virtual bool has_more() const { return false; }  // was read already, and waits
+
   int fd_ = -1;
   bool at_end_ = false;
   std::string buffer_;
@@ -45,6 +51,8 @@ Response read_response(TcpClient& client, bool head = false);
 /// One request on a connection of its own. `headers` end in \r\n each.
 Response request(std::uint16_t port, const std::string& method, const std::string& target,
                  const std::string& headers = {});
+Response request(TcpClient& client, std::uint16_t port, const std::string& method, const std::string& target,
+                 const std::string& headers = {});
 
 struct WsMessage {
   int opcode = 0;  // 1 text, 2 binary, 8 close
@@ -60,6 +68,9 @@ class WsClient {
   /// Connects and upgrades; see status().
   WsClient(std::uint16_t port, const std::string& stream, const std::string& headers = {},
            int receive_buffer_bytes = 0);
+  /// Upgrades a connection at any address of `port`.
+  WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std::string& target,
+           const std::string& headers = {});
   int status() const { return status_; }  // 101 where upgraded
   bool send(const std::string& text, int opcode = 1);
   bool credit(int n) { return send(R"({"type":"credit","n":)" + std::to_string(n) + "}"); }
@@ -67,10 +78,10 @@ class WsClient {
   std::optional<WsMessage> next(std::chrono::milliseconds timeout = kPatience);
   /// Skips to the next message of a kind: "info", "status", "gone", "waiting", "time" or "frame".
   std::optional<WsMessage> next_of(const std::string& kind, std::chrono::milliseconds timeout = kPatience);
-  bool at_end() const { return tcp_.at_end(); }
+  bool at_end() const { return tcp_->at_end(); }
 
  private:
-  TcpClient tcp_;
+  std::unique_ptr<TcpClient> tcp_;
   int status_ = 0;
 };
 

@@ -3,6 +3,7 @@
 // (protocol: docs/WEB.md). Fed by a server's pipeline or by a DDS subscriber; knows neither.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,17 +11,19 @@
 
 #include "base/result.h"
 #include "base/stream.h"
+#include "base/web_options.h"
 
 namespace relievo {
 
 struct GatewayOptions {
   std::string host = "127.0.0.1";
   std::uint16_t port = 8080;  // 0: any free one, see Gateway::port()
-  int max_clients = 64;       // WebSocket clients; more are refused with 503
-  std::string empty_hint{};   // what the viewer says while there are no streams
+  WebOptions web{};
+  std::string empty_hint{};  // what the viewer says while there are no streams
   // A client has to wait for a key frame of the stream; at most once a second a stream, from any thread. Must
   // return at once and not call back.
   std::function<void(const std::string& stream)> key_frame_wanted{};
+  std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 
 /// Runs on a thread of its own from start() to destruction. Every function may be called from any thread and
@@ -28,11 +31,15 @@ struct GatewayOptions {
 /// no credit for are dropped there and counted; so are those that build on a dropped one.
 class Gateway {
  public:
-  /// Fails where the address cannot be had (port in use), saying which and what to do.
+  /// Fails where the address cannot be had (port in use), or a certificate, key or token cannot be read,
+  /// saying which and what to do.
   static Result<std::unique_ptr<Gateway>> start(const GatewayOptions& options);
   virtual ~Gateway() = default;  // closes every client with 1001 and joins
 
   virtual std::uint16_t port() const = 0;
+  /// On an address that others reach, where the options neither name tokens nor say `open`: the one that was
+  /// made for this run. Otherwise empty.
+  virtual std::string made_token() const = 0;
 
   /// A new stream, or new information on a known one. What is published of a stream before is ignored.
   virtual void announce(const StreamInfo& info) = 0;

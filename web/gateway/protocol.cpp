@@ -134,6 +134,13 @@ Result<ClientMessage> parse_client_message(std::string_view text) {
   return message;
 }
 
+std::string_view to_string(Refusal refusal) {
+  constexpr std::array<std::string_view, kRefusals> kNames{"places",    "address", "rate",   "clients",
+                                                           "token",     "origin",  "host",   "tls",
+                                                           "malformed", "slow",    "message"};
+  return kNames[static_cast<std::size_t>(refusal)];
+}
+
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint) {
   Json list = Json::array();
   for (const auto& s : streams) {
@@ -194,8 +201,11 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   out.sample("", static_cast<double>(counts.connections));
   out.family("relievo_gateway_requests_total", "counter", "HTTP requests answered.");
   out.sample("", static_cast<double>(counts.requests));
-  out.family("relievo_gateway_refused_total", "counter", "Connections refused by a limit or their origin.");
-  out.sample("", static_cast<double>(counts.refused));
+  out.family("relievo_gateway_refused_total", "counter", "Who was turned away, by the reason.");
+  for (std::size_t i = 0; i < kRefusals; ++i) {
+    out.sample("{reason=\"" + std::string(to_string(static_cast<Refusal>(i))) + "\"}",
+               static_cast<double>(counts.refused[i]));
+  }
 
   const auto per_stream = [&](const char* name, const char* type, const char* help, auto value) {
     out.family(name, type, help);

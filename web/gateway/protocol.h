@@ -39,12 +39,31 @@ constexpr int kMaxCredit = 8;
 /// Any input; the error is what the client is told as it is closed.
 Result<ClientMessage> parse_client_message(std::string_view text);
 
+/// Why somebody was turned away.
+enum class Refusal : std::uint8_t {
+  kPlaces,     // all connections are taken
+  kAddress,    // all of one address
+  kRate,       // too many requests of one address
+  kClients,    // all places of WebSocket clients are taken
+  kToken,      // none, or a wrong one
+  kOrigin,     // a page of another site
+  kHost,       // under a foreign name
+  kTls,        // no handshake came about
+  kMalformed,  // no request, or too large
+  kSlow,       // a request that did not come to its end, or an answer that was not read
+  kMessage,    // a WebSocket message that is wrong, too large, or one too many
+};
+constexpr std::size_t kRefusals = 11;
+std::string_view to_string(Refusal refusal);
+
 /// Counts of the gateway itself.
 struct GatewayCounts {
   std::uint64_t connections = 0;  // TCP, accepted so far
   std::uint64_t requests = 0;     // HTTP, answered so far
-  std::uint64_t refused = 0;      // connections and upgrades refused, by a limit or a foreign origin
-  int clients = 0;                // WebSocket, now
+  std::array<std::uint64_t, kRefusals> refused{};
+  int clients = 0;  // WebSocket, now
+
+  void refuse(Refusal why) { ++refused[static_cast<std::size_t>(why)]; }
 };
 
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint);

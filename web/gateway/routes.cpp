@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "web/gateway/assets.h"
+#include "web/gateway/sign_in.h"
 
 namespace relievo {
 namespace {
@@ -14,6 +15,12 @@ HttpReply text(int status, std::string line) {
   reply.status = status;
   reply.body = std::move(line) + "\n";
   reply.headers.emplace_back("Cache-Control", "no-store");
+  return reply;
+}
+
+HttpReply refused(Refusal why, int status, std::string line) {
+  HttpReply reply = text(status, std::move(line));
+  reply.refusal = why;
   return reply;
 }
 
@@ -40,29 +47,6 @@ HttpReply asset_reply(const Asset& asset, std::string_view if_none_match) {
   return reply;
 }
 
-HttpReply websocket(const HttpRequest& request, const std::string& stream, const RouteContext& context) {
-  if (!valid_stream_name(stream)) {
-    return text(400, "no stream has such a name: 1 to 64 of A-Z a-z 0-9 _ . - and no dot first");
-  }
-  if (!request.upgrade) {
-    HttpReply reply = text(426, "this address speaks WebSocket only");
-    reply.headers.emplace_back("Upgrade", "websocket");
-    return reply;
-  }
-  if (!request.origin.empty() && !same_origin(request.origin, request.host)) {
-    return text(403, "a page of another site may not open this stream");
-  }
-  if (context.counts.clients >= context.max_clients) {
-    HttpReply reply = text(503, "all " + std::to_string(context.max_clients) + " places are taken");
-    reply.headers.emplace_back("Retry-After", "5");
-    return reply;
-  }
-  HttpReply reply;
-  reply.status = 101;
-  reply.websocket_stream = stream;
-  return reply;
-}
-
 // "host:port", "[v6]:port" or without the port.
 std::string_view without_port(std::string_view host) {
   if (!host.empty() && host.front() == '[') return host.substr(0, host.find(']') + 1);
@@ -74,6 +58,44 @@ std::string lower(std::string_view text_in) {
   std::transform(out.begin(), out.end(), out.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return out;
+}
+
+bool listed_origin(std::string_view origin, const RouteContext& context) {
+  const auto& listed = context.options.origins;
+  return std::any_of(listed.begin(), listed.end(),
+                     [&](const std::string& one) { return lower(one) == lower(origin); });
+}
+
+// A proxy that speaks for a listed site may send that site's name.
+bool listed_host(std::string_view host, const RouteContext& context) {
+  const auto& listed = context.options.origins;
+  return std::any_of(listed.begin(), listed.end(),
+                     [&](const std::string& one) { return same_origin(one, host); });
+}
+
+HttpReply websocket(const HttpRequest& request, const std::string& stream, const RouteContext& context) {
+  if (!valid_stream_name(stream)) {
+    return text(400, "no stream has such a name: 1 to 64 of A-Z a-z 0-9 _ . - and no dot first");
+  }
+  if (!request.upgrade) {
+    HttpReply reply = text(426, "this address speaks WebSocket only");
+    reply.headers.emplace_back("Upgrade", "websocket");
+    return reply;
+  }
+  if (!request.origin.empty() && !same_origin(request.origin, request.host) &&
+      !listed_origin(request.origin, context)) {
+    return refused(Refusal::kOrigin, 403, "a page of another site may not open this stream");
+  }
+  const int places = context.options.max_clients.value_or(kClients);
+  if (context.counts.clients >= places) {
+    HttpReply reply = refused(Refusal::kClients, 503, "all " + std::to_string(places) + " places are taken");
+    reply.headers.emplace_back("Retry-After", "5");
+    return reply;
+  }
+  HttpReply reply;
+  reply.status = 101;
+  reply.websocket_stream = stream;
+  return reply;
 }
 
 }  // namespace
@@ -111,17 +133,17 @@ bool loopback_host(std::string_view host) {
                                       [](unsigned char c) { return std::isdigit(c) != 0 || c == '.'; });
 }
 
-HttpReply answer(const HttpRequest& request, const RouteContext& context) {
-  if (context.loopback && !loopback_host(request.host)) {
-    return text(421, "this server answers to localhost only: open it as http://localhost or by its address");
+namespace {
+
+HttpReply page(std::string_view path, const HttpRequest& request) {
+  const std::string_view wanted = path == "/" ? "/index.html" : path;
+  for (const Asset& asset : assets()) {
+    if (asset.path == wanted) return asset_reply(asset, request.if_none_match);
   }
-  if (request.method != "GET" && request.method != "HEAD") {
-    HttpReply reply = text(405, "only GET and HEAD");
-    reply.headers.emplace_back("Allow", "GET, HEAD");
-    return reply;
-  }
-  const std::string_view path = request.target.substr(0, request.target.find('?'));
-  if (path == "/healthz") return text(200, "ok");
+  return text(404, "nothing here");
+}
+
+HttpReply route(std::string_view path, const HttpRequest& request, const RouteContext& context) {
   if (path == "/api/streams") return json(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
   if (path == "/metrics") {
     HttpReply reply = text(200, "");
@@ -130,11 +152,63 @@ HttpReply answer(const HttpRequest& request, const RouteContext& context) {
     return reply;
   }
   if (path.substr(0, 4) == "/ws/") return websocket(request, std::string(path.substr(4)), context);
-  const std::string_view wanted = path == "/" ? "/index.html" : path;
-  for (const Asset& asset : assets()) {
-    if (asset.path == wanted) return asset_reply(asset, request.if_none_match);
+  return page(path, request);
+}
+
+/// Pages of a listed site may read what they are answered.
+void share_with_origin(const HttpRequest& request, const RouteContext& context, HttpReply& reply) {
+  if (context.options.origins.empty()) return;
+  reply.headers.emplace_back("Vary", "Origin");
+  if (request.origin.empty() || !listed_origin(request.origin, context)) return;
+  reply.headers.emplace_back("Access-Control-Allow-Origin", std::string(request.origin));
+  reply.headers.emplace_back("Access-Control-Allow-Credentials", "true");
+  reply.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
+}
+
+HttpReply preflight() {
+  HttpReply reply;
+  reply.status = 204;
+  reply.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD");
+  reply.headers.emplace_back("Access-Control-Allow-Headers", "Authorization, Range");
+  reply.headers.emplace_back("Access-Control-Max-Age", "600");
+  return reply;
+}
+
+HttpReply answer_by_method(const HttpRequest& request, const RouteContext& context) {
+  if (request.method == "OPTIONS" && listed_origin(request.origin, context)) return preflight();
+  if (request.method != "GET" && request.method != "HEAD") {
+    HttpReply reply = text(405, "only GET and HEAD");
+    reply.headers.emplace_back("Allow", "GET, HEAD");
+    return reply;
   }
-  return text(404, "nothing here");
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  if (path == "/healthz") return text(200, "ok");
+  if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
+  return route(path, request, context);
+}
+
+}  // namespace
+
+HttpReply answer(const HttpRequest& request, const RouteContext& context) {
+  if (context.loopback && !loopback_host(request.host) && !listed_host(request.host, context)) {
+    return refused(Refusal::kHost, 421,
+                   "this server answers to localhost only: open it as http://localhost or by its address, "
+                   "or start it with --allow-origin and the name it has");
+  }
+  const bool is_https = !context.options.tls_cert.empty();
+  if (is_https && !request.tls) {
+    if (request.host.empty()) return text(400, "this server speaks https");
+    HttpReply reply = text(308, "this server speaks https");
+    reply.headers.emplace_back("Location",
+                               "https://" + std::string(request.host) + std::string(request.target));
+    return reply;
+  }
+  HttpReply reply = answer_by_method(request, context);
+  // Browsers keep this for a year for every port of a name: none of localhost's business.
+  if (request.tls && !loopback_host(request.host))
+    reply.headers.emplace_back("Strict-Transport-Security", "max-age=31536000");
+  share_with_origin(request, context, reply);
+  return reply;
 }
 
 }  // namespace relievo

@@ -2,11 +2,15 @@
 // What each HTTP request is answered, sockets apart. Pure but for the hub's snapshot.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "base/web_options.h"
+#include "web/gateway/access.h"
 #include "web/gateway/hub.h"
 #include "web/gateway/protocol.h"
 
@@ -18,7 +22,10 @@ struct HttpRequest {
   std::string_view host;    // header values, empty where absent
   std::string_view origin;
   std::string_view if_none_match;
+  std::string_view authorization;
+  std::string_view cookie;
   bool upgrade = false;  // asks for a WebSocket
+  bool tls = false;      // came over TLS
 };
 
 struct HttpReply {
@@ -26,16 +33,21 @@ struct HttpReply {
   std::string content_type = "text/plain; charset=utf-8";
   std::string body;
   std::string_view fixed_body;  // instead of `body`: bytes that live as long as the program
-  std::vector<std::pair<std::string, std::string>> headers;  // beside the ones every reply carries
-  std::string websocket_stream;  // not empty: no reply, upgrade and serve this stream
+  std::vector<std::pair<std::string, std::string>> headers;  // in place of, or beside, those of every reply
+  std::string websocket_stream;    // not empty: no reply, upgrade and serve this stream
+  std::optional<Refusal> refusal;  // to be counted
 
   std::string_view bytes() const { return fixed_body.empty() ? std::string_view(body) : fixed_body; }
 };
 
+constexpr int kClients = 64;  // where the options do not say how many
+
 struct RouteContext {
   const Hub& hub;
-  GatewayCounts counts;
-  int max_clients = 0;
+  const GatewayCounts& counts;
+  const Tokens& tokens;
+  const WebOptions& options;
+  std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only
 };
 

@@ -47,7 +47,7 @@ TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
   ASSERT_TRUE(whole.status) << whole.status.error().message;
   EXPECT_EQ(whole.config.camera.controls.size(), 3U);
 
-  for (const std::string table : {"", "[recording]\n", "[camera]\n"}) {
+  for (const std::string table : {"", "[recording]\n", "[gateway]\n", "[camera]\n"}) {
     const Read wrong = read(table + "nonsense = 1\n");
     ASSERT_FALSE(wrong.status);
     std::istringstream known(wrong.status.error().message);
@@ -202,6 +202,28 @@ TEST(Config, WhatIsNotNamedStays) {
   EXPECT_TRUE(read("").status);
 }
 
+TEST(Config, Gateway) {
+  const Read r = read(R"([gateway]
+tls_cert = "rig.pem"
+tls_key = "rig.key"
+token_file = "tokens"
+open = false
+allow_origins = ["https://a.example", "http://b:8080"]
+max_clients = 200
+max_per_address = 4
+max_rate = 50
+)");
+  ASSERT_TRUE(r.status) << r.status.error().message;
+  const WebOptions& gateway = r.config.gateway;
+  EXPECT_EQ(gateway.tls_cert, "rig.pem");
+  EXPECT_EQ(gateway.tls_key, "rig.key");
+  EXPECT_EQ(gateway.token_file, "tokens");
+  EXPECT_EQ(gateway.origins, (std::vector<std::string>{"https://a.example", "http://b:8080"}));
+  EXPECT_EQ(gateway.max_clients, 200);
+  EXPECT_EQ(gateway.max_per_address, 4);
+  EXPECT_EQ(gateway.max_rate, 50);
+}
+
 struct Wrong {
   const char* name;
   const char* line;  // the third of the file
@@ -258,6 +280,12 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"names_and_gap", "\"loop  fast\" = true", "loop  fast is no setting"},
         Wrong{"no_name", "\"\" = true", "is no setting"},
         Wrong{"table", "[source]", "source must be a string"},
+        Wrong{"gateway_text", "gateway = \"open\"", "gateway must be a table: write [gateway]"},
+        Wrong{"gateway_open", "gateway = {open = 1}", "open must be true or false"},
+        Wrong{"gateway_origin", "gateway = {allow_origins = [\"example.org\"]}",
+              "'example.org' is no origin"},
+        Wrong{"gateway_origins", "gateway = {allow_origins = \"https://a\"}", "must be a list of strings"},
+        Wrong{"gateway_clients", "gateway = {max_clients = 0}", "max_clients must be a whole number from 1"},
         Wrong{"camera_text", "camera = \"v4l2\"", "camera must be a table: write [camera]"},
         Wrong{"camera_unknown", "camera = {zoom = 3}", "zoom is no setting; there are: rig pattern input"},
         Wrong{"camera_size", "camera = {size = \"big\"}", "size must be a size such as \"640x480\""},

@@ -199,7 +199,7 @@ TEST_F(GatewayStream, AClientThatDoesNotReadHindersNobody) {
 }
 
 TEST_F(GatewayStream, MoreClientsThanAllowedAreTold) {
-  start({.port = 0, .max_clients = 2});
+  start({.port = 0, .web = {.max_clients = 2}});
   WsClient first(port, "face");
   {
     WsClient second(port, "face");

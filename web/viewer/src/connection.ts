@@ -10,6 +10,13 @@ const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
+/** Where the server wants a token that this page does not have (any more), the page it answers with asks for it. */
+async function signInAgain(): Promise<void> {
+  // A WebSocket that is refused does not say why.
+  const response = await fetch(new URL('api/streams', document.baseURI), { cache: 'no-store' }).catch(() => null);
+  if (response?.status === 401) location.reload();
+}
+
 export class Connection implements FrameSource {
   private socket: WebSocket | null = null;
   private attempt = 0;
@@ -96,6 +103,7 @@ export class Connection implements FrameSource {
     if (this.stopped) return;
     this.retryAt = performance.now() + backoffS(this.attempt++) * 1000;
     this.events.lost();
+    void signInAgain();
   }
 
   private tick(): void {

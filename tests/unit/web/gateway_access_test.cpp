@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: who has no token, a wrong one, or comes from another site's page sees nothing and is counted; who
+// has one gets in by a header, a cookie or once by the address.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/support/temp_folder.h"
+#include "tests/unit/web/gateway_fixture.h"
+#include "web/gateway/access.h"
+
+namespace relievo::test {
+namespace {
+
+const std::string kToken = "correct-horse-battery";
+
+std::string bearer(const std::string& token) {
+  return "Authorization: Bearer " + token + "\r\n";
+}
+
+class GatewayTokens : public GatewayTest {
+ protected:
+  void SetUp() override {
+    std::ofstream(file) << "# of the lab\n\n" << kToken << "\nanother.token_of-16\n";
+    start({.port = 0, .web = {.token_file = file}});
+    gateway->announce(make_info());
+  }
+  double refused(const std::string& reason) {
+    const std::string text = request(port, "GET", "/metrics", bearer(kToken)).body;
+    const std::string line = "relievo_gateway_refused_total{reason=\"" + reason + "\"} ";
+    const auto at = text.find(line);
+    return at == std::string::npos ? -1 : std::stod(text.substr(at + line.size()));
+  }
+
+  TempFolder folder;
+  const std::string file = folder / "tokens";
+};
+
+TEST_F(GatewayTokens, WithoutOneNothingIsTold) {
+  for (const char* target : {"/", "/api/streams", "/metrics", "/index.html", "/nothing"})
+    EXPECT_EQ(request(port, "GET", target).status, 401) << target;
+  EXPECT_EQ(WsClient(port, "face").status(), 401);
+  EXPECT_EQ(request(port, "GET", "/healthz").status, 200) << "who watches over the machine needs none";
+  EXPECT_EQ(refused("token"), 6);
+  EXPECT_NE(request(port, "GET", "/").body.find("name=\"token\""), std::string::npos) << "a person is asked";
+}
+
+TEST_F(GatewayTokens, AWrongOneIsNone) {
+  for (const std::string token :
+       {"", "correct-horse-batter", "correct-horse-batteryy", "Correct-horse-battery", "# of the lab",
+        "correct-horse-battery,another.token_of-16"}) {
+    EXPECT_EQ(request(port, "GET", "/api/streams", bearer(token)).status, 401) << token;
+    EXPECT_EQ(request(port, "GET", "/api/streams?token=" + token.substr(0, token.find(' '))).status, 401);
+  }
+  EXPECT_EQ(request(port, "GET", "/api/streams", "Authorization: Basic " + kToken + "\r\n").status, 401);
+  EXPECT_EQ(WsClient(port, "face", bearer("wrong")).status(), 401);
+}
+
+TEST_F(GatewayTokens, ProgramsSendAHeaderOrAQuery) {
+  EXPECT_EQ(request(port, "GET", "/api/streams", bearer(kToken)).status, 200);
+  EXPECT_EQ(request(port, "GET", "/api/streams", bearer("another.token_of-16")).status, 200);
+  EXPECT_EQ(request(port, "GET", "/api/streams?token=" + kToken).status, 200);
+  WsClient client(port, "face", bearer(kToken));
+  EXPECT_EQ(client.status(), 101);
+  EXPECT_TRUE(client.next_of("info"));
+  EXPECT_EQ(WsClient(port, "face?token=" + kToken).status(), 101);
+}
+
+TEST_F(GatewayTokens, ABrowserKeepsItAsACookieAndNotInTheAddress) {
+  const auto sent = request(port, "GET", "/?stream=face&token=" + kToken + "&x=1");
+  ASSERT_EQ(sent.status, 303);
+  EXPECT_EQ(sent.headers.at("location"), "/?stream=face&x=1");
+  const std::string cookie = sent.headers.at("set-cookie");
+  EXPECT_NE(cookie.find("; HttpOnly"), std::string::npos);
+  EXPECT_NE(cookie.find("; SameSite=Lax"), std::string::npos);
+  const std::string header = "Cookie: a=b; " + cookie.substr(0, cookie.find(';')) + "; c=d\r\n";
+  EXPECT_EQ(request(port, "GET", "/", header).status, 200);
+  EXPECT_EQ(WsClient(port, "face", header).status(), 101);
+  EXPECT_EQ(WsClient(port, "face", header + "Origin: http://evil.example\r\n").status(), 403)
+      << "a cookie comes along with whatever page asks";
+  EXPECT_EQ(request(port, "GET", "/", "Cookie: x" + header.substr(13)).status, 401);
+}
+
+TEST_F(GatewayTokens, ANewFileCountsAndABrokenOneDoesNot) {
+  const auto status = [&](const std::string& token) {
+    return request(port, "GET", "/api/streams", bearer(token)).status;
+  };
+  WsClient client(port, "face", bearer(kToken));
+  ASSERT_TRUE(client.next_of("info"));
+  std::ofstream(file) << "a-token-made-yesterday\n";
+  EXPECT_EQ(status("a-token-made-yesterday"), 200);
+  EXPECT_EQ(status(kToken), 401);
+  std::ofstream(file) << "short\n";
+  EXPECT_EQ(status("a-token-made-yesterday"), 200);
+  EXPECT_EQ(status("short"), 401);
+  client.credit(1);
+  gateway->publish("face", make_frame(0));
+  EXPECT_TRUE(client.next_of("frame")) << "who watches goes on";
+}
+
+TEST(Tokens, FilesThatCannotBeUsedAreOneClearLine) {
+  const TempFolder folder;
+  const std::string file = folder / "tokens";
+  EXPECT_FALSE(Tokens::load(file).ok());
+  EXPECT_FALSE(Tokens::load(folder.path()).ok());
+  for (const char* text : {"", "# nothing\n", "short\n", "sixteen characters\n", "quoted\"0123456789\n"}) {
+    std::ofstream(file) << text;
+    const auto loaded = Tokens::load(file);
+    ASSERT_FALSE(loaded.ok()) << text;
+    EXPECT_NE(loaded.error().message.find(file), std::string::npos);
+    EXPECT_NE(loaded.error().message.find("openssl rand"), std::string::npos) << loaded.error().message;
+  }
+  const auto made = Tokens::make(), other = Tokens::make();
+  ASSERT_TRUE(made.ok() && other.ok());
+  EXPECT_TRUE(made->accepts(made->first()));
+  EXPECT_FALSE(made->accepts(other->first()));
+  EXPECT_FALSE(Tokens::none().needed());
+}
+
+using GatewayReach = GatewayTest;
+
+TEST_F(GatewayReach, OnAnAddressOfOthersATokenIsMade) {
+  EXPECT_EQ(gateway->made_token(), "");
+  start({.host = "0.0.0.0", .port = 0});
+  ASSERT_EQ(gateway->made_token().size(), 48u);
+  EXPECT_EQ(request(port, "GET", "/api/streams").status, 401);
+  EXPECT_EQ(request(port, "GET", "/api/streams", bearer(gateway->made_token())).status, 200);
+  start({.host = "0.0.0.0", .port = 0, .web = {.open = true}});
+  EXPECT_EQ(gateway->made_token(), "");
+  EXPECT_EQ(request(port, "GET", "/api/streams").status, 200);
+}
+
+TEST_F(GatewayReach, PagesOfListedSitesMayWatch) {
+  start({.port = 0, .web = {.origins = {"https://viewer.example"}}});
+  const std::string listed = "Origin: https://viewer.example\r\n";
+  EXPECT_EQ(WsClient(port, "face", listed).status(), 101);
+  EXPECT_EQ(WsClient(port, "face", "Origin: https://viewer.example.evil\r\n").status(), 403);
+  EXPECT_EQ(WsClient(port, "face", "Origin: http://viewer.example\r\n").status(), 403);
+  const auto shared = request(port, "GET", "/api/streams", listed);
+  EXPECT_EQ(shared.headers.at("access-control-allow-origin"), "https://viewer.example");
+  const auto other = request(port, "GET", "/api/streams", "Origin: https://evil.example\r\n");
+  EXPECT_EQ(other.headers.count("access-control-allow-origin"), 0u);
+  EXPECT_EQ(request(port, "OPTIONS", "/api/streams", listed).status, 204);
+  EXPECT_EQ(request(port, "OPTIONS", "/api/streams", "Origin: https://evil.example\r\n").status, 405);
+  EXPECT_EQ(metric("relievo_gateway_refused_total{reason=\"origin\"}"), 2);
+
+  TcpClient proxy(port);
+  proxy.send("GET /healthz HTTP/1.1\r\nHost: viewer.example\r\n\r\n");
+  EXPECT_EQ(read_response(proxy).status, 200);
+}
+
+}  // namespace
+}  // namespace relievo::test

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: slow, greedy and senseless connections are refused and counted, and who watches notices nothing of
+// them.
+#include <gtest/gtest.h>
+
+#include <deque>
+
+#include "tests/unit/web/gateway_fixture.h"
+
+namespace relievo::test {
+namespace {
+
+class GatewayCrowd : public GatewayTest {
+ protected:
+  double refused(const std::string& reason) const {
+    return metric("relievo_gateway_refused_total{reason=\"" + reason + "\"}");
+  }
+  /// The next frame reaches a client that watches.
+  void expect_frame(WsClient& client) {
+    gateway->publish("face", make_frame(sequence_, 20'000));
+    const auto frame = client.next_of("frame");
+    ASSERT_TRUE(frame) << sequence_;
+    EXPECT_EQ(u64_at(frame->data, 8), sequence_);
+    EXPECT_EQ(u64_at(frame->data, 40), 0u) << "a frame was dropped for the client";
+    ++sequence_;
+    client.credit(1);
+  }
+
+ private:
+  std::uint64_t sequence_ = 0;
+};
+
+TEST_F(GatewayCrowd, AThousandThatOnlyMakeNoiseDisturbNobody) {
+  gateway->announce(make_info());
+  WsClient watcher(port, "face");
+  ASSERT_TRUE(watcher.next_of("info"));
+  watcher.credit(8);
+  std::deque<TcpClient> crowd;  // of whom so many at a time stay, as far as they are let
+  std::uint32_t random = 7;
+  for (int i = 0; i < 1000; ++i) {
+    crowd.emplace_back(port);
+    ASSERT_TRUE(crowd.back().connected());
+    std::string noise = i % 3 == 0 ? "GET / HTTP/1.1\r\nX: " : i % 3 == 1 ? "\x16\x03\x01" : "";
+    for (int k = 0; k < 40; ++k) {
+      random = random * 1664525u + 1013904223u;
+      noise += static_cast<char>(random >> 24);
+    }
+    crowd.back().send(noise);
+    if (crowd.size() > 500) crowd.pop_front();
+    if (i % 10 == 0) expect_frame(watcher);
+  }
+  EXPECT_EQ(request(port, "GET", "/healthz").status, 200) << "there is room for who wants something";
+  WsClient another(port, "face");
+  EXPECT_EQ(another.status(), 101);
+  expect_frame(watcher);
+  EXPECT_GT(refused("places") + refused("malformed"), 500);
+}
+
+TEST_F(GatewayCrowd, WhoTricklesHisRequestIsCutOff) {
+  start({.port = 0, .request_time = 200ms});
+  gateway->announce(make_info());
+  WsClient watcher(port, "face");
+  ASSERT_TRUE(watcher.next_of("info"));
+  watcher.credit(8);
+  TcpClient slow(port);
+  slow.send("GET / HTTP/1.1\r\nX: ");
+  ASSERT_TRUE(eventually([&] {
+    slow.send("x");  // a byte at a time never lets a read time out
+    if (slow.receive(1ms)) ADD_FAILURE() << slow.buffer();
+    return slow.at_end();
+  }));
+  EXPECT_EQ(refused("slow"), 1);
+  expect_frame(watcher);
+}
+
+TEST_F(GatewayCrowd, WhoDoesNotReadHisAnswerIsCutOff) {
+  start({.port = 0, .request_time = 200ms});
+  TcpClient greedy(port, 4096);
+  // More than the system's buffers take.
+  std::string requests;
+  for (int i = 0; i < 100; ++i) requests += "GET /nothing HTTP/1.1\r\nHost: localhost\r\n\r\n";
+  ASSERT_TRUE(eventually([&] { return !greedy.send(requests) || refused("slow") > 0; }));
+  EXPECT_TRUE(eventually([&] { return refused("slow") > 0; }));
+}
+
+TEST_F(GatewayCrowd, AnAddressHasItsShareOfConnections) {
+  start({.port = 0, .web = {.max_per_address = 3}});
+  std::deque<TcpClient> all;
+  for (int i = 0; i < 3; ++i) all.emplace_back(port);
+  TcpClient fourth(port);
+  EXPECT_FALSE(fourth.receive());
+  EXPECT_TRUE(fourth.at_end());
+  all.clear();
+  ASSERT_TRUE(eventually([&] { return request(port, "GET", "/healthz").status == 200; }));
+  EXPECT_GE(refused("address"), 1);
+}
+
+TEST_F(GatewayCrowd, AnAddressHasItsShareOfRequests) {
+  start({.port = 0, .web = {.max_rate = 1}});
+  int told = 0;
+  for (int i = 0; i < 20; ++i) told += request(port, "GET", "/healthz").status == 429;
+  EXPECT_GT(told, 0);
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/healthz").status == 200; }));
+  EXPECT_TRUE(eventually([&] { return refused("rate") >= told; }));
+}
+
+TEST_F(GatewayCrowd, AClientHasItsShareOfMessages) {
+  gateway->announce(make_info());
+  WsClient flood(port, "face");
+  ASSERT_TRUE(flood.next_of("info"));
+  for (int i = 0; i < 200'000 && flood.send(R"({"type":"x"})"); ++i) {
+  }
+  const auto goodbye = flood.next();
+  if (goodbye) {
+    EXPECT_EQ(goodbye->close_code(), 1008);  // it may be lost in what it sends itself
+  }
+  EXPECT_EQ(refused("message"), 1);
+}
+
+}  // namespace
+}  // namespace relievo::test

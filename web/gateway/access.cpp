@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sys/random.h>
+#include <utility>  // before Asio 1.74 in C++20
+
+#include "web/gateway/access.h"
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/ssl/context.hpp>
+#include <fstream>
+
+#include "base/log.h"
+
+namespace relievo {
+namespace {
+
+namespace ssl = boost::asio::ssl;
+using ErrorCode = boost::system::error_code;
+
+constexpr std::size_t kLeastToken = 16, kMostToken = 256;
+constexpr std::size_t kMadeToken = 24;  // bytes of chance
+constexpr const char* kHowToMake = "make one with: openssl rand -hex 24 > FILE";
+
+// What needs no quoting in an address, a cookie or a header.
+bool is_token_character(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
+         c == '.' || c == '~';
+}
+
+std::string trimmed(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t\r");
+  return first == std::string::npos ? "" : line.substr(first, line.find_last_not_of(" \t\r") + 1 - first);
+}
+
+Result<std::vector<std::string>> read_tokens(const std::filesystem::path& file) {
+  std::error_code ignored;
+  std::ifstream in(file);
+  if (!in || !std::filesystem::is_regular_file(file, ignored))
+    return Error{"cannot read the token file " + file.string() + "; " + kHowToMake};
+  std::vector<std::string> tokens;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    const std::string token = trimmed(line);
+    if (token.empty() || token.front() == '#') continue;
+    const std::string where = file.string() + ":" + std::to_string(number) + ": ";
+    if (token.size() < kLeastToken || token.size() > kMostToken)
+      return Error{where + "a token has 16 to 256 characters; " + kHowToMake};
+    if (!std::all_of(token.begin(), token.end(), is_token_character))
+      return Error{where + "a token is made of letters, digits, '-', '_', '.' and '~'; " + kHowToMake};
+    tokens.push_back(token);
+  }
+  if (tokens.empty()) return Error{"there is no token in " + file.string() + "; " + kHowToMake};
+  return tokens;
+}
+
+}  // namespace
+
+FileMark mark_of(const std::filesystem::path& file) {
+  std::error_code failed;
+  FileMark mark;
+  mark.time = std::filesystem::last_write_time(file, failed);
+  mark.bytes = std::filesystem::file_size(file, failed);
+  return failed ? FileMark{} : mark;
+}
+
+Result<Tokens> Tokens::load(const std::filesystem::path& file) {
+  Tokens out;
+  out.file_ = file;
+  out.mark_ = mark_of(file);
+  auto tokens = read_tokens(file);
+  if (!tokens) return tokens.error();
+  out.tokens_ = *std::move(tokens);
+  std::error_code ignored;
+  const auto others = std::filesystem::perms::others_read;
+  if ((std::filesystem::status(file, ignored).permissions() & others) != std::filesystem::perms::none)
+    log_warning("every user of this machine can read the token in " + file.string() + ": chmod 600 it");
+  return out;
+}
+
+Result<Tokens> Tokens::make() {
+  std::array<std::uint8_t, kMadeToken> chance{};
+  if (getrandom(chance.data(), chance.size(), 0) != static_cast<ssize_t>(chance.size()))
+    return Error{"the system gives no random numbers to make a token of: give --token-file FILE"};
+  std::string token;
+  for (const std::uint8_t byte : chance) {
+    token += "0123456789abcdef"[byte >> 4];
+    token += "0123456789abcdef"[byte & 15];
+  }
+  Tokens out;
+  out.tokens_.push_back(std::move(token));
+  return out;
+}
+
+bool Tokens::accepts(std::string_view token) const {
+  bool any = false;
+  for (const std::string& known : tokens_) {
+    unsigned different = known.size() == token.size() ? 0 : 1;
+    for (std::size_t i = 0; i < known.size(); ++i) {
+      const char given = i < token.size() ? token[i] : '\0';
+      different |= static_cast<unsigned char>(known[i] ^ given);
+    }
+    any = any || different == 0;
+  }
+  return any;
+}
+
+void Tokens::reload() {
+  if (file_.empty()) return;
+  const FileMark mark = mark_of(file_);
+  if (mark == mark_) return;
+  mark_ = mark;
+  auto tokens = read_tokens(file_);
+  if (!tokens) return log_warning("the old tokens stay: " + tokens.error().message);
+  tokens_ = *std::move(tokens);
+  log_info("the tokens of " + file_.string() + " were read again");
+}
+
+Result<TlsFiles> TlsFiles::load(const std::filesystem::path& cert, const std::filesystem::path& key) {
+  TlsFiles out;
+  out.cert_ = cert;
+  out.key_ = key;
+  out.cert_mark_ = mark_of(cert);
+  out.key_mark_ = mark_of(key);
+  if (const Status read = out.read(); !read) return read.error();
+  return out;
+}
+
+Status TlsFiles::read() {
+  auto context = std::make_shared<ssl::context>(ssl::context::tls_server);
+  ErrorCode error;
+  context->set_options(ssl::context::default_workarounds | ssl::context::no_sslv2 | ssl::context::no_sslv3 |
+                           ssl::context::no_tlsv1 | ssl::context::no_tlsv1_1,
+                       error);
+  if (!error) context->use_certificate_chain_file(cert_.string(), error);
+  if (error)
+    return Error{"cannot use the certificate " + cert_.string() + ": " + error.message() +
+                 "; it must be a PEM file, the server's own certificate first"};
+  context->use_private_key_file(key_.string(), ssl::context::pem, error);
+  if (error)
+    return Error{"cannot use the key " + key_.string() + ": " + error.message() +
+                 "; it must be the certificate's own, a PEM file without a password"};
+  context_ = std::move(context);
+  return {};
+}
+
+std::shared_ptr<ssl::context> TlsFiles::context() {
+  const FileMark cert = mark_of(cert_), key = mark_of(key_);
+  if (cert == cert_mark_ && key == key_mark_) return context_;
+  cert_mark_ = cert;
+  key_mark_ = key;
+  // Between the two files' replacement they do not fit together; the second one brings us here again.
+  if (const Status again = read(); !again) {
+    log_warning("the old certificate stays: " + again.error().message);
+  } else {
+    log_info("the certificate " + cert_.string() + " was read again");
+  }
+  return context_;
+}
+
+}  // namespace relievo

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who may watch: tokens, pages of which sites, and the certificate they see. One thread.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+
+namespace boost::asio::ssl {
+class context;
+}
+
+namespace relievo {
+
+/// A file's content changed where this did.
+struct FileMark {
+  std::filesystem::file_time_type time{};
+  std::uintmax_t bytes = 0;
+  bool operator==(const FileMark&) const = default;
+};
+FileMark mark_of(const std::filesystem::path& file);
+
+/// Tokens that open a gateway, from a file that may change.
+class Tokens {
+ public:
+  /// Of `file`, a token a line, empty ones and those after # aside; fails where there is none, or a weak one.
+  static Result<Tokens> load(const std::filesystem::path& file);
+  /// One, made now.
+  static Result<Tokens> make();
+  /// Everybody may watch.
+  static Tokens none() { return Tokens(); }
+
+  bool needed() const { return !tokens_.empty(); }
+  /// In a time that does not tell how much of a token is right.
+  bool accepts(std::string_view token) const;
+  /// Where the file has changed; what is wrong with it is logged, and the old tokens stay.
+  void reload();
+  const std::string& first() const { return tokens_.front(); }
+
+ private:
+  Tokens() = default;
+
+  std::filesystem::path file_;
+  FileMark mark_;
+  std::vector<std::string> tokens_;
+};
+
+/// A certificate and its key, from files that may change.
+class TlsFiles {
+ public:
+  static Result<TlsFiles> load(const std::filesystem::path& cert, const std::filesystem::path& key);
+  /// For a new connection; of the files as they are now, or as they last were in order. Those that already
+  /// are connected keep theirs.
+  std::shared_ptr<boost::asio::ssl::context> context();
+
+ private:
+  TlsFiles() = default;
+  Status read();
+
+  std::filesystem::path cert_, key_;
+  FileMark cert_mark_, key_mark_;
+  std::shared_ptr<boost::asio::ssl::context> context_;
+};
+
+}  // namespace relievo

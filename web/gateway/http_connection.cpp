@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <utility>  // before Asio 1.74 in C++20
+
+#include <array>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <sstream>
+
+#include "base/time.h"
+#include "web/gateway/connection.h"
+
+namespace relievo {
+namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using ErrorCode = boost::system::error_code;
+
+constexpr std::uint32_t kHeaderLimit = 8 * 1024;
+constexpr std::uint64_t kBodyLimit = 4 * 1024;
+constexpr std::size_t kReadAtOnce = 4096;
+
+std::span<const std::uint8_t> bytes_of(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+class HttpSession : public HttpConnection, public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(ConnectionHost& host, std::shared_ptr<Transport> transport,
+              std::shared_ptr<net::ssl::context> tls)
+      : host_(host), transport_(std::move(transport)), tls_(std::move(tls)) {}
+
+  void start() override;
+  void close() override { finish(); }
+  void abort() override { finish(); }
+  std::optional<std::int64_t> waiting_since_ns() const override { return waiting_since_ns_; }
+
+ private:
+  void await_request();
+  void parse();
+  void read();
+  void on_bad_request(ErrorCode error);
+  void on_request();
+  void upgrade(const HttpReply& granted);
+  void reply(HttpReply content, bool head, unsigned version, bool keep_alive);
+  void on_failed(Io io, Refusal why);
+  void finish();
+
+  ConnectionHost& host_;
+  const std::shared_ptr<Transport> transport_;
+  const std::shared_ptr<net::ssl::context> tls_;
+  beast::flat_buffer buffer_{kHeaderLimit + kBodyLimit + kReadAtOnce};
+  std::optional<http::request_parser<http::string_body>> parser_;
+  HttpReply content_;
+  std::string head_;
+  std::int64_t waiting_since_ns_ = steady_now_ns();
+  bool any_request_ = false;
+  bool awaits_request_ = false;
+  bool finished_ = false;
+};
+
+void HttpSession::start() {
+  transport_->expire_after(host_.request_time());
+  transport_->handshake(tls_, [self = shared_from_this()](Io io) {
+    if (io != Io::kDone) return self->on_failed(io, Refusal::kTls);
+    self->await_request();
+  });
+}
+
+void HttpSession::await_request() {
+  parser_.emplace();
+  parser_->eager(true);
+  parser_->header_limit(kHeaderLimit);
+  parser_->body_limit(kBodyLimit);
+  waiting_since_ns_ = steady_now_ns();
+  awaits_request_ = true;
+  transport_->expire_after(host_.request_time());  // for all of it, however it trickles
+  if (buffer_.size() > 0) return parse();
+  read();
+}
+
+void HttpSession::read() {
+  const auto room = buffer_.prepare(kReadAtOnce);
+  transport_->read_some({static_cast<std::uint8_t*>(room.data()), room.size()},
+                        [self = shared_from_this()](Io io, std::size_t bytes) {
+                          if (self->finished_) return;
+                          if (io != Io::kDone) return self->on_failed(io, Refusal::kSlow);
+                          self->buffer_.commit(bytes);
+                          self->parse();
+                        });
+}
+
+void HttpSession::parse() {
+  ErrorCode error;
+  buffer_.consume(parser_->put(buffer_.data(), error));
+  if (error == http::error::need_more) error = {};
+  if (error) return on_bad_request(error);
+  if (parser_->is_done()) return on_request();
+  if (buffer_.size() + kReadAtOnce > buffer_.max_size()) return on_bad_request(http::error::header_limit);
+  read();
+}
+
+void HttpSession::on_bad_request(ErrorCode error) {
+  HttpReply content;
+  content.status = error == http::error::header_limit || error == http::error::buffer_overflow ? 431
+                   : error == http::error::body_limit                                          ? 413
+                                                                                               : 400;
+  content.body = content.status == 431   ? "the request's headers are too long\n"
+                 : content.status == 413 ? "the request's body is too long\n"
+                                         : "this is no HTTP request\n";
+  content.refusal = Refusal::kMalformed;
+  reply(std::move(content), false, 11, false);
+}
+
+void HttpSession::on_request() {
+  any_request_ = true;
+  const auto& request = parser_->get();
+  const auto value = [&](http::field name) {
+    const auto text = request[name];
+    return std::string_view(text.data(), text.size());
+  };
+  const std::string_view method(request.method_string().data(), request.method_string().size());
+  HttpReply content = host_.answer({.method = method,
+                                    .target = {request.target().data(), request.target().size()},
+                                    .host = value(http::field::host),
+                                    .origin = value(http::field::origin),
+                                    .if_none_match = value(http::field::if_none_match),
+                                    .authorization = value(http::field::authorization),
+                                    .cookie = value(http::field::cookie),
+                                    .upgrade = beast::websocket::is_upgrade(request),
+                                    .tls = transport_->is_tls()},
+                                   transport_->peer());
+  ++host_.counts().requests;
+  if (!content.websocket_stream.empty()) return upgrade(content);
+  const bool may_go_on = content.refusal != Refusal::kRate;
+  reply(std::move(content), method == "HEAD", request.version(), may_go_on && request.keep_alive());
+}
+
+void HttpSession::upgrade(const HttpReply& granted) {
+  std::ostringstream request;
+  request << parser_->get().base();
+  const auto behind = buffer_.cdata();
+  request.write(static_cast<const char*>(behind.data()), static_cast<std::streamsize>(behind.size()));
+  start_websocket(host_, {.transport = transport_,
+                          .request = request.str(),
+                          .subprotocol = {},
+                          .feed = host_.make_feed(granted)});
+  finished_ = true;  // the transport is the WebSocket's now
+  host_.remove(shared_from_this());
+}
+
+void HttpSession::reply(HttpReply content, bool head, unsigned version, bool keep_alive) {
+  waiting_since_ns_ = steady_now_ns();
+  awaits_request_ = false;
+  content_ = std::move(content);
+  if (content_.refusal) host_.counts().refuse(*content_.refusal);
+  http::response<http::empty_body> response(static_cast<http::status>(content_.status), version);
+  response.set(http::field::server, "relievo/" RELIEVO_VERSION);
+  response.set(http::field::content_type, content_.content_type);
+  for (const auto& [name, text] : security_headers()) response.set(name, text);
+  for (const auto& [name, text] : content_.headers) response.set(name, text);
+  response.keep_alive(keep_alive);
+  const bool no_body = content_.status == 304 || content_.status == 204;
+  if (!no_body) response.content_length(content_.bytes().size());
+  std::ostringstream text;
+  text << response.base();
+  head_ = text.str();
+
+  transport_->expire_after(host_.request_time());
+  const std::array parts{bytes_of(head_), bytes_of(head || no_body ? std::string_view() : content_.bytes())};
+  transport_->write(parts, [self = shared_from_this(), keep_alive](Io io, std::size_t) {
+    if (self->finished_) return;
+    if (io != Io::kDone) return self->on_failed(io, Refusal::kSlow);
+    if (keep_alive) return self->await_request();
+    self->transport_->linger([self] { self->finish(); });
+  });
+}
+
+void HttpSession::on_failed(Io io, Refusal why) {
+  // Between requests browsers keep connections that they do not need: nobody is slow then.
+  const bool idle = any_request_ && awaits_request_ && buffer_.size() == 0 && !parser_->got_some();
+  if (io == Io::kTimeout ? !idle : why == Refusal::kTls) host_.counts().refuse(why);
+  finish();
+}
+
+void HttpSession::finish() {
+  if (std::exchange(finished_, true)) return;
+  transport_->close();
+  host_.remove(shared_from_this());
+}
+
+}  // namespace
+
+std::shared_ptr<HttpConnection> HttpConnection::make(ConnectionHost& host,
+                                                     std::shared_ptr<Transport> transport,
+                                                     std::shared_ptr<net::ssl::context> tls) {
+  return std::make_shared<HttpSession>(host, std::move(transport), std::move(tls));
+}
+
+}  // namespace relievo
