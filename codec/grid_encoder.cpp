@@ -264,7 +264,6 @@ void GridEncoder::Slice::read(const Input& in) {
   for (int line = begin; line < end; ++line) {
     std::swap(there[0], there[1]);
     const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
-    std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
     if (!in.grid.interpolated.empty()) read_marks(in, line, here);
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
@@ -273,6 +272,7 @@ void GridEncoder::Slice::read(const Input& in) {
       } else {
         there[1].swap(there_after);
       }
+      const std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
       read_places(in, line + 1, here, below);
       read_cells(in, line, here, below);
     }
