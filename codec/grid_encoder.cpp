@@ -144,15 +144,8 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
       const int corners = corners_of(above, below, i, lack);
       good_here[i] = 0;
       if (corners < 3) continue;
-      int symbol = 1;
-      if (corners == 3) {
-        symbol = cells[i] != 0 ? 0 : 1;
-      } else if (cells[i] == grid_cell::kStraight || cells[i] == grid_cell::kTurned) {
-        symbol = 0;
-      } else if (cells[i] != 0) {
-        symbol = 2 + std::countr_zero(cells[i]);
-      }
-      triangles += symbol == 1 ? 0U : symbol == 0 && corners == 4 ? 2U : 1U;
+      const int symbol = cell_symbol(cells[i], corners);
+      triangles += triangles_of(symbol, corners);
       put(kCellTable + (corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i], symbol);
       good_here[i] = symbol == 0;
     }
