@@ -151,7 +151,13 @@ std::vector<Codec> codecs(const SourceInfo& source) {
   options.key_interval = 1;
   options.quality = true;
   all.push_back(grid("grid-1/16px-sigma", source, options));
+  options.geometry = GeometryCodec::kDracoGrid;
+  all.push_back(grid("draco-grid-1/16px-sigma", source, options));
   options.quality = false;
+  all.push_back(grid("draco-grid-1/16px", source, options));
+  options.step_bits = 6;
+  all.push_back(grid("draco-grid-1/64px", source, options));
+  options.geometry = GeometryCodec::kGrid;
   options.key_interval = 30;
   options.step_bits = 6;
   options.estimate = true;

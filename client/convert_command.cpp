@@ -121,7 +121,7 @@ class Conversion {
     const auto bytes = encoder_->encode(frame, wanted);
     if (!bytes) return bytes.error();
     const auto header = read_frame_header(*bytes);
-    if (wanted.geometry == GeometryCodec::kGrid && header && header->geometry != wanted.geometry &&
+    if (wanted.geometry != GeometryCodec::kDracoMesh && header && header->geometry != wanted.geometry &&
         header->vertices > 0)
       return Error{options_.file +
                    ": the places of its vertices in the grid were not recorded (it is Draco): it can "
@@ -217,7 +217,8 @@ Command convert_command() {
               return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
             })
             ->type_name("NAME");
-        app.add_option("--step-bits", options->step_bits, "Of grid: steps of 1/2^N pixel (default 6)")
+        app.add_option("--step-bits", options->step_bits,
+                       "Of grid and draco-grid: steps of 1/2^N pixel (default 6)")
             ->check(CLI::Range(0, 8));
         app.add_option("--key-interval", options->key_interval,
                        "Of grid: every Nth frame decodes alone (default 1)")

@@ -51,6 +51,7 @@ struct FrameTotals {
 
 std::string codec_name(GeometryCodec codec) {
   if (codec == GeometryCodec::kDracoMesh) return "draco-mesh";
+  if (codec == GeometryCodec::kDracoGrid) return "draco-grid";
   return codec == GeometryCodec::kGrid ? "grid" : std::to_string(static_cast<int>(codec));
 }
 

@@ -14,7 +14,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "codec/byte_io.h"
+#include "codec/draco_stream.h"
 #include "codec/surface_check.h"
 #include "codec/vertex_quality.h"
 
@@ -158,58 +158,7 @@ Result<Bytes> encode(const Surface& surface, const Selection& kept, const Encode
   return Bytes(buffer.data(), buffer.data() + buffer.size());
 }
 
-struct Counts {
-  std::uint32_t vertices = 0;
-  std::uint32_t triangles = 0;
-};
-
-std::uint32_t read_varint(ByteReader& reader) {
-  std::uint64_t value = 0;
-  for (int shift = 0; shift < 35; shift += 7) {
-    const auto byte = reader.read<std::uint8_t>();
-    value |= static_cast<std::uint64_t>(byte & 0x7f) << shift;
-    if ((byte & 0x80) == 0) break;
-  }
-  return value <= std::numeric_limits<std::uint32_t>::max() ? static_cast<std::uint32_t>(value)
-                                                            : std::numeric_limits<std::uint32_t>::max();
-}
-
-/// What a stream says of its size (Draco bitstream 2.2 for meshes, 2.3 for point clouds). Only what
-/// encode_draco writes is let through, so that Draco's code for older and other streams is out of reach.
-Result<Counts> declared_counts(std::span<const std::uint8_t> bytes) {
-  ByteReader reader(bytes);
-  const auto magic = reader.take(5);
-  const auto major = reader.read<std::uint8_t>();
-  const auto minor = reader.read<std::uint8_t>();
-  const auto type = reader.read<std::uint8_t>();
-  const auto method = reader.read<std::uint8_t>();
-  const auto flags = reader.read<std::uint16_t>();
-  if (!reader.ok() || !std::ranges::equal(magic, std::string_view("DRACO")))
-    return Error{"geometry is not a Draco stream"};
-  const bool is_mesh = type == draco::TRIANGULAR_MESH && method == draco::MESH_EDGEBREAKER_ENCODING &&
-                       major == 2 && minor == 2;
-  const bool is_cloud = type == draco::POINT_CLOUD && method == draco::POINT_CLOUD_SEQUENTIAL_ENCODING &&
-                        major == 2 && minor == 3;
-  if ((!is_mesh && !is_cloud) || flags != 0)
-    return Error{"geometry is a Draco stream of a kind that the format does not allow (type " +
-                 std::to_string(type) + ", method " + std::to_string(method) + ", version " +
-                 std::to_string(major) + "." + std::to_string(minor) + ")"};
-  Counts counts;
-  if (is_cloud) {
-    counts.vertices = reader.read<std::uint32_t>();
-  } else {
-    const auto traversal = reader.read<std::uint8_t>();
-    counts.vertices = read_varint(reader);
-    counts.triangles = read_varint(reader);
-    const auto more_connectivities = reader.read<std::uint8_t>();
-    if (traversal == draco::MESH_EDGEBREAKER_PREDICTIVE_ENCODING || more_connectivities != 0)
-      return Error{"geometry is a Draco mesh of a kind that the format does not allow"};
-  }
-  if (!reader.ok()) return Error{"geometry is cut short"};
-  return counts;
-}
-
-std::string is_not(const Counts& found, std::uint32_t vertices, std::uint32_t triangles) {
+std::string is_not(const DracoCounts& found, std::uint32_t vertices, std::uint32_t triangles) {
   return "geometry holds " + std::to_string(found.vertices) + " vertices and " +
          std::to_string(found.triangles) + " triangles, but the frame declares " + std::to_string(vertices) +
          " and " + std::to_string(triangles);
@@ -256,7 +205,7 @@ Status read_attribute(const draco::PointCloud& cloud, int id, std::vector<std::a
 }
 
 Result<Surface> to_surface(const GuardedMesh& mesh, std::uint32_t vertices, std::uint32_t triangles) {
-  const Counts found{mesh.num_points(), mesh.num_faces()};
+  const DracoCounts found{mesh.num_points(), mesh.num_faces()};
   if (found.vertices != vertices || found.triangles != triangles)
     return Error{is_not(found, vertices, triangles)};
   Surface surface;
@@ -292,7 +241,7 @@ Result<EncodedGeometry> encode_draco(const Surface& surface, const EncodeOptions
     for (const Packing packing : {Packing::kBest, Packing::kPlain}) {
       auto bytes = encode(surface, kept, options, encoded.volume, packing);
       if (!bytes) return bytes.error();
-      const auto counts = declared_counts(*bytes);
+      const auto counts = allowed_draco_counts(*bytes);
       if (!counts) return counts.error().in("what Draco encoded cannot be sent");
       encoded.bytes = std::move(*bytes);
       encoded.vertices = counts->vertices;
@@ -308,7 +257,7 @@ Result<EncodedGeometry> encode_draco(const Surface& surface, const EncodeOptions
 
 Result<Surface> decode_draco(std::span<const std::uint8_t> bytes, std::uint32_t vertices,
                              std::uint32_t triangles) {
-  const auto declared = declared_counts(bytes);
+  const auto declared = allowed_draco_counts(bytes);
   if (!declared) return declared.error();
   if (declared->vertices != vertices || declared->triangles != triangles)
     return Error{is_not(*declared, vertices, triangles)};

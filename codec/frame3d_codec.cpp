@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/draco_grid.h"
 #include "codec/draco_mesh.h"
 #include "codec/frame_layout.h"
 #include "codec/grid_coder.h"
@@ -24,6 +25,11 @@ namespace {
 constexpr DecodeLimits kFormatLimits{};
 constexpr float kLeastBound_px = 1.5F / 256, kLargestBound_px = 8;
 
+bool is_known(GeometryCodec codec) {
+  return codec == GeometryCodec::kDracoMesh || codec == GeometryCodec::kGrid ||
+         codec == GeometryCodec::kDracoGrid;
+}
+
 Status check(const char* name, int value, int low, int high) {
   if (value >= low && value <= high) return {};
   return Error{std::string(name) + " is " + std::to_string(value) + ", allowed are " + std::to_string(low) +
@@ -31,8 +37,7 @@ Status check(const char* name, int value, int low, int high) {
 }
 
 Status check_options(const EncodeOptions& options) {
-  if (options.geometry != GeometryCodec::kDracoMesh && options.geometry != GeometryCodec::kGrid)
-    return Error{"unknown geometry codec"};
+  if (!is_known(options.geometry)) return Error{"unknown geometry codec"};
   if (options.texture != TextureCodec::kNone && !make_texture_encoder(options.texture))
     return Error{"unknown texture codec"};
   for (const Status& status :
@@ -162,12 +167,7 @@ struct FrameEncoder::State {
     coded.geometry = encoder.encode(grid, calibration, coded.geometry_is_key ? nullptr : &key, tolerance,
                                     step_mm(frame.surface, calibration, grid.step_bits),
                                     {.slice_lines = options.slice_lines});
-    // Nothing may be smaller than FORMAT.md allows.
-    const std::uint64_t places =
-        static_cast<std::uint64_t>(grid.boundaries) * static_cast<std::uint64_t>(grid.lines);
-    coded.geometry.resize(
-        std::max<std::size_t>({coded.geometry.size(), grid.vertices / kMostGridVerticesPerByte + 1,
-                               places / kMostPlacesPerByte + 1}));
+    coded.geometry.resize(std::max(coded.geometry.size(), least_grid_bytes(grid)));
     coded.header.geometry = GeometryCodec::kGrid;
     coded.header.vertices = grid.vertices;
     coded.header.triangles = grid.triangles;
@@ -183,14 +183,30 @@ struct FrameEncoder::State {
     return coded;
   }
 
+  /// The same in Draco's clouds.
+  Result<Coded> encode_in_draco(const Frame3D& frame) {
+    Coded coded;
+    coded.header.geometry = GeometryCodec::kDracoGrid;
+    has_key = false;
+    if (grid.vertices == 0) return coded;
+    auto bytes =
+        encode_draco_grid(grid, calibration, tolerance, step_mm(frame.surface, calibration, grid.step_bits));
+    if (!bytes) return bytes.error();
+    coded.geometry = *std::move(bytes);
+    coded.header.vertices = grid.vertices;
+    coded.header.triangles = grid.triangles;
+    return coded;
+  }
+
   Result<Coded> encode_geometry(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
     const int step_bits = options.bound_px > 0 ? step_bits_within(options.bound_px) : options.step_bits;
-    const bool is_grid = options.geometry == GeometryCodec::kGrid && !frame.surface.positions.empty() &&
+    const bool is_grid = options.geometry != GeometryCodec::kDracoMesh && !frame.surface.positions.empty() &&
                          to_grid(frame.surface, calibration, step_bits, options.quality, grid);
     if (is_grid) {
       tolerance.clear();
       if (options.estimate) estimator.estimate(frame.surface, grid, tolerance);
       if (options.bound_px > 0) tolerance.assign(grid.columns.size(), 1);
+      if (options.geometry == GeometryCodec::kDracoGrid) return encode_in_draco(frame);
       return encode_grid(frame, options, want_key);
     }
     has_key = false;
@@ -282,11 +298,17 @@ struct FrameDecoder::State {
     const auto done = decoder.decode(coded, header.vertices, header.triangles, has_key ? &key : nullptr, to);
     if (!done) return done.error();
     if (head->is_key) {
+      use(head->calibration);
       key.id = grid_id(coded);
       has_key = true;
-      if (!points || points->calibration() != head->calibration) points.emplace(head->calibration);
     }
     return &to;
+  }
+
+  void use(const GridCalibration& calibration) {
+    if (points && points->calibration() == calibration) return;
+    points.emplace(calibration);
+    has_key = false;  // it has the calibration of before
   }
 
   Status decode_geometry(const FrameLayout& layout, Surface& out) {
@@ -299,6 +321,12 @@ struct FrameDecoder::State {
       const auto to = decode_grid(layout.sections.geometry, header);
       if (!to) return to.error();
       return points->to_surface(**to, out);
+    }
+    if (header.geometry == GeometryCodec::kDracoGrid) {
+      const auto head = decode_draco_grid(layout.sections.geometry, header.vertices, header.triangles, grid);
+      if (!head) return head.error();
+      use(head->calibration);
+      return points->to_surface(grid, out);
     }
     auto surface = decode_draco(layout.sections.geometry, header.vertices, header.triangles);
     if (!surface) return surface.error();
@@ -363,7 +391,7 @@ Status FrameDecoder::decode(std::span<const std::uint8_t> bytes, Frame3D& frame,
   if (!layout) return layout.error();
   const FrameHeader& header = layout->header;
   const FrameSections& sections = layout->sections;
-  if (header.geometry != GeometryCodec::kDracoMesh && header.geometry != GeometryCodec::kGrid)
+  if (!is_known(header.geometry))
     return Error{"frame has geometry of codec " + std::to_string(static_cast<int>(header.geometry)) +
                  " that this version does not know: update relievo"};
   // Frames without a texture may come between those that build on each other.

@@ -35,10 +35,10 @@ struct EncodeOptions {
   TextureCodec texture = TextureCodec::kJpeg;
   int texture_quality = 80;  // 1..100: about the error of a JPEG of that quality
   bool quality = true;       // sigma and interpolation of each vertex, where the surface has them
-  int step_bits = 4;         // 0..8; grid: columns are whole steps of 2^-step_bits pixels
-  // Grid: estimates from this frame and those before go instead of what was measured (GridEstimator).
+  int step_bits = 4;         // 0..8; grids: columns are whole steps of 2^-step_bits pixels
+  // Grids: estimates from this frame and those before go instead of what was measured (GridEstimator).
   bool estimate = false;
-  // Grid: how far off a column may be, 0.006 to 8 pixels; chooses the step. 0: step_bits does.
+  // Grids: how far off a column may be, 0.006 to 8 pixels; chooses the step. 0: step_bits does.
   float bound_px = 0;
   int slice_lines = 270;  // 8..16384; grid: lines that are coded together, and lost together
   int key_interval = 1;   // 1..1000; grid and H.264: every so many frames decodes alone, those between do not
@@ -114,7 +114,7 @@ class FrameDecoder {
   ~FrameDecoder();
 
   /// Any input: hostile bytes give an error, never a crash, a hang or an allocation beyond the limits. Vertex
-  /// order is the codec's; `grid` is empty for Draco.
+  /// order is the codec's; `grid` is empty for Draco meshes.
   Result<Frame3D> decode(std::span<const std::uint8_t> bytes, const DecodeLimits& limits = {});
 
   /// The same into the memory of a frame that nobody needs any more. Where it fails, `out` holds nothing of

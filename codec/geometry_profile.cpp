@@ -28,6 +28,7 @@ constexpr std::array kProfiles{
               o.quality = false;
               o.key_interval = kLongInterval;
             }},
+    Profile{"draco-grid", [](EncodeOptions& o) { o.geometry = GeometryCodec::kDracoGrid; }},
     Profile{"draco-mesh", [](EncodeOptions& o) { o.geometry = GeometryCodec::kDracoMesh; }}};
 
 }  // namespace

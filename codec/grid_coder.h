@@ -69,6 +69,12 @@ class GridEncoder {
   GridEncoder& operator=(GridEncoder&&) noexcept;
 };
 
+/// Of cells that hold kBothTriangles, with the columns of their corners.
+void choose_diagonals(StripeGrid& grid, std::int32_t spacing);
+
+/// How many bytes a coded grid must have at least (FORMAT.md, "Sizes").
+std::size_t least_grid_bytes(const StripeGrid& grid);
+
 /// Any bytes.
 Result<GridHead> read_grid_head(std::span<const std::uint8_t> coded);
 

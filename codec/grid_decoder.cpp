@@ -16,7 +16,6 @@ namespace {
 using namespace grid;
 
 const Error kDamaged{"grid is damaged"};
-constexpr std::int32_t kMostPixels = 1 << 14;
 
 struct Tables {
   std::array<std::uint16_t, kControlTables> first{};  // frequency of the first of two symbols
@@ -166,11 +165,8 @@ bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint
       const int symbol = control.one(table);
       if (symbol >= kCellSymbols || (corners == 3 && symbol > 1)) return false;
       good_here[i] = symbol == 0;
-      if (symbol == 1) continue;
-      triangles += symbol == 0 && corners == 4 ? 2 : 1;
-      cells[i] = corners == 3  ? static_cast<std::uint8_t>(1U << lack)
-                 : symbol == 0 ? kBoth
-                               : static_cast<std::uint8_t>(1U << (symbol - 2));
+      triangles += triangles_of(symbol, corners);
+      cells[i] = cell_of(symbol, corners, lack);
     }
   }
   std::swap(good[0], good[1]);
@@ -290,7 +286,7 @@ bool GridDecoder::Scratch::read_sigmas(const Input& in, int line, int begin, ran
     const int b = places[i];
     const std::int32_t code =
         unzigzag(number_of(symbols[i], raw)) + (above[b] != kAbsent ? codes[b - stride] : last);
-    if (code < 0 || code > 63) return false;
+    if (code < 0 || code > kMostSigma) return false;
     codes[b] = static_cast<std::uint8_t>(code);
     last = code;
   }
@@ -358,6 +354,14 @@ std::uint32_t drop_cells(StripeGrid& grid, int line) {
 
 }  // namespace
 
+void choose_diagonals(StripeGrid& grid, std::int32_t spacing) {
+  for (int line = 0; line + 1 < grid.lines; ++line) {
+    const std::int32_t* above = grid.columns.data() + grid.at(line, 0);
+    grid_kernels().diagonals(above, above + grid.stride(), spacing, grid.boundaries - 1,
+                             grid.cells.data() + grid.at(line, 0));
+  }
+}
+
 Result<GridHead> GridDecoder::decode(std::span<const std::uint8_t> coded, std::uint32_t vertices,
                                      std::uint32_t triangles, const GridKey* key, StripeGrid& out,
                                      WorkerPool* pool) {
@@ -424,11 +428,7 @@ Result<GridHead> GridDecoder::decode(std::span<const std::uint8_t> coded, std::u
     if (s > 0 && layout->slices[s].empty())
       out.triangles -= drop_cells(out, static_cast<int>(s) * head.slice_lines - 1);
   }
-  for (int line = 0; line + 1 < out.lines; ++line) {
-    const std::int32_t* above = out.columns.data() + out.at(line, 0);
-    grid_kernels().diagonals(above, above + out.stride(), head.model.spacing, out.boundaries - 1,
-                             out.cells.data() + out.at(line, 0));
-  }
+  choose_diagonals(out, head.model.spacing);
   return head;
 }
 

@@ -144,15 +144,8 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
       const int corners = corners_of(above, below, i, lack);
       good_here[i] = 0;
       if (corners < 3) continue;
-      int symbol = 1;
-      if (corners == 3) {
-        symbol = cells[i] != 0 ? 0 : 1;
-      } else if (cells[i] == grid_cell::kStraight || cells[i] == grid_cell::kTurned) {
-        symbol = 0;
-      } else if (cells[i] != 0) {
-        symbol = 2 + std::countr_zero(cells[i]);
-      }
-      triangles += symbol == 1 ? 0U : symbol == 0 && corners == 4 ? 2U : 1U;
+      const int symbol = cell_symbol(cells[i], corners);
+      triangles += triangles_of(symbol, corners);
       put(kCellTable + (corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i], symbol);
       good_here[i] = symbol == 0;
     }
@@ -264,7 +257,6 @@ void GridEncoder::Slice::read(const Input& in) {
   for (int line = begin; line < end; ++line) {
     std::swap(there[0], there[1]);
     const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
-    std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
     if (!in.grid.interpolated.empty()) read_marks(in, line, here);
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
@@ -273,6 +265,7 @@ void GridEncoder::Slice::read(const Input& in) {
       } else {
         there[1].swap(there_after);
       }
+      const std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
       read_places(in, line + 1, here, below);
       read_cells(in, line, here, below);
     }

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/lens.h"
-#include "codec/byte_io.h"
+#include "codec/frame_layout.h"
 
 namespace relievo {
 namespace {
@@ -74,7 +74,7 @@ Status read_calibration(ByteReader& in, GridHead& head) {
 
 }  // namespace
 
-void write_grid_head(const GridHead& head, const Bytes& tables, Bytes& out) {
+void write_grid_fields(const GridHead& head, Bytes& out) {
   append(out, static_cast<std::uint8_t>((head.is_key ? kKey : 0) | (head.has_sigmas ? kSigmas : 0) |
                                         (head.has_interpolated ? kInterpolated : 0)));
   append(out, static_cast<std::uint8_t>(head.step_bits));
@@ -91,14 +91,15 @@ void write_grid_head(const GridHead& head, const Bytes& tables, Bytes& out) {
   } else {
     append(out, head.key);
   }
+}
+
+void write_grid_head(const GridHead& head, const Bytes& tables, Bytes& out) {
+  write_grid_fields(head, out);
   append(out, static_cast<std::uint16_t>(tables.size()));
   append_bytes(out, tables);
 }
 
-Result<GridLayout> read_grid_layout(std::span<const std::uint8_t> coded) {
-  GridLayout layout;
-  GridHead& head = layout.head;
-  ByteReader in(coded);
+Status read_grid_fields(ByteReader& in, GridHead& head) {
   const auto flags = in.read<std::uint8_t>();
   head.is_key = (flags & kKey) != 0;
   head.has_sigmas = (flags & kSigmas) != 0;
@@ -125,10 +126,18 @@ Result<GridLayout> read_grid_layout(std::span<const std::uint8_t> coded) {
       head.slice_lines < 1 || head.slice_lines > head.lines || head.step_bits > kMostStepBits)
     return Error{"grid has a size out of bounds"};
   if (head.is_key) {
-    if (auto status = read_calibration(in, head); !status) return status.error();
+    if (auto status = read_calibration(in, head); !status) return status;
   } else {
     head.key = in.read<std::uint32_t>();
   }
+  return {};
+}
+
+Result<GridLayout> read_grid_layout(std::span<const std::uint8_t> coded) {
+  GridLayout layout;
+  GridHead& head = layout.head;
+  ByteReader in(coded);
+  if (auto status = read_grid_fields(in, head); !status) return status.error();
   layout.tables = in.take(in.read<std::uint16_t>());
   const int slices = (head.lines + head.slice_lines - 1) / head.slice_lines;
   const auto sizes = in.take(static_cast<std::uint64_t>(slices) * 4);
@@ -147,6 +156,11 @@ Result<GridHead> read_grid_head(std::span<const std::uint8_t> coded) {
   auto layout = read_grid_layout(coded);
   if (!layout) return layout.error();
   return layout->head;
+}
+
+std::size_t least_grid_bytes(const StripeGrid& grid) {
+  const auto places = static_cast<std::uint64_t>(grid.boundaries) * static_cast<std::uint64_t>(grid.lines);
+  return std::max<std::size_t>(grid.vertices / kMostGridVerticesPerByte + 1, places / kMostPlacesPerByte + 1);
 }
 
 GridId grid_id(std::span<const std::uint8_t> coded) {

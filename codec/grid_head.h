@@ -4,9 +4,15 @@
 
 #include <span>
 
+#include "codec/byte_io.h"
 #include "codec/grid_coder.h"
 
 namespace relievo {
+
+/// What codecs 2 and 3 begin, or end, with: sizes, prediction, calibration or the key grid's id.
+void write_grid_fields(const GridHead& head, Bytes& out);
+/// Any bytes.
+Status read_grid_fields(ByteReader& in, GridHead& head);
 
 /// `tables`: the alphabets' levels.
 void write_grid_head(const GridHead& head, const Bytes& tables, Bytes& out);

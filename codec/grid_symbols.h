@@ -29,6 +29,9 @@ constexpr std::uint8_t kFirstSize = 1;  // what is taken for the sizes above a s
 
 constexpr int kSigmaTables = 5;
 constexpr int kFirstSigma = 32;  // code, before the first vertex of a slice
+constexpr int kMostSigma = 63;
+
+constexpr std::int32_t kMostPixels = 1 << 14;  // of a column, on both sides
 
 // Residuals: zigzag, one symbol each up to kDirect, then by the number of bits, which follow in the slice's
 // raw bits.
@@ -128,6 +131,23 @@ inline int corners_of(const std::uint8_t* above, const std::uint8_t* below, int 
     for (int c = 0; c < 4; ++c)
       if (there[c] == 0) lack = c;
   return count;
+}
+
+/// What a cell of so many corners (3 or 4) holds, as a symbol: 0 as many triangles as there can be, 1 none,
+/// 2 + c one, the one without corner c.
+inline int cell_symbol(std::uint8_t cell, int corners) {
+  if (cell == 0) return 1;
+  if (corners == 3 || cell == grid_cell::kStraight || cell == grid_cell::kTurned) return 0;
+  return 2 + std::countr_zero(cell);
+}
+inline std::uint32_t triangles_of(int symbol, int corners) {
+  return symbol == 1 ? 0U : symbol == 0 && corners == 4 ? 2U : 1U;
+}
+/// The reverse; `lack` as corners_of() has it.
+inline std::uint8_t cell_of(int symbol, int corners, int lack) {
+  if (symbol == 1) return 0;
+  if (corners == 3) return static_cast<std::uint8_t>(1U << lack);
+  return symbol == 0 ? kBoth : static_cast<std::uint8_t>(1U << (symbol - 2));
 }
 
 }  // namespace relievo::grid

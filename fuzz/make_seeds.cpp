@@ -34,7 +34,7 @@ void write(const fs::path& file, const Bytes& bytes) {
 
 /// Each vector, those to be refused too, and each sequence of frames that build on one another.
 void frames(const fs::path& conformance, const fs::path& out) {
-  for (const char* folder : {"frame_v1", "grid_v1"}) {
+  for (const char* folder : {"frame_v1", "grid_v1", "draco_grid_v1"}) {
     for (const auto& entry : fs::directory_iterator(conformance / folder))
       if (entry.path().extension() == ".rlv")
         write(out / (std::string(folder) + "_" + entry.path().filename().string()), read(entry.path()));

@@ -323,17 +323,20 @@ Command serve_command() {
                        "coarser than asked for where it needs that, and fine again")
             ->type_name("BITS")
             ->check(bit_rate());
-        app.add_option("--geometry", f->geometry,
-                       "How the surface is sent: grid (default: as measured, for relievo's own receivers), "
-                       "metric (the same estimated from all frames so far: smaller and exacter), visual (the "
-                       "smallest, within --bound) or draco-mesh (for any receiver)")
+        app.add_option(
+               "--geometry", f->geometry,
+               "How the surface is sent: grid (default: as measured, for relievo's own receivers), "
+               "metric (the same estimated from all frames so far: smaller and exacter), visual (the "
+               "smallest, within --bound), draco-grid (as grid, in Draco's point clouds) or draco-mesh "
+               "(for any receiver)")
             ->check([](const std::string& name) {
               EncodeOptions unused;
               return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
             })
             ->type_name("NAME");
-        app.add_option("--step-bits", f->step_bits,
-                       "Of grid and metric: columns are sent in steps of 1/2^N pixel (default 6: 1/64)")
+        app.add_option(
+               "--step-bits", f->step_bits,
+               "Of grid, metric and draco-grid: columns are sent in steps of 1/2^N pixel (default 6: 1/64)")
             ->check(CLI::Range(0, 8))
             ->type_name("N");
         app.add_option("--bound", f->bound_px,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frozen frames of geometry codec 2 (tests/conformance/grid_v1), which the viewer's decoder reads too: what
-// was once written stays readable, and means the same.
+// Frozen frames of geometry codecs 2 and 3 (tests/conformance/grid_v1, draco_grid_v1), which the viewer's
+// decoder reads too: what was once written stays readable, and means the same.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,30 +15,34 @@ namespace relievo {
 namespace {
 
 using nlohmann::json;
-const std::string kFolder = RELIEVO_GRID_VECTORS;
+struct Folder {
+  std::string name;
+  std::size_t sequences, refused;
 
-Bytes read_file(const std::string& name) {
-  std::ifstream in(kFolder + "/" + name, std::ios::binary);
-  return Bytes(std::istreambuf_iterator<char>(in), {});
-}
+  Bytes read(const std::string& file) const {
+    std::ifstream in(std::string(RELIEVO_CONFORMANCE) + "/" + name + "/" + file, std::ios::binary);
+    return Bytes(std::istreambuf_iterator<char>(in), {});
+  }
+  json expected() const { return json::parse(read("expected.json")); }
+};
 
-json expected() {
-  std::ifstream in(kFolder + "/expected.json");
-  return json::parse(in);
-}
+class GridVectors : public testing::TestWithParam<Folder> {};
+INSTANTIATE_TEST_SUITE_P(Codecs, GridVectors,
+                         testing::Values(Folder{"grid_v1", 8, 12}, Folder{"draco_grid_v1", 7, 14}),
+                         [](const auto& test) { return test.param.name; });
 
 std::uint32_t add(std::uint32_t hash, std::uint32_t value) {
   return (hash ^ value) * 16777619U;
 }
 
-TEST(GridVectors, AreReadAsTheyWereMeant) {
-  const json vectors = expected();
-  ASSERT_EQ(vectors["sequences"].size(), 8U);
+TEST_P(GridVectors, AreReadAsTheyWereMeant) {
+  const json vectors = GetParam().expected();
+  ASSERT_EQ(vectors["sequences"].size(), GetParam().sequences);
   for (const json& sequence : vectors["sequences"]) {
     FrameDecoder decoder;
     for (const json& wanted : sequence) {
       SCOPED_TRACE(wanted["file"].get<std::string>());
-      const Bytes bytes = read_file(wanted["file"]);
+      const Bytes bytes = GetParam().read(wanted["file"]);
       EXPECT_EQ(is_key_frame(bytes), wanted["key"].get<bool>());
       const auto frame = decoder.decode(bytes);
       ASSERT_TRUE(frame) << frame.error().message;
@@ -85,11 +89,11 @@ TEST(GridVectors, AreReadAsTheyWereMeant) {
   }
 }
 
-TEST(GridVectors, OthersAreRefused) {
-  const json vectors = expected();
-  ASSERT_EQ(vectors["refused"].size(), 12U);
+TEST_P(GridVectors, OthersAreRefused) {
+  const json vectors = GetParam().expected();
+  ASSERT_EQ(vectors["refused"].size(), GetParam().refused);
   for (const json& file : vectors["refused"]) {
-    const Bytes bytes = read_file(file);
+    const Bytes bytes = GetParam().read(file);
     EXPECT_GT(bytes.size(), 64U) << file;
     EXPECT_FALSE(decode_frame(bytes).ok()) << file;
   }

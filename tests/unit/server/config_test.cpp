@@ -268,7 +268,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"speed_over", "draco_speed = 10", "draco_speed must be a whole number from 0 to 9"},
         Wrong{"speed_huge", "draco_speed = 4294967297", "draco_speed must be a whole number"},
         Wrong{"geometry_unknown", "geometry = \"mesh\"",
-              "geometry must be grid, metric, visual or draco-mesh in quotes"},
+              "geometry must be grid, metric, visual, draco-grid or draco-mesh in quotes"},
         Wrong{"steps_over", "step_bits = 9", "step_bits must be a whole number from 0 to 8"},
         Wrong{"bound_over", "bound = 9", "bound must be a number of pixels from 0.01 to 8"},
         Wrong{"keys_none", "key_interval = 0", "key_interval must be a whole number from 1 to 1000"},

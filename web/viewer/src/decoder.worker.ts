@@ -2,7 +2,7 @@
 // Decodes frames off the main thread, one after the other.
 import wasmUrl from 'draco3d/draco_decoder.wasm?url';
 import { DracoDecoder, type Geometry } from './draco';
-import { kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
+import { kGeometryDracoGrid, kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
 import { GridFrames } from './grid';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
@@ -75,6 +75,7 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
 /** Of a grid the quality is there with the positions; of Draco it is decoded where it is wanted. */
 function decodeGeometry(draco: DracoDecoder, frame: Frame, wantQuality: boolean): Geometry & { quality: VertexQuality | null } {
   if (frame.geometryCodec === kGeometryGrid) return { normals: null, ...grids.decode(frame) };
+  if (frame.geometryCodec === kGeometryDracoGrid) return { normals: null, ...grids.decodeInDraco(frame, draco) };
   const geometry = draco.decode(frame);
   const told = wantQuality && frame.quality.length > 0 && geometry.coordinates !== null;
   return { ...geometry, quality: told ? decodeVertexQuality(frame.quality, geometry.coordinates!) : null };

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Geometry codec 1 of codec/FORMAT.md, with Google's decoder compiled to WebAssembly. Runs in the worker.
+// Geometry codec 1 of codec/FORMAT.md, and the lists of numbers of codec 3, with Google's decoder compiled to WebAssembly.
+// Runs in the worker.
 import createDecoder from 'draco3d/draco_decoder_nodejs.js';
 import { kGeometryDraco, type Frame } from './frame';
-import type { Attribute, Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d';
+import type { Attribute, DataType, Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d';
 
 export interface Geometry {
   positions: Float32Array<ArrayBuffer>; // xyz a vertex
@@ -15,6 +16,10 @@ export interface Geometry {
 interface DecoderWithArrays extends Decoder {
   DecodeArrayToMesh(data: Uint8Array, size: number, mesh: Mesh): { ok(): boolean; error_msg(): string };
   DecodeArrayToPointCloud(data: Uint8Array, size: number, cloud: PointCloud): { ok(): boolean; error_msg(): string };
+}
+
+interface AttributeWithType extends Attribute {
+  data_type(): DataType;
 }
 
 export class DracoDecoder {
@@ -68,6 +73,39 @@ export class DracoDecoder {
       };
     } finally {
       m.destroy(mesh);
+      m.destroy(decoder);
+    }
+  }
+
+  /**
+   * Lists of whole numbers, all of a length: a point cloud with a generic attribute of one component for each. Throws where
+   * it is anything else. Any input.
+   */
+  numbers(bytes: Uint8Array, length: { exactly: number } | { atMost: number }, lists: number): Int32Array[] {
+    const declared = declaredCounts(bytes);
+    const count = declared.vertices;
+    const fits = 'exactly' in length ? count === length.exactly : count <= length.atMost;
+    if (declared.triangles > 0 || count === 0 || !fits) throw new Error('geometry has a list of a wrong length');
+    const m = this.module;
+    const decoder = new m.Decoder() as DecoderWithArrays;
+    const cloud = new m.PointCloud();
+    try {
+      const status = decoder.DecodeArrayToPointCloud(bytes, bytes.length, cloud);
+      if (!status.ok()) throw new Error(`geometry cannot be decoded: ${status.error_msg()}`);
+      if (cloud.num_points() !== count || cloud.num_attributes() !== lists) {
+        throw new Error('geometry does not hold the lists that the format asks for');
+      }
+      return Array.from({ length: lists }, (_, i) => {
+        const attribute = decoder.GetAttribute(cloud, i) as AttributeWithType;
+        if (attribute.num_components() !== 1 || attribute.data_type() !== m.DT_INT32) {
+          throw new Error('geometry has an attribute of a wrong shape');
+        }
+        const at = this.reserve(count * 4);
+        decoder.GetAttributeDataArrayForAllPoints(cloud, attribute, m.DT_INT32, count * 4, at);
+        return new Int32Array(m.HEAPF32.buffer, at, count).slice();
+      });
+    } finally {
+      m.destroy(cloud);
       m.destroy(decoder);
     }
   }

@@ -26,7 +26,7 @@ export interface Frame {
 
 export const kGeometryDraco = 1;
 export const kGeometryGrid = 2;
-const kGeometryDracoGrid = 3;
+export const kGeometryDracoGrid = 3;
 export const kTextureJpeg = 1;
 export const kTextureWebp = 2;
 export const kTexturePng = 3;

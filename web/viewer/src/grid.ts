@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Geometry codec 2 of codec/FORMAT.md, frame after frame. Runs in the worker.
+// Geometry codecs 2 and 3 of codec/FORMAT.md, frame after frame. Runs in the worker.
+import type { DracoDecoder } from './draco';
+import { decodeDracoGrid } from './dracoGrid';
 import { kTextureH264, type Frame } from './frame';
 import { decodeGrid, type KeyGrid } from './gridDecoder';
-import { gridId } from './gridHead';
+import { gridId, type GridFields } from './gridHead';
 import { GridPoints, type GridSurface } from './gridPoints';
 import { videoTextureIsKey } from './videoTexture';
 
@@ -15,23 +17,38 @@ export class GridFrames {
   /** Throws where the geometry is not what the frame's header declares, or its key frame was not received. Any input. */
   decode(frame: Frame): GridSurface {
     const { vertices, triangles } = frame.header;
-    if (vertices === 0) {
-      const none = new Float32Array(0);
-      return { positions: none, coordinates: new Float32Array(0), triangles: new Uint32Array(0), quality: null };
-    }
+    if (vertices === 0) return emptySurface();
     const { head, grid } = decodeGrid(frame.geometry, vertices, triangles, this.key);
     const isDelta = !head.isKey || (frame.textureCodec === kTextureH264 && !videoTextureIsKey(frame.texture));
     if (isDelta === frame.isKey) throw new Error('frame and geometry do not agree whether this is a key frame');
-    if (head.calibration !== null) {
-      this.key = { id: gridId(frame.geometry), grid };
-      const bytes = head.calibrationBytes;
-      const same = bytes.length === this.calibrationBytes.length && bytes.every((b, i) => b === this.calibrationBytes[i]);
-      if (!same || this.points === null) {
-        this.points = new GridPoints(head.calibration);
-        this.calibrationBytes = bytes.slice();
-      }
-    }
-    if (this.points === null) throw new Error('geometry has no calibration');
-    return this.points.toSurface(grid);
+    const points = this.use(head);
+    if (head.isKey) this.key = { id: gridId(frame.geometry), grid };
+    if (points === null) throw new Error('geometry has no calibration');
+    return points.toSurface(grid);
   }
+
+  /** The same of codec 3. */
+  decodeInDraco(frame: Frame, draco: DracoDecoder): GridSurface {
+    const { vertices, triangles } = frame.header;
+    if (vertices === 0) return emptySurface();
+    const { head, grid } = decodeDracoGrid(frame.geometry, vertices, triangles, draco);
+    return this.use(head)!.toSurface(grid);
+  }
+
+  /** The points of the calibration from now on: that of the head, where it has one. */
+  private use({ calibration, calibrationBytes: bytes }: GridFields): GridPoints | null {
+    if (calibration === null) return this.points;
+    const same = bytes.length === this.calibrationBytes.length && bytes.every((b, i) => b === this.calibrationBytes[i]);
+    if (!same || this.points === null) {
+      this.points = new GridPoints(calibration);
+      this.calibrationBytes = bytes.slice();
+      this.key = null; // it has the calibration of before
+    }
+    return this.points;
+  }
+}
+
+function emptySurface(): GridSurface {
+  const none = new Float32Array(0);
+  return { positions: none, coordinates: new Float32Array(0), triangles: new Uint32Array(0), quality: null };
 }

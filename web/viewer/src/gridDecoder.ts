@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The stripe grid from its bytes: codec/FORMAT.md, "Geometry codec 2". The same steps as codec/grid_decoder.cpp.
-import { readGridHead, type GridHead } from './gridHead';
+import { readGridHead, type GridFields, type GridHead } from './gridHead';
 import { BitReader, Decoder, readFirstFrequency, readLevels, tableOf, type Table } from './rans';
 
 export const kAbsent = -(1 << 30);
 export const kMargin = 8;
-const kMostPixels = 1 << 14;
+export const kMostPixels = 1 << 14;
 
 /** A cell with both triangles: on the diagonal from corner 0 to 2, or from 1 to 3. Else bit c: the one without corner c. */
 export const kStraight = 10;
 export const kTurned = 5;
-const kBoth = 255;
+export const kBoth = 255;
 
 const kPlaceTables = 32;
 const kBlockTable = kPlaceTables;
@@ -24,7 +24,7 @@ const kAlone = 7;
 const kFirstSize = 1;
 const kLargestSize = 60;
 const kSigmaTables = 5;
-const kFirstSigma = 32;
+export const kFirstSigma = 32;
 const kDirect = 48;
 
 export interface Grid {
@@ -45,7 +45,7 @@ export interface KeyGrid {
   grid: Grid;
 }
 
-const damaged = (): Error => new Error('geometry is damaged');
+export const damaged = (): Error => new Error('geometry is damaged');
 
 interface Tables {
   first: Uint16Array; // of alphabets of two
@@ -375,7 +375,8 @@ class Slice {
   }
 }
 
-function chooseDiagonals(grid: Grid, spacing: number): void {
+/** Of the cells with both triangles. */
+export function chooseDiagonals(grid: Grid, spacing: number): void {
   const { columns, cells, stride } = grid;
   for (let line = 0; line + 1 < grid.lines; ++line) {
     const above = line * stride + kMargin;
@@ -392,6 +393,24 @@ function chooseDiagonals(grid: Grid, spacing: number): void {
 const kTrianglesOf = Uint8Array.from({ length: 256 }, (_, cell) =>
   cell === kBoth ? 2 : (cell & 1) + ((cell >> 1) & 1) + ((cell >> 2) & 1) + ((cell >> 3) & 1),
 );
+
+/** Of that size, with nothing in it. */
+export function emptyGrid({ boundaries, lines, stepBits, hasSigmas, hasInterpolated }: GridFields): Grid {
+  const stride = ((boundaries + 7) >> 3) * 8 + 2 * kMargin;
+  const size = lines * stride + kMargin;
+  return {
+    boundaries,
+    lines,
+    stepBits,
+    stride,
+    columns: new Int32Array(size).fill(kAbsent),
+    cells: new Uint8Array(size),
+    sigmas: hasSigmas ? new Uint8Array(size) : null,
+    interpolated: hasInterpolated ? new Uint8Array(size) : null,
+    vertices: 0,
+    triangles: 0,
+  };
+}
 
 /** Fails unless the grid holds what the frame declares, less where slices are lost. Any input. */
 export function decodeGrid(
@@ -414,20 +433,8 @@ export function decodeGrid(
     throw new Error('geometry is not of the size that the frame declares');
   }
   const tables = readTables(head.tables, head.hasSigmas);
-  const stride = ((boundaries + 7) >> 3) * 8 + 2 * kMargin;
-  const size = lines * stride + kMargin;
-  const grid: Grid = {
-    boundaries,
-    lines,
-    stepBits,
-    stride,
-    columns: new Int32Array(size).fill(kAbsent),
-    cells: new Uint8Array(size),
-    sigmas: head.hasSigmas ? new Uint8Array(size) : null,
-    interpolated: head.hasInterpolated ? new Uint8Array(size) : null,
-    vertices: 0,
-    triangles: 0,
-  };
+  const grid = emptyGrid(head);
+  const { stride } = grid;
   slices.forEach((slice, s) => {
     const begin = s * head.sliceLines;
     if (slice !== null) {

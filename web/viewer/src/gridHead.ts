@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The head of a coded grid: codec/FORMAT.md, "Geometry codec 2". Pure.
+// The head of a coded grid: codec/FORMAT.md, "Geometry codec 2"; codec 3 has most of it. Pure.
 import type { Lens } from './lens';
 
 export interface Calibration {
@@ -11,7 +11,8 @@ export interface Calibration {
   stripes: number;
 }
 
-export interface GridHead {
+/** What codecs 2 and 3 share. */
+export interface GridFields {
   isKey: boolean;
   hasSigmas: boolean;
   hasInterpolated: boolean;
@@ -28,6 +29,9 @@ export interface GridHead {
   key: number; // of a delta grid: the id of the key grid it builds on
   calibration: Calibration | null; // of a key grid
   calibrationBytes: Uint8Array; // the same as sent
+}
+
+export interface GridHead extends GridFields {
   tables: Uint8Array;
   slices: Uint8Array[]; // empty: lost
 }
@@ -36,7 +40,7 @@ const kMostPlaces = 16384;
 const kMostGridPlaces = 2 ** 24;
 const kMostPlacesPerByte = 4096;
 
-class Reader {
+export class Reader {
   at = 0;
   private readonly view: DataView;
   constructor(private readonly bytes: Uint8Array) {
@@ -56,6 +60,10 @@ class Reader {
   take(size: number): Uint8Array {
     const at = this.next(size);
     return this.bytes.subarray(at, at + size);
+  }
+  /** What was read from `at` on. */
+  since(at: number): Uint8Array {
+    return this.bytes.subarray(at, this.at);
   }
 }
 
@@ -96,9 +104,8 @@ function readCalibration(in_: Reader, boundaries: number, lines: number): Calibr
   return { lineStep, camera, projector, rotation, translation, stripes: boundaries + 1 };
 }
 
-/** Throws an Error that says what is wrong; any input. */
-export function readGridHead(bytes: Uint8Array): GridHead {
-  const in_ = new Reader(bytes);
+/** Throws an Error that says what is wrong; any input. `sectionBytes`: of the whole geometry. */
+export function readGridFields(in_: Reader, sectionBytes: number): GridFields {
   const flags = in_.u8();
   if (flags > 7) throw new Error('geometry has flags that this viewer does not know');
   const isKey = (flags & 1) !== 0;
@@ -120,18 +127,13 @@ export function readGridHead(bytes: Uint8Array): GridHead {
     sliceLines <= lines &&
     stepBits <= 8;
   const places = boundaries * lines;
-  if (!sized || places > kMostGridPlaces || places > kMostPlacesPerByte * bytes.length) {
+  if (!sized || places > kMostGridPlaces || places > kMostPlacesPerByte * sectionBytes) {
     throw new Error('geometry has a size out of bounds');
   }
   const calibrationAt = in_.at;
   const calibration = isKey ? readCalibration(in_, boundaries, lines) : null;
-  const calibrationBytes = bytes.subarray(calibrationAt, in_.at);
+  const calibrationBytes = in_.since(calibrationAt);
   const key = isKey ? 0 : in_.u32();
-  const tables = in_.take(in_.u16());
-  const count = Math.ceil(lines / sliceLines);
-  const sizes = Array.from({ length: count }, () => in_.u32());
-  const slices = sizes.map((size) => in_.take(size));
-  if (bytes.subarray(in_.at).some((b) => b !== 0)) throw new Error('geometry has bytes behind its end');
   return {
     isKey,
     hasSigmas: (flags & 2) !== 0,
@@ -149,9 +151,19 @@ export function readGridHead(bytes: Uint8Array): GridHead {
     key,
     calibration,
     calibrationBytes,
-    tables,
-    slices,
   };
+}
+
+/** Throws an Error that says what is wrong; any input. */
+export function readGridHead(bytes: Uint8Array): GridHead {
+  const in_ = new Reader(bytes);
+  const fields = readGridFields(in_, bytes.length);
+  const tables = in_.take(in_.u16());
+  const count = Math.ceil(fields.lines / fields.sliceLines);
+  const sizes = Array.from({ length: count }, () => in_.u32());
+  const slices = sizes.map((size) => in_.take(size));
+  if (bytes.subarray(in_.at).some((b) => b !== 0)) throw new Error('geometry has bytes behind its end');
+  return { ...fields, tables, slices };
 }
 
 /** Names a key grid: a hash of its coded bytes. */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What became of the last frames: where their time went, and what their bytes are. Pure: every time is given, in ms.
-import { kGeometryDraco, kGeometryGrid, kTextureJpeg, parseFrame } from './frame';
+import { kGeometryDraco, kGeometryDracoGrid, kGeometryGrid, kTextureJpeg, parseFrame } from './frame';
 import type { FramePrefix } from './protocol';
 
 export const kStages = ['server', 'gateway', 'network', 'decode', 'draw'] as const;
@@ -75,7 +75,7 @@ export class Journal {
   }
 }
 
-const kGeometry: Record<number, string> = { [kGeometryDraco]: 'Draco', [kGeometryGrid]: 'stripe grid' };
+const kGeometry: Record<number, string> = { [kGeometryDraco]: 'Draco', [kGeometryGrid]: 'stripe grid', [kGeometryDracoGrid]: 'stripe grid in Draco' };
 const kTexture: Record<number, string> = { [kTextureJpeg]: 'JPEG', 2: 'WebP', 3: 'PNG', 4: 'H.264' }; // codec/FORMAT.md
 
 function codecNames(geometry: number, texture: number): string {
