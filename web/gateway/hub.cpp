@@ -79,6 +79,8 @@ void Hub::publish(const std::string& stream, const FrameMessage& frame) {
   if (it == streams_.end() || !it->second->live || !frame.data) return;
   Entry& entry = *it->second;
   ++entry.facts.published;
+  entry.facts.published_after.add(seconds(frame.publish_time_ns - frame.capture_time_ns));
+  entry.facts.here_after.add(seconds(utc_now_ns() - frame.capture_time_ns));
   // Lost on its way here: what builds on it is of no use to anybody.
   const bool has_gap = entry.latest && frame.sequence != entry.latest->sequence + 1;
   const bool is_broken = has_gap && builds_on(frame) == BuildsOn::kFrameBefore;
@@ -205,12 +207,13 @@ std::optional<Hub::Delivery> Hub::take(Watcher& watcher, bool want_frame) {
   return std::nullopt;
 }
 
-void Hub::count_sent(const Watcher& watcher, std::size_t bytes) {
+void Hub::count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t capture_time_ns) {
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(watcher.stream);
   if (it == streams_.end()) return;
   ++it->second->facts.sent;
   it->second->facts.sent_bytes += bytes;
+  it->second->facts.sent_after.add(seconds(utc_now_ns() - capture_time_ns));
 }
 
 std::vector<StreamSnapshot> Hub::snapshot() const {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/stream.h"
+#include "web/gateway/histogram.h"
 
 namespace relievo {
 
@@ -27,6 +28,8 @@ struct StreamSnapshot {
   std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
   std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
+  // From the capture of each frame until it was published, was here, and was handed to a client's connection.
+  Histogram published_after, here_after, sent_after;
 };
 
 /// Every function may be called from any thread and returns without waiting for a client.
@@ -61,7 +64,7 @@ class Hub {
   /// The next thing to send, `want_frame` saying whether a frame may be among it; nothing where there is
   /// none, and then the watcher will be woken.
   std::optional<Delivery> take(Watcher& watcher, bool want_frame);
-  void count_sent(const Watcher& watcher, std::size_t bytes);
+  void count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t capture_time_ns);
 
   std::vector<StreamSnapshot> snapshot() const;  // announced streams, by name
   const std::string& empty_hint() const { return empty_hint_; }

@@ -143,15 +143,60 @@ HttpReply page(std::string_view path, const HttpRequest& request) {
   return text(404, "nothing here");
 }
 
-HttpReply route(std::string_view path, const HttpRequest& request, const RouteContext& context) {
-  if (path == "/api/streams") return json(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
-  if (path == "/metrics") {
-    HttpReply reply = text(200, "");
-    reply.content_type = "text/plain; version=0.0.4; charset=utf-8";
-    reply.body = metrics_text(context.hub.snapshot(), context.counts);
-    return reply;
+HttpReply ready(const RouteContext& context) {
+  const std::size_t streams = context.hub.snapshot().size();
+  if (streams == 0) return text(503, "there is no stream yet");
+  return text(200, "ready: " + std::to_string(streams) + (streams == 1 ? " stream" : " streams"));
+}
+
+HttpReply metrics(const RouteContext& context) {
+  HttpReply reply = text(200, "");
+  reply.content_type = "text/plain; version=0.0.4; charset=utf-8";
+  reply.body = metrics_text(context.hub.snapshot(), context.counts);
+  return reply;
+}
+
+/// One address, or, ending in a name in braces, all below it. web/gateway/openapi.json describes each.
+struct Route {
+  std::string_view path;
+  bool needs_token;
+  HttpReply (*answer)(std::string_view name, const HttpRequest& request, const RouteContext& context);
+};
+
+constexpr Route kRoutes[] = {
+    {"/healthz", false, [](auto, auto&, auto&) { return text(200, "ok"); }},
+    {"/readyz", false, [](auto, auto&, const RouteContext& context) { return ready(context); }},
+    {"/metrics", true, [](auto, auto&, const RouteContext& context) { return metrics(context); }},
+    {"/api/streams", true,
+     [](auto, auto&, const RouteContext& context) {
+       return json(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
+     }},
+    {"/api/openapi.json", true, [](auto, auto&, auto&) { return json(std::string(openapi_document())); }},
+    {"/ws/{stream}", true,
+     [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
+       return websocket(request, std::string(name), context);
+     }},
+};
+
+/// What `path` has in place of the braces, empty where there are none; nothing where the route is another's.
+std::optional<std::string_view> match(const Route& route, std::string_view path) {
+  const auto brace = route.path.find('{');
+  if (brace == std::string_view::npos) return path == route.path ? std::optional("") : std::nullopt;
+  const std::string_view before = route.path.substr(0, brace);
+  return path.starts_with(before) ? std::optional(path.substr(before.size())) : std::nullopt;
+}
+
+HttpReply answer_get(const HttpRequest& request, const RouteContext& context) {
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  for (const Route& route : kRoutes) {
+    const auto name = match(route, path);
+    if (!name) continue;
+    if (route.needs_token) {
+      if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
+    }
+    return route.answer(*name, request, context);
   }
-  if (path.substr(0, 4) == "/ws/") return websocket(request, std::string(path.substr(4)), context);
+  if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
   return page(path, request);
 }
 
@@ -181,13 +226,16 @@ HttpReply answer_by_method(const HttpRequest& request, const RouteContext& conte
     reply.headers.emplace_back("Allow", "GET, HEAD");
     return reply;
   }
-  const std::string_view path = request.target.substr(0, request.target.find('?'));
-  if (path == "/healthz") return text(200, "ok");
-  if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
-  return route(path, request, context);
+  return answer_get(request, context);
 }
 
 }  // namespace
+
+std::vector<std::string_view> route_paths() {
+  std::vector<std::string_view> paths;
+  for (const Route& route : kRoutes) paths.push_back(route.path);
+  return paths;
+}
 
 HttpReply answer(const HttpRequest& request, const RouteContext& context) {
   if (context.loopback && !loopback_host(request.host) && !listed_host(request.host, context)) {

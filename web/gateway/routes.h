@@ -53,6 +53,9 @@ struct RouteContext {
 
 HttpReply answer(const HttpRequest& request, const RouteContext& context);
 
+/// Of all but the viewer's files, as in the OpenAPI document: "/ws/{stream}".
+std::vector<std::string_view> route_paths();
+
 /// Headers of every reply (FACTS: a policy that lets the page load only from here, wasm included).
 const std::vector<std::pair<std::string, std::string>>& security_headers();
 

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "web/gateway/sign_in.h"
 
+#include <algorithm>
+#include <string>
+#include <string_view>
+
 namespace relievo {
 namespace {
 

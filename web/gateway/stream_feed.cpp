@@ -28,7 +28,7 @@ class StreamFeed : public WsFeed {
   }
   std::optional<WsOutgoing> next() override;
   void on_sent(const WsOutgoing& message) override {
-    if (message.data) hub_.count_sent(*watcher_, message.data->size());
+    if (message.data) hub_.count_sent(*watcher_, message.data->size(), capture_time_ns_);
   }
 
  private:
@@ -37,6 +37,7 @@ class StreamFeed : public WsFeed {
   std::shared_ptr<Hub::Watcher> watcher_;
   std::deque<std::shared_ptr<const std::string>> replies_;
   int credit_ = 0;
+  std::int64_t capture_time_ns_ = 0;  // of the frame that is being sent
 };
 
 std::optional<WsClose> StreamFeed::on_text(std::string_view text) {
@@ -61,6 +62,7 @@ std::optional<WsOutgoing> StreamFeed::next() {
   if (!delivery) return std::nullopt;
   if (delivery->text) return WsOutgoing{.text = std::move(delivery->text)};
   --credit_;
+  capture_time_ns_ = delivery->frame->capture_time_ns;
   const auto prefix = frame_prefix(*delivery->frame, delivery->drops, utc_now_ns());
   return WsOutgoing{.head = {prefix.begin(), prefix.end()}, .data = delivery->frame->data};
 }

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/time.h"
 #include "tests/unit/web/gateway_fixture.h"
 #include "web/gateway/routes.h"
 
@@ -89,6 +90,29 @@ TEST_F(GatewayHttp, MetricsCount) {
   EXPECT_EQ(metric("relievo_stream_state{stream=\"face\",state=\"running\"}"), 1);
   EXPECT_EQ(metric("relievo_stream_state{stream=\"face\",state=\"ended\"}"), 0);
   EXPECT_DOUBLE_EQ(metric("relievo_stream_latency_seconds{stream=\"face\"}"), 0.04);
+}
+
+TEST_F(GatewayHttp, LatenciesAreHistograms) {
+  gateway->announce(make_info());
+  WsClient client(port, "face");
+  client.credit(1);
+  FrameMessage frame = make_frame(0);
+  frame.capture_time_ns = utc_now_ns() - 3'500'000'000;
+  frame.publish_time_ns = frame.capture_time_ns + 25'000'000;
+  gateway->publish("face", frame);
+  ASSERT_TRUE(client.next_of("frame"));
+  const auto value = [&](const std::string& name, const std::string& until, const std::string& more) {
+    return metric("relievo_gateway_latency_seconds_" + name + "{stream=\"face\",until=\"" + until + "\"" +
+                  more + "}");
+  };
+  EXPECT_EQ(value("bucket", "published", ",le=\"0.02\""), 0);
+  EXPECT_EQ(value("bucket", "published", ",le=\"0.03\""), 1);
+  EXPECT_EQ(value("bucket", "published", ",le=\"+Inf\""), 1);
+  EXPECT_DOUBLE_EQ(value("sum", "published", ""), 0.025);
+  EXPECT_EQ(value("bucket", "here", ",le=\"2\""), 0);
+  EXPECT_GE(value("sum", "here", ""), 3.5);
+  EXPECT_TRUE(eventually([&] { return value("count", "sent", "") == 1; }));
+  EXPECT_GE(value("sum", "sent", ""), value("sum", "here", ""));
 }
 
 TEST_F(GatewayHttp, UnknownPathsAndTraversalAreNotFound) {
