@@ -137,10 +137,10 @@ class Walk {
   }
 
   bool add_chunk(const Extent& record) {
-    const auto chunk = chunk_at(record);
+    auto chunk = chunk_at(record);
     if (!chunk) return false;
     if (const auto records = read_chunk_records(file_, *chunk)) {
-      count(*records);
+      count(*records, *chunk);
     } else if (!goes_on_at(record.end())) {
       return false;  // its length is wrong too, it may reach over others
     }
@@ -163,7 +163,9 @@ class Walk {
     return true;
   }
 
-  void count(std::span<const std::uint8_t> records) {
+  /// The chunk's times become those of its messages: no CRC is over what it says of them itself.
+  void count(std::span<const std::uint8_t> records, ChunkIndex& chunk) {
+    bool is_first = true;
     while (!records.empty()) {
       const auto record = take_record(records);
       if (!record) return;
@@ -176,6 +178,9 @@ class Walk {
       const std::uint64_t time = message->first.log_time;
       statistics.start_time = statistics.messages == 0 ? time : std::min(statistics.start_time, time);
       statistics.end_time = std::max(statistics.end_time, time);
+      chunk.start_time = is_first ? time : std::min(chunk.start_time, time);
+      chunk.end_time = is_first ? time : std::max(chunk.end_time, time);
+      is_first = false;
       ++statistics.messages;
       ++counts_[message->first.channel_id];
     }

@@ -163,6 +163,9 @@ class Reader final : public RecordingReader {
       const auto message = mcap::read_message(record->content);
       if (!message || channel_at_[message->first.channel_id] == kNoChannel)
         return unreadable("a message is malformed or of an unknown channel");
+      if (message->first.log_time < chunk.start_time || message->first.log_time > chunk.end_time)
+        return unreadable(
+            "its messages are of other times than the index says: `relievo recover` finds them");
       if (message->first.log_time < from_) continue;
       messages.push_back({message->first.log_time, order_++, shared,
                           static_cast<std::size_t>(record->content.data() - shared->data()),

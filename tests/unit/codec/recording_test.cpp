@@ -13,7 +13,9 @@
 #include <csignal>
 #include <fstream>
 #include <iterator>
+#include <numeric>
 
+#include "codec/byte_io.h"
 #include "codec/mcap_records.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/codec/sample_recording.h"
@@ -333,6 +335,54 @@ TEST(RecordingFault, AnIndexThatLiesIsWithstood) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   EXPECT_LT(usage.ru_maxrss, 500'000) << "kibibytes";
+}
+
+/// Where the contents of the records of that kind begin, outside chunks.
+std::vector<std::size_t> contents_of(const Bytes& file, mcap::Op op) {
+  std::vector<std::size_t> out;
+  std::span<const std::uint8_t> rest = std::span(file).subspan(mcap::kMagic.size());
+  while (const auto record = mcap::take_record(rest))
+    if (record->op == op) out.push_back(static_cast<std::size_t>(record->content.data() - file.data()));
+  return out;
+}
+
+/// Found by the fuzzer: a chunk whose messages are of other times than is said of it made time run backwards.
+TEST(RecordingFault, TimesOfChunksThatLieDoNotMixMessages) {
+  const test::TempFolder folder;
+  constexpr int kMessages = 23;
+  write_sample(folder / "a.mcap", kMessages, 20);
+  const Bytes whole = read_file(folder / "a.mcap");
+  const std::uint64_t late = kStart_ns + 100 * kStep_ns;
+  const auto numbers = [](const ReadBack& back) {
+    std::vector<std::uint32_t> out;
+    for (const auto& m : back.messages) out.push_back(m.sequence);
+    return out;
+  };
+  std::vector<std::uint32_t> all(kMessages);
+  std::iota(all.begin(), all.end(), 0U);
+
+  // What the chunk says itself, where there is no index: its messages know better.
+  Bytes bytes = whole;
+  put(bytes, contents_of(whole, mcap::Op::kChunk).at(1), late);
+  write_file(folder / "chunk.mcap", bytes);
+  const auto walked = RecordingReader::open(folder / "chunk.mcap", {.rebuild_index = true});
+  ASSERT_TRUE(walked.ok());
+  EXPECT_EQ(numbers(read_all(**walked)), all);
+
+  // What the index says: the chunk is left out and named, and found without the index.
+  bytes = whole;
+  std::fill(bytes.end() - 12, bytes.end() - 8, std::uint8_t{0});  // the summary's CRC: none
+  put(bytes, contents_of(whole, mcap::Op::kChunkIndex).at(1), late);
+  write_file(folder / "index.mcap", bytes);
+  const ReadBack back = read_all(*open(folder / "index.mcap"));
+  ASSERT_EQ(back.errors.size(), 1U);
+  EXPECT_NE(back.errors[0].find("relievo recover"), std::string::npos) << back.errors[0];
+  auto found = numbers(back);
+  EXPECT_TRUE(std::ranges::is_sorted(found));
+  EXPECT_EQ(found.size(), all.size() - 5);
+  const auto rebuilt = RecordingReader::open(folder / "index.mcap", {.rebuild_index = true});
+  ASSERT_TRUE(rebuilt.ok());
+  EXPECT_EQ(numbers(read_all(**rebuilt)), all);
 }
 
 TEST(RecordingFault, ACompressedChunkIsRefusedInWords) {
