@@ -9,8 +9,8 @@
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
+#include "cli/size_option.h"
 #include "server/options.h"
-#include "server/size_option.h"
 
 namespace relievo::bench {
 namespace {

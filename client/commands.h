@@ -16,5 +16,6 @@ Command convert_command();
 Command web_command();
 Command keys_command();
 Command doctor_command();
+Command shot_command();
 
 }  // namespace relievo

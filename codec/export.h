@@ -28,7 +28,7 @@ Result<Bytes> encode_glb(const Frame3D& frame, int jpeg_quality = 90);
 /// Wavefront OBJ in glTF's axes; with a texture also NAME.mtl and NAME.png beside it (written first).
 Status write_obj(const std::filesystem::path& path, const Frame3D& frame);
 
-/// RGB or grey picture, 8 bits.
+/// RGB, RGBA or grey picture, 8 bits.
 Status write_png(const std::filesystem::path& path, View8 picture);
 
 }  // namespace relievo

@@ -3,6 +3,7 @@
 
 #include <png.h>
 
+#include <optional>
 #include <string>
 
 namespace relievo {
@@ -22,15 +23,22 @@ constexpr std::size_t kFormatAt = 24;  // of a PNG: bit depth, colour type
 constexpr std::uint8_t kGrey = 0;
 constexpr std::uint8_t kRgb = 2;
 
+std::optional<png_uint_32> format_of(int channels) {
+  if (channels == 1) return PNG_FORMAT_GRAY;
+  if (channels == 3) return PNG_FORMAT_RGB;
+  if (channels == 4) return PNG_FORMAT_RGBA;
+  return std::nullopt;
+}
+
 }  // namespace
 
 Status append_png(View8 picture, PngEffort effort, Bytes& out) {
-  if (picture.empty() || (picture.channels != 3 && picture.channels != 1))
-    return Error{"a picture for a PNG is empty or neither RGB nor grey"};
+  const auto format = picture.empty() ? std::nullopt : format_of(picture.channels);
+  if (!format) return Error{"a picture for a PNG is empty or neither RGB, RGBA nor grey"};
   Header header;
   header.image.width = static_cast<png_uint_32>(picture.width);
   header.image.height = static_cast<png_uint_32>(picture.height);
-  header.image.format = picture.channels == 3 ? PNG_FORMAT_RGB : PNG_FORMAT_GRAY;
+  header.image.format = *format;
   header.image.flags = effort == PngEffort::kFast ? PNG_IMAGE_FLAG_FAST : 0;
   const std::size_t start = out.size();
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(header.image);

@@ -13,7 +13,8 @@ namespace relievo {
 
 enum class PngEffort : std::uint8_t { kFast, kSmall };
 
-/// Appends the PNG of an RGB (3 channels) or grey (1) picture. Deterministic. Any thread.
+/// Appends the PNG of an RGB (3 channels), grey (1) or RGBA (4: no texture, decode_png() refuses it) picture.
+/// Deterministic. Any thread.
 Status append_png(View8 picture, PngEffort effort, Bytes& out);
 
 /// Any bytes. RGB, exactly as encoded. Fails unless the PNG's own header says `width` and `height` (checked

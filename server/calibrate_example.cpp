@@ -14,8 +14,8 @@
 #include "capture/pattern/bcsl.h"
 #include "capture/source/sim/renderer.h"
 #include "cli/progress.h"
+#include "cli/size_option.h"
 #include "server/calibrate_commands.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

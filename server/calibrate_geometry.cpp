@@ -14,11 +14,11 @@
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
 #include "capture/rig_file.h"
+#include "cli/size_option.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
 #include "server/calibrate_views.h"
 #include "server/camera_flags.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

@@ -19,7 +19,7 @@
 #include "capture/calibrate/stripe_stack.h"
 #include "capture/rig_file.h"
 #include "cli/progress.h"
-#include "server/size_option.h"
+#include "cli/size_option.h"
 
 namespace relievo {
 namespace {

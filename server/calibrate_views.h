@@ -11,8 +11,8 @@
 #include "base/result.h"
 #include "base/rig.h"
 #include "capture/calibrate/measure_view.h"
+#include "cli/size_option.h"
 #include "cli/stop_signal.h"
-#include "server/size_option.h"
 
 namespace relievo {
 

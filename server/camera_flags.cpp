@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/checks.h"
-#include "server/size_option.h"
+#include "cli/size_option.h"
 
 namespace relievo {
 namespace {

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "cli/quantities.h"
+#include "cli/size_option.h"
 #include "cli/web_flags.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "server/camera_flags.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

@@ -15,8 +15,8 @@
 #include "capture/calibrate/rig_import.h"
 #include "capture/source/npy.h"
 #include "cli/progress.h"
+#include "cli/size_option.h"
 #include "server/commands.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "cli/size_option.h"
 #include "cli/stop_signal.h"
-#include "server/size_option.h"
 
 namespace CLI {
 class App;

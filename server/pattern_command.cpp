@@ -19,11 +19,11 @@
 #include "capture/pattern/slides.h"
 #include "capture/projector/slide_video.h"
 #include "cli/checks.h"
+#include "cli/size_option.h"
 #include "codec/export.h"
 #include "server/commands.h"
 #include "server/options.h"
 #include "server/pattern_options.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

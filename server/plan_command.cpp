@@ -11,10 +11,10 @@
 #include "capture/plan/plan.h"
 #include "capture/rig_file.h"
 #include "cli/checks.h"
+#include "cli/size_option.h"
 #include "server/commands.h"
 #include "server/options.h"
 #include "server/pattern_options.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

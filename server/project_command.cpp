@@ -17,10 +17,10 @@
 #include "capture/rig_file.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
+#include "cli/size_option.h"
 #include "server/commands.h"
 #include "server/options.h"
 #include "server/pattern_options.h"
-#include "server/size_option.h"
 
 namespace relievo {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/size_option.h"
+#include "cli/size_option.h"
 
 #include <CLI/CLI.hpp>
 #include <charconv>

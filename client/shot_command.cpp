@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+
+#include "base/log.h"
+#include "cli/checks.h"
+#include "cli/progress.h"
+#include "cli/size_option.h"
+#include "client/commands.h"
+#include "client/options.h"
+#include "client/recorded_stream.h"
+#include "client/shot/render.h"
+#include "client/time_range.h"
+#include "codec/export.h"
+#include "codec/frame3d_codec.h"
+#include "idl/cdr.h"
+
+namespace relievo {
+namespace {
+
+struct Options {
+  std::shared_ptr<DomainOptions> domain;
+  std::shared_ptr<RangeOptions> range;
+  std::string input, stream, out;
+  std::string mode = "textured", view = "orbit", background = "white";
+  Orbit orbit;
+  Size size{1280, 720};
+  double wait_s = 10;
+  bool json = false;
+};
+
+const std::map<std::string, Rgba> kBackgrounds{{"white", {255, 255, 255, 255}},
+                                               {"grey", {128, 128, 128, 255}},
+                                               {"black", {0, 0, 0, 255}},
+                                               {"transparent", {0, 0, 0, 0}}};
+
+std::optional<Rgba> parse_background(const std::string& text) {
+  if (const auto named = kBackgrounds.find(text); named != kBackgrounds.end()) return named->second;
+  std::uint32_t rgb = 0;
+  if (text.size() != 7 || text[0] != '#') return std::nullopt;
+  const auto [end, failed] = std::from_chars(text.data() + 1, text.data() + 7, rgb, 16);
+  if (failed != std::errc{} || end != text.data() + 7) return std::nullopt;
+  return Rgba{static_cast<std::uint8_t>(rgb >> 16), static_cast<std::uint8_t>(rgb >> 8 & 255),
+              static_cast<std::uint8_t>(rgb & 255), 255};
+}
+
+/// Draws the frames of one stream alike: eye and colours are chosen by the first one.
+class Camera {
+ public:
+  explicit Camera(const Options& options) : options_(options) {
+    render_.mode = shot_mode_named(options.mode).value_or(ShotMode::kTextured);  // the option is checked
+    render_.background = parse_background(options.background).value_or(Rgba{});
+  }
+
+  Image8 take(const Frame3D& frame, const std::optional<PinholeModel>& rig) {
+    if (!view_) {
+      const auto& [width, height] = options_.size;
+      view_ = options_.view == "rig" && rig
+                  ? rig_view(*rig, width, height)
+                  : orbit_view(extent_of(frame.surface.positions), options_.orbit, width, height);
+      render_.depth = depth_range_of(frame.surface);
+    }
+    return render(frame, *view_, render_);
+  }
+
+  const DepthRange& depth() const { return render_.depth; }
+
+ private:
+  const Options& options_;
+  RenderOptions render_;
+  std::optional<ShotView> view_;
+};
+
+struct Shots {
+  std::uint64_t count = 0;
+  std::string last;  // file
+};
+
+/// One frame: the file itself. Several: a folder of files named after them.
+Status write_shot(const Options& options, bool several, const Frame3D& frame, const Image8& picture,
+                  Shots& shots) {
+  std::filesystem::path file = options.out;
+  if (several) {
+    std::error_code error;
+    if (shots.count == 0) std::filesystem::create_directories(file, error);
+    if (error) return Error{"cannot make the folder " + options.out + ": " + error.message()};
+    char name[48];
+    std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(frame.number));
+    file /= name;
+  }
+  if (auto status = write_png(file, picture.view()); !status) return status;
+  ++shots.count;
+  shots.last = file.string();
+  return {};
+}
+
+Result<std::optional<PinholeModel>> recorded_camera(RecordedStream& recorded) {
+  const auto sample = recorded.find_info();
+  if (!sample) return sample.error();
+  if (!*sample) return std::optional<PinholeModel>();
+  const auto info = read_info_cdr((*sample)->cdr);
+  return info ? std::optional(info->rig.camera) : std::nullopt;
+}
+
+Result<Shots> of_recording(const Options& options, Camera& camera, StopSignal& stop) {
+  auto recorded = RecordedStream::open(options.input, options.stream);
+  if (!recorded) return recorded.error();
+  const auto range = find_range(*options.range, *recorded);
+  if (!range) return range.error().in(options.input);
+  const auto rig = recorded_camera(*recorded);
+  if (!rig) return rig.error();
+  if (options.view == "rig" && !*rig)
+    return Error{options.input + " says nothing of the rig's camera: use --view orbit"};
+  if (auto status = recorded->seek(range->from_ns); !status) return status.error();
+
+  const bool several = !options.out.ends_with(".png");
+  Progress progress("shot", "frames", several ? range->frames : 1);
+  FrameDecoder decoder;
+  Shots shots;
+  while (!stop.stopped() && (several || shots.count == 0)) {
+    auto sample = recorded->next();
+    if (!sample) return sample.error();
+    if (!*sample || (*sample)->receive_time_ns > range->to_ns) break;
+    if ((*sample)->topic != Topic::kFrame) continue;
+    const auto view = read_frame_cdr((*sample)->cdr);
+    if (!view || !decoder.can_decode(view->data)) continue;
+    if ((*sample)->receive_time_ns < range->from_ns) {
+      (void)decoder.remember(view->data);
+      continue;
+    }
+    const auto frame = decoder.decode(view->data);
+    if (!frame) {
+      log_warning("a frame is left out: " + frame.error().message);
+      continue;
+    }
+    if (auto status = write_shot(options, several, *frame, camera.take(*frame, *rig), shots); !status)
+      return status.error();
+    progress.update(shots.count);
+  }
+  if (shots.count == 0 && !stop.stopped())
+    return Error{options.input + ": no frame in that range can be decoded"};
+  return shots;
+}
+
+Result<Shots> of_live(const Options& options, Camera& camera, StopSignal& stop) {
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::optional<PinholeModel> rig;
+  std::optional<Frame3D> taken;
+  FrameDecoder decoder;
+  Subscriber::Callbacks callbacks;
+  callbacks.info = [&](const StreamInfo& info) {
+    std::lock_guard lock(mutex);
+    rig = info.rig.camera;
+  };
+  callbacks.frame = [&](const std::string&, const FrameMessage& message) {
+    std::lock_guard lock(mutex);
+    if (taken || !rig || !decoder.can_decode(*message.data)) return;
+    if (auto frame = decoder.decode(*message.data); frame && !frame->surface.positions.empty()) {
+      taken = *std::move(frame);
+      changed.notify_all();
+    }
+  };
+  auto subscriber = Subscriber::create(*options.domain, options.input, callbacks);
+  if (!subscriber) return subscriber.error();
+  std::unique_lock lock(mutex);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(options.wait_s);
+  while (!taken && !stop.stopped() && std::chrono::steady_clock::now() < end)
+    changed.wait_for(lock, std::chrono::milliseconds(100));
+  lock.unlock();
+  subscriber->reset();
+  Shots shots;
+  if (!taken && stop.stopped()) return shots;
+  if (!taken)
+    return Error{"no frame of a stream '" + options.input + "' came in " + duration_text(options.wait_s) +
+                 ": is its server running? `relievo streams` lists what there is"};
+  if (auto status = write_shot(options, false, *taken, camera.take(*taken, rig), shots); !status)
+    return status.error();
+  return shots;
+}
+
+Status run(const Options& options, StopSignal& stop) {
+  std::error_code ignored;
+  const bool file = std::filesystem::exists(options.input, ignored);
+  if (!file && (!valid_stream_name(options.input) || options.input.ends_with(".mcap")))
+    return Error{"there is no file " + options.input};
+  if (!file && !options.out.ends_with(".png"))
+    return Error{"of a live stream one picture is taken: give --out NAME.png"};
+  Camera camera(options);
+  const auto shots = file ? of_recording(options, camera, stop) : of_live(options, camera, stop);
+  if (!shots) return shots.error();
+  if (options.json) {
+    nlohmann::json j{{"pictures", shots->count}, {"out", options.out}, {"last", shots->last}};
+    if (options.mode == "depth") j["depth_m"] = {camera.depth().from_m, camera.depth().to_m};
+    std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  } else if (shots->count == 1) {
+    std::puts(shots->last.c_str());
+  } else {
+    std::printf("%llu pictures are in %s\n", static_cast<unsigned long long>(shots->count),
+                options.out.c_str());
+  }
+  if (options.mode == "depth" && !options.json)
+    log_info("depth from " + std::to_string(camera.depth().from_m) + " m (yellow) to " +
+             std::to_string(camera.depth().to_m) + " m (violet)");
+  return {};
+}
+
+}  // namespace
+
+Command shot_command() {
+  return {
+      "shot", "Draw a stream or a recording into pictures, without a screen", [](CLI::App& app) {
+        auto o = std::make_shared<Options>();
+        o->domain = add_domain_options(app);
+        app.add_option("input", o->input, "Recording, or live stream")->type_name("FILE|STREAM")->required();
+        app.add_option("--out", o->out,
+                       "NAME.png: one frame; anything else: a folder, a picture a frame of the range")
+            ->type_name("NAME.png|DIR")
+            ->required();
+        app.add_option("--stream", o->stream, "Which stream, where the file holds several")
+            ->type_name("NAME");
+        o->range = add_range_options(app);
+        app.add_option("--mode", o->mode, std::string(shot_mode_names()))
+            ->check([](const std::string& name) {
+              return shot_mode_named(name) ? std::string() : "give " + std::string(shot_mode_names());
+            })
+            ->type_name("NAME")
+            ->capture_default_str();
+        app.add_option("--view", o->view, "orbit, or rig: what the rig's camera sees")
+            ->check(CLI::IsMember({"orbit", "rig"}))
+            ->type_name("NAME")
+            ->capture_default_str();
+        app.add_option("--azimuth", o->orbit.azimuth_deg,
+                       "The eye's, degrees to the right of the rig's camera")
+            ->check(number(-180, 180))
+            ->capture_default_str();
+        app.add_option("--elevation", o->orbit.elevation_deg, "Degrees above it")
+            ->check(number(-89, 89))
+            ->capture_default_str();
+        app.add_option("--zoom", o->orbit.zoom, "2: twice as large")
+            ->check(number(0.05, 100))
+            ->capture_default_str();
+        app.add_option("--fov", o->orbit.fov_deg, "Upright, degrees")
+            ->check(number(5, 120))
+            ->capture_default_str();
+        add_size_option(app, "--size", o->size, "Of the picture, pixels (default 1280x720)");
+        app.add_option("--background", o->background, "white, grey, black, transparent or #RRGGBB")
+            ->check([](const std::string& text) {
+              return parse_background(text) ? "" : "give white, grey, black, transparent or #RRGGBB";
+            })
+            ->type_name("COLOUR")
+            ->capture_default_str();
+        app.add_option("--wait", o->wait_s, "Seconds to wait for a live stream")
+            ->check(number(0, 1e9))
+            ->capture_default_str();
+        app.add_flag("--json", o->json, "Print the result as JSON");
+        app.footer(
+            "Examples:\n  relievo shot face --out face.png\n"
+            "  relievo shot face.mcap --from 3 --mode shaded --azimuth -30 --out face.png\n"
+            "  relievo shot face.mcap --view rig --background transparent --out frames");
+        return [o](StopSignal& stop) { return run(*o, stop); };
+      }};
+}
+
+}  // namespace relievo
