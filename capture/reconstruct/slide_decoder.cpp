@@ -8,6 +8,7 @@
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/grow.h"
 #include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
 #include "capture/reconstruct/readmit.h"
@@ -49,7 +50,9 @@ struct SlideDecoder::State {
                     rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
         instant(p.boundaries(),
                 rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height,
-                1e9 / rig.frame_rate) {}
+                1e9 / rig.frame_rate),
+        growth(rig.colour_matrix, p.boundaries(),
+               rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height) {}
 
   Pattern pattern;
   bool paper;
@@ -66,6 +69,7 @@ struct SlideDecoder::State {
   Continuity continuity;
   Readmission readmission;
   InstantFilter instant;
+  Growth growth;
 
   Observation newer;
   Observation previous;  // the frame before
@@ -250,6 +254,12 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered, pool);
+    if (s.pattern.slides == 2) {
+      const std::size_t grown = s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order)},
+                                              s.result, s.edges, s.recovered);
+      report.filters.recovered += grown;
+      report.matched += grown;
+    }
   }
   s.list(pool, out);
   return true;

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/grow.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace relievo {
+namespace {
+
+constexpr int kLines = 20;
+constexpr int kBoundaries = 8;
+constexpr int kWidth = 160;
+constexpr std::array<double, 9> kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/// Stripes 9 px wide under one slide, all boundaries decoded, in a scene that holds still.
+struct Frame {
+  std::vector<Primary> stripes{1, 2, 4, 3, 5, 6, 1, 4, 2};
+  std::vector<std::array<Primary, 2>> colours;
+  Image8 picture{kWidth, kLines, 3};
+  EdgeImage edges;
+  SequenceResult result;
+  std::vector<RecoveredBoundary> recovered;
+
+  Frame() {
+    for (std::size_t b = 0; b + 1 < stripes.size(); ++b) colours.push_back({stripes[b], stripes[b + 1]});
+    edges.lines = kLines;
+    edges.line_start.push_back(0);
+    for (int line = 0; line < kLines; ++line) {
+      for (int x = 0; x < kWidth; ++x) paint(line, x, stripe_at(x));
+      for (int b = 0; b < kBoundaries; ++b) {
+        Edge edge;
+        edge.column_px = place(b);
+        edges.edges.push_back(edge);
+        result.boundary.push_back(static_cast<std::int16_t>(b));
+        result.still.push_back(1);
+      }
+      edges.line_start.push_back(static_cast<std::uint32_t>(edges.edges.size()));
+    }
+  }
+
+  /// Between the pixels of the two stripes.
+  static float place(int boundary) { return 39.5F + 9 * static_cast<float>(boundary); }
+  Primary stripe_at(int x) const {
+    const int stripe = static_cast<int>(std::floor((static_cast<float>(x) - place(0)) / 9)) + 1;
+    return stripes[static_cast<std::size_t>(std::clamp(stripe, 0, kBoundaries))];
+  }
+  void paint(int line, int x, Primary colour) {
+    for (int c = 0; c < 3; ++c)
+      picture.row(line)[3 * x + c] = (colour >> c & 1) != 0 ? static_cast<std::uint8_t>(120 + 30 * c) : 10;
+  }
+  static std::size_t at(int line, int boundary) {
+    return static_cast<std::size_t>(line * kBoundaries + boundary);
+  }
+  void lose(int line, int boundary) { result.boundary[at(line, boundary)] = -1; }
+  void move(int line) {
+    for (int b = 0; b < kBoundaries; ++b) result.still[at(line, b)] = 0;
+  }
+  std::size_t grow(Growth& growth) {
+    recovered.clear();
+    return growth.grow({picture.view(), colours}, result, edges, recovered);
+  }
+  std::size_t grow() {
+    Growth growth(kIdentity, kBoundaries, kLines);
+    return grow(growth);
+  }
+};
+
+TEST(Growth, NothingIsAddedWhereNothingIsMissing) {
+  EXPECT_EQ(Frame().grow(), 0U);
+}
+
+TEST(Growth, WhatIsMissingBetweenLinesIsFoundInTheSlidesFieldAlone) {
+  for (int lost = 1; lost <= 6; ++lost) {
+    Frame f;
+    for (int line = 7; line < 10; ++line) f.lose(line, lost);
+    ASSERT_EQ(f.grow(), 3U) << lost;
+    for (const RecoveredBoundary& r : f.recovered) {
+      EXPECT_EQ(r.boundary, lost);
+      EXPECT_NEAR(r.column_px, Frame::place(lost), 0.05F);
+      EXPECT_GT(r.sigma_px, 0);
+    }
+  }
+}
+
+TEST(Growth, TheFieldSaysWhereItIsMoreThanOneLineDoes) {
+  Frame f;
+  f.move(7);
+  f.lose(7, kBoundaries - 1);
+  for (int line = 8; line < kLines; ++line) f.lose(line, kBoundaries - 1);
+  for (int line = 0; line < 7; ++line) f.edges.edges[Frame::at(line, kBoundaries - 1)].column_px += 1.5F;
+  ASSERT_GE(f.grow(), 1U);
+  EXPECT_NEAR(f.recovered.front().column_px, Frame::place(kBoundaries - 1), 0.4F);
+  EXPECT_GT(f.recovered.front().sigma_px, 0.4F) << "the two disagree";
+}
+
+TEST(Growth, WhereTheFieldShowsOtherColoursThereIsNone) {
+  Frame f;
+  f.lose(7, 3);
+  for (int x = 60; x < 75; ++x) f.paint(7, x, x < 67 ? 6 : 1);  // the stripes there are 3 and 5
+  EXPECT_EQ(f.grow(), 0U);
+}
+
+TEST(Growth, WhereTheFieldShowsNoLightThereIsNone) {
+  Frame f;
+  f.lose(7, 3);
+  for (int x = 55; x < 80; ++x) f.paint(7, x, 0);
+  EXPECT_EQ(f.grow(), 0U);
+}
+
+TEST(Growth, ASurfacesEndGoesOnWhereItMovesOnly) {
+  for (const bool moves : {false, true}) {
+    Frame f;
+    for (int line = 12; line < kLines; ++line) f.lose(line, kBoundaries - 1);
+    for (int line = 11; moves && line < 16; ++line) f.move(line);
+    EXPECT_EQ(f.grow(), moves ? 4U : 0U);
+  }
+}
+
+TEST(Growth, TheFrameBeforeTellsWhereBoundariesWere) {
+  Growth growth(kIdentity, kBoundaries, kLines);
+  Frame before;
+  EXPECT_EQ(before.grow(growth), 0U);
+  Frame f;
+  for (int line = 0; line < kLines; ++line) {
+    f.lose(line, kBoundaries - 1);
+    if (line < 8) f.move(line);
+  }
+  EXPECT_EQ(f.grow(growth), 8U);
+}
+
+TEST(Growth, ABoundaryThatWouldBreakTheOrderIsNone) {
+  Frame f;
+  for (int line = 0; line < kLines; ++line) {
+    f.lose(line, 3);
+    if (line != 7) continue;
+    f.result.boundary[Frame::at(line, 3)] = 6;  // as 6 and 3 swapped
+    f.lose(line, 6);
+  }
+  f.recovered.clear();
+  f.result.boundary[Frame::at(6, 3)] = 3;
+  f.result.boundary[Frame::at(8, 3)] = 3;
+  f.grow();
+  for (const RecoveredBoundary& r : f.recovered) EXPECT_FALSE(r.line == 7 && r.boundary == 3);
+}
+
+TEST(Growth, WhereAllMovesOnlyWhatLinesEncloseIsFound) {
+  Frame f;
+  for (int line = 0; line < kLines; ++line) f.move(line);
+  f.lose(7, 3);
+  for (int line = 12; line < kLines; ++line) f.lose(line, kBoundaries - 1);
+  ASSERT_EQ(f.grow(), 1U);
+  EXPECT_EQ(f.recovered.front().boundary, 3);
+}
+
+TEST(Growth, AtThePicturesEdgesAndOnLinesThatTheFieldLacksNothingIsRead) {
+  Frame f;
+  for (int line = 0; line < kLines; ++line) {
+    for (int b = 0; b < kBoundaries; ++b)
+      f.edges.edges[Frame::at(line, b)].column_px =
+          static_cast<float>(b) * static_cast<float>(kWidth - 1) / 7;
+    f.move(line);
+    if (line % 3 != 0) f.lose(line, 0), f.lose(line, kBoundaries - 1);
+  }
+  f.picture = Image8(kWidth, kLines - 1, 3);
+  EXPECT_EQ(f.grow(), 0U);
+}
+
+}  // namespace
+}  // namespace relievo
