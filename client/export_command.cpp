@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "base/log.h"
 #include "cli/progress.h"
 #include "client/commands.h"
+#include "client/export_formats.h"
 #include "client/options.h"
 #include "client/recorded_stream.h"
 #include "client/time_range.h"
-#include "codec/export.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 
@@ -21,36 +24,20 @@ namespace {
 struct Options {
   std::string file;
   std::string stream;
-  std::filesystem::path folder;
+  std::filesystem::path out;
   std::string format = "ply";
+  double depth_unit_mm = 1;
+  bool reencode = false;
   std::shared_ptr<RangeOptions> range;
   bool json = false;
 };
 
-struct Format {
-  const char* name;  // and the files' extension
-  Status (*write)(const std::filesystem::path& file, const Frame3D& frame);
-};
-
-const Format kFormats[] = {
-    {"ply", [](const auto& file,
-               const auto& frame) { return write_ply(file, frame.surface, frame.texture.view()); }},
-    {"glb", [](const auto& file, const auto& frame) { return write_glb(file, frame); }},
-    {"obj", [](const auto& file, const auto& frame) { return write_obj(file, frame); }},
-    {"png", [](const auto& file, const auto& frame) { return write_png(file, frame.texture.view()); }},
-};
-
-const Format& format_named(const std::string& name) {
-  for (const Format& format : kFormats) {
-    if (name == format.name) return format;
-  }
-  return kFormats[0];  // not reached: the option is checked
-}
-
-std::string file_name(std::uint64_t number, const char* extension) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%06llu.%s", static_cast<unsigned long long>(number), extension);
-  return text;
+const ExportFormat& format_named(const std::string& name) {
+  const auto formats = export_formats();
+  const auto found =
+      std::ranges::find(formats, name, [](const ExportFormat& f) { return std::string(f.name); });
+  return found != formats.end() ? *found
+                                : formats.front();  // the latter is not reached: the option is checked
 }
 
 struct Exported {
@@ -61,7 +48,7 @@ struct Exported {
   bool stopped = false;
 };
 
-Status export_frame(const Options& options, const RawSample& sample, FrameDecoder& decoder,
+Status export_frame(ExportWriter& writer, const RawSample& sample, FrameDecoder& decoder,
                     Exported& exported) {
   const auto unreadable = [&](const Error& error) {
     if (exported.unreadable++ == 0) exported.first_problem = error.message;
@@ -76,13 +63,7 @@ Status export_frame(const Options& options, const RawSample& sample, FrameDecode
   }
   const auto frame = decoder.decode(view->data);
   if (!frame) return unreadable(frame.error());
-  std::error_code error;  // made with the first frame, so that a failure leaves no empty folder
-  if (exported.written == 0) std::filesystem::create_directories(options.folder, error);
-  if (error) return Error{"cannot make the folder " + options.folder.string() + ": " + error.message()};
-  const Format& format = format_named(options.format);
-  if (auto status = format.write(options.folder / file_name(frame->number, format.name), *frame); !status) {
-    return status;
-  }
+  if (auto status = writer.add(*frame, view->data); !status) return status;
   ++exported.written;
   return {};
 }
@@ -92,9 +73,23 @@ void remember(const RawSample& sample, FrameDecoder& decoder) {
   if (const auto view = read_frame_cdr(sample.cdr)) (void)decoder.remember(view->data);
 }
 
+Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, RecordedStream& recorded) {
+  ExportTarget target{.out = options.out,
+                      .rig = {},
+                      .depth_unit_m = 1e-3 * options.depth_unit_mm,
+                      .reencode = options.reencode};
+  const auto described = recorded.find_info();
+  const auto info =
+      described && *described ? read_info_cdr((*described)->cdr) : Result<StreamInfo>(Error{"it is missing"});
+  if (info) target.rig = info->rig;
+  return format_named(options.format).make(target);
+}
+
 Result<Exported> export_frames(const Options& options, RecordedStream& recorded, StopSignal& stop) {
   const auto range = find_range(*options.range, recorded);
   if (!range) return range.error().in(options.file);
+  const auto writer = make_writer(options, recorded);
+  if (!writer) return writer.error().in(options.file);
   if (auto status = recorded.seek(range->from_ns); !status) return status.error();
   Exported exported;
   FrameDecoder decoder;
@@ -108,11 +103,13 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
       remember(**sample, decoder);
       continue;
     }
-    if (auto status = export_frame(options, **sample, decoder, exported); !status) return status.error();
+    if (auto status = export_frame(**writer, **sample, decoder, exported); !status) return status.error();
     progress.update(exported.written);
     exported.stopped = stop.stopped();
     if (exported.stopped) break;
   }
+  if (exported.written > 0)
+    if (auto status = (*writer)->finish(); !status) return status.error();
   return exported;
 }
 
@@ -121,7 +118,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (!recorded) return recorded.error();
   auto exported = export_frames(options, *recorded, stop);
   if (!exported) return exported.error();
-  const std::string written = std::to_string(exported->written) + " frames are in " + options.folder.string();
+  const std::string written = std::to_string(exported->written) + " frames are in " + options.out.string();
   if (exported->stopped) return Error{"stopped early: " + written};
   if (exported->unreadable > 0) {
     return Error{std::to_string(exported->unreadable) + " frames could not be decoded (" +
@@ -129,12 +126,13 @@ Status run(const Options& options, StopSignal& stop) {
   }
   if (exported->written == 0) return Error{options.file + ": no frame in that range is whole"};
   if (options.json) {
-    std::puts(nlohmann::json({{"frames", exported->written},
-                              {"folder", options.folder.string()},
-                              {"format", options.format},
-                              {"damaged", recorded->damaged()}})
-                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
-                  .c_str());
+    std::puts(
+        nlohmann::json({{"frames", exported->written},
+                        {format_named(options.format).is_one_file ? "file" : "folder", options.out.string()},
+                        {"format", options.format},
+                        {"damaged", recorded->damaged()}})
+            .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
+            .c_str());
   } else {
     std::puts(written.c_str());
   }
@@ -144,21 +142,40 @@ Status run(const Options& options, StopSignal& stop) {
 }  // namespace
 
 Command export_command() {
-  return {"export", "Write the frames of a recording as PLY, GLB, OBJ or PNG files", [](CLI::App& app) {
+  return {"export", "Write the frames of a recording as files that other programs open", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
+            std::vector<std::string> names;
+            for (const ExportFormat& format : export_formats()) names.emplace_back(format.name);
             app.add_option("file", options->file, "Recording")->type_name("FILE")->required();
-            app.add_option("--out", options->folder, "Folder; a file is named after its camera frame")
-                ->type_name("DIR")
+            app.add_option(
+                   "--out", options->out,
+                   "Folder, where files are named after their camera frames; of animation (.glb) and video "
+                   "(.mp4, .mkv) the one file")
+                ->type_name("PATH")
                 ->required();
-            app.add_option("--format", options->format,
-                           "ply, glb, obj (the textured surface) or png (the texture)")
-                ->check(CLI::IsMember({"ply", "glb", "obj", "png"}))
+            app.add_option(
+                   "--format", options->format,
+                   "ply, glb, obj (the textured surface), png (the texture), depth (texture and 16-bit depth "
+                   "as PNGs of a camera without distortion, which camera.json describes), animation (all "
+                   "frames in one GLB that plays them) or video (of the texture; as recorded where it is "
+                   "H.264)")
+                ->check(CLI::IsMember(names))
                 ->capture_default_str();
+            app.add_option("--depth-unit", options->depth_unit_mm, "Of depth: millimetres a step; 65,535 fit")
+                ->check(CLI::Range(0.001, 100.0))
+                ->type_name("MM")
+                ->capture_default_str();
+            app.add_flag("--reencode", options->reencode,
+                         "Of video: code it anew even where it could be copied");
             app.add_option("--stream", options->stream, "Which stream, where the file holds several")
                 ->type_name("NAME");
             options->range = add_range_options(app);
             app.add_flag("--json", options->json, "Print the result as JSON");
-            app.footer("Example:\n  relievo export face.mcap --format glb --frames 30:59 --out DIR");
+            app.footer(
+                "Examples:\n"
+                "  relievo export face.mcap --format glb --frames 30:59 --out DIR\n"
+                "  relievo export face.mcap --format animation --from 1 --to 5 --out face.glb\n"
+                "  relievo export face.mcap --format video --out face.mp4");
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

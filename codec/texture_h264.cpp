@@ -37,9 +37,6 @@ std::uint32_t builds_on(std::span<const std::uint8_t> section) {
 int coded_side(int side) {
   return std::max(kLeastSide, side + side % 2);
 }
-VideoFormat coded_format(int width, int height) {
-  return {.width = coded_side(width), .height = coded_side(height)};
-}
 
 /// The picture with its last column and row repeated.
 Image8 enlarged(View8 picture, int width, int height) {
@@ -109,7 +106,7 @@ class Encoder final : public TextureEncoder {
   Result<bool> encode(View8 picture, const TextureEncodeOptions& options, Bytes& out) override {
     if (picture.channels != 3 && picture.channels != 1)
       return Error{"texture has " + std::to_string(picture.channels) + " channels, not 3 (RGB) or 1 (grey)"};
-    const VideoFormat format = coded_format(picture.width, picture.height);
+    const VideoFormat format = h264_texture_format(picture.width, picture.height);
     if (!video_ || format_ != format) {
       auto made = VideoEncoder::create(format);
       if (!made) return made.error();
@@ -174,8 +171,8 @@ class Decoder final : public TextureDecoder {
     if (!can_decode(section))
       return Error{"texture builds on a picture that is not there: wait for the next key frame"};
     constexpr std::uint32_t kFarTooLarge = 65'536;  // checked exactly with the rest
-    const VideoFormat format = coded_format(static_cast<int>(std::min(width, kFarTooLarge)),
-                                            static_cast<int>(std::min(height, kFarTooLarge)));
+    const VideoFormat format = h264_texture_format(static_cast<int>(std::min(width, kFarTooLarge)),
+                                                   static_cast<int>(std::min(height, kFarTooLarge)));
     if (!video_) {
       auto made = VideoDecoder::create();
       if (!made) return made.error();
@@ -204,6 +201,14 @@ std::unique_ptr<TextureEncoder> make_h264_texture_encoder() {
 }
 std::unique_ptr<TextureDecoder> make_h264_texture_decoder() {
   return std::make_unique<Decoder>();
+}
+
+std::span<const std::uint8_t> h264_access_unit(std::span<const std::uint8_t> section) {
+  return section.subspan(std::min(section.size(), kHeadBytes));
+}
+
+VideoFormat h264_texture_format(int width, int height) {
+  return {.width = coded_side(width), .height = coded_side(height)};
 }
 
 bool h264_texture_is_key(std::span<const std::uint8_t> section) {

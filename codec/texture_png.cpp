@@ -3,6 +3,7 @@
 
 #include <png.h>
 
+#include <cstring>
 #include <optional>
 #include <string>
 
@@ -49,6 +50,37 @@ Status append_png(View8 picture, PngEffort effort, Bytes& out) {
     return Error{std::string("a picture cannot be encoded as PNG: ") + header.image.message};
   }
   out.resize(start + size);
+  return {};
+}
+
+Status append_grey16_png(std::span<const std::uint16_t> pixels, int width, int height, Bytes& out) {
+  if (width < 1 || height < 1 ||
+      pixels.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    return Error{"a picture for a PNG is empty or not of its size"};
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  const auto append = [](png_structp to, png_bytep data, png_size_t size) {
+    static_cast<Bytes*>(png_get_io_ptr(to))
+        ->insert(static_cast<Bytes*>(png_get_io_ptr(to))->end(), data, data + size);
+  };
+  const std::size_t start = out.size();
+  // libpng leaves by longjmp: nothing between here and there has a destructor.
+  if (info == nullptr || setjmp(png_jmpbuf(png)) != 0) {
+    png_destroy_write_struct(&png, &info);
+    out.resize(start);
+    return Error{"a picture cannot be encoded as PNG"};
+  }
+  png_set_write_fn(png, &out, append, nullptr);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 16,
+               PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  png_set_swap(png);  // PNG is big endian
+  for (int row = 0; row < height; ++row)
+    png_write_row(png, reinterpret_cast<png_const_bytep>(
+                           pixels.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width)));
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
   return {};
 }
 

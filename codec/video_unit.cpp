@@ -227,15 +227,28 @@ Result<bool> check_access_unit(std::span<const std::uint8_t> unit, const VideoFo
   return is_key;
 }
 
-void append_lean_unit(std::span<const std::uint8_t> unit, Bytes& out) {
+namespace {
+
+template <typename Wanted>
+void append_nals(std::span<const std::uint8_t> unit, const Wanted& wanted, Bytes& out) {
   while (!unit.empty()) {
     const auto nal = next_nal(unit);
-    if (nal.empty()) continue;
-    const unsigned type = nal[0] & 0x1f;
-    if (type == kSei || type == kDelimiter || type == kFiller) continue;
+    if (nal.empty() || !wanted(nal[0] & 0x1fU)) continue;
     for (const std::uint8_t byte : {0, 0, 0, 1}) out.push_back(byte);
     append_bytes(out, nal);
   }
+}
+
+}  // namespace
+
+void append_parameter_sets(std::span<const std::uint8_t> unit, Bytes& out) {
+  append_nals(
+      unit, [](unsigned type) { return type == kSequence || type == kPicture; }, out);
+}
+
+void append_lean_unit(std::span<const std::uint8_t> unit, Bytes& out) {
+  append_nals(
+      unit, [](unsigned type) { return type != kSei && type != kDelimiter && type != kFiller; }, out);
 }
 
 }  // namespace relievo

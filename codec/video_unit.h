@@ -32,6 +32,9 @@ Status check_video_format(const VideoFormat& format);
 /// filler. True: an IDR picture. Any bytes.
 Result<bool> check_access_unit(std::span<const std::uint8_t> unit, const VideoFormat& format);
 
+/// Appends the unit's parameter sets, Annex B: none but in an IDR picture's. Of a checked unit.
+void append_parameter_sets(std::span<const std::uint8_t> unit, Bytes& out);
+
 /// Appends the unit without what no decoder needs: SEI, delimiters and filler.
 void append_lean_unit(std::span<const std::uint8_t> unit, Bytes& out);
 

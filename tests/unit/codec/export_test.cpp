@@ -14,6 +14,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "base/lens.h"
 #include "codec/jpeg_texture.h"
 #include "codec/surface_check.h"
 #include "tests/support/make_surface.h"
@@ -147,6 +148,89 @@ TEST(Export, GlbOfPointsAndOfNothing) {
   EXPECT_TRUE(write_glb(folder / "points.glb", frame).ok());
   EXPECT_TRUE(write_glb(folder / "nothing.glb", Frame3D()).ok());
   EXPECT_FALSE(write_glb(folder / "bad.glb", frame, 101).ok());
+}
+
+/// Frames of one triangle each, the middle one empty, at 0, 0.1 and 0.25 s.
+Result<Bytes> small_animation() {
+  GlbAnimation animation;
+  for (int i = 0; i < 3; ++i) {
+    Frame3D frame;
+    frame.number = 10 + static_cast<std::uint64_t>(i);
+    frame.time_ns = 1'700'000'000'000'000'000 + (i == 0 ? 0 : i == 1 ? 100'000'000 : 250'000'000);
+    const auto x = static_cast<float>(i);
+    if (i != 1) {
+      frame.surface.positions = {{x, 0, 1}, {x, 1, 1}, {x + 1, 0, 1}};
+      frame.surface.triangles = {{0, 1, 2}};
+    }
+    if (auto status = animation.add(frame); !status) return status.error();
+  }
+  return animation.finish();
+}
+
+nlohmann::json json_of(const std::string& glb) {
+  return nlohmann::json::parse(glb.substr(20, at<std::uint32_t>(glb, 12)));
+}
+
+/// The viewer's tests play the same file with three.js's loader.
+TEST(Export, AnimationIsTheFileThatOthersPlay) {
+  const auto bytes = small_animation();
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  const std::string made(bytes->begin(), bytes->end());
+  const std::string frozen = read_file(RELIEVO_CONFORMANCE "/animation/small.glb");
+  auto root = json_of(made), expected = json_of(frozen);
+  root["asset"].erase("generator");
+  expected["asset"].erase("generator");
+  EXPECT_EQ(root, expected);
+  const auto binary = [](const std::string& glb) { return glb.substr(28 + at<std::uint32_t>(glb, 12)); };
+  EXPECT_EQ(binary(made), binary(frozen));
+  EXPECT_EQ(root["nodes"].size(), 2U) << "nothing of an empty surface";
+}
+
+TEST(Export, AnimationOfOneFrameIsAStill) {
+  GlbAnimation animation;
+  ASSERT_TRUE(animation.add(test::frame(8, 6)).ok());
+  const auto bytes = animation.finish();
+  ASSERT_TRUE(bytes);
+  EXPECT_FALSE(json_of({bytes->begin(), bytes->end()}).contains("animations"));
+}
+
+TEST(Export, AnimationRefusesTimesThatDoNotRise) {
+  GlbAnimation animation;
+  Frame3D frame = test::frame(8, 6);
+  ASSERT_TRUE(animation.add(frame).ok());
+  EXPECT_FALSE(animation.add(frame).ok());
+  frame.time_ns += 1'000'000;
+  EXPECT_TRUE(animation.add(frame).ok());
+}
+
+TEST(Export, StraightenedPictureIsWhatThePinholeSees) {
+  PinholeModel camera{64, 48, {60, 0, 31, 0, 62, 23, 0, 0, 1}, {-0.2, 0.05, 0.001, -0.002, 0}};
+  Image8 picture(64, 48, 3);  // red: the column, green: the row
+  for (int row = 0; row < 48; ++row)
+    for (int column = 0; column < 64; ++column) {
+      picture.row(row)[3 * column] = static_cast<std::uint8_t>(3 * column);
+      picture.row(row)[3 * column + 1] = static_cast<std::uint8_t>(5 * row);
+    }
+  EXPECT_EQ(std::memcmp(straightened(picture.view(), pinhole_of(camera)).data(), picture.data(), 64 * 48 * 3),
+            0);
+  const Image8 straight = straightened(picture.view(), camera);
+  int seen = 0;
+  for (int row = 0; row < 48; ++row)
+    for (int column = 0; column < 64; ++column) {
+      const auto from = distort(camera, (column - 31) / 60.0, (row - 23) / 62.0);
+      if (from[0] < 0 || from[0] > 63 || from[1] < 0 || from[1] > 47) continue;
+      ASSERT_NEAR(straight.row(row)[3 * column], 3 * from[0], 0.51);
+      ASSERT_NEAR(straight.row(row)[3 * column + 1], 5 * from[1], 0.51);
+      ++seen;
+    }
+  EXPECT_GT(seen, 2000);
+}
+
+TEST(Export, DepthRefusesAUnitThatIsNone) {
+  const test::TempFolder folder;
+  const PinholeModel camera{64, 48, {60, 0, 31, 0, 62, 23, 0, 0, 1}, {}};
+  EXPECT_FALSE(write_depth_png(folder / "a.png", test::frame(8, 6).surface, camera, 0).ok());
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.png"));
 }
 
 TEST(Export, ObjNamesItsMaterialAndPicture) {

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/export_formats.h"
+
+#include <cstdio>
+#include <string>
+
+#include "base/whole_file.h"
+#include "codec/export.h"
+#include "codec/frame_layout.h"
+#include "codec/texture_codec.h"
+#include "codec/video_file.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+using Made = Result<std::unique_ptr<ExportWriter>>;
+
+std::string file_name(std::uint64_t number, const char* ending) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%06llu%s", static_cast<unsigned long long>(number), ending);
+  return text;
+}
+
+/// A file a frame, named after the camera's. The folder comes with the first, so that a failure leaves no
+/// empty one.
+class FolderWriter : public ExportWriter {
+ public:
+  explicit FolderWriter(fs::path folder) : folder_(std::move(folder)) {}
+
+  Status add(const Frame3D& frame, std::span<const std::uint8_t>) final {
+    std::error_code error;
+    fs::create_directories(folder_, error);
+    if (error) return Error{"cannot make the folder " + folder_.string() + ": " + error.message()};
+    return write(folder_, frame);
+  }
+
+ private:
+  virtual Status write(const fs::path& folder, const Frame3D& frame) = 0;
+
+  fs::path folder_;
+};
+
+using WriteFile = Status (*)(const fs::path& file, const Frame3D& frame);
+
+class FileWriter final : public FolderWriter {
+ public:
+  FileWriter(fs::path folder, const char* ending, WriteFile file)
+      : FolderWriter(std::move(folder)), ending_(ending), write_(file) {}
+
+ private:
+  Status write(const fs::path& folder, const Frame3D& frame) override {
+    return write_(folder / file_name(frame.number, ending_), frame);
+  }
+
+  const char* ending_;
+  WriteFile write_;
+};
+
+/// Texture and depth as a camera without lens distortion sees them, and what that camera is.
+class DepthWriter final : public FolderWriter {
+ public:
+  DepthWriter(const ExportTarget& target, const PinholeModel& camera)
+      : FolderWriter(target.out),
+        camera_(camera),
+        pinhole_(pinhole_of(camera)),
+        unit_m_(target.depth_unit_m) {}
+
+ private:
+  Status write(const fs::path& folder, const Frame3D& frame) override {
+    if (auto status = write_camera_json(folder / "camera.json", pinhole_, unit_m_); !status) return status;
+    if (!frame.texture.empty()) {
+      const bool fits = frame.texture.width() == camera_.width && frame.texture.height() == camera_.height;
+      if (!fits) return Error{"the texture is not of the camera's size: depth would not lie on it"};
+      const bool is_straight = camera_.distortion == pinhole_.distortion;
+      const Image8 shown = is_straight ? Image8() : straightened(frame.texture.view(), camera_);
+      if (auto status = write_png(folder / file_name(frame.number, ".png"),
+                                  is_straight ? frame.texture.view() : shown.view());
+          !status)
+        return status;
+    }
+    return write_depth_png(folder / file_name(frame.number, ".depth.png"), frame.surface, pinhole_, unit_m_);
+  }
+
+  PinholeModel camera_, pinhole_;
+  double unit_m_;
+};
+
+class AnimationWriter final : public ExportWriter {
+ public:
+  explicit AnimationWriter(fs::path file) : file_(std::move(file)) {}
+
+  Status add(const Frame3D& frame, std::span<const std::uint8_t>) override { return animation_.add(frame); }
+  Status finish() override {
+    const auto bytes = animation_.finish();
+    return bytes ? write_whole_file(file_, *bytes)
+                 : Status(bytes.error().in("cannot write " + file_.string()));
+  }
+
+ private:
+  fs::path file_;
+  GlbAnimation animation_;
+};
+
+/// The stream's own video as it is where the range begins with a key frame of one, else coded anew.
+class VideoWriter final : public ExportWriter {
+ public:
+  VideoWriter(VideoFile file, bool reencode) : file_(std::move(file)), reencode_(reencode) {}
+
+  Status add(const Frame3D& frame, std::span<const std::uint8_t> bytes) override {
+    const auto layout = read_frame_layout(bytes);
+    if (!layout) return layout.error();
+    const FrameHeader& header = layout->header;
+    const auto section = layout->sections.texture;
+    const bool is_video = header.texture == TextureCodec::kH264 && !section.empty();
+    if (is_first_) copies_ = !reencode_ && is_video && texture_is_key(header.texture, section);
+    const int number = is_first_ ? 0 : number_ + 1;
+    is_first_ = false;
+    number_ = number;
+    if (copies_) {
+      if (!is_video) return Error{kMixed};
+      auto status = file_.add(section, frame.texture.width(), frame.texture.height(), frame.time_ns);
+      return status ? status : Status(status.error().in(kMixed));
+    }
+    if (frame.texture.empty()) return Error{"frame " + std::to_string(frame.number) + " has no texture"};
+    if (!encoder_) encoder_ = make_texture_encoder(TextureCodec::kH264);
+    Bytes coded;
+    const auto key = encoder_->encode(frame.texture.view(),
+                                      {.quality = kQuality, .key = number % kKeyInterval == 0}, coded);
+    if (!key) return key.error();
+    return file_.add(coded, frame.texture.width(), frame.texture.height(), frame.time_ns);
+  }
+  Status finish() override { return file_.finish(); }
+
+ private:
+  static constexpr int kQuality = 90;
+  static constexpr int kKeyInterval = 30;
+  static constexpr const char* kMixed = "the texture's video cannot be copied into one file: give --reencode";
+
+  VideoFile file_;
+  bool reencode_, copies_ = false, is_first_ = true;
+  int number_ = 0;
+  std::unique_ptr<TextureEncoder> encoder_;
+};
+
+template <const char* const* Ending, WriteFile Write>
+Made make_files(const ExportTarget& target) {
+  return Made(std::make_unique<FileWriter>(target.out, *Ending, Write));
+}
+
+Status ply(const fs::path& file, const Frame3D& frame) {
+  return write_ply(file, frame.surface, frame.texture.view());
+}
+Status glb(const fs::path& file, const Frame3D& frame) {
+  return write_glb(file, frame);
+}
+Status png(const fs::path& file, const Frame3D& frame) {
+  return write_png(file, frame.texture.view());
+}
+constexpr const char *kPly = ".ply", *kGlb = ".glb", *kObj = ".obj", *kPng = ".png";
+
+Made make_depth(const ExportTarget& target) {
+  if (!target.rig)
+    return Error{
+        "depth needs the camera's calibration, and the recording has no description of the stream: "
+        "export another format"};
+  return Made(std::make_unique<DepthWriter>(target, target.rig->camera));
+}
+
+Made make_animation(const ExportTarget& target) {
+  return Made(std::make_unique<AnimationWriter>(target.out));
+}
+
+Made make_video(const ExportTarget& target) {
+  auto file = VideoFile::create(target.out);
+  if (!file) return file.error();
+  return Made(std::make_unique<VideoWriter>(*std::move(file), target.reencode));
+}
+
+constexpr ExportFormat kFormats[] = {{"ply", false, make_files<&kPly, ply>},
+                                     {"glb", false, make_files<&kGlb, glb>},
+                                     {"obj", false, make_files<&kObj, write_obj>},
+                                     {"png", false, make_files<&kPng, png>},
+                                     {"depth", false, make_depth},
+                                     {"animation", true, make_animation},
+                                     {"video", true, make_video}};
+
+}  // namespace
+
+std::span<const ExportFormat> export_formats() {
+  return kFormats;
+}
+
+}  // namespace relievo

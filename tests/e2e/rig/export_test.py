@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""relievo export, read by programs that share no code with it: depth by OpenCV, video by ffmpeg, GLB by hand.
+
+usage: export_test.py RELIEVO_SERVER RELIEVO
+"""
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import cv2
+import numpy as np
+
+RELIEVO = sys.argv.pop(2)
+SERVER = sys.argv.pop(1)
+SOURCE = "sim:object"
+DOMAIN = os.environ.get("RELIEVO_TEST_DOMAIN", "228")
+FRAMES = 5
+
+
+def read_ply(file):
+    """Positions and triangles of a PLY as relievo writes it."""
+    data = file.read_bytes()
+    end = data.index(b"end_header\n") + len(b"end_header\n")
+    header = data[:end].decode().splitlines()
+    counts = {line.split()[1]: int(line.split()[2]) for line in header if line.startswith("element")}
+    kinds = {"float": "<f4", "uchar": "u1"}
+    fields = [(line.split()[2], kinds[line.split()[1]]) for line in header
+              if line.startswith("property") and "list" not in line]
+    vertices = np.frombuffer(data, np.dtype(fields), counts["vertex"], end)
+    faces = np.frombuffer(data, np.dtype([("n", "u1"), ("i", "<i4", 3)]), counts["face"], end + vertices.nbytes)
+    return np.stack([vertices[k] for k in "xyz"], 1).astype(float), faces["i"]
+
+
+def read_glb(file):
+    data = file.read_bytes()
+    size, = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20:20 + size]), data[28 + size:]
+
+
+def numbers(root, binary, accessor):
+    of = root["accessors"][accessor]
+    width = {"SCALAR": 1, "VEC3": 3}[of["type"]]
+    at = root["bufferViews"][of["bufferView"]]["byteOffset"]
+    return np.frombuffer(binary, "<f4", of["count"] * width, at).reshape(-1, width)
+
+
+class Export(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.path = pathlib.Path(cls.folder.name)
+        for texture in ("jpeg", "h264"):
+            subprocess.run([SERVER, "serve", "--source", SOURCE, "--fast", "--frames", str(FRAMES + 1), "--texture", texture,
+                            "--web", "none", "--domain", DOMAIN, "-q", "--record", cls.path / f"{texture}.mcap"],
+                           check=True, stdout=subprocess.DEVNULL)
+
+    def export(self, recording, kind, out, *more):
+        done = subprocess.run([RELIEVO, "export", self.path / f"{recording}.mcap", "--format", kind, "--out",
+                               self.path / out, "--json", *more], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["frames"], FRAMES)
+        return self.path / out
+
+    def check_depth(self, unit_mm):
+        plies = self.export("jpeg", "ply", "ply")
+        depths = self.export("jpeg", "depth", f"depth{unit_mm}", "--depth-unit", str(unit_mm))
+        camera = json.loads((depths / "camera.json").read_text())
+        self.assertAlmostEqual(camera["depth_unit_m"], unit_mm * 1e-3)
+        self.assertAlmostEqual(camera["depth_scale"] * camera["depth_unit_m"], 1)
+        k = np.array([[camera["fx"], camera["skew"], camera["cx"]], [0, camera["fy"], camera["cy"]], [0, 0, 1]])
+        ply = sorted(plies.glob("*.ply"))[0]
+        depth = cv2.imread(str(depths / f"{ply.stem}.depth.png"), cv2.IMREAD_UNCHANGED)
+        texture = cv2.imread(str(depths / f"{ply.stem}.png"))
+        self.assertEqual((depth.dtype, depth.shape), (np.uint16, (camera["height"], camera["width"])))
+        self.assertEqual(texture.shape, (*depth.shape, 3))
+        points, triangles = read_ply(ply)
+
+        # Rays through the centres of pixels, met with the plane of each triangle that they go through.
+        rows, columns = np.nonzero(depth)
+        self.assertGreater(len(rows), 10_000)
+        read = depth[rows, columns] * camera["depth_unit_m"]
+        at = {(r, c): i for i, (r, c) in enumerate(zip(rows, columns))}
+        seen = points @ k.T
+        seen = seen[:, :2] / seen[:, 2:]
+        nearest = np.full(len(rows), np.inf)
+        missing = 0
+        for corners in triangles[:: 3 if unit_mm == 1 else 7]:
+            low, high = np.ceil(seen[corners].min(0)).astype(int), np.floor(seen[corners].max(0)).astype(int)
+            edges = points[corners].T
+            for r in range(low[1], high[1] + 1):
+                for c in range(low[0], high[0] + 1):
+                    inside = np.linalg.solve(edges, np.linalg.solve(k, [c, r, 1]))  # the ray as a sum of corners
+                    if inside.min() < 1e-9:
+                        continue
+                    i = at.get((r, c))
+                    if i is None:
+                        missing += 1
+                    else:
+                        nearest[i] = min(nearest[i], 1 / inside.sum())
+        self.assertEqual(missing, 0)
+        known = np.isfinite(nearest)
+        self.assertGreater(known.sum(), 3000)
+        # Of the triangles looked at, none is nearer than what was read; most pixels show one of them.
+        error = nearest[known] - read[known]
+        self.assertGreater(error.min(), -0.5 * camera["depth_unit_m"] - 1e-6)
+        self.assertGreater((error < 0.5 * camera["depth_unit_m"] + 1e-6).mean(), 0.98)
+
+    def test_depth_reads_back_as_the_surface(self):
+        self.check_depth(1)
+
+    def test_depth_in_finer_units(self):
+        self.check_depth(0.1)
+
+    def probed(self, file):
+        done = subprocess.run(["ffprobe", "-v", "error", "-of", "json", "-show_streams", "-show_packets", file],
+                              capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        return json.loads(done.stdout)
+
+    def check_video(self, recording, name, *more):
+        file = self.export(recording, "video", name, *more)
+        self.assertEqual(list(self.path.glob("*.part")), [])
+        probe = self.probed(file)
+        stream, = probe["streams"]
+        self.assertEqual([stream[k] for k in ("codec_name", "color_range", "color_space")], ["h264", "pc", "smpte170m"])
+        self.assertEqual(len(probe["packets"]), FRAMES)
+        times = [float(p["pts_time"]) for p in probe["packets"]]
+        self.assertLess(max(abs(t - i / 29.97) for i, t in enumerate(times)), 0.002)
+        done = subprocess.run(["ffmpeg", "-v", "error", "-xerror", "-i", file, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+                              capture_output=True)
+        self.assertEqual((done.returncode, done.stderr), (0, b""))
+        pictures = [cv2.imread(str(png))[:, :, ::-1] for png in sorted(self.export(recording, "png", recording).iterdir())]
+        shown = np.frombuffer(done.stdout, np.uint8).reshape(FRAMES, *pictures[0].shape)
+        for a, b in zip(shown, pictures):
+            self.assertLess(np.abs(a.astype(float) - b).mean(), 4)
+        return file
+
+    def test_video_is_copied_where_it_is_one(self):
+        copied = self.check_video("h264", "copied.mp4")
+        again = self.check_video("h264", "again.mp4", "--reencode")
+        self.assertNotEqual(copied.read_bytes(), again.read_bytes())
+        mkv = self.check_video("h264", "copied.mkv")
+        sizes = [[int(p["size"]) for p in self.probed(f)["packets"]] for f in (copied, mkv)]
+        self.assertEqual(*sizes)
+
+    def test_video_of_still_pictures_is_coded(self):
+        self.check_video("jpeg", "coded.mp4")
+
+    def test_a_range_between_key_frames_is_coded(self):
+        file = self.path / "late.mp4"
+        done = subprocess.run([RELIEVO, "export", self.path / "h264.mcap", "--format", "video", "--out", file,
+                               "--frames", "2:3"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(len(self.probed(file)["packets"]), 2)
+
+    def test_other_endings_are_refused(self):
+        done = subprocess.run([RELIEVO, "export", self.path / "h264.mcap", "--format", "video", "--out",
+                               self.path / "a.avi"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(".mp4 or .mkv", done.stderr)
+
+    def test_animation_shows_one_frame_at_a_time(self):
+        root, binary = read_glb(self.export("jpeg", "animation", "a.glb"))
+        self.assertEqual(len(root["nodes"]), FRAMES)
+        animation, = root["animations"]
+        self.assertEqual(len(animation["channels"]), FRAMES)
+        start = int(root["nodes"][0]["extras"]["time_ns"])
+        for shown, node in enumerate(root["nodes"]):
+            time = 1e-9 * (int(node["extras"]["time_ns"]) - start) + 1e-3
+            scales = []
+            for channel in animation["channels"]:
+                self.assertEqual(channel["target"]["path"], "scale")
+                sampler = animation["samplers"][channel["sampler"]]
+                self.assertEqual(sampler["interpolation"], "STEP")
+                times = numbers(root, binary, sampler["input"])[:, 0]
+                self.assertTrue((np.diff(times) > 0).all())
+                step = max(0, int(np.searchsorted(times, time, side="right")) - 1)
+                scales.append(numbers(root, binary, sampler["output"])[step].tolist())
+            self.assertEqual(scales, [[float(i == shown)] * 3 for i in range(FRAMES)])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
