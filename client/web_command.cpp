@@ -47,6 +47,7 @@ class LoopedFile {
       : file_(std::move(file)), recorded_(std::move(recorded)), gateway_(gateway) {
     // Before anyone is told the address: who follows it at once finds the stream.
     if (auto info = recorded_.find_info(); info && *info) (void)publish(**info).ok();
+    gateway_.offer(recorded_.stream(), file_);
     thread_ = std::thread([this, &stop] { run(stop); });
   }
   LoopedFile(const LoopedFile&) = delete;

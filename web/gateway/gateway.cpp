@@ -62,6 +62,9 @@ class Server : public Gateway, private ConnectionHost {
   void announce(const StreamInfo& info) override { hub_.announce(info); }
   void publish(const std::string& stream, const FrameMessage& frame) override { hub_.publish(stream, frame); }
   void publish(const ServerStatus& status) override { hub_.publish(status); }
+  void offer(const std::string& stream, const std::filesystem::path& recording) override {
+    hub_.offer(stream, recording);
+  }
   void withdraw(const std::string& stream) override { hub_.withdraw(stream); }
 
  private:

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -45,6 +46,9 @@ class Gateway {
   virtual void announce(const StreamInfo& info) = 0;
   virtual void publish(const std::string& stream, const FrameMessage& frame) = 0;
   virtual void publish(const ServerStatus& status) = 0;
+  /// The stream, which was announced, is played from this file: clients may read it
+  /// (/recordings/STREAM.mcap), each at its own place. Until it is withdrawn.
+  virtual void offer(const std::string& stream, const std::filesystem::path& recording) = 0;
   /// The stream is gone: clients are told and stay connected, since it may come back.
   virtual void withdraw(const std::string& stream) = 0;
 };

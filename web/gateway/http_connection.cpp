@@ -9,6 +9,7 @@
 
 #include "base/time.h"
 #include "web/gateway/connection.h"
+#include "web/gateway/recording_route.h"
 
 namespace relievo {
 namespace {
@@ -21,6 +22,7 @@ using ErrorCode = boost::system::error_code;
 constexpr std::uint32_t kHeaderLimit = 8 * 1024;
 constexpr std::uint64_t kBodyLimit = 4 * 1024;
 constexpr std::size_t kReadAtOnce = 4096;
+constexpr std::size_t kFileAtOnce = 256 * 1024;
 
 std::span<const std::uint8_t> bytes_of(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
@@ -45,6 +47,8 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   void on_request();
   void upgrade(const HttpReply& granted);
   void reply(HttpReply content, bool head, unsigned version, bool keep_alive);
+  void send_file(std::uint64_t offset, bool keep_alive);
+  void on_replied(bool keep_alive);
   void on_failed(Io io, Refusal why);
   void finish();
 
@@ -55,6 +59,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   std::optional<http::request_parser<http::string_body>> parser_;
   HttpReply content_;
   std::string head_;
+  std::vector<std::uint8_t> file_bytes_;  // on their way
   std::int64_t waiting_since_ns_ = steady_now_ns();
   bool any_request_ = false;
   bool awaits_request_ = false;
@@ -129,6 +134,8 @@ void HttpSession::on_request() {
                                     .if_none_match = value(http::field::if_none_match),
                                     .authorization = value(http::field::authorization),
                                     .cookie = value(http::field::cookie),
+                                    .range = value(http::field::range),
+                                    .if_range = value(http::field::if_range),
                                     .upgrade = beast::websocket::is_upgrade(request),
                                     .tls = transport_->is_tls()},
                                    transport_->peer());
@@ -163,19 +170,45 @@ void HttpSession::reply(HttpReply content, bool head, unsigned version, bool kee
   for (const auto& [name, text] : content_.headers) response.set(name, text);
   response.keep_alive(keep_alive);
   const bool no_body = content_.status == 304 || content_.status == 204;
-  if (!no_body) response.content_length(content_.bytes().size());
+  if (!no_body) response.content_length(content_.file ? content_.file->length() : content_.bytes().size());
   std::ostringstream text;
   text << response.base();
   head_ = text.str();
 
   transport_->expire_after(host_.request_time());
   const std::array parts{bytes_of(head_), bytes_of(head || no_body ? std::string_view() : content_.bytes())};
+  if (head) content_.file.reset();
   transport_->write(parts, [self = shared_from_this(), keep_alive](Io io, std::size_t) {
     if (self->finished_) return;
     if (io != Io::kDone) return self->on_failed(io, Refusal::kSlow);
-    if (keep_alive) return self->await_request();
-    self->transport_->linger([self] { self->finish(); });
+    if (self->content_.file) return self->send_file(0, keep_alive);
+    self->on_replied(keep_alive);
   });
+}
+
+void HttpSession::send_file(std::uint64_t offset, bool keep_alive) {
+  const std::uint64_t left = content_.file->length() - offset;
+  if (left == 0) {
+    file_bytes_ = {};
+    return on_replied(keep_alive);
+  }
+  file_bytes_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kFileAtOnce, left)));
+  const std::size_t n = content_.file->read(offset, file_bytes_);
+  if (n == 0) return finish();  // it has become shorter: the client sees that some is missing
+  waiting_since_ns_ = steady_now_ns();
+  transport_->expire_after(host_.request_time());
+  const std::array parts{Transport::Part(file_bytes_.data(), n)};
+  transport_->write(parts, [self = shared_from_this(), offset, n, keep_alive](Io io, std::size_t) {
+    if (self->finished_) return;
+    if (io != Io::kDone) return self->on_failed(io, Refusal::kSlow);
+    self->send_file(offset + n, keep_alive);
+  });
+}
+
+void HttpSession::on_replied(bool keep_alive) {
+  content_.file.reset();
+  if (keep_alive) return await_request();
+  transport_->linger([self = shared_from_this()] { self->finish(); });
 }
 
 void HttpSession::on_failed(Io io, Refusal why) {

@@ -140,6 +140,7 @@ void Hub::withdraw(const std::string& stream) {
   entry.latest.reset();
   entry.latest_key.reset();
   entry.facts.status.reset();
+  entry.facts.recording.clear();
   entry.status_version = 0;
   for (const auto& watcher : entry.watchers) {
     watcher->needs_key = true;  // whatever comes next
@@ -150,6 +151,19 @@ void Hub::withdraw(const std::string& stream) {
   }
   wake_all(entry);
   erase_if_unused(stream);
+}
+
+void Hub::offer(const std::string& stream, const std::filesystem::path& recording) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it != streams_.end() && it->second->live) it->second->facts.recording = recording;
+}
+
+std::optional<std::filesystem::path> Hub::recording_of(const std::string& stream) const {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it == streams_.end() || it->second->facts.recording.empty()) return std::nullopt;
+  return it->second->facts.recording;
 }
 
 std::shared_ptr<Hub::Watcher> Hub::watch(const std::string& stream, std::function<void()> wake) {

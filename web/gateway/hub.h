@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -28,6 +29,7 @@ struct StreamSnapshot {
   std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
   std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
+  std::filesystem::path recording;  // that it is played from; empty: none that clients may read
   // From the capture of each frame until it was published, was here, and was handed to a client's connection.
   Histogram published_after, here_after, sent_after;
 };
@@ -55,6 +57,9 @@ class Hub {
   void publish(const std::string& stream, const FrameMessage& frame);
   void publish(const ServerStatus& status);
   void withdraw(const std::string& stream);
+  /// A stream that was announced is played from this file, until it is withdrawn.
+  void offer(const std::string& stream, const std::filesystem::path& recording);
+  std::optional<std::filesystem::path> recording_of(const std::string& stream) const;
 
   /// `wake` is called, from any thread and with the hub locked, when take() has something; it must not call
   /// back.

@@ -134,15 +134,17 @@ Result<ClientMessage> parse_client_message(std::string_view text) {
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint) {
   Json list = Json::array();
   for (const auto& s : streams) {
-    list.push_back({{"name", s.info.stream},
-                    {"source", s.info.source},
-                    {"started_ns", s.info.started_ns},
-                    {"state", s.status ? to_string(s.status->state) : to_string(StreamState::kStarting)},
-                    {"frame_rate", s.status ? s.status->frame_rate : 0.0},
-                    {"rig", rig_json(s.info)},
-                    {"status", s.status ? status_json(*s.status) : Json()},
-                    {"clients", s.watchers},
-                    {"frames", s.published}});
+    list.push_back(
+        {{"name", s.info.stream},
+         {"source", s.info.source},
+         {"started_ns", s.info.started_ns},
+         {"state", s.status ? to_string(s.status->state) : to_string(StreamState::kStarting)},
+         {"frame_rate", s.status ? s.status->frame_rate : 0.0},
+         {"rig", rig_json(s.info)},
+         {"status", s.status ? status_json(*s.status) : Json()},
+         {"recording", s.recording.empty() ? Json() : Json("recordings/" + s.info.stream + ".mcap")},
+         {"clients", s.watchers},
+         {"frames", s.published}});
   }
   return text_of({{"version", RELIEVO_VERSION}, {"hint", hint}, {"streams", std::move(list)}});
 }

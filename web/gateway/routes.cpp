@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "web/gateway/assets.h"
+#include "web/gateway/recording_route.h"
 #include "web/gateway/sign_in.h"
 
 namespace relievo {
@@ -172,6 +173,10 @@ constexpr Route kRoutes[] = {
        return json(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
      }},
     {"/api/openapi.json", true, [](auto, auto&, auto&) { return json(std::string(openapi_document())); }},
+    {"/recordings/{recording}", true,
+     [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
+       return recording_reply(name, request, context.hub);
+     }},
     {"/ws/{stream}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
        return websocket(request, std::string(name), context);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -24,15 +25,20 @@ struct HttpRequest {
   std::string_view if_none_match;
   std::string_view authorization;
   std::string_view cookie;
+  std::string_view range;
+  std::string_view if_range;
   bool upgrade = false;  // asks for a WebSocket
   bool tls = false;      // came over TLS
 };
+
+class FilePart;  // web/gateway/recording_route.h
 
 struct HttpReply {
   int status = 200;
   std::string content_type = "text/plain; charset=utf-8";
   std::string body;
-  std::string_view fixed_body;  // instead of `body`: bytes that live as long as the program
+  std::string_view fixed_body;           // instead of `body`: bytes that live as long as the program
+  std::shared_ptr<const FilePart> file;  // instead of both
   std::vector<std::pair<std::string, std::string>> headers;  // in place of, or beside, those of every reply
   std::string websocket_stream;    // not empty: no reply, upgrade and serve this stream
   std::optional<Refusal> refusal;  // to be counted

@@ -3,11 +3,11 @@
 // with the right surfaces, also where frames build on others; surfaces that were exported are shown where they are.
 // Run as: in_own_domain node recording_test.mjs GATEWAY_FEEDER RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium.
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawn } from 'node:child_process';
 import { mkdtempSync, readdirSync, readFileSync, rmSync, truncateSync, writeFileSync, copyFileSync, statSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { eventually, launchChromium } from './chromium.mjs';
+import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
 
 const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
@@ -198,6 +198,47 @@ const checks = {
     await page.selectOption('#streams', 'ball');
     await inState(page, 'live');
     assert.equal(await page.isVisible('#timeline'), false);
+  },
+
+  async 'a recording of the server plays for each page by itself, once the person has a token'() {
+    const tokens = join(scratch, 'tokens');
+    writeFileSync(tokens, 'a-token-for-this-test\n', { mode: 0o600 });
+    const web = spawn(relievoPath, ['web', recorded, '--listen', '127.0.0.1:0', '--token-file', tokens, '--domain', process.env.RELIEVO_TEST_DOMAIN], {
+      stdio: ['ignore', 'pipe', 'inherit'],
+    });
+    try {
+      const said = await new Promise((resolve, reject) => {
+        web.stdout.once('data', (data) => resolve(String(data)));
+        web.once('exit', (code) => reject(new Error(`relievo web ended with ${code}`)));
+      });
+      const address = said.trim().replace('viewer ', '');
+      const context = await browser.newContext({ viewport: { width: 800, height: 500 } });
+      const pages = [await context.newPage(), await context.newPage()];
+      for (const page of pages) page.setDefaultTimeout(kPatienceMs);
+      await pages[0].goto(address);
+      await pages[0].fill('input[name=token]', 'a-token-for-this-test');
+      await pages[0].click('button');
+      await inState(pages[0], 'file');
+      assert.equal(pages[0].url(), address, 'the token is still in the address');
+      await pages[1].goto(`${address}?stream=object`);
+      for (const [i, index] of [3, 17].entries()) {
+        await inState(pages[i], 'file');
+        await pages[i].waitForFunction(() => window.relievo.diagnostics().playback?.playing === false);
+        await seek(pages[i], index);
+      }
+      for (const [i, index] of [3, 17].entries()) {
+        await onFrame(pages[i], numbers[index]);
+        assert.equal((await shownSurface(pages[i])).hash, surfaces.get(numbers[index]), `frame ${index}`);
+        assert.equal((await playback(pages[i])).times.length, numbers.length);
+        assert.equal((await look(pages[i])).errors, 0);
+        assert.ok(await pages[i].isVisible('#timeline'));
+      }
+      await context.close();
+    } finally {
+      const ended = new Promise((resolve) => web.once('exit', resolve));
+      web.kill('SIGTERM');
+      await ended;
+    }
   },
 
   async 'no error, no request to another host'() {

@@ -10,7 +10,7 @@ import { listenToKeys } from './keys';
 import { Legend } from './legend';
 import { crc32 } from './crc32';
 import { MeasurePanel } from './measurePanel';
-import { openFile } from './openFile';
+import { openFile, openRemote } from './openFile';
 import { Panels } from './panels';
 import { Picture } from './picture';
 import { pixelsOf, type PixelReport } from './pixels';
@@ -52,6 +52,7 @@ class Viewer {
   private hint = '';
   private note = ''; // on the file shown
   private stream: string | null = null;
+  private triedRecording = false; // of that stream
   private file: string | null = null; // shown instead of a stream
   private fileProblem: { name: string; why: string } | null = null;
   private presentation: Presentation | null = null;
@@ -234,8 +235,28 @@ class Viewer {
     this.stream = name;
     this.file = null;
     this.note = '';
+    this.triedRecording = false;
     this.session.watch((events) => new Connection(name, events));
     this.timeline.show(null);
+    void this.preferRecording();
+    this.refresh();
+  }
+
+  /** A stream that is played from a file is watched by the file, each page at its own place of it. */
+  private async preferRecording(): Promise<void> {
+    const listed = this.streams.find((s) => s.name === this.stream);
+    if (this.triedRecording || typeof listed?.recording !== 'string') return;
+    this.triedRecording = true;
+    try {
+      const opened = await openRemote(new URL(listed.recording, document.baseURI));
+      if (this.stream !== listed.name) return;
+      this.view?.restart(null, false);
+      this.session.watch(opened.source);
+      this.note = opened.note ?? '';
+      this.timeline.show(this.session.source?.playback ?? null);
+    } catch (error) {
+      this.session.meter.failed(error instanceof Error ? error.message : String(error)); // the stream goes on
+    }
     this.refresh();
   }
 
@@ -309,7 +330,7 @@ class Viewer {
       quietMs: now - this.session.lastFrameAt,
       frameRate: info?.frame_rate ?? 0,
       hint: this.hint,
-      file: this.file === null ? null : playback === null ? 'surface' : playback.playing ? 'playing' : 'paused',
+      file: playback !== null ? (playback.playing ? 'playing' : 'paused') : this.file !== null ? 'surface' : null,
     });
     if (this.fileProblem !== null) {
       const { name, why } = this.fileProblem;
@@ -336,6 +357,7 @@ class Viewer {
       const first = list.streams[0];
       const missing = this.session.info === null && !list.streams.some((s) => s.name === this.stream);
       if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);
+      void this.preferRecording();
     } catch {
       this.listed = false;
       this.listFailed = true;

@@ -6,6 +6,8 @@ import { crc32 } from './crc32';
 /** A file, or anything like it. `read` gives fewer bytes only at the end. */
 export interface Bytes {
   size: number;
+  /** Reading a little everywhere costs as much as reading it all. */
+  isRemote?: boolean;
   read(at: number, length: number): Promise<Uint8Array>;
 }
 

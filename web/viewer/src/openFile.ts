@@ -1,22 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 // What kind of file it is, and what to read it with. The readers are loaded when they are needed.
+import type { Bytes } from './mcap';
 import type { DecodedFrame } from './messages';
 import type { FrameSource, SourceEvents } from './source';
 
+export interface OpenedRecording {
+  kind: 'recording';
+  source(events: SourceEvents): FrameSource;
+  note: string | null;
+}
+
 export type Opened =
-  | { kind: 'recording'; source(events: SourceEvents): FrameSource; note: string | null }
+  | OpenedRecording
   | { kind: 'surface'; frame: DecodedFrame };
+
+async function openRecording(bytes: Bytes): Promise<OpenedRecording> {
+  const [{ Recording }, { RecordingSource }] = await Promise.all([import('./recording'), import('./recordingSource')]);
+  const recording = await Recording.open(bytes);
+  return { kind: 'recording', source: (events) => new RecordingSource(recording, events), note: recording.damage };
+}
+
+/** A recording of the server. Throws as openFile. */
+export async function openRemote(url: URL): Promise<OpenedRecording> {
+  const { RemoteFile } = await import('./remoteFile');
+  return openRecording(await RemoteFile.open(url));
+}
 
 /** Throws with what a person should know. */
 export async function openFile(file: File): Promise<Opened> {
   if (/\.mcap$/i.test(file.name)) {
-    const [{ bytesOf }, { Recording }, { RecordingSource }] = await Promise.all([
-      import('./mcap'),
-      import('./recording'),
-      import('./recordingSource'),
-    ]);
-    const recording = await Recording.open(bytesOf(file));
-    return { kind: 'recording', source: (events) => new RecordingSource(recording, events), note: recording.damage };
+    const { bytesOf } = await import('./mcap');
+    return openRecording(bytesOf(file));
   }
   if (/\.(ply|glb)$/i.test(file.name)) {
     const { readSurface } = await import('./surfaceFile');

@@ -78,6 +78,8 @@ export interface ListedStream {
   name: string;
   source: string;
   state: string;
+  /** Where the file is that it is played from, relative to the page; not said by older servers. */
+  recording?: string | null;
 }
 
 export interface StreamList {

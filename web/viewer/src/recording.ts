@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording of this device: which frames it has, and each one's bytes. Nothing of it leaves the page.
+// A recording, of this device or of the server: which frames it has, and each one's bytes.
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
 import { kTextureH264, parseFrame } from './frame';
 import { openMcap, readMessage, readMessageHead, type Bytes, type McapFile, type McapMessage } from './mcap';
@@ -48,8 +48,9 @@ export class Recording {
     return (this.heads[index] ??= readFrameHead(await readMessageHead(this.file, this.frames[index]!, kFrameHeadBytes)));
   }
 
-  /** All heads, for marks on the time line. `progress` after some of them; stops where it returns false. */
+  /** All heads, for marks on the time line; of a remote file only those that are needed anyway. `progress` after some of them; stops where it returns false. */
   async readHeads(progress: () => boolean): Promise<void> {
+    if (this.file.isRemote === true) return;
     for (let i = 0; i < this.count; i += kTogether) {
       const some = Array.from({ length: Math.min(kTogether, this.count - i) }, (_, j) => this.head(i + j));
       await Promise.allSettled(some); // what is damaged has no mark

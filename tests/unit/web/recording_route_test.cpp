@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: a recording is read in parts by its name alone, no name leads to another file, and a file that
+// changes is never mixed up with what it was.
+#include "web/gateway/recording_route.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/temp_folder.h"
+#include "tests/unit/web/gateway_fixture.h"
+#include "web/gateway/byte_range.h"
+
+namespace relievo::test {
+namespace {
+
+TEST(ByteRange, Headers) {
+  const struct {
+    const char* header;
+    RangeKind kind;
+    ByteRange range;
+  } cases[] = {{"", RangeKind::kWhole, {0, 100}},
+               {"bytes=0-9", RangeKind::kPart, {0, 10}},
+               {"bytes=90-", RangeKind::kPart, {90, 10}},
+               {"bytes=0-", RangeKind::kPart, {0, 100}},
+               {"bytes=-10", RangeKind::kPart, {90, 10}},
+               {"bytes=-1000", RangeKind::kPart, {0, 100}},
+               {"bytes=99-99", RangeKind::kPart, {99, 1}},
+               {"bytes=50-18446744073709551615", RangeKind::kPart, {50, 50}},
+               {"bytes=100-", RangeKind::kUnsatisfiable, {0, 100}},
+               {"bytes=100-200", RangeKind::kUnsatisfiable, {0, 100}},
+               {"bytes=-0", RangeKind::kUnsatisfiable, {0, 100}},
+               {"bytes=9-3", RangeKind::kWhole, {0, 100}},
+               {"bytes=0-1,5-6", RangeKind::kWhole, {0, 100}},
+               {"bytes=0-99999999999999999999", RangeKind::kWhole, {0, 100}},
+               {"bytes= 1-2", RangeKind::kWhole, {0, 100}},
+               {"bytes=--2", RangeKind::kWhole, {0, 100}},
+               {"bytes=-", RangeKind::kWhole, {0, 100}},
+               {"bytes=", RangeKind::kWhole, {0, 100}},
+               {"lines=1-2", RangeKind::kWhole, {0, 100}}};
+  for (const auto& c : cases) {
+    ByteRange range;
+    EXPECT_EQ(parse_range(c.header, 100, range), c.kind) << c.header;
+    if (c.kind != RangeKind::kUnsatisfiable) {
+      EXPECT_EQ(range, c.range) << c.header;
+    }
+  }
+  ByteRange none;
+  EXPECT_EQ(parse_range("bytes=-5", 0, none), RangeKind::kUnsatisfiable);
+  EXPECT_EQ(parse_range("bytes=0-", 0, none), RangeKind::kUnsatisfiable);
+}
+
+class Recordings : public GatewayTest {
+ protected:
+  void SetUp() override {
+    GatewayTest::SetUp();
+    for (int i = 0; i < 1'000'000; ++i) content += static_cast<char>(i * 7 + i / 256);
+    std::ofstream(file, std::ios::binary) << content;
+    std::ofstream(folder / "secret.mcap") << "secret";
+    gateway->announce(make_info());
+    gateway->offer("face", file);
+  }
+  Response get(const std::string& headers = {}) {
+    return request(port, "GET", "/recordings/face.mcap", headers);
+  }
+
+  TempFolder folder;
+  const std::filesystem::path file = folder / "a take of yesterday.mcap";
+  std::string content;
+};
+
+TEST_F(Recordings, AreListedAndReadInParts) {
+  const auto stream = nlohmann::json::parse(request(port, "GET", "/api/streams").body)["streams"][0];
+  EXPECT_EQ(stream["recording"], "recordings/face.mcap");
+  const auto whole = get();
+  EXPECT_EQ(whole.status, 200);
+  EXPECT_EQ(whole.headers.at("accept-ranges"), "bytes");
+  EXPECT_EQ(whole.body, content);
+  const auto part = get("Range: bytes=1000-299999\r\n");
+  EXPECT_EQ(part.status, 206);
+  EXPECT_EQ(part.headers.at("content-range"), "bytes 1000-299999/1000000");
+  EXPECT_EQ(part.body, content.substr(1000, 299000));
+  EXPECT_EQ(get("Range: bytes=-3\r\n").body, content.substr(content.size() - 3));
+  const auto behind = get("Range: bytes=1000000-\r\n");
+  EXPECT_EQ(behind.status, 416);
+  EXPECT_EQ(behind.headers.at("content-range"), "bytes */1000000");
+  const auto head = request(port, "HEAD", "/recordings/face.mcap");
+  EXPECT_EQ(head.headers.at("content-length"), "1000000");
+}
+
+TEST_F(Recordings, OneConnectionReadsPartAfterPart) {
+  TcpClient client(port);
+  for (int i = 0; i < 20; ++i) {
+    const int at = i * 49'999;
+    client.send("GET /recordings/face.mcap HTTP/1.1\r\nHost: localhost\r\nRange: bytes=" +
+                std::to_string(at) + "-" + std::to_string(at + 9'999) + "\r\n\r\n");
+    EXPECT_EQ(read_response(client).body, content.substr(static_cast<std::size_t>(at), 10'000)) << i;
+  }
+}
+
+TEST_F(Recordings, NoNameLeadsElsewhere) {
+  for (const char* name :
+       {"secret.mcap", "../secret.mcap", "%2e%2e/secret.mcap", "..%2fsecret.mcap", "/etc/passwd",
+        "//etc/passwd", "../../../../etc/passwd", "face.mcap/../secret.mcap", "./face.mcap", "face.mcap/",
+        "face.mcap%00", "a%20take%20of%20yesterday.mcap", "face", ".mcap", "", "face.MCAP"}) {
+    const auto response = request(port, "GET", std::string("/recordings/") + name);
+    EXPECT_EQ(response.status, 404) << name;
+    EXPECT_EQ(response.body.find("secret"), std::string::npos) << name;
+  }
+  gateway->announce(make_info("live"));
+  EXPECT_EQ(request(port, "GET", "/recordings/live.mcap").status, 404) << "it is played from no file";
+}
+
+TEST_F(Recordings, AFileThatChangedIsAnotherOne) {
+  const std::string etag = get("Range: bytes=0-9\r\n").headers.at("etag");
+  EXPECT_EQ(get("If-None-Match: " + etag + "\r\n").status, 304);
+  const std::string same = "Range: bytes=0-9\r\nIf-Range: " + etag + "\r\n";
+  EXPECT_EQ(get(same).status, 206);
+  std::ofstream(file, std::ios::binary) << "something else, and shorter";
+  const auto now = get(same);
+  EXPECT_EQ(now.status, 200) << "parts of two files would have been put together";
+  EXPECT_EQ(now.body, "something else, and shorter");
+  std::filesystem::remove(file);
+  EXPECT_EQ(get().status, 404);
+  std::filesystem::create_directory(file);
+  EXPECT_EQ(get().status, 404);
+}
+
+TEST_F(Recordings, GoWithTheirStream) {
+  gateway->withdraw("face");
+  EXPECT_EQ(get().status, 404);
+  gateway->announce(make_info());
+  EXPECT_EQ(get().status, 404) << "what comes back under the name may be live";
+}
+
+TEST_F(Recordings, AreNotToldWithoutAToken) {
+  std::ofstream(folder / "tokens") << "correct-horse-battery\n";
+  start({.port = 0, .web = {.token_file = folder / "tokens"}});
+  gateway->announce(make_info());
+  gateway->offer("face", file);
+  EXPECT_EQ(get().status, 401);
+  EXPECT_EQ(get("Authorization: Bearer correct-horse-battery\r\n").status, 200);
+}
+
+}  // namespace
+}  // namespace relievo::test

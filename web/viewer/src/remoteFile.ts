@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// A file of the server, read in parts: what is asked for comes in blocks, of which the last ones are kept, and the
+// next one is fetched ahead.
+import type { Bytes } from './mcap';
+
+export const kBlock = 2 ** 18; // bytes
+const kKept = 64; // blocks
+const kTries = 4;
+const kFirstWaitMs = 300; // before a second try; twice as long before each further one
+
+export type Fetch = (url: URL, init: RequestInit) => Promise<Response>;
+
+export class RemoteFile implements Bytes {
+  readonly isRemote = true;
+  private readonly blocks = new Map<number, Promise<Uint8Array>>(); // the one used last is the last
+
+  private constructor(
+    private readonly url: URL,
+    readonly size: number,
+    private readonly etag: string,
+    private readonly fetch: Fetch,
+  ) {}
+
+  /** Throws where the server has no such file, or does not give parts of it. */
+  static async open(url: URL, fetch: Fetch = (at, init) => window.fetch(at, init)): Promise<RemoteFile> {
+    const head = await fetch(url, { headers: { Range: 'bytes=0-0' }, cache: 'no-store' });
+    const size = Number(/\/(\d+)$/.exec(head.headers.get('content-range') ?? '')?.[1]);
+    const etag = head.headers.get('etag') ?? '';
+    if (head.status !== 206 || !Number.isSafeInteger(size) || etag === '') {
+      throw new Error(`the server does not give parts of it (HTTP ${head.status})`);
+    }
+    return new RemoteFile(url, size, etag, fetch);
+  }
+
+  async read(at: number, length: number): Promise<Uint8Array> {
+    const end = Math.min(this.size, at + length);
+    if (end <= at) return new Uint8Array();
+    const [first, last] = [Math.floor(at / kBlock), Math.floor((end - 1) / kBlock)];
+    const wanted = Array.from({ length: last - first + 1 }, (_, i) => this.block(first + i));
+    if ((last + 1) * kBlock < this.size) this.block(last + 1).catch(() => undefined); // asked for again when needed
+    const blocks = await Promise.all(wanted);
+    if (blocks.length === 1) return blocks[0]!.slice(at - first * kBlock, end - first * kBlock);
+    const out = new Uint8Array(end - at);
+    blocks.forEach((block, i) => {
+      const begin = (first + i) * kBlock;
+      const part = block.subarray(Math.max(0, at - begin), end - begin);
+      out.set(part, Math.max(0, begin - at));
+    });
+    return out;
+  }
+
+  private block(index: number): Promise<Uint8Array> {
+    let block = this.blocks.get(index);
+    this.blocks.delete(index);
+    if (block === undefined) {
+      block = this.load(index);
+      const asked = block;
+      block.catch(() => {
+        if (this.blocks.get(index) === asked) this.blocks.delete(index);
+      });
+    }
+    this.blocks.set(index, block);
+    for (const oldest of this.blocks.keys()) {
+      if (this.blocks.size <= kKept) break;
+      this.blocks.delete(oldest);
+    }
+    return block;
+  }
+
+  private async load(index: number): Promise<Uint8Array> {
+    const [at, end] = [index * kBlock, Math.min(this.size, (index + 1) * kBlock)];
+    for (let tried = 1; ; ++tried) {
+      try {
+        return await this.ask(at, end);
+      } catch (error) {
+        if (error instanceof Changed || tried === kTries) throw error;
+        await new Promise((resolve) => setTimeout(resolve, kFirstWaitMs * 2 ** (tried - 1)));
+      }
+    }
+  }
+
+  private async ask(at: number, end: number): Promise<Uint8Array> {
+    const headers = { Range: `bytes=${at}-${end - 1}`, 'If-Range': this.etag };
+    const response = await this.fetch(this.url, { headers, cache: 'no-store' });
+    if (response.status === 200 || response.status === 416) {
+      await response.body?.cancel();
+      throw new Changed('the recording has changed on the server: open it anew');
+    }
+    if (response.status !== 206) throw new Error(`the server does not give the recording: HTTP ${response.status}`);
+    const bytes = new Uint8Array(await response.arrayBuffer());
+    if (bytes.length !== end - at) throw new Error('a part of the recording came short');
+    return bytes;
+  }
+}
+
+class Changed extends Error {}

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: a file of the server reads as one of this device, in few requests, and never as a mixture of two.
+import { describe, expect, it } from 'vitest';
+import { kBlock, RemoteFile, type Fetch } from '../src/remoteFile';
+
+const url = new URL('http://host/recordings/a.mcap');
+
+class Server {
+  bytes = Uint8Array.from({ length: 3 * kBlock + 1234 }, (_, i) => (i * 31 + (i >> 8)) & 255);
+  etag = '"one"';
+  asked: string[] = [];
+  failures = 0;
+
+  readonly fetch: Fetch = async (_, init) => {
+    const headers = new Headers(init.headers);
+    const range = headers.get('range')!;
+    this.asked.push(range);
+    if (this.failures > 0) {
+      --this.failures;
+      throw new TypeError('network');
+    }
+    const condition = headers.get('if-range');
+    if (condition !== null && condition !== this.etag) return new Response(this.bytes, { status: 200 });
+    const [from, to] = range.slice('bytes='.length).split('-').map(Number) as [number, number];
+    const total = this.bytes.length;
+    return new Response(this.bytes.slice(from, to + 1), {
+      status: 206,
+      headers: { 'content-range': `bytes ${from}-${to}/${total}`, etag: this.etag },
+    });
+  };
+}
+
+describe('RemoteFile', () => {
+  it('reads what is there, across blocks and up to the end', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, server.fetch);
+    expect(file.size).toBe(server.bytes.length);
+    const places: [number, number][] = [[0, 10], [kBlock - 3, 6], [5, 2 * kBlock + 7], [kBlock, kBlock], [file.size - 5, 100], [file.size, 4]];
+    for (const [at, length] of places) {
+      expect(Buffer.compare(await file.read(at, length), server.bytes.slice(at, at + length)), `${at}+${length}`).toBe(0);
+    }
+  });
+
+  it('asks for a block once, and for the next one ahead', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, server.fetch);
+    for (let at = 0; at < kBlock; at += 1000) await file.read(at, 9);
+    expect(server.asked.slice(1)).toEqual([`bytes=0-${kBlock - 1}`, `bytes=${kBlock}-${2 * kBlock - 1}`]);
+  });
+
+  it('tries again where the network fails', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, server.fetch);
+    server.failures = 2;
+    expect(await file.read(3 * kBlock, 4)).toEqual(server.bytes.slice(3 * kBlock, 3 * kBlock + 4));
+  });
+
+  it('says that the file has changed', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, server.fetch);
+    server.etag = '"two"';
+    await expect(file.read(0, 4)).rejects.toThrow('changed');
+  });
+
+  it('is not opened where the server gives no parts', async () => {
+    await expect(RemoteFile.open(url, async () => new Response('all of it', { status: 200 }))).rejects.toThrow('HTTP 200');
+    await expect(RemoteFile.open(url, async () => new Response('', { status: 404 }))).rejects.toThrow('HTTP 404');
+  });
+});
