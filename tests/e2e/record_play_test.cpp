@@ -418,6 +418,13 @@ TEST(RecordPlay, ARecordingIsCodedAnew) {
   ASSERT_EQ(exported.status, 0) << exported.err;
   EXPECT_EQ(nlohmann::json::parse(exported.out)["frames"], 2);
 
+  const auto in_draco = convert(original, "draco.mcap", {"--geometry", "draco-grid", "--step-bits", "4"});
+  ASSERT_EQ(in_draco.status, 0) << in_draco.err;
+  EXPECT_EQ(info(folder / "draco.mcap")["geometry_codecs"], nlohmann::json({"draco-grid"}));
+  EXPECT_EQ(info(folder / "draco.mcap")["mean_vertices"], info(original)["mean_vertices"]);
+  const auto grid = convert(folder / "draco.mcap", "grid.mcap", {"--geometry", "grid", "--step-bits", "4"});
+  EXPECT_EQ(grid.status, 0) << "it has the places: " << grid.err;
+
   const auto mesh = convert(original, "mesh.mcap", {"--geometry", "draco-mesh"});
   ASSERT_EQ(mesh.status, 0) << mesh.err;
   EXPECT_EQ(info(folder / "mesh.mcap")["geometry_codecs"], nlohmann::json({"draco-mesh"}));
