@@ -34,25 +34,19 @@ constexpr float kLeastRoom_px = 3.F;  // to the next boundary
 constexpr float kOpen_px = 12.F;      // where there is none
 constexpr int kCell_px = 4;           // in which motion is told,
 constexpr int kCellsAround = 3;       // and around an edge that moves
-constexpr float kRegular = 1.6F;      // times a distance of boundaries, the one next to it
 
 // Standard deviations, measured on simulated scenes.
 constexpr float kFound_px = 0.4F;     // of where the field shows the step
 constexpr float kBetween_px = 0.12F;  // between the lines above and below,
 constexpr float kLeanShare = 0.2F;    // and of their difference more
-constexpr float kOneSide_px = 1.F;    // from one line or from the frame before
+constexpr float kOneSide_px = 1.F;    // from one line
 constexpr float kApartShare = 0.3F;   // of the distance between the two
 
 // What tells where a boundary is.
-constexpr unsigned kAbove = 1, kBelow = 2, kBefore = 4, kLeft = 8, kRight = 16;
+constexpr unsigned kAbove = 1, kBelow = 2, kLeft = 4, kRight = 8;
 
 bool known(float x) {
   return x == x;
-}
-
-/// Whether two distances side by side are those of stripes on one surface. True where one is not known.
-bool regular(float a_px, float b_px) {
-  return !(a_px > kRegular * b_px) && !(b_px > kRegular * a_px);
 }
 
 }  // namespace
@@ -146,9 +140,9 @@ bool Growth::moves(int line, float column_px) const {
   return cell >= 0 && cell < cells_ && moving_[static_cast<std::size_t>(line * cells_ + cell)] != 0;
 }
 
-std::optional<Growth::Prediction> Growth::predict(int line, int boundary, Round round) {
+std::optional<Growth::Prediction> Growth::predict(int line, int boundary) {
   const float* here = row(now_, line);
-  std::array<float, 3> places{};
+  std::array<float, 2> places{};
   std::size_t count = 0;
   unsigned sources = 0;
   for (const int direction : {-1, 1}) {
@@ -160,27 +154,18 @@ std::optional<Growth::Prediction> Growth::predict(int line, int boundary, Round 
       break;
     }
   }
-  const float before = row(before_, line)[boundary];
-  if (known(before)) {
-    places[count++] = before;
-    sources |= kBefore;
-  }
+  if (count == 0) return std::nullopt;
   if (known(here[boundary - 1])) sources |= kLeft;
   if (known(here[boundary + 1])) sources |= kRight;
-  if (count == 0) return std::nullopt;
-  const bool vertical = (sources & (kAbove | kBelow)) != 0;
-  const bool both = (sources & kAbove) != 0 && (sources & kBelow) != 0;
+  const bool both = count == 2;
+  const bool beside = (sources & (kLeft | kRight)) != 0;
   const bool enclosed = both || ((sources & kLeft) != 0 && (sources & kRight) != 0);
-  if (!both && !mostly_still_) return std::nullopt;
-  // What the frame before had there may be covered by now.
-  const bool doubtful = (sources & kBefore) != 0 && !both;
-  if (round == Round::kSure && (!vertical || !(sources & (kLeft | kRight)) || doubtful)) return std::nullopt;
+  if (!both && (!beside || !mostly_still_)) return std::nullopt;
+  // What the frame before had there and this one does not may be covered by now.
+  if (!both && known(row(before_, line)[boundary])) return std::nullopt;
   std::uint8_t& tried = tried_[static_cast<std::size_t>(line * boundaries_ + boundary)];
   if (std::exchange(tried, static_cast<std::uint8_t>(sources)) == sources) return std::nullopt;
-  const auto [low, high] = std::minmax(places[0], places[1]);
-  const float column = count == 1   ? places[0]
-                       : count == 2 ? 0.5F * (low + high)
-                                    : std::clamp(places[2], low, high);  // the median
+  const float column = both ? 0.5F * (places[0] + places[1]) : places[0];
   float left = -std::numeric_limits<float>::infinity();
   float right = std::numeric_limits<float>::infinity();
   int left_index = -1;
@@ -195,12 +180,8 @@ std::optional<Growth::Prediction> Growth::predict(int line, int boundary, Round 
       right_index = b;
     }
   }
-  const bool follows_left = doubtful ? left_index == boundary - 1 : left_index < boundary;
-  const bool follows_right = doubtful ? right_index == boundary + 1 : right_index > boundary;
-  if ((column - left < kOpen_px && !follows_left) || (right - column < kOpen_px && !follows_right))
-    return std::nullopt;
-  if (doubtful && (!regular(column - here[boundary - 1], here[boundary - 1] - here[boundary - 2]) ||
-                   !regular(here[boundary + 1] - column, here[boundary + 2] - here[boundary + 1])))
+  if ((column - left < kOpen_px && left_index > boundary) ||
+      (right - column < kOpen_px && right_index < boundary))
     return std::nullopt;
   // Where the scene holds still, what is against a boundary is as good as what is for it.
   if (!enclosed && !moves(line, column)) return std::nullopt;
@@ -274,13 +255,13 @@ std::optional<Growth::Found> Growth::find(const SlideFieldView& view, int line, 
                std::hypot(1 / std::sqrt(own + predicted), kApartShare * moved)};
 }
 
-std::size_t Growth::grow_line(const SlideFieldView& view, int line, Round round,
+std::size_t Growth::grow_line(const SlideFieldView& view, int line,
                               std::vector<RecoveredBoundary>& recovered) {
   float* here = row(now_, line);
   std::size_t added = 0;
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
-    const auto p = predict(line, b, round);
+    const auto p = predict(line, b);
     if (!p) continue;
     const auto found = find(view, line, b, *p);
     if (!found) continue;
@@ -296,10 +277,8 @@ std::size_t Growth::grow(const SlideFieldView& view, const SequenceResult& resul
   fill(view.field.width, result, edges, recovered);
   const int lines = std::min(lines_, view.field.height);
   std::size_t added = 0;
-  for (const Round round : {Round::kSure, Round::kAll}) {
-    for (int line = 0; line < lines; ++line) added += grow_line(view, line, round, recovered);
-    for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, round, recovered);
-  }
+  for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
+  for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);
   std::swap(now_, before_);
   return added;
 }

@@ -2,8 +2,7 @@
 // Boundaries beside the edges of what moves. A silhouette has moved on between a slide's field and its
 // complement's, and further since the other slide's: there the difference of the fields and the other slide
 // show two surfaces. The slide's own field shows one, at the frame's own instant; where boundaries on the
-// lines around, on the line itself and in the frame before tell which boundary must be there, it tells
-// whether and where it is.
+// lines around and on the line itself tell which one must be there, it tells whether and where it is.
 #pragma once
 
 #include <array>
@@ -34,12 +33,11 @@ class Growth {
   Growth(const std::array<double, 9>& colour_matrix, int boundaries, int lines);
 
   /// Adds boundaries that neither `result` nor `recovered` has to `recovered`; what was added leads to more.
-  /// Once a frame, when columns are those of the field's instant. Returns how many were added.
+  /// Once a frame. Columns must be those of the field's instant. Returns how many were added.
   std::size_t grow(const SlideFieldView& view, const SequenceResult& result, const EdgeImage& edges,
                    std::vector<RecoveredBoundary>& recovered);
 
  private:
-  enum class Round { kSure, kAll };
   /// Where a boundary should be, by what is around it.
   struct Prediction {
     float column_px, sigma_px;
@@ -54,11 +52,10 @@ class Growth {
   void fill(int width, const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered);
   bool moves(int line, float column_px) const;
-  std::optional<Prediction> predict(int line, int boundary, Round round);
+  std::optional<Prediction> predict(int line, int boundary);
   void read(const std::uint8_t* pixels, int centre, Light& out) const;
   std::optional<Found> find(const SlideFieldView& view, int line, int boundary, const Prediction& p) const;
-  std::size_t grow_line(const SlideFieldView& view, int line, Round round,
-                        std::vector<RecoveredBoundary>& recovered);
+  std::size_t grow_line(const SlideFieldView& view, int line, std::vector<RecoveredBoundary>& recovered);
 
   std::array<float, 9> colour_;
   int boundaries_, lines_;

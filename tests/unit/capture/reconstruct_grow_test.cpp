@@ -58,13 +58,8 @@ struct Frame {
   void move(int line) {
     for (int b = 0; b < kBoundaries; ++b) result.still[at(line, b)] = 0;
   }
-  std::size_t grow(Growth& growth) {
-    recovered.clear();
-    return growth.grow({picture.view(), colours}, result, edges, recovered);
-  }
   std::size_t grow() {
-    Growth growth(kIdentity, kBoundaries, kLines);
-    return grow(growth);
+    return Growth(kIdentity, kBoundaries, kLines).grow({picture.view(), colours}, result, edges, recovered);
   }
 };
 
@@ -119,16 +114,19 @@ TEST(Growth, ASurfacesEndGoesOnWhereItMovesOnly) {
   }
 }
 
-TEST(Growth, TheFrameBeforeTellsWhereBoundariesWere) {
+TEST(Growth, WhatTheFrameBeforeHadThereMayBeCoveredByNow) {
   Growth growth(kIdentity, kBoundaries, kLines);
-  Frame before;
-  EXPECT_EQ(before.grow(growth), 0U);
-  Frame f;
-  for (int line = 0; line < kLines; ++line) {
-    f.lose(line, kBoundaries - 1);
-    if (line < 8) f.move(line);
-  }
-  EXPECT_EQ(f.grow(growth), 8U);
+  const auto grown = [&](int lost_from) {
+    Frame f;
+    for (int line = lost_from; line < kLines; ++line) {
+      f.move(line);
+      f.lose(line, kBoundaries - 1);
+    }
+    return growth.grow({f.picture.view(), f.colours}, f.result, f.edges, f.recovered);
+  };
+  EXPECT_EQ(grown(kLines), 0U) << "all are there";
+  EXPECT_EQ(grown(12), 0U);
+  EXPECT_EQ(grown(12), 8U) << "they were not there before";
 }
 
 TEST(Growth, ABoundaryThatWouldBreakTheOrderIsNone) {
@@ -139,7 +137,6 @@ TEST(Growth, ABoundaryThatWouldBreakTheOrderIsNone) {
     f.result.boundary[Frame::at(line, 3)] = 6;  // as 6 and 3 swapped
     f.lose(line, 6);
   }
-  f.recovered.clear();
   f.result.boundary[Frame::at(6, 3)] = 3;
   f.result.boundary[Frame::at(8, 3)] = 3;
   f.grow();
