@@ -127,13 +127,18 @@ Status run(const Options& options, StopSignal& stop) {
   auto inputs = sort_inputs(options.inputs);
   if (!inputs) return inputs.error();
   KeyFrameWishes wishes;  // outlives the gateway
-  auto gateway =
-      Gateway::start({.host = address->host,
-                      .port = address->port,
-                      .web = *options.web,
-                      .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
-                                    " yet: start relievo-server serve there.",
-                      .key_frame_wanted = [&](const std::string& stream) { wishes.wish(stream); }});
+  auto gateway = Gateway::start(
+      {.host = address->host,
+       .port = address->port,
+       .web = *options.web,
+       .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
+                     " yet: start relievo-server serve there.",
+       .key_frame_wanted = [&](const std::string& stream) { wishes.wish(stream); },
+       .samples = SampleFormat{.type_name = topic_type(Topic::kFrame).type_name,
+                               .idl = topic_type(Topic::kFrame).idl,
+                               .encode = [](const std::string& name, const FrameMessage& frame) {
+                                 return write_frame_cdr(name, frame);
+                               }}});
   if (!gateway) return gateway.error();
 
   std::vector<std::unique_ptr<Subscriber>> subscribers;

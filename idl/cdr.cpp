@@ -262,6 +262,15 @@ Bytes write_frame_cdr(const FrameView& frame) {
   return out;
 }
 
+Bytes write_frame_cdr(const std::string& stream, const FrameMessage& frame) {
+  return write_frame_cdr(FrameView{.stream = stream,
+                                   .sequence = frame.sequence,
+                                   .number = frame.number,
+                                   .capture_time_ns = frame.capture_time_ns,
+                                   .publish_time_ns = frame.publish_time_ns,
+                                   .data = *frame.data});
+}
+
 Result<StreamInfo> read_info_cdr(std::span<const std::uint8_t> cdr) {
   if (auto bad = bad_encapsulation(cdr)) return *bad;
   Cursor in(cdr.subspan(kEncapsulationBytes));

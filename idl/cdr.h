@@ -33,6 +33,7 @@ inline constexpr std::size_t kFrameStartBytes = 256;
 
 /// The bytes that a Publisher sends for this frame.
 Bytes write_frame_cdr(const FrameView& frame);
+Bytes write_frame_cdr(const std::string& stream, const FrameMessage& frame);
 
 Result<StreamInfo> read_info_cdr(std::span<const std::uint8_t> cdr);
 Result<ServerStatus> read_status_cdr(std::span<const std::uint8_t> cdr);

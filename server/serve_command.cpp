@@ -17,6 +17,7 @@
 #include "cli/web_flags.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
+#include "idl/cdr.h"
 #include "idl/recorder.h"
 #include "idl/transport.h"
 #include "server/camera_flags.h"
@@ -123,10 +124,16 @@ Status serve(const ServeConfig& config, StopSignal& stop) {
   // The gateway first: a port in use should fail before anything is opened or announced.
   std::unique_ptr<Gateway> gateway;
   if (web) {
-    auto started = Gateway::start({.host = web->host,
-                                   .port = web->port,
-                                   .web = config.gateway,
-                                   .key_frame_wanted = [&](const std::string& name) { wishes.wish(name); }});
+    auto started = Gateway::start(
+        {.host = web->host,
+         .port = web->port,
+         .web = config.gateway,
+         .key_frame_wanted = [&](const std::string& name) { wishes.wish(name); },
+         .samples = SampleFormat{.type_name = topic_type(Topic::kFrame).type_name,
+                                 .idl = topic_type(Topic::kFrame).idl,
+                                 .encode = [](const std::string& name, const FrameMessage& frame) {
+                                   return write_frame_cdr(name, frame);
+                                 }}});
     if (!started) return started.error();
     gateway = *std::move(started);
   }

@@ -17,6 +17,7 @@
 #include "base/time.h"
 #include "web/gateway/access.h"
 #include "web/gateway/connection.h"
+#include "web/gateway/foxglove_feed.h"
 #include "web/gateway/hub.h"
 #include "web/gateway/limits.h"
 #include "web/gateway/routes.h"
@@ -72,7 +73,8 @@ class Server : public Gateway, private ConnectionHost {
   GatewayCounts& counts() override { return counts_; }
   HttpReply answer(const HttpRequest& request, const Peer& peer) override;
   std::unique_ptr<WsFeed> make_feed(const HttpReply& reply) override {
-    return make_stream_feed(hub_, reply.websocket_stream);
+    if (reply.websocket->stream.empty()) return make_foxglove_feed(hub_, *options_.samples);
+    return make_stream_feed(hub_, reply.websocket->stream);
   }
   std::chrono::milliseconds request_time() const override { return options_.request_time; }
   void add(std::shared_ptr<Connection> connection) override { connections_.insert(std::move(connection)); }
@@ -111,6 +113,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .counts = counts_,
                                    .tokens = tokens_,
                                    .options = options_.web,
+                                   .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});
 }

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/result.h"
@@ -15,6 +16,14 @@
 #include "base/web_options.h"
 
 namespace relievo {
+
+/// Frames as DDS carries them, for readers of such samples: the Foxglove protocol.
+struct SampleFormat {
+  std::string type_name;  // "relievo::Frame"
+  std::string idl;        // its OMG IDL, self-contained
+  // CDR with its encapsulation header. On the gateway's thread.
+  std::function<Bytes(const std::string& stream, const FrameMessage& frame)> encode;
+};
 
 struct GatewayOptions {
   std::string host = "127.0.0.1";
@@ -24,6 +33,7 @@ struct GatewayOptions {
   // A client has to wait for a key frame of the stream; at most once a second a stream, from any thread. Must
   // return at once and not call back.
   std::function<void(const std::string& stream)> key_frame_wanted{};
+  std::optional<SampleFormat> samples{};           // none: no /foxglove
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 

@@ -136,11 +136,12 @@ void HttpSession::on_request() {
                                     .cookie = value(http::field::cookie),
                                     .range = value(http::field::range),
                                     .if_range = value(http::field::if_range),
+                                    .subprotocols = value(http::field::sec_websocket_protocol),
                                     .upgrade = beast::websocket::is_upgrade(request),
                                     .tls = transport_->is_tls()},
                                    transport_->peer());
   ++host_.counts().requests;
-  if (!content.websocket_stream.empty()) return upgrade(content);
+  if (content.websocket) return upgrade(content);
   const bool may_go_on = content.refusal != Refusal::kRate;
   reply(std::move(content), method == "HEAD", request.version(), may_go_on && request.keep_alive());
 }
@@ -152,7 +153,7 @@ void HttpSession::upgrade(const HttpReply& granted) {
   request.write(static_cast<const char*>(behind.data()), static_cast<std::streamsize>(behind.size()));
   start_websocket(host_, {.transport = transport_,
                           .request = request.str(),
-                          .subprotocol = {},
+                          .subprotocol = granted.websocket->subprotocol,
                           .feed = host_.make_feed(granted)});
   finished_ = true;  // the transport is the WebSocket's now
   host_.remove(shared_from_this());

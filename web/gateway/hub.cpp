@@ -55,6 +55,19 @@ void Hub::wake_all(Entry& entry) {
   }
 }
 
+void Hub::wake_list() {
+  std::erase_if(list_watchers_, [](const auto& watcher) { return watcher.expired(); });
+  for (const auto& watcher : list_watchers_)
+    if (const auto wake = watcher.lock()) (*wake)();
+}
+
+std::shared_ptr<void> Hub::watch_list(std::function<void()> wake) {
+  auto watcher = std::make_shared<std::function<void()>>(std::move(wake));
+  const std::lock_guard lock(mutex_);
+  list_watchers_.push_back(watcher);
+  return watcher;
+}
+
 void Hub::erase_if_unused(const std::string& stream) {
   const auto it = streams_.find(stream);
   if (it != streams_.end() && !it->second->live && it->second->watchers.empty()) streams_.erase(it);
@@ -69,8 +82,9 @@ void Hub::announce(const StreamInfo& info) {
   entry->facts.info = info;
   entry->info_text = std::move(text);
   entry->info_version = next_version_++;
-  entry->live = true;
+  const bool is_new = !std::exchange(entry->live, true);
   wake_all(*entry);
+  if (is_new) wake_list();
 }
 
 void Hub::publish(const std::string& stream, const FrameMessage& frame) {
@@ -150,6 +164,7 @@ void Hub::withdraw(const std::string& stream) {
     ++entry.facts.client_drops;
   }
   wake_all(entry);
+  wake_list();
   erase_if_unused(stream);
 }
 

@@ -64,6 +64,8 @@ class Hub {
   /// `wake` is called, from any thread and with the hub locked, when take() has something; it must not call
   /// back.
   std::shared_ptr<Watcher> watch(const std::string& stream, std::function<void()> wake);
+  /// `wake` is called, as above, when a stream has come or gone; until what this returns is destroyed.
+  std::shared_ptr<void> watch_list(std::function<void()> wake);
   void unwatch(const std::shared_ptr<Watcher>& watcher);
 
   /// The next thing to send, `want_frame` saying whether a frame may be among it; nothing where there is
@@ -77,6 +79,7 @@ class Hub {
  private:
   struct Entry;
   void wake_all(Entry& entry);
+  void wake_list();
   void offer(Entry& entry, Watcher& watcher, const FrameMessage& frame);
   void ask_for_key_frame(Entry& entry);
   void erase_if_unused(const std::string& stream);
@@ -85,6 +88,7 @@ class Hub {
   const std::function<void(const std::string& stream)> key_frame_wanted_;
   mutable std::mutex mutex_;
   std::map<std::string, std::unique_ptr<Entry>> streams_;
+  std::vector<std::weak_ptr<std::function<void()>>> list_watchers_;
   std::uint64_t next_version_ = 1;
 };
 

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "web/gateway/assets.h"
+#include "web/gateway/foxglove_feed.h"
 #include "web/gateway/recording_route.h"
 #include "web/gateway/sign_in.h"
 
@@ -74,10 +75,8 @@ bool listed_host(std::string_view host, const RouteContext& context) {
                      [&](const std::string& one) { return same_origin(one, host); });
 }
 
-HttpReply websocket(const HttpRequest& request, const std::string& stream, const RouteContext& context) {
-  if (!valid_stream_name(stream)) {
-    return text(400, "no stream has such a name: 1 to 64 of A-Z a-z 0-9 _ . - and no dot first");
-  }
+/// Upgrades to `target`, unless something speaks against it.
+HttpReply websocket(const HttpRequest& request, WsTarget target, const RouteContext& context) {
   if (!request.upgrade) {
     HttpReply reply = text(426, "this address speaks WebSocket only");
     reply.headers.emplace_back("Upgrade", "websocket");
@@ -95,8 +94,34 @@ HttpReply websocket(const HttpRequest& request, const std::string& stream, const
   }
   HttpReply reply;
   reply.status = 101;
-  reply.websocket_stream = stream;
+  reply.websocket = std::move(target);
   return reply;
+}
+
+HttpReply stream_socket(const std::string& stream, const HttpRequest& request, const RouteContext& context) {
+  if (!valid_stream_name(stream)) {
+    return text(400, "no stream has such a name: 1 to 64 of A-Z a-z 0-9 _ . - and no dot first");
+  }
+  return websocket(request, {.stream = stream, .subprotocol = {}}, context);
+}
+
+bool offers(std::string_view subprotocols, std::string_view wanted) {
+  while (!subprotocols.empty()) {
+    const auto end = subprotocols.find(',');
+    std::string_view one = subprotocols.substr(0, end);
+    one.remove_prefix(std::min(one.find_first_not_of(' '), one.size()));
+    one = one.substr(0, one.find_last_not_of(' ') + 1);
+    if (one == wanted) return true;
+    subprotocols = end == std::string_view::npos ? std::string_view() : subprotocols.substr(end + 1);
+  }
+  return false;
+}
+
+HttpReply foxglove_socket(const HttpRequest& request, const RouteContext& context) {
+  if (!context.foxglove) return text(404, "nothing here");
+  if (request.upgrade && !offers(request.subprotocols, kFoxgloveProtocol))
+    return text(400, "this address speaks the subprotocol " + std::string(kFoxgloveProtocol) + " only");
+  return websocket(request, {.stream = {}, .subprotocol = std::string(kFoxgloveProtocol)}, context);
 }
 
 }  // namespace
@@ -173,13 +198,17 @@ constexpr Route kRoutes[] = {
        return json(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
      }},
     {"/api/openapi.json", true, [](auto, auto&, auto&) { return json(std::string(openapi_document())); }},
+    {"/foxglove", true,
+     [](auto, const HttpRequest& request, const RouteContext& context) {
+       return foxglove_socket(request, context);
+     }},
     {"/recordings/{recording}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
        return recording_reply(name, request, context.hub);
      }},
     {"/ws/{stream}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
-       return websocket(request, std::string(name), context);
+       return stream_socket(std::string(name), request, context);
      }},
 };
 

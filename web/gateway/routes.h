@@ -27,8 +27,15 @@ struct HttpRequest {
   std::string_view cookie;
   std::string_view range;
   std::string_view if_range;
-  bool upgrade = false;  // asks for a WebSocket
-  bool tls = false;      // came over TLS
+  std::string_view subprotocols;  // Sec-WebSocket-Protocol: "a, b"
+  bool upgrade = false;           // asks for a WebSocket
+  bool tls = false;               // came over TLS
+};
+
+/// What a WebSocket serves.
+struct WsTarget {
+  std::string stream;       // empty: all of them, by the Foxglove protocol
+  std::string subprotocol;  // of those the client offered; empty: none
 };
 
 class FilePart;  // web/gateway/recording_route.h
@@ -40,8 +47,8 @@ struct HttpReply {
   std::string_view fixed_body;           // instead of `body`: bytes that live as long as the program
   std::shared_ptr<const FilePart> file;  // instead of both
   std::vector<std::pair<std::string, std::string>> headers;  // in place of, or beside, those of every reply
-  std::string websocket_stream;    // not empty: no reply, upgrade and serve this stream
-  std::optional<Refusal> refusal;  // to be counted
+  std::optional<WsTarget> websocket;                         // no reply: upgrade
+  std::optional<Refusal> refusal;                            // to be counted
 
   std::string_view bytes() const { return fixed_body.empty() ? std::string_view(body) : fixed_body; }
 };
@@ -53,6 +60,7 @@ struct RouteContext {
   const GatewayCounts& counts;
   const Tokens& tokens;
   const WebOptions& options;
+  bool foxglove = false;  // there is an encoder for it
   std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only
 };

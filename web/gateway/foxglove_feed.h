@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// All streams of the hub by the Foxglove WebSocket protocol: a channel a stream, its frames as DDS carries
+// them.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "web/gateway/connection.h"
+#include "web/gateway/gateway.h"
+#include "web/gateway/hub.h"
+
+namespace relievo {
+
+inline constexpr std::string_view kFoxgloveProtocol = "foxglove.websocket.v1";
+
+/// `hub` and `format` must outlive it. A frame follows as soon as the one before it was taken by the system,
+/// and those that come meanwhile are dropped and counted as for want of credit.
+std::unique_ptr<WsFeed> make_foxglove_feed(Hub& hub, const SampleFormat& format);
+
+}  // namespace relievo
