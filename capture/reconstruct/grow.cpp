@@ -27,7 +27,7 @@ constexpr float kFull = 0.5F;         // of the brightest primary, what each is 
 constexpr float kDark = 12.F;         // grey levels; less is no light
 constexpr float kOff = 0.4F;          // of its brightest: in between on and off
 constexpr float kClear = 0.25F;       // to either side of that it is clear
-constexpr float kLeastAgree = 0.45F;  // of each side's colour, -1..1
+constexpr float kLeastAgree = 0.55F;  // of each side's colour, -1..1
 constexpr float kMostSide_px = 4.5F;  // colours are read up to here
 
 constexpr float kLeastRoom_px = 3.F;  // to the next boundary
@@ -159,7 +159,6 @@ std::optional<Growth::Prediction> Growth::predict(int line, int boundary) {
   if (known(here[boundary + 1])) sources |= kRight;
   const bool both = count == 2;
   const bool beside = (sources & (kLeft | kRight)) != 0;
-  const bool enclosed = both || ((sources & kLeft) != 0 && (sources & kRight) != 0);
   if (!both && (!beside || !mostly_still_)) return std::nullopt;
   // What the frame before had there and this one does not may be covered by now.
   if (!both && known(row(before_, line)[boundary])) return std::nullopt;
@@ -184,7 +183,7 @@ std::optional<Growth::Prediction> Growth::predict(int line, int boundary) {
       (right - column < kOpen_px && right_index < boundary))
     return std::nullopt;
   // Where the scene holds still, what is against a boundary is as good as what is for it.
-  if (!enclosed && !moves(line, column)) return std::nullopt;
+  if (!both && !moves(line, column)) return std::nullopt;
   const float sigma = both ? kBetween_px + kLeanShare * std::fabs(places[1] - places[0]) : kOneSide_px;
   return Prediction{column, sigma, std::min(column - left, kOpen_px), std::min(right - column, kOpen_px)};
 }
