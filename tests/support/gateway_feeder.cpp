@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A gateway with a synthetic moving surface, for the browser test: what it serves is encoded by the real
-// codec. Prints "listening PORT" and obeys lines on stdin: start NAME, stop, corrupt (one frame), status
-// STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every 8th). Ends when stdin does, so that
-// no test leaves it behind.
+// codec. Prints "listening PORT" and obeys lines on stdin: start NAME, stop, frame NUMBER (that one, then
+// stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
+// 8th). Ends when stdin does, so that no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -101,6 +102,7 @@ struct Orders {
   std::string stream;  // feeding this one; empty: none
   bool announce = false, withdraw = false, feeding = false, corrupt = false, quit = false;
   std::string state, text;
+  std::optional<std::uint64_t> only;  // this frame, then none
   TextureCodec texture = TextureCodec::kJpeg;
 };
 
@@ -116,6 +118,9 @@ void read_orders(Orders& orders) {
       orders.stream = name;
       orders.announce = orders.feeding = true;
     } else if (verb == "stop") {
+      orders.feeding = false;
+    } else if (verb == "frame") {
+      if (std::uint64_t number = 0; words >> number) orders.only = number;
       orders.feeding = false;
     } else if (verb == "corrupt") {
       orders.corrupt = true;
@@ -173,13 +178,14 @@ int feed(std::uint16_t port, double rate) {
       status.message = orders.text;
       gateway.publish(status);
     }
-    if (!orders.feeding) continue;
+    if (!orders.feeding && !orders.only) continue;
     FrameMessage message;
     message.capture_time_ns = utc_now_ns();
-    message.sequence = message.number = sequence++;
+    message.sequence = sequence++;
+    message.number = std::exchange(orders.only, {}).value_or(message.sequence);
     options.texture = orders.texture;
     const auto bytes =
-        encoder.encode(make_frame(message.number, static_cast<float>(sequence) * 0.05f), options);
+        encoder.encode(make_frame(message.number, static_cast<float>(message.number + 1) * 0.05f), options);
     if (!bytes.ok()) {
       std::fprintf(stderr, "%s\n", bytes.error().message.c_str());
       return 1;

@@ -33,6 +33,8 @@ const press = async (page, key) => {
   await still(page);
 };
 const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
+/** Of the feeder: the ball is in the middle, its rim at none of kPlaces, and none of them behind it. */
+const kFrame = 62;
 /** Shares of the picture with flat ground and with the ball. */
 const kPlaces = [[0.1, 0.15], [0.9, 0.2], [0.15, 0.85], [0.5, 0.5], [0.4, 0.6], [0.85, 0.8]];
 
@@ -52,7 +54,8 @@ const checks = {
 
   async "the rig camera's view shows the picture where the camera saw it"(page) {
     await shownPast(page, 2);
-    feeder.say('stop'); // one surface from here on
+    feeder.say(`frame ${kFrame}`); // this surface from here on
+    await page.waitForFunction((number) => window.relievo.diagnostics().frame === number, kFrame);
     await still(page);
     await press(page, 'c');
     assert.equal((await look(page)).way, 'camera');
