@@ -58,9 +58,7 @@ class Conversion {
 
   Status begin() {
     if (options_.encode()) {
-      const auto described = recorded_.find_info();
-      const auto info = described && *described ? read_info_cdr((*described)->cdr)
-                                                : Result<StreamInfo>(Error{"it is missing"});
+      const auto info = recorded_.read_info();
       if (!info)
         return Error{options_.file + ": frames cannot be coded anew without the stream's description: " +
                      info.error().message};

@@ -78,10 +78,7 @@ Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, Record
                       .rig = {},
                       .depth_unit_m = 1e-3 * options.depth_unit_mm,
                       .reencode = options.reencode};
-  const auto described = recorded.find_info();
-  const auto info =
-      described && *described ? read_info_cdr((*described)->cdr) : Result<StreamInfo>(Error{"it is missing"});
-  if (info) target.rig = info->rig;
+  if (const auto info = recorded.read_info()) target.rig = info->rig;
   return format_named(options.format).make(target);
 }
 

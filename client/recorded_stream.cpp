@@ -146,4 +146,11 @@ Result<std::optional<RawSample>> RecordedStream::find_info() {
   return info;
 }
 
+Result<StreamInfo> RecordedStream::read_info() {
+  const auto described = find_info();
+  if (!described) return described.error();
+  if (!*described) return Error{"it is missing"};
+  return read_info_cdr((*described)->cdr);
+}
+
 }  // namespace relievo

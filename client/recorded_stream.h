@@ -47,6 +47,8 @@ class RecordedStream {
   /// The first description in the file, attached or among the first samples; rewinds. Nothing where there is
   /// none.
   Result<std::optional<RawSample>> find_info();
+  /// What it says. Fails where it is missing or damaged; rewinds.
+  Result<StreamInfo> read_info();
 
  private:
   RecordedStream() = default;

@@ -101,22 +101,14 @@ Status write_shot(const Options& options, bool several, const Frame3D& frame, co
   return {};
 }
 
-Result<std::optional<PinholeModel>> recorded_camera(RecordedStream& recorded) {
-  const auto sample = recorded.find_info();
-  if (!sample) return sample.error();
-  if (!*sample) return std::optional<PinholeModel>();
-  const auto info = read_info_cdr((*sample)->cdr);
-  return info ? std::optional(info->rig.camera) : std::nullopt;
-}
-
 Result<Shots> of_recording(const Options& options, Camera& camera, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.input, options.stream);
   if (!recorded) return recorded.error();
   const auto range = find_range(*options.range, *recorded);
   if (!range) return range.error().in(options.input);
-  const auto rig = recorded_camera(*recorded);
-  if (!rig) return rig.error();
-  if (options.view == "rig" && !*rig)
+  std::optional<PinholeModel> rig;
+  if (const auto info = recorded->read_info()) rig = info->rig.camera;
+  if (options.view == "rig" && !rig)
     return Error{options.input + " says nothing of the rig's camera: use --view orbit"};
   if (auto status = recorded->seek(range->from_ns); !status) return status.error();
 
@@ -140,7 +132,7 @@ Result<Shots> of_recording(const Options& options, Camera& camera, StopSignal& s
       log_warning("a frame is left out: " + frame.error().message);
       continue;
     }
-    if (auto status = write_shot(options, several, *frame, camera.take(*frame, *rig), shots); !status)
+    if (auto status = write_shot(options, several, *frame, camera.take(*frame, rig), shots); !status)
       return status.error();
     progress.update(shots.count);
   }

@@ -94,7 +94,8 @@ std::string domain_config(const NetworkInterface& interface, std::optional<int> 
   if (on_network) xml += "<ExternalDomainId>" + std::to_string(*on_network) + "</ExternalDomainId>";
   xml += "</Discovery>";
   // min="default": take what the kernel grants (net.core.rmem_max) instead of failing.
-  xml += "<Internal><SocketReceiveBufferSize min=\"default\" max=\"8MB\"/></Internal>";
+  xml += "<Internal><SocketReceiveBufferSize min=\"default\" max=\"" + std::to_string(kReceiveBuffer_MiB) +
+         "MB\"/></Internal>";
   xml += "<Sizing><ReceiveBufferSize>4MB</ReceiveBufferSize></Sizing>";
   return "<CycloneDDS><Domain>" + xml + "</Domain></CycloneDDS>";
 }

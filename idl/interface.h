@@ -10,6 +10,8 @@
 
 namespace relievo {
 
+inline constexpr int kReceiveBuffer_MiB = 8;  // of a socket, where the kernel grants it: net.core.rmem_max
+
 struct NetworkInterface {
   std::string name;     // "eth0"
   std::string address;  // IPv4, dotted

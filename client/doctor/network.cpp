@@ -19,9 +19,9 @@ namespace {
 
 using Grade = Finding::Grade;
 
-constexpr const char* kGroup = "239.255.0.1";       // the one that DDS participants find each other by
-constexpr std::int64_t kReceiveBuffer = 8LL << 20;  // bytes that our sockets ask for (idl/interface.cpp)
-constexpr double kFewLost = 1e-5;                   // of all datagrams: not worth a word
+constexpr const char* kGroup = "239.255.0.1";  // the one that DDS participants find each other by
+constexpr std::int64_t kReceiveBuffer = std::int64_t{kReceiveBuffer_MiB} << 20;  // bytes
+constexpr double kFewLost = 1e-5;  // of all datagrams: not worth a word
 
 Result<NetworkInterface> interface_of(const std::string& wanted) {
   return choose_interface(network_interfaces(), wanted);

@@ -59,6 +59,7 @@ class FoxgloveFeed : public WsFeed {
  private:
   struct Subscription {
     std::uint32_t channel = 0;
+    std::string stream;
     std::shared_ptr<Hub::Watcher> watcher;
   };
   void list_streams();
@@ -165,7 +166,7 @@ void FoxgloveFeed::subscribe(const nlohmann::json& wanted) {
   if (subscriptions_.size() >= kMostSubscriptions) return warn("too many subscriptions");
   for (const auto& [stream, known] : channels_) {
     if (known != *channel) continue;
-    subscriptions_[*id] = {known, hub_.watch(stream, wake_)};
+    subscriptions_[*id] = {known, stream, hub_.watch(stream, wake_)};
     return;
   }
   warn("there is no channel " + std::to_string(*channel));
@@ -197,10 +198,7 @@ std::optional<WsOutgoing> FoxgloveFeed::next_frame(std::uint32_t id, const Subsc
   out.head.push_back(kMessageData);
   append_le(out.head, id, 4);
   append_le(out.head, static_cast<std::uint64_t>(delivery->frame->capture_time_ns), 8);
-  std::string stream;
-  for (const auto& [name, channel] : channels_)
-    if (channel == subscription.channel) stream = name;
-  out.data = std::make_shared<const Bytes>(format_.encode(stream, *delivery->frame));
+  out.data = std::make_shared<const Bytes>(format_.encode(subscription.stream, *delivery->frame));
   return out;
 }
 
