@@ -95,7 +95,8 @@ std::string domain_config(const NetworkInterface& interface, std::optional<int> 
   xml += "</Discovery>";
   // min="default": take what the kernel grants (net.core.rmem_max) instead of failing.
   xml += "<Internal><SocketReceiveBufferSize min=\"default\" max=\"" + std::to_string(kReceiveBuffer_MiB) +
-         "MB\"/></Internal>";
+         "MB\"/>";
+  xml += "<NackDelay>10ms</NackDelay></Internal>";
   xml += "<Sizing><ReceiveBufferSize>4MB</ReceiveBufferSize></Sizing>";
   return "<CycloneDDS><Domain>" + xml + "</Domain></CycloneDDS>";
 }

@@ -54,7 +54,10 @@ struct Known {
   bool told = false;  // the info callback was called, and the gone callback not since
 
   bool live() const { return std::find(alive.begin(), alive.end(), true) != alive.end(); }
-  std::uint64_t frame_writer = 0;  // DDS handle of the writer of the last frame; 0 before the first
+  // The writer of the last frame; none before the first. Its handle is another one after a break of the
+  // network that was long enough for DDS to forget it; its guid is the same.
+  std::uint64_t writer_handle = 0;
+  dds_guid_t writer{};
   std::uint64_t last_sequence = 0;
 };
 
@@ -239,11 +242,27 @@ class DdsSubscriber final : public Subscriber {
   }
 
   void count_lost(Known& known, const FrameView& frame, std::uint64_t writer) {
-    const bool follows = known.frame_writer == writer && frame.sequence > known.last_sequence;
+    const bool follows = same_writer(known, writer) && frame.sequence > known.last_sequence;
     const std::uint64_t lost = follows ? frame.sequence - known.last_sequence - 1 : 0;
-    known.frame_writer = writer;
     known.last_sequence = frame.sequence;
     if (lost > 0 && callbacks_.lost) callbacks_.lost(frame.stream, lost);
+  }
+
+  // Whether a frame's writer is that of the frame before, and remembers it.
+  bool same_writer(Known& known, std::uint64_t handle) const {
+    if (known.writer_handle == handle) return true;
+    const bool first = known.writer_handle == 0;
+    known.writer_handle = handle;
+    const dds_guid_t before = known.writer;
+    auto* const endpoint =
+        dds_get_matched_publication_data(readers_[static_cast<std::size_t>(Topic::kFrame)].get(), handle);
+    if (endpoint == nullptr) {  // it has left already
+      known.writer = {};
+      return false;
+    }
+    known.writer = endpoint->key;
+    dds_builtintopic_free_endpoint(endpoint);
+    return !first && std::equal(std::begin(before.v), std::end(before.v), std::begin(known.writer.v));
   }
 
   void raw(Topic topic, const std::string& stream, std::span<const std::uint8_t> cdr,

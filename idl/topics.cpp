@@ -29,7 +29,7 @@ struct TopicRow {
 const TopicRow& row(Topic topic) {
   static const TopicRow rows[] = {
       {&relievo_StreamInfo_desc, DDS_DURABILITY_TRANSIENT_LOCAL, 1, 1},
-      {&relievo_Frame_desc, DDS_DURABILITY_VOLATILE, 8, 32},
+      {&relievo_Frame_desc, DDS_DURABILITY_VOLATILE, 16, 32},
       {&relievo_ServerStatus_desc, DDS_DURABILITY_TRANSIENT_LOCAL, 1, 4},
   };
   return rows[static_cast<std::size_t>(topic)];

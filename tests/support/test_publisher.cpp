@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A stream's server reduced to its publishing: test_publisher STREAM DOMAIN BYTES RATE_HZ FRAMES [READERS]
-// waits for READERS readers, publishes FRAMES example frames, prints "done" and stays until killed. BYTES 0:
-// real frames of 3D video instead of bytes that only differ.
+// A stream's server reduced to its publishing:
+// test_publisher STREAM DOMAIN BYTES RATE_HZ FRAMES [READERS [INTERFACE]] waits for READERS readers,
+// publishes FRAMES example frames, prints "done" and stays until killed. BYTES 0: real frames of 3D video
+// instead of bytes that only differ.
 #include <unistd.h>
 
 #include <chrono>
@@ -42,7 +43,9 @@ int main(int argc, char** argv) {
   const std::uint64_t frames = std::strtoul(argv[5], nullptr, 10);
   const int readers = argc > 6 ? std::atoi(argv[6]) : 0;
 
-  auto publisher = Publisher::create({std::atoi(argv[2]), "lo"}, test::example_info(stream));
+  const std::string interface = argc > 7 ? argv[7] : "lo";
+
+  auto publisher = Publisher::create({std::atoi(argv[2]), interface}, test::example_info(stream));
   if (!publisher) {
     std::fprintf(stderr, "%s\n", publisher.error().message.c_str());
     return 1;

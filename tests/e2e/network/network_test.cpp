@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// Programs on hosts of a network that loses, stops and is cut.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "base/time.h"
+#include "codec/recording.h"
+#include "tests/e2e/network/network.h"
+#include "tests/support/patience.h"
+#include "tests/support/process.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo::test {
+namespace {
+
+class NetworkTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { unavailable_ = Network::enter(); }
+  void SetUp() override {
+    if (!unavailable_.empty()) GTEST_SKIP() << "no network of its own: " << unavailable_;
+  }
+
+  /// Publishes numbered frames of host 1 once `readers` are there.
+  std::unique_ptr<Process> publisher(std::size_t bytes, int rate_hz, int frames, int readers) {
+    return std::make_unique<Process>(Network::on(
+        1, {program("test_publisher"), "numbers", "0", std::to_string(bytes), std::to_string(rate_hz),
+            std::to_string(frames), std::to_string(readers), Network::kInterface}));
+  }
+
+  std::unique_ptr<Process> recorder(int host) {
+    return std::make_unique<Process>(
+        Network::on(host, {program("relievo"), "record", "numbers", "--interface", Network::kInterface,
+                           "--out", file(host), "--json"}));
+  }
+  std::filesystem::path file(int host) const { return folder_ / (std::to_string(host) + ".mcap"); }
+
+  struct Counts {
+    std::uint64_t frames = 0, lost = 0;
+  };
+  /// What a recorder says at its end.
+  Counts stop(Process& recorder) {
+    recorder.signal(SIGINT);
+    EXPECT_EQ(recorder.wait(), 0) << recorder.err();
+    const auto said = nlohmann::json::parse(recorder.out(), nullptr, false);
+    if (said.is_discarded()) {
+      ADD_FAILURE() << recorder.out() << recorder.err();
+      return {};
+    }
+    return {said["frames"], said["lost"]};
+  }
+
+  /// When a host's recorder had its first frame after a time, in seconds after it; nothing where it had none.
+  std::optional<double> came_back_after_s(int host, std::int64_t time_ns) const {
+    const auto reader = RecordingReader::open(file(host));
+    if (!reader) return std::nullopt;
+    for (;;) {
+      const auto message = (*reader)->next();
+      if (!message || !*message) return std::nullopt;
+      const bool frame = (*reader)->summary().channels[(*message)->channel].topic == "relievo/frame";
+      if (frame && (*message)->log_time_ns > time_ns) return seconds((*message)->log_time_ns - time_ns);
+    }
+  }
+
+  const TempFolder folder_;
+  static inline std::string unavailable_;
+};
+
+TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {
+  constexpr int kFrames = 200, kRate_Hz = 10;  // at 30 Hz too, where the machine keeps up
+  Network network(3);
+  network.lose(2, 10);
+  network.lose(3, 50);
+  const auto one_percent = recorder(2), five_percent = recorder(3);
+  const auto server = publisher(200'000, kRate_Hz, kFrames, 2);
+  ASSERT_TRUE(server->wait_for_text("done")) << server->err();
+  std::this_thread::sleep_for(1s);
+  const Counts at_one = stop(*one_percent), at_five = stop(*five_percent);
+  EXPECT_EQ(at_one.frames, kFrames);
+  EXPECT_EQ(at_one.lost, 0);
+  EXPECT_EQ(at_five.frames + at_five.lost, kFrames);
+  EXPECT_GE(at_five.frames, kFrames * 99 / 100);
+}
+
+// A receiver forgets a sender that it has not heard of for 10 s, and has to find it anew.
+TEST_F(NetworkTest, WhoIsStoppedOrCutOffComesBackKnowsWhatHeLostAndDisturbsNobody) {
+  constexpr int kFrames = 600, kRate_Hz = 20;
+  Network network(4);
+  const auto steady = recorder(2), stopped = recorder(3), cut_off = recorder(4);
+  const auto server = publisher(50'000, kRate_Hz, kFrames, 3);
+  for (const int host : {2, 3, 4}) ASSERT_TRUE(wait_for_size(file(host), 1));
+  std::this_thread::sleep_for(2s);
+  stopped->signal(SIGSTOP);
+  network.cut(4);
+  std::this_thread::sleep_for(15s);
+  stopped->signal(SIGCONT);
+  network.join(4);
+  const std::int64_t back_ns = utc_now_ns();
+  ASSERT_TRUE(server->wait_for_text("done")) << server->err();
+  std::this_thread::sleep_for(1s);
+
+  const Counts all = stop(*steady);
+  EXPECT_EQ(all.frames, kFrames);
+  EXPECT_EQ(all.lost, 0);
+  for (const auto& [host, recorder] : {std::pair{3, stopped.get()}, {4, cut_off.get()}}) {
+    const Counts some = stop(*recorder);
+    EXPECT_EQ(some.frames + some.lost, kFrames) << "host " << host;
+    EXPECT_GT(some.lost, 0);
+    const auto after_s = came_back_after_s(host, back_ns);
+    ASSERT_TRUE(after_s) << "host " << host;
+    std::printf("host %d is back after %.2f s; lost %llu frames\n", host, *after_s,
+                static_cast<unsigned long long>(some.lost));
+  }
+}
+
+}  // namespace
+}  // namespace relievo::test
