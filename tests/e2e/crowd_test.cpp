@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many who watch at once, and some of them slow: nobody loses a frame for another, and who is slow knows what
+// he lost.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/e2e/server/server_process.h"
+#include "tests/support/socket_client.h"
+
+namespace relievo::test {
+namespace {
+
+constexpr double kRate_Hz = 6;  // so slow that a loaded machine keeps up
+constexpr int kFrames = 60;
+
+/// What a browser was sent until the stream ended.
+struct Seen {
+  std::uint64_t frames = 0, first = 0, last = 0;
+  std::uint64_t dropped = 0;  // as the gateway says
+
+  std::uint64_t published() const { return last - first + 1; }
+};
+
+Seen watch(std::uint16_t port, int credit, std::chrono::milliseconds a_frame_takes) {
+  WsClient client(port, "take");
+  EXPECT_TRUE(client.credit(credit));
+  Seen seen;
+  while (const auto frame = client.next_of("frame")) {
+    seen.last = u64_at(frame->data, 8);
+    if (seen.frames++ == 0) seen.first = seen.last;
+    seen.dropped = u64_at(frame->data, 40);
+    std::this_thread::sleep_for(a_frame_takes);
+    client.credit(1);
+  }
+  return seen;
+}
+
+TEST(Crowd, NobodyLosesAFrameForAnother) {
+  const TempFolder folder;
+  const auto take = folder / "take";
+  StripedScene scene = striped_scene();
+  scene.rig.frame_rate = kRate_Hz;
+  ASSERT_TRUE(write_striped_take(scene, take, 12));
+  Process server(serve("take:" + take.string(),
+                       {"--loop", "--frames", std::to_string(kFrames), "--web", "127.0.0.1:0"}));
+  const std::string before = "viewer http://127.0.0.1:";
+  ASSERT_TRUE(server.wait_for_text(before)) << server.err();
+  const std::string out = server.out();
+  const auto port = static_cast<std::uint16_t>(std::stoi(out.substr(out.find(before) + before.size())));
+
+  std::vector<std::unique_ptr<Process>> recorders;
+  for (int i = 0; i < 8; ++i) {
+    recorders.push_back(std::make_unique<Process>(std::vector<std::string>{
+        program("relievo"), "record", "take", "--out", folder / (std::to_string(i) + ".mcap"), "--json",
+        "--domain", std::to_string(own_domain()), "--interface", "lo"}));
+  }
+  std::vector<Seen> browsers(16);
+  Seen slow;
+  {
+    std::vector<std::jthread> threads;
+    for (Seen& seen : browsers) threads.emplace_back([&seen, port] { seen = watch(port, 2, 0ms); });
+    threads.emplace_back([&slow, port] { slow = watch(port, 1, 600ms); });
+  }
+  EXPECT_EQ(server.wait(), 0) << server.err();
+  for (const Seen& seen : browsers) {
+    EXPECT_EQ(seen.frames, seen.published());
+    EXPECT_EQ(seen.dropped, 0);
+    EXPECT_GT(seen.frames, 0);
+  }
+  EXPECT_GT(slow.dropped, 0);
+  EXPECT_EQ(slow.frames + slow.dropped, slow.published());
+  for (const auto& recorder : recorders) {
+    recorder->signal(SIGINT);
+    EXPECT_EQ(recorder->wait(), 0) << recorder->err();
+    const auto said = nlohmann::json::parse(recorder->out(), nullptr, false);
+    ASSERT_FALSE(said.is_discarded()) << recorder->out();
+    EXPECT_GT(said["frames"], 0);
+    EXPECT_EQ(said["lost"], 0);
+  }
+}
+
+}  // namespace
+}  // namespace relievo::test
