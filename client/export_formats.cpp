@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/whole_file.h"
+#include "client/picture_video.h"
 #include "codec/export.h"
 #include "codec/frame_layout.h"
 #include "codec/texture_codec.h"
@@ -102,45 +103,70 @@ class AnimationWriter final : public ExportWriter {
   GlbAnimation animation_;
 };
 
-/// The stream's own video as it is where the range begins with a key frame of one, else coded anew.
+/// The stream's own video as it is.
+class VideoCopier final : public ExportWriter {
+ public:
+  explicit VideoCopier(VideoFile file) : file_(std::move(file)) {}
+
+  Status add(const Frame3D& frame, std::span<const std::uint8_t> bytes) override {
+    const auto layout = read_frame_layout(bytes);
+    if (!layout) return layout.error();
+    const auto section = layout->sections.texture;
+    if (layout->header.texture != TextureCodec::kH264 || section.empty()) return Error{kMixed};
+    auto status = file_.add(section, frame.texture.width(), frame.texture.height(), frame.time_ns);
+    return status ? status : Status(status.error().in(kMixed));
+  }
+  Status finish() override { return file_.finish(); }
+
+ private:
+  static constexpr const char* kMixed = "the texture's video cannot be copied into one file: give --reencode";
+
+  VideoFile file_;
+};
+
+class VideoCoder final : public ExportWriter {
+ public:
+  explicit VideoCoder(VideoFile file) : video_(std::move(file)) {}
+
+  Status add(const Frame3D& frame, std::span<const std::uint8_t>) override {
+    if (frame.texture.empty()) return Error{"frame " + std::to_string(frame.number) + " has no texture"};
+    return video_.add(frame.texture.view(), frame.time_ns);
+  }
+  Status finish() override { return video_.finish(); }
+
+ private:
+  PictureVideo video_;
+};
+
+/// The stream's own video where the range begins with a key frame of one, else coded anew.
 class VideoWriter final : public ExportWriter {
  public:
   VideoWriter(VideoFile file, bool reencode) : file_(std::move(file)), reencode_(reencode) {}
 
   Status add(const Frame3D& frame, std::span<const std::uint8_t> bytes) override {
-    const auto layout = read_frame_layout(bytes);
-    if (!layout) return layout.error();
-    const FrameHeader& header = layout->header;
-    const auto section = layout->sections.texture;
-    const bool is_video = header.texture == TextureCodec::kH264 && !section.empty();
-    if (is_first_) copies_ = !reencode_ && is_video && texture_is_key(header.texture, section);
-    const int number = is_first_ ? 0 : number_ + 1;
-    is_first_ = false;
-    number_ = number;
-    if (copies_) {
-      if (!is_video) return Error{kMixed};
-      auto status = file_.add(section, frame.texture.width(), frame.texture.height(), frame.time_ns);
-      return status ? status : Status(status.error().in(kMixed));
+    if (!writer_) {
+      const bool copies = !reencode_ && begins_video(bytes);
+      if (copies) {
+        writer_ = std::make_unique<VideoCopier>(std::move(file_));
+      } else {
+        writer_ = std::make_unique<VideoCoder>(std::move(file_));
+      }
     }
-    if (frame.texture.empty()) return Error{"frame " + std::to_string(frame.number) + " has no texture"};
-    if (!encoder_) encoder_ = make_texture_encoder(TextureCodec::kH264);
-    Bytes coded;
-    const auto key = encoder_->encode(frame.texture.view(),
-                                      {.quality = kQuality, .key = number % kKeyInterval == 0}, coded);
-    if (!key) return key.error();
-    return file_.add(coded, frame.texture.width(), frame.texture.height(), frame.time_ns);
+    return writer_->add(frame, bytes);
   }
-  Status finish() override { return file_.finish(); }
+  Status finish() override { return writer_->finish(); }
 
  private:
-  static constexpr int kQuality = 90;
-  static constexpr int kKeyInterval = 30;
-  static constexpr const char* kMixed = "the texture's video cannot be copied into one file: give --reencode";
+  static bool begins_video(std::span<const std::uint8_t> bytes) {
+    const auto layout = read_frame_layout(bytes);
+    if (!layout || layout->header.texture != TextureCodec::kH264) return false;
+    const auto section = layout->sections.texture;
+    return !section.empty() && texture_is_key(TextureCodec::kH264, section);
+  }
 
   VideoFile file_;
-  bool reencode_, copies_ = false, is_first_ = true;
-  int number_ = 0;
-  std::unique_ptr<TextureEncoder> encoder_;
+  bool reencode_;
+  std::unique_ptr<ExportWriter> writer_;
 };
 
 template <const char* const* Ending, WriteFile Write>

@@ -2,23 +2,26 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
+#include "base/time.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "cli/size_option.h"
 #include "client/commands.h"
 #include "client/options.h"
 #include "client/recorded_stream.h"
+#include "client/shot/output.h"
 #include "client/shot/render.h"
 #include "client/time_range.h"
-#include "codec/export.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 
@@ -33,6 +36,7 @@ struct Options {
   Orbit orbit;
   Size size{1280, 720};
   double wait_s = 10;
+  double seconds = 10;
   bool json = false;
 };
 
@@ -78,30 +82,7 @@ class Camera {
   std::optional<ShotView> view_;
 };
 
-struct Shots {
-  std::uint64_t count = 0;
-  std::string last;  // file
-};
-
-/// One frame: the file itself. Several: a folder of files named after them.
-Status write_shot(const Options& options, bool several, const Frame3D& frame, const Image8& picture,
-                  Shots& shots) {
-  std::filesystem::path file = options.out;
-  if (several) {
-    std::error_code error;
-    if (shots.count == 0) std::filesystem::create_directories(file, error);
-    if (error) return Error{"cannot make the folder " + options.out + ": " + error.message()};
-    char name[48];
-    std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(frame.number));
-    file /= name;
-  }
-  if (auto status = write_png(file, picture.view()); !status) return status;
-  ++shots.count;
-  shots.last = file.string();
-  return {};
-}
-
-Result<Shots> of_recording(const Options& options, Camera& camera, StopSignal& stop) {
+Status of_recording(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.input, options.stream);
   if (!recorded) return recorded.error();
   const auto range = find_range(*options.range, *recorded);
@@ -112,11 +93,9 @@ Result<Shots> of_recording(const Options& options, Camera& camera, StopSignal& s
     return Error{options.input + " says nothing of the rig's camera: use --view orbit"};
   if (auto status = recorded->seek(range->from_ns); !status) return status.error();
 
-  const bool several = !options.out.ends_with(".png");
-  Progress progress("shot", "frames", several ? range->frames : 1);
+  Progress progress("shot", "frames", options.out.ends_with(".png") ? 1 : range->frames);
   FrameDecoder decoder;
-  Shots shots;
-  while (!stop.stopped() && (several || shots.count == 0)) {
+  while (!stop.stopped() && !output.full()) {
     auto sample = recorded->next();
     if (!sample) return sample.error();
     if (!*sample || (*sample)->receive_time_ns > range->to_ns) break;
@@ -132,50 +111,77 @@ Result<Shots> of_recording(const Options& options, Camera& camera, StopSignal& s
       log_warning("a frame is left out: " + frame.error().message);
       continue;
     }
-    if (auto status = write_shot(options, several, *frame, camera.take(*frame, rig), shots); !status)
-      return status.error();
-    progress.update(shots.count);
+    if (auto status = output.add(*frame, camera.take(*frame, rig)); !status) return status;
+    progress.update(output.count());
   }
-  if (shots.count == 0 && !stop.stopped())
+  if (output.count() == 0 && !stop.stopped())
     return Error{options.input + ": no frame in that range can be decoded"};
-  return shots;
+  return {};
 }
 
-Result<Shots> of_live(const Options& options, Camera& camera, StopSignal& stop) {
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::optional<PinholeModel> rig;
-  std::optional<Frame3D> taken;
-  FrameDecoder decoder;
-  Subscriber::Callbacks callbacks;
-  callbacks.info = [&](const StreamInfo& info) {
-    std::lock_guard lock(mutex);
-    rig = info.rig.camera;
+/// The latest frame of a live stream: a renderer that is slower than the camera leaves frames out.
+class LatestFrame {
+ public:
+  struct Taken {
+    Frame3D frame;
+    std::optional<PinholeModel> rig;
   };
-  callbacks.frame = [&](const std::string&, const FrameMessage& message) {
-    std::lock_guard lock(mutex);
-    if (taken || !rig || !decoder.can_decode(*message.data)) return;
-    if (auto frame = decoder.decode(*message.data); frame && !frame->surface.positions.empty()) {
-      taken = *std::move(frame);
-      changed.notify_all();
-    }
-  };
-  auto subscriber = Subscriber::create(*options.domain, options.input, callbacks);
+
+  Subscriber::Callbacks callbacks() {
+    Subscriber::Callbacks callbacks;
+    callbacks.info = [this](const StreamInfo& info) {
+      std::lock_guard lock(mutex_);
+      rig_ = info.rig.camera;
+    };
+    callbacks.frame = [this](const std::string&, const FrameMessage& message) {
+      if (!decoder_.can_decode(*message.data)) return;
+      auto frame = decoder_.decode(*message.data);
+      std::lock_guard lock(mutex_);
+      if (!rig_ || !frame || frame->surface.positions.empty()) return;
+      frame_ = *std::move(frame);
+      changed_.notify_all();
+    };
+    return callbacks;
+  }
+
+  /// Nothing where none comes in time.
+  std::optional<Taken> take(std::chrono::duration<double> patience, StopSignal& stop) {
+    std::unique_lock lock(mutex_);
+    const auto end = std::chrono::steady_clock::now() + patience;
+    while (!frame_ && !stop.stopped() && std::chrono::steady_clock::now() < end)
+      changed_.wait_for(lock, std::chrono::milliseconds(100));
+    if (!frame_) return std::nullopt;
+    Taken taken{*std::move(frame_), rig_};
+    frame_.reset();
+    return taken;
+  }
+
+ private:
+  FrameDecoder decoder_;  // of the subscriber's thread alone
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<PinholeModel> rig_;
+  std::optional<Frame3D> frame_;
+};
+
+Status of_live(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
+  LatestFrame latest;
+  auto subscriber = Subscriber::create(*options.domain, options.input, latest.callbacks());
   if (!subscriber) return subscriber.error();
-  std::unique_lock lock(mutex);
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(options.wait_s);
-  while (!taken && !stop.stopped() && std::chrono::steady_clock::now() < end)
-    changed.wait_for(lock, std::chrono::milliseconds(100));
-  lock.unlock();
-  subscriber->reset();
-  Shots shots;
-  if (!taken && stop.stopped()) return shots;
-  if (!taken)
+  Progress progress("shot", "frames");
+  std::int64_t end_ns = std::numeric_limits<std::int64_t>::max();
+  while (!stop.stopped() && !output.full()) {
+    const auto taken = latest.take(std::chrono::duration<double>(options.wait_s), stop);
+    if (!taken || taken->frame.time_ns > end_ns) break;
+    if (output.count() == 0)
+      end_ns = taken->frame.time_ns + std::llround(options.seconds * kNanosecondsPerSecond);
+    if (auto status = output.add(taken->frame, camera.take(taken->frame, taken->rig)); !status) return status;
+    progress.update(output.count());
+  }
+  if (output.count() == 0 && !stop.stopped())
     return Error{"no frame of a stream '" + options.input + "' came in " + duration_text(options.wait_s) +
                  ": is its server running? `relievo streams` lists what there is"};
-  if (auto status = write_shot(options, false, *taken, camera.take(*taken, rig), shots); !status)
-    return status.error();
-  return shots;
+  return {};
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -183,19 +189,26 @@ Status run(const Options& options, StopSignal& stop) {
   const bool file = std::filesystem::exists(options.input, ignored);
   if (!file && (!valid_stream_name(options.input) || options.input.ends_with(".mcap")))
     return Error{"there is no file " + options.input};
-  if (!file && !options.out.ends_with(".png"))
-    return Error{"of a live stream one picture is taken: give --out NAME.png"};
+  const auto made = ShotOutput::create(options.out);
+  if (!made) return made.error();
+  ShotOutput& output = **made;
+  if (!output.has_transparency() && options.background == "transparent")
+    return Error{"a video has no transparency: give another --background, or a folder of pictures"};
   Camera camera(options);
-  const auto shots = file ? of_recording(options, camera, stop) : of_live(options, camera, stop);
-  if (!shots) return shots.error();
+  const Status drawn =
+      file ? of_recording(options, camera, output, stop) : of_live(options, camera, output, stop);
+  if (!drawn) return drawn;
+  if (output.count() > 0) {
+    if (const Status finished = output.finish(); !finished) return finished;
+  }
   if (options.json) {
-    nlohmann::json j{{"pictures", shots->count}, {"out", options.out}, {"last", shots->last}};
+    nlohmann::json j{{"pictures", output.count()}, {"out", options.out}, {"last", output.last()}};
     if (options.mode == "depth") j["depth_m"] = {camera.depth().from_m, camera.depth().to_m};
     std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-  } else if (shots->count == 1) {
-    std::puts(shots->last.c_str());
+  } else if (output.count() == 1) {
+    std::puts(output.last().c_str());
   } else {
-    std::printf("%llu pictures are in %s\n", static_cast<unsigned long long>(shots->count),
+    std::printf("%llu pictures are in %s\n", static_cast<unsigned long long>(output.count()),
                 options.out.c_str());
   }
   if (options.mode == "depth" && !options.json)
@@ -212,9 +225,10 @@ Command shot_command() {
         auto o = std::make_shared<Options>();
         o->domain = add_domain_options(app);
         app.add_option("input", o->input, "Recording, or live stream")->type_name("FILE|STREAM")->required();
-        app.add_option("--out", o->out,
-                       "NAME.png: one frame; anything else: a folder, a picture a frame of the range")
-            ->type_name("NAME.png|DIR")
+        app.add_option(
+               "--out", o->out,
+               "NAME.png: one frame; NAME.mp4 or .mkv: a video; anything else: a folder, a picture a frame")
+            ->type_name("NAME.png|NAME.mp4|DIR")
             ->required();
         app.add_option("--stream", o->stream, "Which stream, where the file holds several")
             ->type_name("NAME");
@@ -249,6 +263,9 @@ Command shot_command() {
             })
             ->type_name("COLOUR")
             ->capture_default_str();
+        app.add_option("--seconds", o->seconds, "Of a live stream, where not one picture is asked for")
+            ->check(number(0.001, 1e9))
+            ->capture_default_str();
         app.add_option("--wait", o->wait_s, "Seconds to wait for a live stream")
             ->check(number(0, 1e9))
             ->capture_default_str();
@@ -256,7 +273,8 @@ Command shot_command() {
         app.footer(
             "Examples:\n  relievo shot face --out face.png\n"
             "  relievo shot face.mcap --from 3 --mode shaded --azimuth -30 --out face.png\n"
-            "  relievo shot face.mcap --view rig --background transparent --out frames");
+            "  relievo shot face.mcap --view rig --background transparent --out frames\n"
+            "  relievo shot face --seconds 5 --out face.mp4");
         return [o](StopSignal& stop) { return run(*o, stop); };
       }};
 }

@@ -94,6 +94,37 @@ TEST_F(Shot, ALiveStreamIsDrawnToo) {
   EXPECT_EQ(cv::imread(in("live.png")).size(), cv::Size(320, 240));
 }
 
+#ifdef RELIEVO_VIDEO
+
+/// What ffprobe says of a file's only stream: "WIDTH,HEIGHT,FRAMES".
+std::string probe(const std::string& video) {
+  const Finished probed =
+      run({"/usr/bin/ffprobe", "-v", "error", "-count_frames", "-select_streams", "v", "-show_entries",
+           "stream=width,height,nb_read_frames", "-of", "csv=p=0", video});
+  EXPECT_EQ(probed.status, 0) << probed.err;
+  return probed.out;
+}
+
+TEST_F(Shot, SeveralFramesAreAVideoToo) {
+  const Finished drawn = shot({"--out", in("turned.mp4"), "--azimuth", "30", "--size", "320x240"});
+  ASSERT_EQ(drawn.status, 0) << drawn.err;
+  EXPECT_EQ(probe(in("turned.mp4")), "320,240,3\n");
+}
+
+TEST_F(Shot, ALiveStreamIsFilmed) {
+  Process serving(serve("sim:face", {"--stream", "filmed"}));
+  ASSERT_TRUE(serving.wait_for_text("stream filmed"));
+  const Finished drawn = run({program("relievo").string(), "shot", "filmed", "--domain",
+                              std::to_string(own_domain()), "--interface", "lo", "--wait", "60", "--seconds",
+                              "0.5", "--out", in("live.mkv"), "--size", "160x120", "--json"});
+  ASSERT_EQ(drawn.status, 0) << drawn.err;
+  const int pictures = nlohmann::json::parse(drawn.out)["pictures"];
+  EXPECT_GE(pictures, 1);
+  EXPECT_EQ(probe(in("live.mkv")), "160,120," + std::to_string(pictures) + "\n");
+}
+
+#endif
+
 TEST_F(Shot, WhatCannotBeDrawnIsSaidInOneLine) {
   const auto fails = [](const std::vector<std::string>& arguments, int status, const std::string& why) {
     std::vector<std::string> command{program("relievo").string(), "shot"};
@@ -107,12 +138,15 @@ TEST_F(Shot, WhatCannotBeDrawnIsSaidInOneLine) {
   fails({"nobody", "--domain", std::to_string(own_domain()), "--interface", "lo", "--wait", "0.2", "--out",
          in("a.png")},
         1, "nobody");
-  fails({"nobody", "--out", in("folder")}, 1, "NAME.png");
+#ifdef RELIEVO_VIDEO
+  fails({file(), "--out", in("a.mp4"), "--background", "transparent"}, 1, "transparency");
+#endif
   fails({file(), "--out", in("a.png"), "--frames", "7"}, 1, "frames");
   fails({file(), "--out", in("a.png"), "--mode", "pretty"}, 2, "textured");
   fails({file(), "--out", in("a.png"), "--background", "#12345"}, 2, "#RRGGBB");
   fails({file(), "--out", in("no/such/folder/a.png")}, 1, "folder");
   EXPECT_FALSE(std::filesystem::exists(in("a.png")));
+  EXPECT_FALSE(std::filesystem::exists(in("a.mp4")));
 }
 
 }  // namespace
