@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// One WebSocket to one stream, kept up: credit, clock exchange, silence as loss, retries with backoff.
+// One WebSocket to one stream, kept up: clock exchange, silence as loss, retries with backoff.
 import { parseFramePrefix, parseServerMessage } from './protocol';
-import type { FrameSource, SourceEvents } from './source';
+import type { SourceEvents } from './source';
 import { backoffS } from './state';
 
-const kCredit = 2; // frames under way: one being decoded while the next travels (FACTS: 1 or 2 bound the latency)
 const kClockEveryMs = 4000;
 const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
 
@@ -17,13 +16,12 @@ async function signInAgain(): Promise<void> {
   if (response?.status === 401) location.reload();
 }
 
-export class Connection implements FrameSource {
+export class Connection {
   private socket: WebSocket | null = null;
   private attempt = 0;
   private retryAt: number | null = null; // performance.now()
   private lastHeard = 0;
   private lastClock = -Infinity;
-  readonly playback = null; // live
   private stopped = false;
   private readonly timer: number;
 
@@ -45,7 +43,7 @@ export class Connection implements FrameSource {
     return Math.max(0, Math.ceil((this.retryAt - performance.now()) / 1000));
   }
 
-  /** This many frames more may come. */
+  /** This many frames more may come; none may where it has just opened. */
   credit(n = 1): void {
     this.send({ type: 'credit', n });
   }
@@ -75,7 +73,6 @@ export class Connection implements FrameSource {
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
       this.events.open();
-      this.credit(kCredit);
       this.tick();
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);

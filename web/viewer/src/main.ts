@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
-import { Connection } from './connection';
 import { loadDisplay, storeDisplay, type Display } from './display';
 import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
@@ -8,6 +7,7 @@ import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
 import { listenToKeys } from './keys';
 import { Legend } from './legend';
+import { LiveSource } from './liveSource';
 import { crc32 } from './crc32';
 import { MeasurePanel } from './measurePanel';
 import { openFile, openRemote } from './openFile';
@@ -17,6 +17,7 @@ import { pixelsOf, type PixelReport } from './pixels';
 import type { DecodedFrame } from './messages';
 import type { Pose } from './navigator';
 import type { ListedStream, StreamList } from './protocol';
+import { RecordControl } from './recordControl';
 import { readShared, shareLink } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
@@ -38,6 +39,7 @@ class Viewer {
   private readonly displayPanel: DisplayPanel;
   private readonly measure: MeasurePanel | null;
   private readonly timeline = new Timeline();
+  private readonly record: RecordControl;
   private readonly session: Session;
   readonly view: View | null;
   private display: Display;
@@ -82,6 +84,7 @@ class Viewer {
     });
     const picker = new FilePicker((file) => void this.openFile(file));
     this.panels.action('open', () => picker.ask());
+    this.record = new RecordControl(this.panels.action('record', () => undefined));
     this.displayPanel = new DisplayPanel(this.panels.panel('display', text.display.title), (part) => this.change(part));
     this.measure = this.makeMeasure();
     this.makeStatistics();
@@ -131,9 +134,10 @@ class Viewer {
   private playbackReport(): object | null {
     const p = this.session.source?.playback;
     if (!p) return null;
-    const keys = Array.from(p.times, (_, i) => p.isKey(i));
-    const { index, position, playing, speed, loop } = p;
-    return { index, position, playing, speed, loop, keys, gaps: keys.map((_, i) => p.gapBefore(i)), times: [...p.times] };
+    const keys = Array.from(p.times, (_, i) => p.isKey(p.first + i));
+    const gaps = keys.map((_, i) => p.gapBefore(p.first + i));
+    const { first, index, position, playing, speed, loop, following } = p;
+    return { first, index, position, playing, speed, loop, following, keys, gaps, times: [...p.times] };
   }
 
   private makeView(): View | null {
@@ -160,7 +164,12 @@ class Viewer {
 
   private makeStatistics(): void {
     const body = this.panels.panel('statistics', text.statistics.title, (open) => (panel.open = open));
-    const panel = new StatisticsPanel(body, this.session.meter, () => this.session.status);
+    const panel = new StatisticsPanel(
+      body,
+      this.session.meter,
+      () => this.session.status,
+      () => this.session.source?.kept ?? null,
+    );
   }
 
   private makeTake(): void {
@@ -210,6 +219,7 @@ class Viewer {
       m: () => this.panels.toggle('measure'),
       i: () => this.panels.toggle('statistics'),
       t: () => this.panels.toggle('take'),
+      x: () => this.record.toggle(),
       '?': () => this.panels.toggle('help'),
       escape: () => this.panels.close(),
     };
@@ -236,8 +246,12 @@ class Viewer {
     this.file = null;
     this.note = '';
     this.triedRecording = false;
-    this.session.watch((events) => new Connection(name, events));
-    this.timeline.show(null);
+    this.session.watch((events) => {
+      const source = new LiveSource(name, events);
+      this.record.watch({ stream: name, source, info: () => this.session.info });
+      return source;
+    });
+    this.timeline.show(this.session.source!.playback);
     void this.preferRecording();
     this.refresh();
   }
@@ -251,6 +265,7 @@ class Viewer {
       const opened = await openRemote(new URL(listed.recording, document.baseURI));
       if (this.stream !== listed.name) return;
       this.view?.restart(null, false);
+      this.record.watch(null);
       this.session.watch(opened.source);
       this.note = opened.note ?? '';
       this.timeline.show(this.session.source?.playback ?? null);
@@ -268,6 +283,7 @@ class Viewer {
       this.file = file.name;
       this.fileProblem = null;
       this.view?.restart(null, false);
+      this.record.watch(null);
       this.session.watch(opened.kind === 'recording' ? opened.source : null);
       this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';
       if (opened.kind === 'surface') this.show(opened.frame);
@@ -310,7 +326,8 @@ class Viewer {
   private refresh(): void {
     const now = performance.now();
     const { source, info, status, seen } = this.session;
-    const playback = source?.playback ?? null;
+    const playing = source === null ? null : source.playback.playing ? 'playing' : 'paused';
+    const following = source?.playback.following ?? null; // null: of a recording
     const offline = source !== null && !source.connected; // it tries again by itself
     if (now >= this.nextListAt && !document.hidden && !offline) {
       this.nextListAt = now + kListEveryMs;
@@ -330,7 +347,8 @@ class Viewer {
       quietMs: now - this.session.lastFrameAt,
       frameRate: info?.frame_rate ?? 0,
       hint: this.hint,
-      file: playback !== null ? (playback.playing ? 'playing' : 'paused') : this.file !== null ? 'surface' : null,
+      file: following !== null ? null : (playing ?? (this.file !== null ? 'surface' : null)),
+      shifted: following === false ? playing : null,
     });
     if (this.fileProblem !== null) {
       const { name, why } = this.fileProblem;

@@ -34,6 +34,7 @@ export class Session {
   everConnected = false;
   private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
   private waiting: Waiting | null = null; // decoded, not drawn
+  private live = false; // the frame that came last
 
   constructor(private readonly events: SessionEvents) {
     this.decoder = new Decoder({
@@ -76,7 +77,7 @@ export class Session {
     if (this.waiting === null) return null;
     const { frame, prefix } = this.waiting;
     this.waiting = null;
-    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.playback === null);
+    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.live === true);
     this.source?.credit();
     this.seen = true;
     return frame;
@@ -99,7 +100,10 @@ export class Session {
 
   private onFrame(prefix: FramePrefix, bytes: ArrayBuffer, forLater: boolean): void {
     this.lastFrameAt = performance.now();
-    if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, this.source?.playback === null);
+    const live = this.source?.live === true;
+    if (live !== this.live) this.meter.pause(); // what was left out in going back or returning is no loss
+    this.live = live;
+    if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, live);
     this.underway.set(this.decoder.decode(bytes, prefix.bytes), { prefix, forLater });
   }
 
