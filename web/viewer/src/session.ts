@@ -35,6 +35,7 @@ export class Session {
   private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
   private waiting: Waiting | null = null; // decoded, not drawn
   private live = false; // the frame that came last
+  private readonly pause = (): void => this.meter.pause();
 
   constructor(private readonly events: SessionEvents) {
     this.decoder = new Decoder({
@@ -42,7 +43,14 @@ export class Session {
       failed: (id, message) => this.onFailed(id, message),
       unusable: (message) => events.unusable(message),
     });
-    document.addEventListener('visibilitychange', () => this.meter.pause());
+    document.addEventListener('visibilitychange', this.pause);
+  }
+
+  /** For good. */
+  end(): void {
+    this.watch(null);
+    this.decoder.stop();
+    document.removeEventListener('visibilitychange', this.pause);
   }
 
   /** From now on, instead of what was watched before; null: nothing. */

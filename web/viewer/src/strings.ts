@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says, in one place.
 import type { Background, Mode, Theme, Way } from './display';
+import type { Placement } from './placement';
 import type { StreamStatus } from './protocol';
 
 const modes: Record<Mode, string> = {
@@ -19,6 +20,7 @@ const ways: Record<Way, readonly [string, string]> = {
   camera: ['Camera', "Exactly what the rig's camera sees (C)"],
 };
 
+const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
 const themes: Record<Theme, string> = { auto: 'As the system', dark: 'Dark', light: 'Light' };
 
@@ -28,6 +30,7 @@ export const text = {
   backgrounds,
   themes,
   rail: {
+    streams: 'Streams and recordings, with pictures (N)',
     record: 'Record (X)',
     open: 'Open a recording, PLY or GLB of this device',
     display: 'Display (B)',
@@ -152,6 +155,20 @@ export const text = {
     paused: 'Paused',
     note: (name: string, note: string) => `${name}: ${note}`,
   },
+  streams: {
+    title: 'Streams',
+    none: 'The server has no streams yet.',
+    recordings: 'Recordings on the server',
+    recording: 'recording',
+    show: 'Show',
+    showTitle: (name: string) => `Show ${name} alone`,
+    beside: 'Beside',
+    besideTitle: (name: string) => `Show ${name} beside the first, or no more`,
+    picture: (name: string) => `A picture of ${name}`,
+    placement: 'Placed',
+    placements,
+    unknownPlaces: 'A calibration does not say where one rig stands to another. In one frame is right where all have the same camera.',
+  },
   record: {
     start: 'Record: on the server where it has a folder for it, else here (X)',
     startHere: 'Record: save what this page keeps and what follows as a file here (X)',
@@ -212,6 +229,7 @@ export const text = {
     ],
     panels: 'Panels',
     panelKeys: [
+      ['N', 'streams'],
       ['B', 'display'],
       ['M', 'measure'],
       ['I', 'statistics'],
