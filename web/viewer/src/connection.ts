@@ -9,10 +9,11 @@ const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
-/** Where the server wants a token that this page does not have (any more), the page it answers with asks for it. */
-async function signInAgain(): Promise<void> {
+/** Where the server wants a token that its page does not have (any more), the page it answers with asks for it. */
+async function signInAgain(server: string): Promise<void> {
+  if (server !== document.baseURI) return; // a page that embeds a stream of elsewhere stays
   // A WebSocket that is refused does not say why.
-  const response = await fetch(new URL('api/streams', document.baseURI), { cache: 'no-store' }).catch(() => null);
+  const response = await fetch(new URL('api/streams', server), { cache: 'no-store' }).catch(() => null);
   if (response?.status === 401) location.reload();
 }
 
@@ -25,9 +26,11 @@ export class Connection {
   private stopped = false;
   private readonly timer: number;
 
+  /** `server`: the address of its page. */
   constructor(
     private readonly stream: string,
     private readonly events: SourceEvents,
+    private readonly server: string = document.baseURI,
   ) {
     this.connect();
     this.timer = window.setInterval(() => this.tick(), 250);
@@ -61,7 +64,7 @@ export class Connection {
   private connect(): void {
     this.detach();
     this.retryAt = null;
-    const url = new URL(`ws/${encodeURIComponent(this.stream)}`, document.baseURI);
+    const url = new URL(`ws/${encodeURIComponent(this.stream)}`, this.server);
     url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
     url.search = url.hash = '';
     const socket = new WebSocket(url);
@@ -100,7 +103,7 @@ export class Connection {
     if (this.stopped) return;
     this.retryAt = performance.now() + backoffS(this.attempt++) * 1000;
     this.events.lost();
-    void signInAgain();
+    void signInAgain(this.server);
   }
 
   private tick(): void {

@@ -22,18 +22,21 @@ export class LiveSource implements FrameSource, Playback {
   /** Gets each message that comes from now on, to be read only. */
   tap: ((message: ArrayBuffer) => void) | null = null;
 
+  /** `server`: the address of its page, where it is not this one. */
   constructor(
     stream: string,
     private readonly events: SourceEvents,
+    server?: string,
   ) {
-    this.connection = new Connection(stream, {
+    const received: SourceEvents = {
       ...events,
       open: () => this.onOpen(),
       lost: () => {
         if (this.live) events.lost(); // what was is still there to be seen
       },
       frame: (prefix, message) => this.onFrame(prefix, message),
-    });
+    };
+    this.connection = new Connection(stream, received, server);
   }
 
   get connected(): boolean {

@@ -24,7 +24,7 @@ import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
 import { StatisticsPanel } from './statisticsPanel';
-import { StreamsPanel } from './streamsPanel';
+import type { StreamsPanel } from './streamsPanel';
 import { TakePanel } from './takePanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
@@ -41,8 +41,8 @@ class Viewer {
   private readonly displayPanel: DisplayPanel;
   private readonly measure: MeasurePanel | null;
   private readonly companions: Companions | null;
-  private readonly streamsPanel: StreamsPanel;
-  private readonly timeline = new Timeline();
+  private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
+  private readonly timeline = new Timeline(element('timeline'), (shown) => document.body.classList.toggle('with-timeline', shown));
   private readonly record: RecordControl;
   private readonly session: Session;
   readonly view: View | null;
@@ -91,7 +91,7 @@ class Viewer {
     this.panels.action('open', () => picker.ask());
     this.record = new RecordControl(this.panels.action('record', () => undefined));
     this.companions = this.view === null ? null : new Companions(this.view, () => this.refresh());
-    this.streamsPanel = this.makeStreams();
+    this.makeStreams();
     this.displayPanel = new DisplayPanel(this.panels.panel('display', text.display.title), (part) => this.change(part));
     this.measure = this.makeMeasure();
     this.makeStatistics();
@@ -130,6 +130,7 @@ class Viewer {
       mode: this.view?.mode,
       way: this.view?.navigator.way,
       drawn: this.view?.drawn,
+      busy: this.view?.isBusy,
       scale: this.view?.movingScale,
       depthRange: this.view?.depthRange,
       gridStep: this.view?.gridStep,
@@ -171,12 +172,13 @@ class Viewer {
     return new MeasurePanel(body, this.view, (at) => this.picture.point(at));
   }
 
-  private makeStreams(): StreamsPanel {
-    const body = this.panels.panel('streams', text.streams.title, (open) => {
-      panel.open = open;
-      this.refresh();
-    });
-    const panel = new StreamsPanel(body, {
+  private makeStreams(): void {
+    const body = this.panels.panel('streams', text.streams.title, (open) => void this.openStreams(body, open));
+  }
+
+  private async openStreams(body: HTMLElement, open: boolean): Promise<void> {
+    const { StreamsPanel } = await import('./streamsPanel');
+    this.streamsPanel ??= new StreamsPanel(body, {
       choose: (name) => this.choose(name),
       beside: (name, on) => {
         if (on) this.companions?.add(name, this.streams.find((s) => s.name === name));
@@ -188,7 +190,8 @@ class Viewer {
         if (this.view !== null) this.view.placement = placement;
       },
     });
-    return panel;
+    this.streamsPanel.open = open;
+    this.refresh();
   }
 
   private makeStatistics(): void {
@@ -407,7 +410,7 @@ class Viewer {
       this.presentation = { ...this.presentation, title: text.file.failed(name), text: `${why}.`, hint: '', dim: seen };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
-    this.streamsPanel.show(this.streams, this.stream, this.companions?.names ?? []);
+    this.streamsPanel?.show(this.streams, this.stream, this.companions?.names ?? []);
     this.ui.showStreams(this.streams, this.stream, this.file ?? info?.source ?? '', this.note);
     this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }

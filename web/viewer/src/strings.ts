@@ -180,6 +180,10 @@ export const text = {
     unreachable: 'the server does not answer',
     nothing: 'Nothing has come yet: nothing is saved',
   },
+  player: {
+    canvas: '3D video. Arrow keys turn it, shift and arrow keys move it, plus and minus zoom, R resets the view.',
+    noStream: 'src names no stream: give the address of a recording (.mcap), or of a gateway with ?stream=NAME',
+  },
   shifted: { playing: 'Behind live', paused: 'Paused' },
   timeline: {
     live: 'Live',

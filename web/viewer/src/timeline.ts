@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time line of a source that has one: playing, scrubbing, speed, a range to repeat, marks of key frames and gaps.
-import { button, element, make, setText } from './dom';
+import { button, make, setText } from './dom';
 import { clockText, frameAt, kSpeeds } from './playback';
 import type { Playback } from './source';
 import { text } from './strings';
@@ -11,7 +11,6 @@ const kLongGap = 5; // frames lost in a row, which a person sees
 const kMarksMs = 250; // between drawings of the marks, which move while a stream is live
 
 export class Timeline {
-  private readonly box = element('timeline');
   private readonly track = make('canvas', {});
   private readonly slider = make('input', { type: 'range', min: '0', step: 'any' });
   private readonly playButton = button('', '', () => this.toggle());
@@ -22,9 +21,14 @@ export class Timeline {
   private playback: Playback | null = null;
   private absolute = false;
   private dirty = false;
+  private readonly timer: number;
   private marksAt = 0; // when they were drawn
 
-  constructor() {
+  /** `shown` is told whether there is anything to go through. */
+  constructor(
+    private readonly box: HTMLElement,
+    private readonly shown: (shown: boolean) => void = () => undefined,
+  ) {
     this.slider.setAttribute('aria-label', say.slider);
     this.speed.setAttribute('aria-label', say.speed);
     for (const speed of kSpeeds) this.speed.append(make('option', { value: String(speed) }, `${speed}×`));
@@ -37,7 +41,12 @@ export class Timeline {
     this.time.className = 'time';
     this.box.append(this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
     new ResizeObserver(() => (this.dirty = true)).observe(this.track);
-    window.setInterval(() => this.refresh(), kRefreshMs);
+    this.timer = window.setInterval(() => this.refresh(), kRefreshMs);
+  }
+
+  /** For good. */
+  stop(): void {
+    window.clearInterval(this.timer);
   }
 
   show(playback: Playback | null): void {
@@ -104,7 +113,7 @@ export class Timeline {
     const hidden = p === null || p.times.length < 2; // a stream that has just begun has nothing to go back to
     if (hidden !== this.box.hidden) {
       this.box.hidden = hidden;
-      document.body.classList.toggle('with-timeline', !hidden);
+      this.shown(!hidden);
     }
     if (p === null || hidden || (!this.dirty && !p.playing)) return;
     this.slider.min = String(this.begin);

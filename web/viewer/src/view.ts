@@ -36,6 +36,8 @@ export interface ViewEvents {
 export class View {
   readonly navigator: Navigator;
   readonly overlay: Overlay;
+  private readonly sizes = new ResizeObserver(() => this.resize());
+  private ended = false;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
   private readonly surface = new SurfaceMesh();
@@ -55,17 +57,19 @@ export class View {
   private grid = false;
   drawn = 0;
 
-  /** Throws where there is no WebGL 2. `overlay` lies over `canvas`. */
+  /** Throws where there is no WebGL 2. `overlay` lies over `canvas`; `keys`: where those are listened to that move. */
   constructor(
     readonly canvas: HTMLCanvasElement,
     overlay: HTMLCanvasElement,
     private readonly events: ViewEvents,
+    keys: EventTarget = window,
   ) {
     // Four samples a pixel cost a processor that draws more than all the rest.
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
     this.renderer.setClearAlpha(0);
     this.overlay = new Overlay(overlay);
-    this.navigator = new Navigator(canvas, { changed: () => this.invalidate(), way: (way) => events.way(way) });
+    const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
+    this.navigator = new Navigator(canvas, navigated, keys);
     this.setScale(1);
     this.scene.add(this.surface.object, this.ground.object, this.navigator.camera);
     this.light();
@@ -74,7 +78,7 @@ export class View {
       events.contextLost(false);
       this.invalidate();
     });
-    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.sizes.observe(canvas);
     this.resize();
   }
 
@@ -184,17 +188,33 @@ export class View {
     return frame === null || ray === null ? null : pick(frame, ray.origin, ray.direction);
   }
 
+  /** For good: gives back what it holds of the card. */
+  end(): void {
+    this.ended = true;
+    this.sizes.disconnect();
+    window.clearTimeout(this.stillTimer);
+    this.navigator.end();
+    for (const mesh of this.meshes) mesh.dispose();
+    this.renderer.dispose();
+  }
+
   invalidate(): void {
-    if (this.scheduled) return;
+    if (this.scheduled || this.ended) return;
     this.scheduled = true;
     requestAnimationFrame((now) => {
       this.scheduled = false;
+      if (this.ended) return;
       this.events.beforeDraw();
       this.navigator.update(now);
       this.setScale(this.resolution.scale);
       this.render();
       this.time();
     });
+  }
+
+  /** Whether something will be drawn without anything happening before: motion that dies away, a finer picture. */
+  get isBusy(): boolean {
+    return this.scheduled || this.fence !== null || this.stillTimer !== 0;
   }
 
   /** Of the screen's pixels that are drawn while the picture moves. */
@@ -238,8 +258,10 @@ export class View {
     ++this.drawn;
     this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
     window.clearTimeout(this.stillTimer);
+    this.stillTimer = 0;
     if (this.scale === 1) return;
     this.stillTimer = window.setTimeout(() => {
+      this.stillTimer = 0;
       this.setScale(1);
       this.render();
     }, kStill_ms);
