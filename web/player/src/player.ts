@@ -41,7 +41,7 @@ interface Parts {
 
 export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   static readonly observedAttributes = ['src', 'mode', ...kFlags];
-  private readonly box = make('div');
+  private readonly box = make('div', { className: 'box' });
   private readonly messageLine = make('p', { className: 'message', hidden: true });
   private readonly timelineBox = make('div', { id: 'timeline', hidden: true });
   private parts: Parts | null = null;

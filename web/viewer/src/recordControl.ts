@@ -157,6 +157,7 @@ export class RecordControl {
     this.saidUntil = performance.now() + kSaidMs;
     this.pill.className = bad ? 'bad' : '';
     setText(this.pill, what);
+    this.pill.title = what; // where there is no room for all of it
     this.show();
   }
 
