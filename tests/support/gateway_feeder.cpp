@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A gateway with a synthetic moving surface, for the browser test: what it serves is encoded by the real
-// codec. Prints "listening PORT" and obeys lines on stdin: start NAME, stop, frame NUMBER (that one, then
-// stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
-// 8th). Ends when stdin does, so that no test leaves it behind.
+// codec. Prints "listening PORT" and obeys lines on stdin: start NAME, also NAME (a second stream of the
+// same frames), stop, frame NUMBER (that one, then stop), corrupt (one frame), status STATE TEXT, gone,
+// texture NAME (of a codec; h264 with a key frame every 8th). Ends when stdin does, so that no test leaves
+// it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -100,6 +101,7 @@ StreamInfo make_info(const std::string& name) {
 struct Orders {
   std::mutex mutex;
   std::string stream;  // feeding this one; empty: none
+  std::string also;    // and this one; empty: none
   bool announce = false, withdraw = false, feeding = false, corrupt = false, quit = false;
   std::string state, text;
   std::optional<std::uint64_t> only;  // this frame, then none
@@ -117,6 +119,9 @@ void read_orders(Orders& orders) {
       words >> name;
       orders.stream = name;
       orders.announce = orders.feeding = true;
+    } else if (verb == "also") {
+      words >> orders.also;
+      orders.announce = true;
     } else if (verb == "stop") {
       orders.feeding = false;
     } else if (verb == "frame") {
@@ -169,7 +174,10 @@ int feed(std::uint16_t port, double rate) {
     std::this_thread::sleep_until(next);
     const std::lock_guard lock(orders.mutex);
     if (orders.quit) return 0;
-    if (std::exchange(orders.announce, false)) gateway.announce(make_info(orders.stream));
+    if (std::exchange(orders.announce, false)) {
+      gateway.announce(make_info(orders.stream));
+      if (!orders.also.empty()) gateway.announce(make_info(orders.also));
+    }
     if (std::exchange(orders.withdraw, false)) gateway.withdraw(orders.stream);
     if (!orders.state.empty()) {
       ServerStatus status;
@@ -195,6 +203,7 @@ int feed(std::uint16_t port, double rate) {
     message.data = std::make_shared<const Bytes>(std::move(data));
     message.publish_time_ns = utc_now_ns();
     gateway.publish(orders.stream, message);
+    if (!orders.also.empty()) gateway.publish(orders.also, message);
   }
 }
 

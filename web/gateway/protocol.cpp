@@ -74,6 +74,14 @@ std::string info_message(const StreamInfo& info) {
   Json json = {
       {"type", "info"}, {"stream", info.stream}, {"source", info.source}, {"started_ns", info.started_ns}};
   json.update(rig_json(info));
+  // All there is to know, so that a page can write a recording.
+  json["field_order"] = to_string(info.rig.field_order);
+  json["colour_matrix"] = info.rig.colour_matrix;
+  json["pattern"] = {{"base", info.pattern.base},
+                     {"slides", info.pattern.slides},
+                     {"palette", info.pattern.palette},
+                     {"sequence", info.pattern.sequence},
+                     {"scheme", to_string(info.pattern.scheme)}};
   return text_of(json);
 }
 

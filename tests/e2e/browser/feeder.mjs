@@ -95,9 +95,11 @@ export const shownPast = (page, count) =>
 /** Until nothing is drawn any more: what was under way has arrived, and no motion is left. */
 export async function still(page) {
   await eventually('the picture does not come to rest', async () => {
-    const before = (await look(page)).drawn;
+    const before = await look(page);
+    if (before.busy) return false;
     await page.waitForTimeout(700);
-    return (await look(page)).drawn === before;
+    const after = await look(page);
+    return !after.busy && after.drawn === before.drawn;
   });
 }
 

@@ -26,6 +26,10 @@ TEST_F(GatewayStream, InfoComesFirstAndDescribesTheRig) {
   EXPECT_EQ(info["type"], "info");
   EXPECT_EQ(info["stream"], "face");
   EXPECT_EQ(info["stripes"], 90);
+  EXPECT_EQ(info["pattern"]["sequence"].size(), 90u);
+  EXPECT_EQ(info["pattern"]["scheme"], "complementary");
+  EXPECT_EQ(info["colour_matrix"].size(), 9u);
+  EXPECT_EQ(info["field_order"], "top");
   EXPECT_EQ(info["frame_rate"], 29.97);
   EXPECT_EQ(info["camera"]["width"], 640);
   EXPECT_EQ(info["camera"]["cx"], 319.5);

@@ -1,35 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// One WebSocket to one stream, kept up: credit, clock exchange, silence as loss, retries with backoff.
+// One WebSocket to one stream, kept up: clock exchange, silence as loss, retries with backoff.
 import { parseFramePrefix, parseServerMessage } from './protocol';
-import type { FrameSource, SourceEvents } from './source';
+import type { SourceEvents } from './source';
 import { backoffS } from './state';
 
-const kCredit = 2; // frames under way: one being decoded while the next travels (FACTS: 1 or 2 bound the latency)
 const kClockEveryMs = 4000;
 const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
-/** Where the server wants a token that this page does not have (any more), the page it answers with asks for it. */
-async function signInAgain(): Promise<void> {
+/** Where the server wants a token that its page does not have (any more), the page it answers with asks for it. */
+async function signInAgain(server: string): Promise<void> {
+  if (server !== document.baseURI) return; // a page that embeds a stream of elsewhere stays
   // A WebSocket that is refused does not say why.
-  const response = await fetch(new URL('api/streams', document.baseURI), { cache: 'no-store' }).catch(() => null);
+  const response = await fetch(new URL('api/streams', server), { cache: 'no-store' }).catch(() => null);
   if (response?.status === 401) location.reload();
 }
 
-export class Connection implements FrameSource {
+export class Connection {
   private socket: WebSocket | null = null;
   private attempt = 0;
   private retryAt: number | null = null; // performance.now()
   private lastHeard = 0;
   private lastClock = -Infinity;
-  readonly playback = null; // live
   private stopped = false;
   private readonly timer: number;
 
+  /** `server`: the address of its page. */
   constructor(
     private readonly stream: string,
     private readonly events: SourceEvents,
+    private readonly server: string = document.baseURI,
   ) {
     this.connect();
     this.timer = window.setInterval(() => this.tick(), 250);
@@ -45,7 +46,7 @@ export class Connection implements FrameSource {
     return Math.max(0, Math.ceil((this.retryAt - performance.now()) / 1000));
   }
 
-  /** This many frames more may come. */
+  /** This many frames more may come; none may where it has just opened. */
   credit(n = 1): void {
     this.send({ type: 'credit', n });
   }
@@ -63,7 +64,7 @@ export class Connection implements FrameSource {
   private connect(): void {
     this.detach();
     this.retryAt = null;
-    const url = new URL(`ws/${encodeURIComponent(this.stream)}`, document.baseURI);
+    const url = new URL(`ws/${encodeURIComponent(this.stream)}`, this.server);
     url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
     url.search = url.hash = '';
     const socket = new WebSocket(url);
@@ -75,7 +76,6 @@ export class Connection implements FrameSource {
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
       this.events.open();
-      this.credit(kCredit);
       this.tick();
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
@@ -103,7 +103,7 @@ export class Connection implements FrameSource {
     if (this.stopped) return;
     this.retryAt = performance.now() + backoffS(this.attempt++) * 1000;
     this.events.lost();
-    void signInAgain();
+    void signInAgain(this.server);
   }
 
   private tick(): void {

@@ -17,10 +17,11 @@ export class Decoder {
   private nextId = 1;
   private readonly pending = new Map<number, number>(); // id -> when it was handed over
   private ready = false;
+  private readonly timer: number;
 
   constructor(private readonly events: DecoderEvents) {
     this.worker = this.start();
-    window.setInterval(() => this.watch(), 1000);
+    this.timer = window.setInterval(() => this.watch(), 1000);
   }
 
   /** Takes the message's bytes; the answer carries the id returned. */
@@ -30,6 +31,13 @@ export class Decoder {
     const request: DecodeRequest = { type: 'decode', id, bytes, offset, want: { ...this.want } };
     this.worker.postMessage(request, [bytes]);
     return id;
+  }
+
+  /** For good. */
+  stop(): void {
+    window.clearInterval(this.timer);
+    this.worker.terminate();
+    this.pending.clear();
   }
 
   private start(): Worker {

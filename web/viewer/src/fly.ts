@@ -33,20 +33,27 @@ export class Fly {
   private last = 0;
   private pointer: number | null = null;
 
-  constructor(canvas: HTMLCanvasElement, events: FlyEvents) {
-    window.addEventListener('keydown', (event) => {
+  private readonly listening = new AbortController();
+
+  /** `keys`: where they are listened to. */
+  constructor(canvas: HTMLCanvasElement, events: FlyEvents, keys: EventTarget) {
+    const { signal } = this.listening;
+    const onKeyDown = (e: Event): void => {
+      const event = e as KeyboardEvent;
       this.fast = event.shiftKey;
       const free = !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping(event.target);
       if (!free || kDirections[event.code] === undefined) return;
       if (this.held.size === 0) this.last = performance.now();
       this.held.add(event.code);
       events.moving();
-    });
-    window.addEventListener('keyup', (event) => {
-      this.fast = event.shiftKey;
-      this.held.delete(event.code);
-    });
-    window.addEventListener('blur', () => this.held.clear());
+    };
+    const onKeyUp = (e: Event): void => {
+      this.fast = (e as KeyboardEvent).shiftKey;
+      this.held.delete((e as KeyboardEvent).code);
+    };
+    keys.addEventListener('keydown', onKeyDown, { signal });
+    keys.addEventListener('keyup', onKeyUp, { signal });
+    window.addEventListener('blur', () => this.held.clear(), { signal });
     canvas.addEventListener('pointerdown', (event) => {
       this.pointer = event.button === 0 ? event.pointerId : null;
     });
@@ -55,6 +62,11 @@ export class Fly {
         events.look(event.movementX * kLook, -event.movementY * kLook);
       }
     });
+  }
+
+  /** For good. */
+  end(): void {
+    this.listening.abort();
   }
 
   /** Right, up and ahead since the last call, in distances to the target; null while no key is held. */

@@ -25,8 +25,9 @@ const kArrows: Record<string, readonly [number, number]> = {
 };
 const kWayKeys: Record<string, Way> = { o: 'orbit', y: 'fly', c: 'camera' };
 
-export function listenToKeys(actions: KeyActions): void {
-  window.addEventListener('keydown', (event) => {
+export function listenToKeys(actions: KeyActions, of: EventTarget = window): void {
+  of.addEventListener('keydown', (e) => {
+    const event = e as KeyboardEvent;
     const modified = event.ctrlKey || event.metaKey || event.altKey;
     if (modified || isTyping(event.target) || belongsToControl(event)) return;
     if (act(event, actions)) event.preventDefault();

@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
-import { Connection } from './connection';
 import { loadDisplay, storeDisplay, type Display } from './display';
+import { Companions } from './companions';
 import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
 import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
 import { listenToKeys } from './keys';
 import { Legend } from './legend';
+import { LiveSource } from './liveSource';
 import { crc32 } from './crc32';
 import { MeasurePanel } from './measurePanel';
-import { openFile, openRemote } from './openFile';
+import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Picture } from './picture';
 import { pixelsOf, type PixelReport } from './pixels';
 import type { DecodedFrame } from './messages';
 import type { Pose } from './navigator';
 import type { ListedStream, StreamList } from './protocol';
+import { RecordControl } from './recordControl';
 import { readShared, shareLink } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
 import { StatisticsPanel } from './statisticsPanel';
+import type { StreamsPanel } from './streamsPanel';
 import { TakePanel } from './takePanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
@@ -37,7 +40,10 @@ class Viewer {
   private readonly picture = new Picture();
   private readonly displayPanel: DisplayPanel;
   private readonly measure: MeasurePanel | null;
-  private readonly timeline = new Timeline();
+  private readonly companions: Companions | null;
+  private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
+  private readonly timeline = new Timeline(element('timeline'), (shown) => document.body.classList.toggle('with-timeline', shown));
+  private readonly record: RecordControl;
   private readonly session: Session;
   readonly view: View | null;
   private display: Display;
@@ -49,6 +55,7 @@ class Viewer {
   private nextListAt = 0;
   private chosenByPerson = false; // the stream, by the address or the picker
   private streams: ListedStream[] = [];
+  private wantedBesides: string[] = []; // by the address, until the list says what they are
   private hint = '';
   private note = ''; // on the file shown
   private stream: string | null = null;
@@ -82,6 +89,9 @@ class Viewer {
     });
     const picker = new FilePicker((file) => void this.openFile(file));
     this.panels.action('open', () => picker.ask());
+    this.record = new RecordControl(this.panels.action('record', () => undefined));
+    this.companions = this.view === null ? null : new Companions(this.view, () => this.refresh());
+    this.makeStreams();
     this.displayPanel = new DisplayPanel(this.panels.panel('display', text.display.title), (part) => this.change(part));
     this.measure = this.makeMeasure();
     this.makeStatistics();
@@ -91,10 +101,11 @@ class Viewer {
     fillHelp(this.panels.panel('help', text.help.title));
     this.listen();
     this.change({});
-    const asked = new URLSearchParams(location.search).get('stream');
-    if (asked !== null && asked !== '') {
+    const [asked, ...besides] = (new URLSearchParams(location.search).get('stream') ?? '').split(',').filter((n) => n !== '');
+    if (asked !== undefined) {
       this.chosenByPerson = true;
       this.watch(asked);
+      this.wantedBesides = besides.filter((name) => name !== asked);
     }
     window.setInterval(() => this.refresh(), kRefreshMs);
     this.refresh();
@@ -119,9 +130,11 @@ class Viewer {
       mode: this.view?.mode,
       way: this.view?.navigator.way,
       drawn: this.view?.drawn,
+      busy: this.view?.isBusy,
       scale: this.view?.movingScale,
       depthRange: this.view?.depthRange,
       gridStep: this.view?.gridStep,
+      besides: this.companions?.report(),
       measurements: this.measure?.measurements,
       problem: this.problem,
       ...this.session.meter.report(),
@@ -131,9 +144,10 @@ class Viewer {
   private playbackReport(): object | null {
     const p = this.session.source?.playback;
     if (!p) return null;
-    const keys = Array.from(p.times, (_, i) => p.isKey(i));
-    const { index, position, playing, speed, loop } = p;
-    return { index, position, playing, speed, loop, keys, gaps: keys.map((_, i) => p.gapBefore(i)), times: [...p.times] };
+    const keys = Array.from(p.times, (_, i) => p.isKey(p.first + i));
+    const gaps = keys.map((_, i) => p.gapBefore(p.first + i));
+    const { first, index, position, playing, speed, loop, following } = p;
+    return { first, index, position, playing, speed, loop, following, keys, gaps, times: [...p.times] };
   }
 
   private makeView(): View | null {
@@ -158,9 +172,36 @@ class Viewer {
     return new MeasurePanel(body, this.view, (at) => this.picture.point(at));
   }
 
+  private makeStreams(): void {
+    const body = this.panels.panel('streams', text.streams.title, (open) => void this.openStreams(body, open));
+  }
+
+  private async openStreams(body: HTMLElement, open: boolean): Promise<void> {
+    const { StreamsPanel } = await import('./streamsPanel');
+    this.streamsPanel ??= new StreamsPanel(body, {
+      choose: (name) => this.choose(name),
+      beside: (name, on) => {
+        if (on) this.companions?.add(name, this.streams.find((s) => s.name === name));
+        else this.companions?.remove(name);
+        this.writeAddress();
+      },
+      recording: (file) => void this.openServerFile(file),
+      placement: (placement) => {
+        if (this.view !== null) this.view.placement = placement;
+      },
+    });
+    this.streamsPanel.open = open;
+    this.refresh();
+  }
+
   private makeStatistics(): void {
     const body = this.panels.panel('statistics', text.statistics.title, (open) => (panel.open = open));
-    const panel = new StatisticsPanel(body, this.session.meter, () => this.session.status);
+    const panel = new StatisticsPanel(
+      body,
+      this.session.meter,
+      () => this.session.status,
+      () => this.session.source?.kept ?? null,
+    );
   }
 
   private makeTake(): void {
@@ -173,7 +214,7 @@ class Viewer {
   link(): string {
     const navigator = this.view?.navigator;
     const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
-    return shareLink(location.href, this.stream, this.display, pose);
+    return shareLink(location.href, this.shownStreams, this.display, pose);
   }
 
   // What the decoder should bring along.
@@ -181,6 +222,7 @@ class Viewer {
     if (this.view === null) return;
     const { wants } = this.view;
     this.session.decoder.want = { ...wants, quality: wants.quality || this.measure?.isOpen === true };
+    this.companions?.wish();
   }
 
   private listen(): void {
@@ -207,9 +249,11 @@ class Viewer {
       g: () => this.change({ grid: !this.display.grid }),
       v: () => this.change({ split: !this.display.split }),
       b: () => this.panels.toggle('display'),
+      n: () => this.panels.toggle('streams'),
       m: () => this.panels.toggle('measure'),
       i: () => this.panels.toggle('statistics'),
       t: () => this.panels.toggle('take'),
+      x: () => this.record.toggle(),
       '?': () => this.panels.toggle('help'),
       escape: () => this.panels.close(),
     };
@@ -224,10 +268,20 @@ class Viewer {
 
   private choose(name: string): void {
     this.chosenByPerson = true;
-    const url = new URL(location.href);
-    url.searchParams.set('stream', name);
-    history.replaceState(null, '', url);
+    for (const beside of this.companions?.names ?? []) this.companions!.remove(beside);
     this.watch(name);
+    this.writeAddress();
+  }
+
+  private get shownStreams(): string | null {
+    return this.stream === null ? null : [this.stream, ...(this.companions?.names ?? [])].join(',');
+  }
+
+  private writeAddress(): void {
+    if (this.shownStreams === null) return;
+    const url = new URL(location.href);
+    url.search = `?stream=${this.shownStreams}`; // names hold no character that would have to be escaped
+    history.replaceState(null, '', url);
   }
 
   private watch(name: string): void {
@@ -236,8 +290,13 @@ class Viewer {
     this.file = null;
     this.note = '';
     this.triedRecording = false;
-    this.session.watch((events) => new Connection(name, events));
-    this.timeline.show(null);
+    if (this.view !== null) this.view.name = name;
+    this.session.watch((events) => {
+      const source = new LiveSource(name, events);
+      this.record.watch({ stream: name, source, info: () => this.session.info });
+      return source;
+    });
+    this.timeline.show(this.session.source!.playback);
     void this.preferRecording();
     this.refresh();
   }
@@ -251,6 +310,7 @@ class Viewer {
       const opened = await openRemote(new URL(listed.recording, document.baseURI));
       if (this.stream !== listed.name) return;
       this.view?.restart(null, false);
+      this.record.watch(null);
       this.session.watch(opened.source);
       this.note = opened.note ?? '';
       this.timeline.show(this.session.source?.playback ?? null);
@@ -260,19 +320,29 @@ class Viewer {
     this.refresh();
   }
 
-  private async openFile(file: File): Promise<void> {
+  private openFile(file: File): Promise<void> {
+    return this.showFile(file.name, () => openFile(file));
+  }
+
+  private openServerFile(name: string): Promise<void> {
+    return this.showFile(name, () => openRemote(new URL(`recordings/${encodeURIComponent(name)}`, document.baseURI)));
+  }
+
+  private async showFile(name: string, open: () => Promise<Opened>): Promise<void> {
     try {
-      const opened = await openFile(file);
+      const opened = await open();
       this.chosenByPerson = true;
       this.stream = null;
-      this.file = file.name;
+      this.file = name;
+      if (this.view !== null) this.view.name = name;
       this.fileProblem = null;
       this.view?.restart(null, false);
+      this.record.watch(null);
       this.session.watch(opened.kind === 'recording' ? opened.source : null);
       this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';
       if (opened.kind === 'surface') this.show(opened.frame);
     } catch (error) {
-      this.fileProblem = { name: file.name, why: error instanceof Error ? error.message : String(error) };
+      this.fileProblem = { name, why: error instanceof Error ? error.message : String(error) };
     }
     this.timeline.show(this.session.source?.playback ?? null);
     this.refresh();
@@ -281,6 +351,7 @@ class Viewer {
   // On the screen's beat.
   private draw(): void {
     const first = !this.session.seen;
+    this.companions?.draw();
     const frame = this.view === null ? null : this.session.take();
     if (frame === null) return;
     this.show(frame);
@@ -310,7 +381,8 @@ class Viewer {
   private refresh(): void {
     const now = performance.now();
     const { source, info, status, seen } = this.session;
-    const playback = source?.playback ?? null;
+    const playing = source === null ? null : source.playback.playing ? 'playing' : 'paused';
+    const following = source?.playback.following ?? null; // null: of a recording
     const offline = source !== null && !source.connected; // it tries again by itself
     if (now >= this.nextListAt && !document.hidden && !offline) {
       this.nextListAt = now + kListEveryMs;
@@ -330,13 +402,15 @@ class Viewer {
       quietMs: now - this.session.lastFrameAt,
       frameRate: info?.frame_rate ?? 0,
       hint: this.hint,
-      file: playback !== null ? (playback.playing ? 'playing' : 'paused') : this.file !== null ? 'surface' : null,
+      file: following !== null ? null : (playing ?? (this.file !== null ? 'surface' : null)),
+      shifted: following === false ? playing : null,
     });
     if (this.fileProblem !== null) {
       const { name, why } = this.fileProblem;
       this.presentation = { ...this.presentation, title: text.file.failed(name), text: `${why}.`, hint: '', dim: seen };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
+    this.streamsPanel?.show(this.streams, this.stream, this.companions?.names ?? []);
     this.ui.showStreams(this.streams, this.stream, this.file ?? info?.source ?? '', this.note);
     this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }
@@ -358,6 +432,8 @@ class Viewer {
       const missing = this.session.info === null && !list.streams.some((s) => s.name === this.stream);
       if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);
       void this.preferRecording();
+      for (const name of this.wantedBesides) this.companions?.add(name, list.streams.find((s) => s.name === name));
+      this.wantedBesides = [];
     } catch {
       this.listed = false;
       this.listFailed = true;

@@ -76,6 +76,12 @@ export class Materials {
     this.points.size = this.plainPoints.size = this.colouredPoints.size = pixels;
   }
 
+  dispose(): void {
+    for (const material of Object.values(this)) {
+      if (material instanceof THREE.Material) material.dispose();
+    }
+  }
+
   /** Of a surface with triangles. */
   solid(mode: Mode, has: { texture: boolean; quality: boolean; colours: boolean }): THREE.Material {
     if (mode === 'wireframe') return this.fill;

@@ -139,6 +139,14 @@ export class SurfaceMesh {
     this.apply();
   }
 
+  /** Gives back what it holds of the card, and its picture. */
+  dispose(): void {
+    for (const geometry of [this.solid, this.lines, this.cloud]) geometry.dispose();
+    this.materials.dispose();
+    (this.texture.image as ImageBitmap | undefined | null)?.close();
+    this.texture.dispose();
+  }
+
   private setTexture(bitmap: ImageBitmap): void {
     const old = this.texture.image as ImageBitmap | undefined | null;
     // The card's storage is of a fixed size.

@@ -36,7 +36,7 @@ export class Meter {
     this.journal.clear();
   }
 
-  /** The page was hidden or shown again: frames it did not ask for meanwhile are no losses. */
+  /** The page was hidden or shown again, or left what is live: frames it did not ask for meanwhile are no losses. */
   pause(): void {
     this.restart();
   }

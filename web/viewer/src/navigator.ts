@@ -41,6 +41,7 @@ export class Navigator {
   constructor(
     canvas: HTMLCanvasElement,
     private readonly events: NavigatorEvents,
+    keys: EventTarget,
   ) {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
@@ -51,10 +52,17 @@ export class Navigator {
       events.changed();
     });
     this.controls.addEventListener('start', () => (this.moved = true)); // a mere click leaves no camera
-    this.fly = new Fly(canvas, {
-      look: (right, up) => this.way_ === 'fly' && this.look(right, up),
+    const flown = {
+      look: (right: number, up: number) => this.way_ === 'fly' && this.look(right, up),
       moving: () => events.changed(),
-    });
+    };
+    this.fly = new Fly(canvas, flown, keys);
+  }
+
+  /** For good. */
+  end(): void {
+    this.controls.dispose();
+    this.fly.end();
   }
 
   get way(): Way {

@@ -6,6 +6,8 @@ import { text } from './strings';
 export type RailName = keyof typeof text.rail;
 
 const kIcons: Record<RailName, string> = {
+  streams: 'M4 5h7v6H4zM13 5h7v6h-7zM4 13h7v6H4zM13 13h7v6h-7z',
+  record: 'M12 5a7 7 0 1 0 .01 0M12 9a3 3 0 1 0 .01 0',
   open: 'M3 7h6l2 2h10v10H3zM12 17v-5M9.5 14 12 11.5 14.5 14',
   display: 'M4 7h9M17 7h3M4 17h3M11 17h9M15 4.5v5M9 14.5v5',
   measure: 'M3.5 15.5 15.5 3.5l5 5-12 12zM7 12l2.5 2.5M10 9l1.5 1.5M13 6l2.5 2.5',

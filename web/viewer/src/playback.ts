@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The time of a recording: playing, speed, a range to repeat. Pure; the clock is given, in milliseconds.
+// The time of what is played: playing, speed, a range to repeat. Pure; the clock is given, in milliseconds.
 
 export const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 4, 8] as const;
 
@@ -15,11 +15,15 @@ export class PlayClock {
   private at = 0; // ms of the recording, at `since`
   private since = 0;
 
-  /** Of a recording whose frames are at `times`, rising from 0; at least one. */
-  constructor(private readonly times: Float64Array) {}
+  /** Of frames at rising times, at least one; those of a live stream change. */
+  constructor(private readonly of: { readonly times: Float64Array }) {}
 
+  get begin(): number {
+    return this.of.times[0]!;
+  }
   get end(): number {
-    return this.times[this.times.length - 1]!;
+    const { times } = this.of;
+    return times[times.length - 1]!;
   }
   get speed(): number {
     return this.speed_;
@@ -37,7 +41,7 @@ export class PlayClock {
   play(now: number): void {
     this.hold(now);
     const end = this.loop_?.to ?? this.end;
-    if (this.at >= end) this.at = this.loop_?.from ?? 0;
+    if (this.at >= end) this.at = this.loop_?.from ?? this.begin;
     this.playing = true;
   }
 
@@ -47,7 +51,7 @@ export class PlayClock {
   }
 
   seek(at: number, now: number): void {
-    this.at = Math.min(this.end, Math.max(0, at));
+    this.at = Math.min(this.end, Math.max(this.begin, at));
     this.since = now;
   }
 
@@ -59,8 +63,9 @@ export class PlayClock {
 
   /** Ms of the recording. Stops at the end, unless a range is repeated. */
   position(now: number): number {
-    if (!this.playing) return this.at;
-    const at = this.at + (now - this.since) * this.speed_;
+    const from = Math.max(this.at, this.begin); // what was there may be gone
+    if (!this.playing) return from;
+    const at = from + (now - this.since) * this.speed_;
     const loop = this.loop_;
     if (loop !== null && at > loop.to) {
       this.at = loop.from + ((at - loop.from) % (loop.to - loop.from));
@@ -75,16 +80,16 @@ export class PlayClock {
     return at;
   }
 
-  /** The last frame that is due. */
+  /** The last frame that is due: its place among the times. */
   index(now: number): number {
-    return frameAt(this.times, this.position(now));
+    return frameAt(this.of.times, this.position(now));
   }
 
   /** Until the next frame is due; null where none comes. */
   untilNext(now: number): number | null {
     const at = this.position(now);
     if (!this.playing) return null;
-    const next = this.times[frameAt(this.times, at) + 1] ?? this.end;
+    const next = this.of.times[frameAt(this.of.times, at) + 1] ?? this.end;
     const end = this.loop_ === null ? next : Math.min(next, this.loop_.to + 1e-3);
     return Math.max(0, (end - at) / this.speed_);
   }

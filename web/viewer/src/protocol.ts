@@ -18,6 +18,23 @@ export interface StreamInfo {
   scan: string;
   stripes: number;
   camera: Pinhole;
+  // What only a recording needs; not said by older servers.
+  started_ns?: number;
+  projector?: Pinhole;
+  projector_from_camera_rotation?: number[]; // row-major
+  projector_from_camera_translation?: number[]; // metres
+  field_order?: string;
+  colour_matrix?: number[]; // row-major
+  pattern?: Pattern;
+}
+
+/** The projected stripes. */
+export interface Pattern {
+  base: number;
+  slides: number;
+  palette: number[];
+  sequence: number[];
+  scheme: string;
 }
 
 export interface StreamStatus {

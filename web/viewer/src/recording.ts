@@ -2,6 +2,7 @@
 // A recording, of this device or of the server: which frames it has, and each one's bytes.
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
 import { kTextureH264, parseFrame } from './frame';
+import type { FrameStore, StoredFrame } from './frameStore';
 import { openMcap, readMessage, readMessageHead, type Bytes, type McapFile, type McapMessage } from './mcap';
 import type { StreamInfo } from './protocol';
 import { videoTextureIsKey } from './videoTexture';
@@ -10,9 +11,10 @@ const kFrameTopic = 'relievo/frame';
 const kInfoTopic = 'relievo/info';
 const kTogether = 64; // heads read at a time
 
-export class Recording {
-  readonly times: Float64Array; // of the frames, ms from the first
-  readonly startMs: number; // UTC of the first
+export class Recording implements FrameStore {
+  readonly times: Float64Array;
+  readonly startMs: number; // UTC of the first frame
+  readonly first = 0;
   /** Of each frame whose head was read. */
   readonly heads: (FrameHead | undefined)[];
 
@@ -58,22 +60,28 @@ export class Recording {
     }
   }
 
+  async read(index: number): Promise<StoredFrame> {
+    const { head, message } = await this.readWhole(index);
+    const { at, length, sequence, captureMs, publishMs } = head;
+    const prefix = { bytes: at, sequence, captureMs, publishMs, sentMs: publishMs, drops: 0 };
+    // DDS fills a message up to whole words; a frame has nothing behind its end.
+    return { prefix, message: message.slice(0, at + length).buffer };
+  }
+
   /** The message, and where in it the frame begins. */
-  async read(index: number): Promise<{ head: FrameHead; message: Uint8Array }> {
+  private async readWhole(index: number): Promise<{ head: FrameHead; message: Uint8Array }> {
     const message = await readMessage(this.file, this.frames[index]!);
     const head = readFrameHead(message);
     this.heads[index] = head;
     return { head, message };
   }
 
-  /** Whether it holds video that builds on the frame before it. */
   async buildsOnFrameBefore(index: number): Promise<boolean> {
-    const { head, message } = await this.read(index);
+    const { head, message } = await this.readWhole(index);
     const frame = parseFrame(message.subarray(head.at, head.at + head.length));
     return frame.textureCodec === kTextureH264 && !videoTextureIsKey(frame.texture);
   }
 
-  /** The last frame up to this one that decodes alone; null where there is none. */
   async keyBefore(index: number): Promise<number | null> {
     for (let i = index; i >= 0; --i) {
       if ((await this.head(i)).isKey) return i;
@@ -81,7 +89,10 @@ export class Recording {
     return null;
   }
 
-  /** Frames lost before this one was written. */
+  isKey(index: number): boolean | null {
+    return this.heads[index]?.isKey ?? null;
+  }
+
   gapBefore(index: number): number {
     const [before, here] = [this.heads[index - 1], this.heads[index]];
     if (before === undefined || here === undefined) return 0;

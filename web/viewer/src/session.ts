@@ -34,6 +34,8 @@ export class Session {
   everConnected = false;
   private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
   private waiting: Waiting | null = null; // decoded, not drawn
+  private live = false; // the frame that came last
+  private readonly pause = (): void => this.meter.pause();
 
   constructor(private readonly events: SessionEvents) {
     this.decoder = new Decoder({
@@ -41,7 +43,14 @@ export class Session {
       failed: (id, message) => this.onFailed(id, message),
       unusable: (message) => events.unusable(message),
     });
-    document.addEventListener('visibilitychange', () => this.meter.pause());
+    document.addEventListener('visibilitychange', this.pause);
+  }
+
+  /** For good. */
+  end(): void {
+    this.watch(null);
+    this.decoder.stop();
+    document.removeEventListener('visibilitychange', this.pause);
   }
 
   /** From now on, instead of what was watched before; null: nothing. */
@@ -76,7 +85,7 @@ export class Session {
     if (this.waiting === null) return null;
     const { frame, prefix } = this.waiting;
     this.waiting = null;
-    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.playback === null);
+    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.live === true);
     this.source?.credit();
     this.seen = true;
     return frame;
@@ -99,7 +108,10 @@ export class Session {
 
   private onFrame(prefix: FramePrefix, bytes: ArrayBuffer, forLater: boolean): void {
     this.lastFrameAt = performance.now();
-    if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, this.source?.playback === null);
+    const live = this.source?.live === true;
+    if (live !== this.live) this.meter.pause(); // what was left out in going back or returning is no loss
+    this.live = live;
+    if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, live);
     this.underway.set(this.decoder.decode(bytes, prefix.bytes), { prefix, forLater });
   }
 

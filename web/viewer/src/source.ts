@@ -18,23 +18,35 @@ export interface FrameSource {
   readonly connected: boolean;
   /** Whole seconds until the next attempt; null while connected or connecting for the first time. */
   readonly retryInS: number | null;
-  /** The time line, where there is one. */
-  readonly playback: Playback | null;
+  readonly playback: Playback;
+  /** Whether what comes now is of now: what is missing was lost, its age is a latency. */
+  readonly live: boolean;
+  /** What is kept of a live stream; null: a recording. */
+  readonly kept: Kept | null;
   /** This many frames more may come. */
   credit(n?: number): void;
   retryNow(): void;
   stop(): void;
 }
 
-/** What a time line drives: a source that can show more than what comes next. Times in ms from the first frame. */
+export interface Kept {
+  readonly spanMs: number;
+  readonly bytes: number;
+  readonly limits: { readonly ms: number; readonly bytes: number };
+}
+
+/** What a time line drives: a source that can show more than what comes next. Times in ms from `startMs`. */
 export interface Playback {
-  readonly times: Float64Array; // of the frames
-  readonly startMs: number; // UTC of the first
+  readonly times: Float64Array; // of the frames there are; of a live stream it changes
+  readonly startMs: number; // UTC
+  readonly first: number; // index of the frame at times[0]
   readonly index: number; // the frame sent last
   readonly position: number;
   readonly playing: boolean;
   readonly speed: number;
   readonly loop: Loop | null;
+  /** Of a live stream: whether what comes next is shown; null: a recording. */
+  readonly following: boolean | null;
   /** Whether a frame decodes alone; null: not known yet. */
   isKey(index: number): boolean | null;
   /** Frames lost before this one. */
@@ -45,6 +57,8 @@ export interface Playback {
   step(frames: number): void;
   setSpeed(speed: number): void;
   setLoop(loop: Loop | null): void;
+  /** Back to what comes next; a recording has no such. */
+  follow(): void;
   /** Called whenever one of these has changed, except `position`. */
   changed: () => void;
 }

@@ -11,6 +11,7 @@ export type State =
   | 'starting'
   | 'live'
   | 'file'
+  | 'shifted'
   | 'stalled'
   | 'ended';
 
@@ -28,6 +29,7 @@ export interface Facts {
   frameRate: number; // nominal; 0: not known
   hint: string;
   file: 'playing' | 'paused' | 'surface' | null; // what is shown is no stream
+  shifted: 'playing' | 'paused' | null; // what is shown is of a stream, but was before
 }
 
 export interface Presentation {
@@ -64,6 +66,7 @@ export function present(facts: Facts): Presentation {
     const { playing, paused, surface } = text.file;
     return make('file', { playing, paused, surface }[facts.file]);
   }
+  if (facts.shifted !== null) return make('shifted', text.shifted[facts.shifted]);
   if (!facts.connected) {
     if (!facts.everConnected && facts.retryInS === null) {
       return make('connecting', 'Connecting', { title: 'Connecting', text: 'Asking the server for its streams.' });

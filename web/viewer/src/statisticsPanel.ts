@@ -5,6 +5,7 @@ import { kParts, kStages } from './journal';
 import type { Meter } from './meter';
 import { plot, type Line } from './plot';
 import type { StreamStatus } from './protocol';
+import type { Kept } from './source';
 import { text } from './strings';
 
 const say = text.statistics;
@@ -19,6 +20,7 @@ export class StatisticsPanel {
     private readonly body: HTMLElement,
     private readonly meter: Meter,
     private readonly status: () => StreamStatus | null,
+    private readonly kept: () => Kept | null,
   ) {
     this.plot.setAttribute('role', 'img');
     this.plot.setAttribute('aria-label', say.plot);
@@ -28,6 +30,7 @@ export class StatisticsPanel {
     body.append(this.plot);
     this.section(say.drops, ['serverDrops', 'link', 'viewer', 'gaps']);
     this.section(say.machines, ['reconstruct', 'encode', 'decodeTime', 'clock']);
+    this.section(say.kept, ['keptTime', 'keptBytes']);
   }
 
   set open(open: boolean) {
@@ -80,7 +83,16 @@ export class StatisticsPanel {
     this.set('decodeTime', ms(figures.decodeMs));
     const [offset, trip] = [clock.get(), clock.roundTrip()];
     this.set('clock', offset === null || trip === null ? null : `${offset.toFixed(1)} ± ${(trip / 2).toFixed(1)} ms`);
+    this.showKept();
     this.drawPlot();
+  }
+
+  private showKept(): void {
+    const kept = this.kept();
+    const seconds = (ms: number): string => `${Math.round(ms / 1000)} s`;
+    const megabytes = (bytes: number): string => `${Math.round(bytes / 1e6)} MB`;
+    this.set('keptTime', kept && say.keptOf(seconds(kept.spanMs), seconds(kept.limits.ms)));
+    this.set('keptBytes', kept && say.keptOf(megabytes(kept.bytes), megabytes(kept.limits.bytes)));
   }
 
   // One stage upon the other, frame by frame.

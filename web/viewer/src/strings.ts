@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says, in one place.
 import type { Background, Mode, Theme, Way } from './display';
+import type { Placement } from './placement';
 import type { StreamStatus } from './protocol';
 
 const modes: Record<Mode, string> = {
@@ -19,6 +20,7 @@ const ways: Record<Way, readonly [string, string]> = {
   camera: ['Camera', "Exactly what the rig's camera sees (C)"],
 };
 
+const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
 const themes: Record<Theme, string> = { auto: 'As the system', dark: 'Dark', light: 'Light' };
 
@@ -28,6 +30,8 @@ export const text = {
   backgrounds,
   themes,
   rail: {
+    streams: 'Streams and recordings, with pictures (N)',
+    record: 'Record (X)',
     open: 'Open a recording, PLY or GLB of this device',
     display: 'Display (B)',
     measure: 'Measure (M)',
@@ -90,6 +94,7 @@ export const text = {
     latency: 'Latency, medians',
     drops: 'Frames lost',
     machines: 'Machines',
+    kept: 'Kept here, to go back to',
     plot: 'Latency of the last frames, one stage upon the other, in milliseconds',
     delta: ' (builds on a key frame)',
     names: {
@@ -115,7 +120,10 @@ export const text = {
       encode: 'server: encodes in',
       decodeTime: 'this page: decodes in',
       clock: "server's clock ahead by",
+      keptTime: 'the last',
+      keptBytes: 'memory',
     },
+    keptOf: (now: string, most: string) => `${now} of at most ${most}`,
     serverDrops: (s: StreamStatus) =>
       `${s.drops_capture} capture, ${s.drops_reconstruct} reconstruct, ${s.drops_encode} encode, ${s.drops_publish} publish`,
   },
@@ -147,14 +155,48 @@ export const text = {
     paused: 'Paused',
     note: (name: string, note: string) => `${name}: ${note}`,
   },
+  streams: {
+    title: 'Streams',
+    none: 'The server has no streams yet.',
+    recordings: 'Recordings on the server',
+    recording: 'recording',
+    show: 'Show',
+    showTitle: (name: string) => `Show ${name} alone`,
+    beside: 'Beside',
+    besideTitle: (name: string) => `Show ${name} beside the first, or no more`,
+    picture: (name: string) => `A picture of ${name}`,
+    placement: 'Placed',
+    placements,
+    unknownPlaces: 'A calibration does not say where one rig stands to another. In one frame is right where all have the same camera.',
+  },
+  record: {
+    start: 'Record: on the server where it has a folder for it, else here (X)',
+    startHere: 'Record: save what this page keeps and what follows as a file here (X)',
+    stop: 'Stop recording (X)',
+    running: (time: string, bytes: number) => `${time}, ${(bytes / 1e6).toFixed(1)} MB`,
+    savedHere: (name: string, frames: number, bytes: number) => `${name}: ${frames} frames, ${(bytes / 1e6).toFixed(1)} MB`,
+    savedThere: (name: string, frames: number) => `${name}: ${frames} frames, on the server`,
+    failed: (why: string) => `Not recorded: ${why}`,
+    unreachable: 'the server does not answer',
+    nothing: 'Nothing has come yet: nothing is saved',
+  },
+  player: {
+    canvas: '3D video. Arrow keys turn it, shift and arrow keys move it, plus and minus zoom, R resets the view.',
+    noStream: 'src names no stream: give the address of a recording (.mcap), or of a gateway with ?stream=NAME',
+  },
+  shifted: { playing: 'Behind live', paused: 'Paused' },
   timeline: {
+    live: 'Live',
+    goLive: 'Back to live (L)',
+    isLive: 'Live: what comes is shown',
+    behind: (time: string) => `−${time}`,
     play: 'Play (Space)',
     pause: 'Pause (Space)',
     back: 'A frame back (,)',
     ahead: 'A frame ahead (.)',
     slider: 'Time',
     speed: 'Speed (< >)',
-    time: 'Time: since the start, or of the day',
+    time: 'Time: since the start or behind live, or of the day',
     range: '⟲',
     rangeTitle: 'Repeat a range: set its start, then its end, then none ([ ] \\)',
     at: (time: string, frame: number, of: number) => `${time}, frame ${frame} of ${of}`,
@@ -179,16 +221,19 @@ export const text = {
       ['F', 'full screen'],
       ['H', 'hide or show everything but the picture'],
     ],
-    time: 'Recordings',
+    time: 'Recordings, and back in a live stream',
     timeKeys: [
       ['Space', 'play, pause'],
       [', .', 'a frame back, ahead'],
       ['< >', 'slower, faster'],
       ['[ ] \\', 'repeat from here, to here, no more'],
       ['Home End', 'first, last frame'],
+      ['L', 'back to live'],
+      ['X', 'record, stop recording'],
     ],
     panels: 'Panels',
     panelKeys: [
+      ['N', 'streams'],
       ['B', 'display'],
       ['M', 'measure'],
       ['I', 'statistics'],

@@ -1,26 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time line of a source that has one: playing, scrubbing, speed, a range to repeat, marks of key frames and gaps.
-import { button, element, make, setText } from './dom';
+import { button, make, setText } from './dom';
 import { clockText, frameAt, kSpeeds } from './playback';
 import type { Playback } from './source';
 import { text } from './strings';
 
 const say = text.timeline;
 const kRefreshMs = 60;
+const kLongGap = 5; // frames lost in a row, which a person sees
+const kMarksMs = 250; // between drawings of the marks, which move while a stream is live
 
 export class Timeline {
-  private readonly box = element('timeline');
   private readonly track = make('canvas', {});
   private readonly slider = make('input', { type: 'range', min: '0', step: 'any' });
   private readonly playButton = button('', '', () => this.toggle());
   private readonly time = button('', say.time, () => this.toggleTime());
+  private readonly live = button(say.live, '', () => this.playback?.follow());
   private readonly speed = make('select', { title: say.speed });
   private readonly range = button(say.range, say.rangeTitle, () => this.cycleLoop());
   private playback: Playback | null = null;
   private absolute = false;
   private dirty = false;
+  private readonly timer: number;
+  private marksAt = 0; // when they were drawn
 
-  constructor() {
+  /** `shown` is told whether there is anything to go through. */
+  constructor(
+    private readonly box: HTMLElement,
+    private readonly shown: (shown: boolean) => void = () => undefined,
+  ) {
     this.slider.setAttribute('aria-label', say.slider);
     this.speed.setAttribute('aria-label', say.speed);
     for (const speed of kSpeeds) this.speed.append(make('option', { value: String(speed) }, `${speed}×`));
@@ -29,25 +37,30 @@ export class Timeline {
     const track = make('div', { className: 'track' }, this.track, this.slider);
     const steps = [button('‹', say.back, () => this.playback?.step(-1)), button('›', say.ahead, () => this.playback?.step(1))];
     for (const b of steps) b.setAttribute('aria-label', b.title);
-    this.box.append(this.playButton, ...steps, track, this.time, this.speed, this.range);
+    this.live.id = 'follow';
+    this.time.className = 'time';
+    this.box.append(this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
     new ResizeObserver(() => (this.dirty = true)).observe(this.track);
-    window.setInterval(() => this.refresh(), kRefreshMs);
+    this.timer = window.setInterval(() => this.refresh(), kRefreshMs);
+  }
+
+  /** For good. */
+  stop(): void {
+    window.clearInterval(this.timer);
   }
 
   show(playback: Playback | null): void {
     this.playback = playback;
-    this.box.hidden = playback === null;
-    document.body.classList.toggle('with-timeline', playback !== null);
-    if (playback === null) return;
-    playback.changed = () => (this.dirty = true);
+    if (playback !== null) playback.changed = () => (this.dirty = true);
     this.dirty = true;
-    this.slider.max = String(playback.times[playback.times.length - 1]!);
+    this.marksAt = 0;
+    this.refresh();
   }
 
   /** True where the key is one of the time line's. */
   command(key: string): boolean {
     const p = this.playback;
-    if (p === null) return false;
+    if (p === null || this.box.hidden) return false;
     const faster = (by: number): void => {
       const at = kSpeeds.findIndex((s) => s >= p.speed);
       p.setSpeed(kSpeeds[Math.min(kSpeeds.length - 1, Math.max(0, at + by))]!);
@@ -58,16 +71,20 @@ export class Timeline {
       '.': () => p.step(1),
       '<': () => faster(-1),
       '>': () => faster(1),
-      home: () => p.seek(0),
-      end: () => p.seek(Infinity),
+      home: () => p.seek(this.begin),
+      end: () => (p.following === null ? p.seek(Infinity) : p.follow()),
+      l: () => p.follow(),
       '[': () => p.setLoop({ from: p.position, to: p.loop?.to ?? this.end }),
-      ']': () => p.setLoop({ from: p.loop?.from ?? 0, to: p.position }),
+      ']': () => p.setLoop({ from: p.loop?.from ?? this.begin, to: p.position }),
       '\\': () => p.setLoop(null),
     };
     commands[key]?.();
     return commands[key] !== undefined;
   }
 
+  private get begin(): number {
+    return this.playback!.times[0]!;
+  }
   private get end(): number {
     const { times } = this.playback!;
     return times[times.length - 1]!;
@@ -93,19 +110,41 @@ export class Timeline {
 
   private refresh(): void {
     const p = this.playback;
-    if (p === null || (!this.dirty && !p.playing)) return;
-    if (!this.slider.matches(':active')) this.slider.value = String(p.position);
-    const frame = frameAt(p.times, p.position);
-    this.slider.setAttribute('aria-valuetext', say.at(clockText(p.position), frame + 1, p.times.length));
-    setText(this.time, this.absolute ? absoluteText(p.startMs + p.position) : `${clockText(p.position)} / ${clockText(this.end)}`);
+    const hidden = p === null || p.times.length < 2; // a stream that has just begun has nothing to go back to
+    if (hidden !== this.box.hidden) {
+      this.box.hidden = hidden;
+      this.shown(!hidden);
+    }
+    if (p === null || hidden || (!this.dirty && !p.playing)) return;
+    this.slider.min = String(this.begin);
+    this.slider.max = String(this.end);
+    const position = p.position;
+    if (!this.slider.matches(':active')) this.slider.value = String(position);
+    const frame = frameAt(p.times, position);
+    const time = this.timeText(p, position);
+    this.slider.setAttribute('aria-valuetext', say.at(time, frame + 1, p.times.length));
+    setText(this.time, time);
     const label = p.playing ? say.pause : say.play;
     setText(this.playButton, p.playing ? '❚❚' : '▶');
     this.playButton.title = label;
     this.playButton.setAttribute('aria-label', label);
     this.range.setAttribute('aria-pressed', String(p.loop !== null));
+    this.live.hidden = p.following === null;
+    this.live.setAttribute('aria-pressed', String(p.following === true));
+    this.live.title = p.following === true ? say.isLive : say.goLive;
     if (this.speed.value !== String(p.speed)) this.speed.value = String(p.speed);
-    if (this.dirty) this.drawMarks(p);
-    this.dirty = false;
+    const now = performance.now();
+    if (this.dirty && (p.following === null || now - this.marksAt >= kMarksMs)) {
+      this.marksAt = now;
+      this.drawMarks(p);
+      this.dirty = false;
+    }
+  }
+
+  private timeText(p: Playback, position: number): string {
+    if (this.absolute) return absoluteText(p.startMs + position);
+    if (p.following === null) return `${clockText(position)} / ${clockText(this.end)}`;
+    return say.behind(clockText(p.following ? 0 : this.end - position));
   }
 
   private drawMarks(p: Playback): void {
@@ -115,7 +154,8 @@ export class Timeline {
     this.track.height = height;
     const c = this.track.getContext('2d')!;
     const style = getComputedStyle(this.track);
-    const at = (ms: number): number => (ms / Math.max(1, this.end)) * width;
+    const { begin } = this;
+    const at = (ms: number): number => ((ms - begin) / Math.max(1, this.end - begin)) * width;
     if (p.loop !== null) {
       c.fillStyle = style.getPropertyValue('--hover');
       c.fillRect(at(p.loop.from), 0, at(p.loop.to) - at(p.loop.from), height);
@@ -123,10 +163,11 @@ export class Timeline {
       for (const edge of [p.loop.from, p.loop.to]) c.fillRect(at(edge) - ratio, 0, 2 * ratio, height);
     }
     for (let i = 0; i < p.times.length; ++i) {
-      const gap = p.gapBefore(i) > 0;
-      if (!gap && p.isKey(i) !== true) continue;
+      const lost = p.gapBefore(p.first + i);
+      const gap = lost > 0;
+      if (!gap && p.isKey(p.first + i) !== true) continue;
       c.fillStyle = style.getPropertyValue(gap ? '--bad' : '--quiet');
-      const tall = gap ? height : 4 * ratio;
+      const tall = lost >= kLongGap ? height : (gap ? 9 : 4) * ratio;
       c.fillRect(at(p.times[i]!) - ratio / 2, height - tall, gap ? 2 * ratio : ratio, tall);
     }
   }

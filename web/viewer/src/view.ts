@@ -2,19 +2,28 @@
 // The picture: scene, surface, what is drawn over it. Draws only when something changed.
 import * as THREE from 'three';
 import type { Display, Mode, Way } from './display';
-import { Ground } from './ground';
+import { Ground, type Label } from './ground';
 import { SurfaceMesh } from './mesh';
 import type { DecodedFrame } from './messages';
 import { Navigator } from './navigator';
 import { Overlay } from './overlay';
 import { steadyRange, type Range } from './palette';
 import { pick, type Picked } from './pick';
+import { around, placed, type Placement } from './placement';
 import { readPixels, type PixelReport } from './pixels';
 import type { Pinhole } from './protocol';
 import { Resolution, drawnInSoftware } from './resolution';
+import type { Extent } from './surface';
 
 const kStill_ms = 1000; // without a drawing: the picture stands still and can be as fine as the screen
 const kPoll_ms = 2;
+
+/** A surface beside the first one, in a frame of its own camera. */
+export interface Beside {
+  readonly name: string;
+  readonly mesh: SurfaceMesh;
+  extent: Extent | null; // of its first frame
+}
 
 export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
@@ -27,10 +36,18 @@ export interface ViewEvents {
 export class View {
   readonly navigator: Navigator;
   readonly overlay: Overlay;
+  private readonly sizes = new ResizeObserver(() => this.resize());
+  private ended = false;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
   private readonly surface = new SurfaceMesh();
   private readonly ground = new Ground();
+  private readonly besides: Beside[] = [];
+  private placement_: Placement = 'beside';
+  private extent: Extent | null = null; // of the first surface
+  private offsets: number[] = [0]; // of the first surface and those beside it, metres to the right
+  /** Of the first surface, where there are others beside it. */
+  name = '';
   private scheduled = false;
   private readonly resolution = new Resolution();
   private scale = 0; // drawn at
@@ -40,17 +57,19 @@ export class View {
   private grid = false;
   drawn = 0;
 
-  /** Throws where there is no WebGL 2. `overlay` lies over `canvas`. */
+  /** Throws where there is no WebGL 2. `overlay` lies over `canvas`; `keys`: where those are listened to that move. */
   constructor(
     readonly canvas: HTMLCanvasElement,
     overlay: HTMLCanvasElement,
     private readonly events: ViewEvents,
+    keys: EventTarget = window,
   ) {
     // Four samples a pixel cost a processor that draws more than all the rest.
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
     this.renderer.setClearAlpha(0);
     this.overlay = new Overlay(overlay);
-    this.navigator = new Navigator(canvas, { changed: () => this.invalidate(), way: (way) => events.way(way) });
+    const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
+    this.navigator = new Navigator(canvas, navigated, keys);
     this.setScale(1);
     this.scene.add(this.surface.object, this.ground.object, this.navigator.camera);
     this.light();
@@ -59,12 +78,12 @@ export class View {
       events.contextLost(false);
       this.invalidate();
     });
-    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.sizes.observe(canvas);
     this.resize();
   }
 
   set display(display: Display) {
-    this.surface.mode = display.mode;
+    for (const mesh of this.meshes) mesh.mode = display.mode;
     this.grid = display.grid;
     if (this.navigator.way !== display.way) this.navigator.way = display.way;
     if (this.navigator.wantedFieldOfView !== display.fov) this.navigator.wantedFieldOfView = display.fov;
@@ -90,15 +109,76 @@ export class View {
   /** The rig of the stream; the next surface sets the view, unless the view is to be kept. */
   restart(camera: Pinhole | null, keep: boolean): void {
     this.navigator.restart(camera, keep);
+    if (!keep) this.extent = null;
   }
 
   show(frame: DecodedFrame): void {
     this.surface.show(frame);
     if (frame.extent === null) return;
-    this.ground.setExtent(frame.extent);
-    this.range = steadyRange(frame.extent.min[2], frame.extent.max[2], this.range);
-    this.surface.setDepthRange(this.range);
-    this.navigator.setExtent(frame.extent);
+    const isFirst = this.extent === null;
+    this.extent = frame.extent;
+    if (isFirst && this.besides.length > 0) this.arrange();
+    this.useExtent();
+  }
+
+  /** The surface of another stream; what it shows comes by showBeside(). */
+  addBeside(name: string): Beside {
+    const beside: Beside = { name, mesh: new SurfaceMesh(), extent: null };
+    beside.mesh.mode = this.mode;
+    beside.mesh.setPixelRatio(this.pixelRatio);
+    this.besides.push(beside);
+    this.scene.add(beside.mesh.object);
+    return beside;
+  }
+
+  removeBeside(beside: Beside): void {
+    this.besides.splice(this.besides.indexOf(beside), 1);
+    this.scene.remove(beside.mesh.object);
+    beside.mesh.dispose();
+    this.arrange();
+  }
+
+  /** It gets its place by its first frame, and keeps it. */
+  showBeside(beside: Beside, frame: DecodedFrame): void {
+    beside.mesh.show(frame);
+    if (this.range !== null) beside.mesh.setDepthRange(this.range);
+    if (beside.extent !== null || frame.extent === null) return;
+    beside.extent = frame.extent;
+    this.arrange();
+  }
+
+  set placement(placement: Placement) {
+    if (placement === this.placement_) return;
+    this.placement_ = placement;
+    this.arrange();
+  }
+
+  /** Where the surfaces stand: metres to the right of their cameras' frames, by name; none where there is only one. */
+  get places(): Record<string, number> {
+    return Object.fromEntries(this.besides.map(({ name }, i) => [name, this.offsets[i + 1] ?? 0]));
+  }
+
+  private get meshes(): SurfaceMesh[] {
+    return [this.surface, ...this.besides.map(({ mesh }) => mesh)];
+  }
+  private get extents(): (Extent | null)[] {
+    return [this.extent, ...this.besides.map(({ extent }) => extent)];
+  }
+
+  private arrange(): void {
+    this.offsets = placed(this.extents, this.placement_);
+    for (const [i, { mesh }] of this.besides.entries()) mesh.object.position.x = this.offsets[i + 1]!;
+    this.useExtent();
+    this.navigator.reset();
+  }
+
+  private useExtent(): void {
+    const all = this.besides.length === 0 ? this.extent : around(this.extents, this.offsets);
+    if (all === null) return;
+    this.ground.setExtent(all);
+    this.range = steadyRange(all.min[2], all.max[2], this.range);
+    for (const mesh of this.meshes) mesh.setDepthRange(this.range);
+    this.navigator.setExtent(all);
   }
 
   /** What of the surface is at this place of the page (pixels of it, from the canvas' upper left corner). */
@@ -108,17 +188,33 @@ export class View {
     return frame === null || ray === null ? null : pick(frame, ray.origin, ray.direction);
   }
 
+  /** For good: gives back what it holds of the card. */
+  end(): void {
+    this.ended = true;
+    this.sizes.disconnect();
+    window.clearTimeout(this.stillTimer);
+    this.navigator.end();
+    for (const mesh of this.meshes) mesh.dispose();
+    this.renderer.dispose();
+  }
+
   invalidate(): void {
-    if (this.scheduled) return;
+    if (this.scheduled || this.ended) return;
     this.scheduled = true;
     requestAnimationFrame((now) => {
       this.scheduled = false;
+      if (this.ended) return;
       this.events.beforeDraw();
       this.navigator.update(now);
       this.setScale(this.resolution.scale);
       this.render();
       this.time();
     });
+  }
+
+  /** Whether something will be drawn without anything happening before: motion that dies away, a finer picture. */
+  get isBusy(): boolean {
+    return this.scheduled || this.fence !== null || this.stillTimer !== 0;
   }
 
   /** Of the screen's pixels that are drawn while the picture moves. */
@@ -151,6 +247,8 @@ export class View {
 
   private draw(): void {
     this.ground.object.visible = this.showsGround;
+    // Another rig's camera sees something else.
+    for (const { mesh } of this.besides) mesh.object.visible = !this.navigator.isRigView;
     this.surface.setLens(this.navigator.isRigView ? this.navigator.rigCamera : null);
     this.renderer.render(this.scene, this.navigator.camera);
   }
@@ -158,21 +256,39 @@ export class View {
   private render(): void {
     this.draw();
     ++this.drawn;
-    this.overlay.draw((point) => this.navigator.toPage(point), this.showsGround ? this.ground.labels : []);
+    this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
     window.clearTimeout(this.stillTimer);
+    this.stillTimer = 0;
     if (this.scale === 1) return;
     this.stillTimer = window.setTimeout(() => {
+      this.stillTimer = 0;
       this.setScale(1);
       this.render();
     }, kStill_ms);
   }
 
+  private get labels(): readonly Label[] {
+    const ground = this.showsGround ? this.ground.labels : [];
+    if (this.besides.length === 0 || this.navigator.isRigView) return ground;
+    const names = [this.name, ...this.besides.map(({ name }) => name)];
+    const above = this.extents.flatMap((extent, i): Label[] => {
+      if (extent === null) return [];
+      const { min, max } = extent;
+      const at: Label['at'] = [(min[0] + max[0]) / 2 + this.offsets[i]!, min[1] - 0.1 * (max[1] - min[1]), (min[2] + max[2]) / 2];
+      return [{ at, text: names[i]!, colour: '--text' }];
+    });
+    return [...ground, ...above];
+  }
+
+  private get pixelRatio(): number {
+    return Math.min(window.devicePixelRatio, 2) * this.scale;
+  }
+
   private setScale(scale: number): void {
     if (scale === this.scale) return;
     this.scale = scale;
-    const pixelRatio = Math.min(window.devicePixelRatio, 2) * scale;
-    this.renderer.setPixelRatio(pixelRatio);
-    this.surface.setPixelRatio(pixelRatio);
+    this.renderer.setPixelRatio(this.pixelRatio);
+    for (const mesh of this.meshes) mesh.setPixelRatio(this.pixelRatio);
   }
 
   // How long the graphics card, or the processor in its place, takes for what was just asked of it.

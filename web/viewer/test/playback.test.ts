@@ -7,7 +7,7 @@ const times = Float64Array.from({ length: 11 }, (_, i) => i * 100); // a second,
 
 describe('PlayClock', () => {
   it('runs at its speed and stops at the end', () => {
-    const clock = new PlayClock(times);
+    const clock = new PlayClock({ times });
     clock.play(1000);
     expect(clock.index(1000)).toBe(0);
     expect(clock.index(1250)).toBe(2);
@@ -23,7 +23,7 @@ describe('PlayClock', () => {
   });
 
   it('stands still while it pauses', () => {
-    const clock = new PlayClock(times);
+    const clock = new PlayClock({ times });
     clock.play(0);
     clock.pause(320);
     expect(clock.position(5000)).toBeCloseTo(320, 9);
@@ -34,7 +34,7 @@ describe('PlayClock', () => {
   });
 
   it('repeats a range', () => {
-    const clock = new PlayClock(times);
+    const clock = new PlayClock({ times });
     clock.setLoop({ from: 200, to: 500 }, 0);
     clock.seek(200, 0);
     clock.play(0);
@@ -46,11 +46,29 @@ describe('PlayClock', () => {
   });
 
   it('keeps its speed within bounds', () => {
-    const clock = new PlayClock(times);
+    const clock = new PlayClock({ times });
     clock.setSpeed(100, 0);
     expect(clock.speed).toBe(8);
     clock.setSpeed(0, 0);
     expect(clock.speed).toBe(0.1);
+  });
+});
+
+describe('PlayClock of a live stream', () => {
+  it('stays within what is there', () => {
+    const live = { times: Float64Array.from([0, 100, 200]) };
+    const clock = new PlayClock(live);
+    clock.seek(100, 0);
+    live.times = Float64Array.from([200, 300, 400]); // what it stood at is gone
+    expect(clock.position(50)).toBe(200);
+    clock.play(50);
+    expect(clock.position(100)).toBeCloseTo(250, 9);
+    live.times = Float64Array.from([200, 300, 400, 500, 600]);
+    expect(clock.position(400)).toBeCloseTo(550, 9);
+    expect(clock.position(600)).toBe(600);
+    expect(clock.playing).toBe(false);
+    clock.play(700); // at the end: from the oldest there is
+    expect(clock.position(700)).toBe(200);
   });
 });
 

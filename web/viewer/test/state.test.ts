@@ -17,12 +17,14 @@ const live: Facts = {
   frameRate: 30,
   hint: 'relievo-server serve --source sim:face',
   file: null,
+  shifted: null,
 };
 
 describe('present', () => {
   it.each<[string, Partial<Facts>, string]>([
     ['a running stream', {}, 'live'],
     ['a paused recording, however old', { file: 'paused', connected: false, quietMs: 1e9 }, 'file'],
+    ['what was of a stream, also of one that left', { shifted: 'paused', connected: false, quietMs: 1e9 }, 'shifted'],
     ['no WebGL', { problem: 'no WebGL 2' }, 'unsupported'],
     ['the first attempt', { everConnected: false, connected: false }, 'connecting'],
     ['a server that is not there', { everConnected: false, connected: false, retryInS: 2 }, 'lost'],
@@ -38,7 +40,7 @@ describe('present', () => {
   ])('%s', (_, facts, state) => {
     const shown = present({ ...live, ...facts });
     expect(shown.state).toBe(state);
-    expect(shown.title === '').toBe(state === 'live' || state === 'file');
+    expect(shown.title === '').toBe(state === 'live' || state === 'shifted' || state === 'file');
     if (['lost', 'stalled', 'ended', 'unsupported'].includes(state)) expect(shown.dim).toBe(true);
   });
 

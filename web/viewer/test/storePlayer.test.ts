@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { describe, expect, it } from 'vitest';
-import { framesBefore } from '../src/recordingSource';
+import { framesBefore } from '../src/storePlayer';
 
 const kNothing = { key: -1, last: -1 };
 

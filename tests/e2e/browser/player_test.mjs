@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: the package that `npm pack` makes holds <relievo-player> with its types, and a page of
+// another site with a strict content policy shows a live stream and a recording with it.
+// Run as: in_own_domain node player_test.mjs RELIEVO_SERVER PACKAGE, in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { createReadStream, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { tmpdir } from 'node:os';
+import { extname, join, normalize } from 'node:path';
+import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { Server } from './server.mjs';
+
+const [serverPath, packagePath] = process.argv.slice(2);
+const scratch = mkdtempSync(join(tmpdir(), 'relievo-player-'));
+const site = join(scratch, 'site'); // what the other site serves
+const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
+const kPolicy =
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self'; connect-src 'self' ws://127.0.0.1:*";
+const kFrames = 14;
+
+/** Files with ranges, as a recording needs them. */
+function serveSite() {
+  const server = createServer((request, response) => {
+    const file = join(site, normalize(new URL(request.url, 'http://site').pathname));
+    if (!existsSync(file) || !statSync(file).isFile()) return response.writeHead(404).end();
+    const { size, mtimeMs } = statSync(file);
+    const headers = { 'content-type': kTypes[extname(file)] ?? 'application/octet-stream', 'content-security-policy': kPolicy, etag: `"${mtimeMs}"` };
+    const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
+    if (range === null) {
+      response.writeHead(200, { ...headers, 'content-length': size });
+      createReadStream(file).pipe(response);
+      return;
+    }
+    const [start, end] = [Number(range[1]), Math.min(Number(range[2]), size - 1)];
+    response.writeHead(206, { ...headers, 'content-length': end - start + 1, 'content-range': `bytes ${start}-${end}/${size}` });
+    createReadStream(file, { start, end }).pipe(response);
+  });
+  return new Promise((resolve) => server.listen(0, '127.0.0.1', () => resolve(server)));
+}
+
+function packed() {
+  const listed = JSON.parse(execFileSync('npm', ['pack', '--json', '--pack-destination', scratch], { cwd: packagePath, encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] }));
+  execFileSync('tar', ['xzf', join(scratch, listed[0].filename), '-C', scratch]);
+  return listed[0].files.map(({ path }) => path);
+}
+
+const kSource = 'sim:object,width=320,height=240,stripes=60,rate=6';
+const files = packed();
+mkdirSync(site);
+execFileSync('cp', ['-r', join(scratch, 'package'), join(site, 'relievo-player')]);
+const web = await serveSite();
+const origin = `http://127.0.0.1:${web.address().port}`;
+const rig = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--allow-origin', origin]);
+writeFileSync(join(site, 'page.html'), '<!doctype html><title>Another site</title><script type="module" src="relievo-player/dist/relievo-player.js"></script><relievo-player controls></relievo-player>');
+execFileSync(
+  serverPath,
+  ['serve', '--source', kSource, '--frames', String(kFrames), '--web', 'none', '--record', join(site, 'take.mcap'), '--stream', 'take',
+    '--key-interval', '5', '--domain', process.env.RELIEVO_TEST_DOMAIN, '--interface', 'lo'],
+  { stdio: 'ignore' },
+);
+const browser = await launchChromium();
+const complaints = [];
+
+const player = (page, read) => page.evaluate(`(${read})(document.querySelector('relievo-player'))`);
+const when = (page, condition) => eventually(`not: ${condition}`, () => player(page, condition));
+/** Opaque share of a picture that the player takes of itself, and a sum of its pixels. */
+const shot = (page) =>
+  page.evaluate(async () => {
+    const bitmap = await createImageBitmap(await document.querySelector('relievo-player').screenshot());
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+    const opaque = rgba.filter((v, i) => i % 4 === 3 && v > 128).length / (bitmap.width * bitmap.height);
+    return { opaque, sum: rgba.reduce((a, b) => a + b, 0) };
+  });
+const forget = (page) =>
+  page.evaluate(() => {
+    window.frames_ = [];
+    const element = document.querySelector('relievo-player');
+    element.addEventListener('frame', ({ detail }) => window.frames_.push(detail));
+  });
+
+const checks = {
+  async 'the package holds what it says'() {
+    for (const name of ['package.json', 'README.md', 'relievo-player.d.ts', 'dist/relievo-player.js', 'example/index.html']) {
+      assert.ok(files.includes(name), `${name} is not in ${files}`);
+    }
+    const { main, types } = JSON.parse(readFileSync(join(scratch, 'package', 'package.json'), 'utf8'));
+    assert.ok(files.includes(main) && files.includes(types));
+    assert.ok(files.every((name) => !/\.map$|node_modules|src\//.test(name)), `${files}`);
+    writeFileSync(join(scratch, 'use.ts'), `import './package/relievo-player';
+const player = document.querySelector('relievo-player')!;
+player.mode = 'depth';
+player.addEventListener('frame', ({ detail }) => detail.vertices.toFixed());
+const blob: Promise<Blob> = player.screenshot();
+void blob;
+`);
+    execFileSync('node_modules/.bin/tsc', ['--noEmit', '--strict', '--target', 'es2022', '--lib', 'es2022,dom', '--typeRoots', join(scratch, 'none'), '--moduleResolution', 'bundler', '--module', 'esnext', join(scratch, 'use.ts')]);
+  },
+
+  async 'a live stream of another origin'(page) {
+    assert.equal(await player(page, (p) => p.state), 'idle');
+    await forget(page);
+    await page.evaluate((src) => (document.querySelector('relievo-player').src = src), `${rig.address}/?stream=object`);
+    await when(page, (p) => p.state === 'live' && p.duration > 1);
+    await page.waitForFunction(() => window.frames_.length > 3);
+    assert.ok(await page.evaluate(() => window.frames_.every(({ vertices, triangles }) => vertices > 1000 && triangles > 1000)));
+    const textured = await shot(page);
+    assert.ok(textured.opaque > 0.15, `covers ${textured.opaque}`);
+    await page.evaluate(() => document.querySelector('relievo-player').pause());
+    await when(page, (p) => p.state === 'behind' && p.paused);
+    await page.evaluate(() => (document.querySelector('relievo-player').mode = 'normals'));
+    assert.notEqual((await shot(page)).sum, textured.sum);
+    await page.evaluate(() => (document.querySelector('relievo-player').currentTime = 0));
+    await when(page, (p) => p.currentTime < 0.5);
+    await page.evaluate(() => document.querySelector('relievo-player').goLive());
+    await when(page, (p) => p.state === 'live');
+  },
+
+  async 'its time line, its keys, and none of the page\'s'(page) {
+    assert.ok(await page.isVisible('relievo-player #timeline'));
+    await page.click('relievo-player #timeline button[title^="Pause"]');
+    await when(page, (p) => p.state === 'behind');
+    await page.focus('relievo-player .view');
+    await page.keyboard.press('6');
+    assert.equal(await player(page, (p) => p.getAttribute('mode')), 'depth');
+    await page.keyboard.press('l');
+    await when(page, (p) => p.state === 'live');
+    await page.evaluate(() => document.activeElement.blur());
+    await page.keyboard.press('1');
+    assert.equal(await player(page, (p) => p.mode), 'depth');
+    await page.evaluate(() => (document.querySelector('relievo-player').controls = false));
+    assert.equal(await page.isVisible('relievo-player #timeline'), false);
+  },
+
+  async 'a recording of the page\'s own site'(page) {
+    await page.evaluate(() => (document.querySelector('relievo-player').src = 'take.mcap'));
+    await when(page, (p) => p.state === 'file' && p.paused && p.duration > 1);
+    const duration = await player(page, (p) => p.duration);
+    assert.ok(Math.abs(duration - (kFrames - 2) / 6) < 0.5, `${duration} s`);
+    assert.ok(Math.abs((await player(page, (p) => p.currentTime)) - duration) < 1e-3);
+    await page.evaluate(() => {
+      const element = document.querySelector('relievo-player');
+      element.loop = true;
+      window.frames_.length = 0;
+      element.play();
+    });
+    await page.waitForFunction(() => window.frames_.some(({ number }, i) => i > 0 && number < window.frames_[i - 1].number));
+    assert.equal(await player(page, (p) => p.paused), false);
+  },
+
+  async 'what cannot be shown says why'(page) {
+    await page.evaluate(() => (document.querySelector('relievo-player').src = 'http://127.0.0.1:9/'));
+    await when(page, (p) => p.state === 'failed' && /names no stream/.test(p.message));
+    assert.match(await page.textContent('relievo-player .message'), /names no stream/);
+    await page.evaluate(() => (document.querySelector('relievo-player').src = 'take.mcap'));
+    await when(page, (p) => p.state === 'file');
+  },
+
+  async 'taken out of the page it rests, put back it goes on'(page) {
+    const workers = page.workers().length;
+    await page.evaluate(() => {
+      window.element_ = document.querySelector('relievo-player');
+      window.element_.remove();
+    });
+    await page.waitForFunction(() => document.querySelector('relievo-player') === null);
+    await eventually('its worker goes on', () => page.workers().length === workers - 1);
+    await page.evaluate(() => {
+      window.frames_.length = 0;
+      document.body.append(window.element_);
+    });
+    await page.waitForFunction(() => window.frames_.length > 2);
+    assert.ok((await shot(page)).opaque > 0.15);
+  },
+
+  async 'the example shows what its address asks for'() {
+    const page = await newPage(`/relievo-player/example/index.html?src=${encodeURIComponent('/take.mcap')}`);
+    await page.waitForFunction(() => /file: frame \d+, \d+ vertices/.test(document.querySelector('output').value));
+    await page.close();
+  },
+
+  async 'no error, nothing against the policy'() {
+    assert.deepEqual(complaints, []);
+  },
+};
+
+async function newPage(path) {
+  const page = await browser.newPage({ viewport: { width: 720, height: 560 } });
+  page.setDefaultTimeout(kPatienceMs);
+  page.on('pageerror', (error) => complaints.push(`page error: ${error.message}`));
+  page.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(`console: ${message.text()}`);
+  });
+  await page.goto(origin + path);
+  return page;
+}
+
+let failed = 0;
+try {
+  const page = await newPage('/page.html');
+  for (const [name, check] of Object.entries(checks)) {
+    try {
+      await check(page);
+      console.log(`ok    ${name}`);
+    } catch (error) {
+      ++failed;
+      console.log(`FAIL  ${name}: ${error.stack}`, error.stdout?.toString() ?? '');
+      console.log('      ', JSON.stringify(await player(page, (p) => p && [p.state, p.message, p.duration, p.currentTime]).catch(() => null)));
+    }
+  }
+} finally {
+  await browser.close();
+  await rig.kill();
+  web.close();
+  rmSync(scratch, { recursive: true, force: true });
+}
+console.log(failed === 0 ? 'all checks passed' : `${failed} checks failed`);
+process.exit(failed === 0 ? 0 : 1);

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: where the server has no folder for recordings, the record button saves what the page
+// keeps and what follows as a recording that `relievo` reads whole and the page shows as it was.
+// Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { eventually, launchChromium } from './chromium.mjs';
+import { inState, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { Server } from './server.mjs';
+
+const [serverPath, relievoPath] = process.argv.slice(2);
+const scratch = mkdtempSync(join(tmpdir(), 'relievo-record-'));
+const saved = join(scratch, 'saved.mcap');
+const server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5']);
+const browser = await launchChromium();
+const complaints = [];
+const { open } = pagesOf(browser, server.address, complaints);
+const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
+const kKept = 12;
+let last; // the surface shown last while it was recorded
+
+const checks = {
+  async 'what is kept and what follows is saved'(page) {
+    await shownPast(page, 2);
+    await page.waitForFunction((n) => window.relievo.diagnostics().playback.times.length >= n, kKept);
+    await page.click('#tool-record');
+    await page.waitForFunction(() => document.querySelector('#tool-record').getAttribute('aria-pressed') === 'true');
+    assert.match(await page.textContent('#recording'), /^0:0\d, [\d.]+ MB$/);
+    const { shown } = await look(page);
+    await shownPast(page, shown + 6);
+    await page.focus('#view'); // else the space bar presses the button again
+    await page.keyboard.press(' ');
+    await inState(page, 'shifted'); // the surface stays, what comes is recorded all the same
+    last = await page.evaluate(() => window.relievo.surface());
+    const { times } = await playback(page);
+    await page.waitForFunction((n) => window.relievo.diagnostics().playback.times.length >= n, times.length + 4);
+    const [file] = await Promise.all([page.waitForEvent('download'), page.keyboard.press('x')]);
+    assert.match(file.suggestedFilename(), /^object-\d{8}-\d{6}\.mcap$/);
+    await file.saveAs(saved);
+    await page.waitForFunction(() => /object-.*\.mcap: \d+ frames/.test(document.querySelector('#recording').textContent));
+    assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'false');
+  },
+
+  async 'relievo reads it whole'() {
+    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', saved], { encoding: 'utf8' }));
+    assert.equal(told.stream, 'object');
+    assert.ok(told.frames >= kKept + 6 + 4, `${told.frames} frames`);
+    assert.equal(told.unreadable, 0);
+    assert.equal(told.damaged_parts, 0);
+    assert.equal(told.recovered, false);
+    assert.equal(told.info.pattern.stripes, 60);
+    assert.deepEqual(told.info.rig.camera.size, [320, 240]);
+    assert.equal(told.info.rig.colour_matrix.length, 9);
+    assert.ok(Math.abs(told.info.rig.camera.matrix[0]) > 100, `${told.info.rig.camera.matrix}`);
+    execFileSync(relievoPath, ['export', saved, '--out', join(scratch, 'ply'), '--format', 'ply'], { stdio: 'ignore' });
+  },
+
+  async 'the page shows it as it was'(page) {
+    await page.setInputFiles('#file', saved);
+    await inState(page, 'file');
+    assert.equal(await page.isVisible('#tool-record'), false);
+    await page.keyboard.press('Home');
+    await eventually('the surface that was seen is not in it', async () => {
+      const now = await page.evaluate(() => window.relievo.surface());
+      if (now.number === last.number) return now.hash === last.hash;
+      await page.keyboard.press('.');
+      return false;
+    });
+    const { keys } = await playback(page);
+    assert.equal(keys[0], true);
+    assert.equal((await look(page)).errors, 0);
+  },
+
+  async 'no error, no request to another host'() {
+    // Chromium tells of what the server refuses: that it has no folder, or knows no such thing.
+    assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);
+    assert.equal(complaints.length, 1);
+  },
+};
+
+let failed = 1;
+try {
+  failed = await runChecks(checks, await open());
+} finally {
+  await browser.close();
+  await server.kill();
+  rmSync(scratch, { recursive: true, force: true });
+}
+process.exit(failed === 0 ? 0 : 1);

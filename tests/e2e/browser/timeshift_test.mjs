@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: a live stream is stopped, gone back in and stepped through to the right surfaces, plays
+// on behind live, and returns to live without a fault; also where frames build on others, and after the server is gone.
+// Run as: in_own_domain node timeshift_test.mjs GATEWAY_FEEDER RELIEVO_SERVER, in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { eventually, launchChromium } from './chromium.mjs';
+import { depthOf, Feeder, inState, kPicture, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { Server } from './server.mjs';
+
+const [feederPath, serverPath] = process.argv.slice(2);
+const feeder = await Feeder.start(feederPath);
+const browser = await launchChromium();
+const complaints = [];
+const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
+
+const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
+const surface = (page) => page.evaluate(() => window.relievo.surface());
+const kept = (page, frames) =>
+  page.waitForFunction((least) => window.relievo.diagnostics().playback?.times.length >= least, frames);
+/** Until all that was handed to the decoder is on the screen. */
+const settled = (page) =>
+  page.waitForFunction(() => {
+    const { received, shown, errors, drops } = window.relievo.diagnostics();
+    return shown + errors + drops.viewer === received;
+  });
+/** To a frame of those kept, by the time line; resolves when it is shown. */
+async function seek(page, index) {
+  const { first, times } = await playback(page);
+  await page.evaluate((ms) => {
+    const slider = document.querySelector('#timeline input[type=range]');
+    slider.value = String(ms);
+    slider.dispatchEvent(new Event('input', { bubbles: true }));
+  }, times[index - first] + 1e-3);
+  await eventually(`frame ${index} is not sent`, async () => (await playback(page)).index === index);
+  await settled(page);
+}
+const press = async (page, key) => {
+  await page.keyboard.press(key);
+  await settled(page);
+};
+const errors = async (page) => {
+  const now = await look(page);
+  assert.equal(now.errors, 0, now.lastError);
+};
+/** Goes to each of these frames one after the other, then in another order, and compares the surfaces. */
+async function compare(page, indices) {
+  const hashes = new Map();
+  for (const index of indices) {
+    await seek(page, index);
+    hashes.set(index, (await surface(page)).hash);
+  }
+  for (const index of [...indices].sort((a, b) => ((a * 7) % 11) - ((b * 7) % 11))) {
+    await seek(page, index);
+    assert.equal((await surface(page)).hash, hashes.get(index), `frame ${index}`);
+  }
+  assert.ok(new Set(hashes.values()).size > indices.length / 2, 'the surfaces are all alike');
+}
+
+const onFeeder = {
+  async 'a live stream has a time line'(page) {
+    await inState(page, 'live');
+    await kept(page, 12);
+    assert.ok(await page.isVisible('#timeline'));
+    assert.equal(await page.getAttribute('#follow', 'aria-pressed'), 'true');
+    const now = await playback(page);
+    assert.ok(now.following && now.playing, JSON.stringify(now));
+    await page.keyboard.press('i');
+    await page.waitForFunction(() => /the last\d+ s of at most 60 s/.test(document.querySelector('#panel-statistics').textContent));
+    await page.waitForFunction(() => /memory\d+ MB of at most 256 MB/.test(document.querySelector('#panel-statistics').textContent));
+    await page.keyboard.press('i');
+  },
+
+  async 'it is stopped, and what comes is kept'(page) {
+    await page.keyboard.press(' ');
+    await inState(page, 'shifted');
+    await settled(page);
+    const [{ times }, { number }] = [await playback(page), await surface(page)];
+    await kept(page, times.length + 10);
+    assert.equal((await surface(page)).number, number);
+    assert.equal(await page.getAttribute('#follow', 'aria-pressed'), 'false');
+    assert.match(await page.textContent('#timeline'), /−\d+:\d\d/);
+    await page.waitForFunction(() => document.querySelector('#badge-text').textContent === 'Paused');
+  },
+
+  async 'each frame that was is the one it was'(page) {
+    const { first, index } = await playback(page);
+    await seek(page, index - 4);
+    let before = (await surface(page)).number;
+    for (const key of ['.', '.', '.']) {
+      await press(page, key);
+      const { number } = await surface(page);
+      assert.ok(number > before, `${number} after ${before}`);
+      before = number;
+    }
+    await page.keyboard.press('c');
+    for (const i of [first + 1, index - 2]) {
+      await seek(page, i);
+      const { number } = await surface(page);
+      const { width, height } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
+      const scale = Math.min(width / kPicture.width, height / kPicture.height);
+      for (const [u, v] of [[0.1, 0.15], [0.85, 0.8]]) {
+        const at = [width / 2 + (u - 0.5) * kPicture.width * scale, height / 2 + (v - 0.5) * kPicture.height * scale];
+        const picked = await page.evaluate(([x, y]) => window.relievo.pick(x, y), at);
+        assert.ok(Math.abs(picked.point[2] - depthOf(u, v, number)) < 0.0006, `frame ${number}: ${picked.point[2]}`);
+      }
+    }
+    await page.keyboard.press('o');
+    await press(page, 'Home');
+    assert.equal((await playback(page)).index, first);
+    await errors(page);
+  },
+
+  async 'it plays on behind live'(page) {
+    await page.keyboard.press(' ');
+    const { shown } = await look(page);
+    await shownPast(page, shown + 5);
+    const { playing, following, index, first, times } = await playback(page);
+    assert.ok(playing && !following);
+    assert.ok(index < first + times.length - 5, `at ${index} of ${first + times.length}`);
+    await page.waitForFunction(() => document.querySelector('#badge-text').textContent === 'Behind live');
+  },
+
+  async 'L is live again'(page) {
+    await page.keyboard.press('l');
+    await inState(page, 'live');
+    const { received, frame } = await look(page);
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame > n, frame);
+    assert.ok((await look(page)).received > received);
+    assert.equal((await playback(page)).following, true);
+    assert.equal((await look(page)).drops.gaps, 0);
+    await page.waitForFunction(() => window.relievo.diagnostics().latencyMs !== null);
+    await errors(page);
+  },
+
+  async 'what plays faster than it comes arrives at live by itself'(page) {
+    await page.keyboard.press(' ');
+    await press(page, ',');
+    await page.selectOption('#timeline select', '8');
+    await page.evaluate(() => document.querySelector('#view').focus());
+    await page.keyboard.press(' ');
+    await inState(page, 'live');
+    await page.click('#timeline button[title^="Pause"]');
+    await inState(page, 'shifted');
+    await page.click('#follow');
+    await inState(page, 'live');
+    await errors(page);
+  },
+
+  async 'frames that were lost are marked'(page) {
+    const { gaps } = await playback(page);
+    await page.evaluate(() => {
+      for (const end = performance.now() + 2000; performance.now() < end; );
+    });
+    await page.waitForFunction(
+      (before) => window.relievo.diagnostics().playback.gaps.reduce((a, b) => a + b, 0) > before,
+      gaps.reduce((a, b) => a + b, 0),
+    );
+    assert.ok((await look(page)).drops.link > 0);
+  },
+
+  async 'what was is there when the server is gone, and a phone has room for it'(page) {
+    await page.setViewportSize({ width: 360, height: 740 });
+    await page.waitForFunction(() => document.querySelector('#timeline').getBoundingClientRect().width < 360);
+    const outside = await page.evaluate(() =>
+      [...document.querySelectorAll('#timeline *')]
+        .filter((e) => e.getClientRects().length > 0 && !e.closest('option'))
+        .filter((e) => e.getBoundingClientRect().left < -0.5 || e.getBoundingClientRect().right > innerWidth + 0.5)
+        .map((e) => e.id || e.textContent),
+    );
+    assert.deepEqual(outside, []);
+    assert.deepEqual(complaints, []);
+    await feeder.kill();
+    await inState(page, 'lost');
+    const { index } = await playback(page);
+    await seek(page, index - 3);
+    await inState(page, 'shifted');
+    await page.keyboard.press('l');
+    await inState(page, 'lost');
+    await errors(page);
+  },
+};
+
+const onServer = {
+  async 'frames that build on a key frame are shown in any order'(page) {
+    await shownPast(page, 2);
+    await page.waitForFunction(() => window.relievo.diagnostics().playback.keys.filter((k) => k).length > 2);
+    await page.keyboard.press(' ');
+    await inState(page, 'shifted');
+    await settled(page);
+    const { first, index, keys } = await playback(page);
+    assert.ok(keys.some((k) => k === false), 'every frame is a key frame');
+    const from = Math.max(first, index - 9);
+    await compare(page, Array.from({ length: Math.min(10, index - first) }, (_, i) => from + i));
+    await page.keyboard.press('l');
+    await inState(page, 'live');
+    const { shown } = await look(page);
+    await shownPast(page, shown + 8);
+    await errors(page);
+  },
+};
+
+let failed = 2;
+let server = null;
+try {
+  feeder.say('start ball');
+  failed = await runChecks(onFeeder, await open());
+  server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5']);
+  const ofServer = pagesOf(browser, server.address, complaints);
+  failed += await runChecks(onServer, await ofServer.open());
+} finally {
+  await browser.close();
+  await feeder.kill();
+  await server?.kill();
+}
+process.exit(failed === 0 ? 0 : 1);

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+/** How the surface is drawn. */
+export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points' | 'normals' | 'depth' | 'confidence';
+
+/** `idle`: no src. `live` and `stalled`: a live stream. `behind`: a live stream as it was. `file`: a recording. */
+export type PlayerState = 'idle' | 'loading' | 'live' | 'stalled' | 'ended' | 'lost' | 'behind' | 'file' | 'failed';
+
+export interface FrameDetail {
+  /** Of the camera frame. */
+  number: number;
+  vertices: number;
+  triangles: number;
+}
+
+export interface RelievoPlayerEventMap extends HTMLElementEventMap {
+  /** `state` has changed. */
+  statechange: CustomEvent<{ state: PlayerState; message: string }>;
+  /** A frame was drawn. */
+  frame: CustomEvent<FrameDetail>;
+}
+
+/**
+ * `<relievo-player src=... mode=... controls grid loop paused>`: 3D video from a Relievo gateway, or a recording.
+ * Attributes and properties of the same name are one.
+ */
+export interface RelievoPlayerElement extends HTMLElement {
+  /** A recording (.mcap), or the address of a gateway's page with ?stream=NAME. */
+  src: string;
+  /** Default: textured. Any other text is that. */
+  mode: Mode;
+  /** Whether the time line is shown. */
+  controls: boolean;
+  /** Whether floor and axes are shown, in metres. */
+  grid: boolean;
+  /** Whether a recording begins again at its end. */
+  loop: boolean;
+  readonly state: PlayerState;
+  /** For a person; empty while all is well. */
+  readonly message: string;
+  readonly paused: boolean;
+  /** Seconds: of a recording from its start, of a live stream from the oldest frame kept. Setting it seeks. */
+  currentTime: number;
+  /** Seconds; of a live stream, of what is kept. 0 before the first frame. */
+  readonly duration: number;
+  /** 0.1 to 8. */
+  playbackRate: number;
+  play(): void;
+  pause(): void;
+  /** Back to what is live. */
+  goLive(): void;
+  /** The first view of the surface as it is now. */
+  resetView(): void;
+  /** What is seen, as PNG with a transparent ground. Rejects before the first frame. */
+  screenshot(): Promise<Blob>;
+  addEventListener<K extends keyof RelievoPlayerEventMap>(
+    type: K,
+    listener: (this: RelievoPlayerElement, event: RelievoPlayerEventMap[K]) => void,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: boolean | AddEventListenerOptions): void;
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    'relievo-player': RelievoPlayerElement;
+  }
+}

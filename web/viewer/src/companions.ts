@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Streams that are shown beside the first one, in the same scene. Each has a decoder and a rate of its own.
+import { LiveSource } from './liveSource';
+import { openRemote } from './openFile';
+import type { ListedStream } from './protocol';
+import { Session } from './session';
+import type { Beside, View } from './view';
+
+interface Companion {
+  session: Session;
+  beside: Beside;
+}
+
+export class Companions {
+  private readonly shown = new Map<string, Companion>();
+
+  constructor(
+    private readonly view: View,
+    private readonly changed: () => void,
+  ) {}
+
+  get names(): string[] {
+    return [...this.shown.keys()];
+  }
+
+  /** For tests and bug reports. */
+  report(): object[] {
+    const { places } = this.view;
+    return [...this.shown].map(([name, { session, beside }]) => {
+      const { shown, errors, frame } = session.meter.report();
+      return { name, shown, errors, frame, right: places[name], extent: beside.extent };
+    });
+  }
+
+  /** `listed`: what the server says of it, where it is known. */
+  add(name: string, listed: ListedStream | undefined): void {
+    if (this.shown.has(name)) return;
+    const session = new Session({
+      changed: () => this.changed(),
+      described: () => undefined,
+      ready: () => this.view.invalidate(),
+      hint: () => undefined,
+      unusable: () => this.changed(),
+    });
+    this.shown.set(name, { session, beside: this.view.addBeside(name) });
+    if (typeof listed?.recording === 'string') void this.openRecording(name, session, listed.recording);
+    else session.watch((events) => new LiveSource(name, events));
+    this.wish();
+    this.changed();
+  }
+
+  remove(name: string): void {
+    const companion = this.shown.get(name);
+    if (companion === undefined) return;
+    this.shown.delete(name);
+    companion.session.end();
+    this.view.removeBeside(companion.beside);
+    this.changed();
+  }
+
+  /** On the screen's beat: what has come since. */
+  draw(): void {
+    for (const { session, beside } of this.shown.values()) {
+      const first = !session.seen;
+      const frame = session.take();
+      if (frame === null) continue;
+      this.view.showBeside(beside, frame);
+      if (first) this.changed();
+    }
+  }
+
+  /** What the decoders should bring along. */
+  wish(): void {
+    for (const { session } of this.shown.values()) session.decoder.want = this.view.wants;
+  }
+
+  // A file plays on and on beside the others.
+  private async openRecording(name: string, session: Session, address: string): Promise<void> {
+    const opened = await openRemote(new URL(address, document.baseURI)).catch(() => null);
+    if (this.shown.get(name)?.session !== session) return;
+    session.watch(opened === null ? (events) => new LiveSource(name, events) : opened.source);
+    const playback = opened === null ? null : session.source!.playback;
+    playback?.setLoop({ from: 0, to: playback.times[playback.times.length - 1]! });
+  }
+}

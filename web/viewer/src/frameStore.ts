@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames that can be read in any order: those of a recording, or the last ones of a live stream.
+import type { FramePrefix } from './protocol';
+
+export interface StoredFrame {
+  prefix: FramePrefix;
+  message: ArrayBuffer; // the reader's own; the frame begins behind the prefix
+}
+
+/** A frame keeps its index: of a live stream the first ones go and others come. */
+export interface FrameStore {
+  readonly times: Float64Array; // rising, ms from `startMs`; of the frames there are now
+  readonly startMs: number; // UTC
+  readonly first: number; // index of the frame at times[0]
+  /** Whether a frame decodes alone; null: not known yet. */
+  isKey(index: number): boolean | null;
+  /** Frames lost before this one. */
+  gapBefore(index: number): number;
+  /** The last frame up to this one that decodes alone; null where there is none. */
+  keyBefore(index: number): Promise<number | null>;
+  /** Whether it holds video that builds on the frame before it. */
+  buildsOnFrameBefore(index: number): Promise<boolean>;
+  read(index: number): Promise<StoredFrame>;
+}

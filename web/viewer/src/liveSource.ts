@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// A live stream as a source of frames. What comes is kept for a while, so that a person can stop it, go back, and
+// return to what is live. Kept frames are played as those of a recording are.
+import { Connection } from './connection';
+import { History } from './history';
+import type { Loop } from './playback';
+import type { FramePrefix } from './protocol';
+import type { FrameSource, Kept, Playback, SourceEvents } from './source';
+import { StorePlayer } from './storePlayer';
+
+const kCredit = 2; // frames under way: one being decoded while the next travels; more would only be older when they are shown
+
+export class LiveSource implements FrameSource, Playback {
+  readonly playback: Playback = this;
+  private readonly history = new History();
+  private readonly connection: Connection;
+  private player: StorePlayer | null = null; // of what was; null: what comes is shown
+  private returning = false; // the player catches up
+  private withServer = 0; // frames that the server may send
+  private withPage = 0; // frames that the page has not shown yet
+  changed: () => void = () => undefined;
+  /** Gets each message that comes from now on, to be read only. */
+  tap: ((message: ArrayBuffer) => void) | null = null;
+
+  /** `server`: the address of its page, where it is not this one. */
+  constructor(
+    stream: string,
+    private readonly events: SourceEvents,
+    server?: string,
+  ) {
+    const received: SourceEvents = {
+      ...events,
+      open: () => this.onOpen(),
+      lost: () => {
+        if (this.live) events.lost(); // what was is still there to be seen
+      },
+      frame: (prefix, message) => this.onFrame(prefix, message),
+    };
+    this.connection = new Connection(stream, received, server);
+  }
+
+  get connected(): boolean {
+    return this.connection.connected;
+  }
+  get retryInS(): number | null {
+    return this.connection.retryInS;
+  }
+  get live(): boolean {
+    return this.player === null;
+  }
+  get kept(): Kept {
+    return this.history;
+  }
+  get following(): boolean {
+    return this.live || this.returning;
+  }
+  get times(): Float64Array {
+    return this.history.times;
+  }
+  get startMs(): number {
+    return this.history.startMs;
+  }
+  get first(): number {
+    return this.history.first;
+  }
+  get index(): number {
+    return this.player?.index ?? Math.max(this.first, this.history.end - 1);
+  }
+  get position(): number {
+    return this.player?.position ?? this.times[this.times.length - 1] ?? 0;
+  }
+  get playing(): boolean {
+    return this.player?.playing ?? true;
+  }
+  get speed(): number {
+    return this.player?.speed ?? 1;
+  }
+  get loop(): Loop | null {
+    return this.player?.loop ?? null;
+  }
+  isKey(index: number): boolean | null {
+    return this.history.isKey(index);
+  }
+  gapBefore(index: number): number {
+    return this.history.gapBefore(index);
+  }
+
+  /** Oldest first; to be read only. */
+  keptMessages(): ArrayBuffer[] {
+    return this.history.messages;
+  }
+
+  play(): void {
+    this.player?.play();
+  }
+  pause(): void {
+    this.shifted()?.pause();
+  }
+  seek(atMs: number): void {
+    this.shifted()?.seek(atMs);
+  }
+  step(frames: number): void {
+    this.shifted()?.step(frames);
+  }
+  setSpeed(speed: number): void {
+    if (speed !== 1 || !this.live) this.shifted(true)?.setSpeed(speed);
+  }
+  setLoop(loop: Loop | null): void {
+    if (loop !== null || !this.live) this.shifted(true)?.setLoop(loop);
+  }
+
+  /** The page goes on when it has what the next frame builds on. */
+  follow(): void {
+    if (this.player === null) return;
+    this.returning = true;
+    this.player.pause();
+    this.player.seek(Infinity);
+  }
+
+  /** The page has shown this many frames, whoever sent them. */
+  credit(n = 1): void {
+    this.withPage = Math.max(0, this.withPage - n);
+    this.player?.credit(n);
+    this.topUp();
+  }
+
+  retryNow(): void {
+    this.connection.retryNow();
+  }
+
+  stop(): void {
+    this.player?.stop();
+    this.connection.stop();
+  }
+
+  // The player of what was, from the newest frame on; null where nothing is kept yet.
+  private shifted(playing = false): StorePlayer | null {
+    this.returning = false;
+    if (this.player !== null || this.times.length === 0) return this.player;
+    const events = {
+      frame: (prefix: FramePrefix, message: ArrayBuffer, forLater: boolean): void => {
+        if (!forLater) ++this.withPage;
+        this.events.frame(prefix, message, forLater);
+      },
+      nonsense: (message: string): void => this.events.nonsense(message),
+      sent: (index: number): void => {
+        if (this.returning && index === this.history.end - 1) this.becomeLive();
+      },
+      ended: (): void => this.follow(),
+    };
+    const player = new StorePlayer(this.history, events, 1 - this.withPage);
+    this.player = player;
+    player.changed = () => this.changed();
+    player.seek(Infinity);
+    if (playing) player.play();
+    this.topUp(); // what comes is kept from now on, whether the page is ready or not
+    return player;
+  }
+
+  private becomeLive(): void {
+    this.player?.stop();
+    this.player = null;
+    this.returning = false;
+    if (!this.connected) this.events.lost();
+    this.changed();
+  }
+
+  private onOpen(): void {
+    this.withServer = 0;
+    if (this.live) {
+      this.withPage = 0; // the page forgets them with the old connection
+      this.events.open();
+    }
+    this.topUp();
+  }
+
+  private onFrame(prefix: FramePrefix, message: ArrayBuffer): void {
+    --this.withServer;
+    const kept = this.history.add(prefix, message);
+    if (kept !== null) this.tap?.(kept);
+    if (this.live) {
+      ++this.withPage;
+      this.events.frame(prefix, message, false);
+    } else {
+      this.topUp();
+      if (this.returning) this.player?.seek(Infinity);
+    }
+    this.changed();
+  }
+
+  private topUp(): void {
+    const more = kCredit - this.withServer - (this.live ? this.withPage : 0);
+    if (more <= 0 || !this.connected) return;
+    this.withServer += more;
+    this.connection.credit(more);
+  }
+}

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plays stored frames. Like a live stream it sends only what the page has credit for, so a slow page skips frames and
+// stays in time.
+import type { FrameStore } from './frameStore';
+import { PlayClock, type Loop } from './playback';
+import type { Playback, SourceEvents } from './source';
+
+/** What the decoder holds: the key frame, and the last frame that was decoded after it. */
+export interface Decoded {
+  key: number;
+  last: number;
+}
+
+/**
+ * What has to be decoded before a frame whose key frame is `key`. Grids build on the key frame alone, video (`onBefore`)
+ * on the frame before and so on all since the key frame.
+ */
+export function framesBefore(index: number, key: number, decoded: Decoded, onBefore: boolean): number[] {
+  if (key === index) return [];
+  const known = decoded.key === key;
+  if (!onBefore) return known ? [] : [key];
+  const first = known && decoded.last < index ? decoded.last + 1 : key;
+  return Array.from({ length: index - first }, (_, i) => first + i);
+}
+
+export interface PlayerEvents extends Pick<SourceEvents, 'frame' | 'nonsense'> {
+  /** This frame was handed over. */
+  sent?(index: number): void;
+  /** It played to the end of what there is. */
+  ended?(): void;
+}
+
+export class StorePlayer implements Playback {
+  readonly following: boolean | null = null;
+  private readonly clock: PlayClock;
+  private wanted: number | null; // to be shown whether it plays or not
+  private last = -1; // sent
+  private decoded: Decoded = { key: -1, last: -1 };
+  private sending = false;
+  private running = false;
+  private timer = 0;
+  protected stopped = false;
+  changed: () => void = () => undefined;
+
+  /** Begins with the first frame; `credits`: how many frames the page can take now. */
+  constructor(
+    private readonly store: FrameStore,
+    private readonly handed: PlayerEvents,
+    private credits = 1,
+  ) {
+    this.clock = new PlayClock(store);
+    this.wanted = store.first;
+  }
+
+  get times(): Float64Array {
+    return this.store.times;
+  }
+  get startMs(): number {
+    return this.store.startMs;
+  }
+  get first(): number {
+    return this.store.first;
+  }
+  get index(): number {
+    return Math.max(this.first, this.last);
+  }
+  get position(): number {
+    return this.clock.position(performance.now());
+  }
+  get playing(): boolean {
+    return this.clock.playing;
+  }
+  get speed(): number {
+    return this.clock.speed;
+  }
+  get loop(): Loop | null {
+    return this.clock.loop;
+  }
+
+  isKey(index: number): boolean | null {
+    return this.store.isKey(index);
+  }
+  gapBefore(index: number): number {
+    return this.store.gapBefore(index);
+  }
+
+  play(): void {
+    this.running = true;
+    this.clock.play(performance.now());
+    this.pump();
+  }
+
+  pause(): void {
+    this.running = false;
+    this.clock.pause(performance.now());
+    this.pump();
+  }
+
+  seek(atMs: number): void {
+    const now = performance.now();
+    this.clock.seek(atMs, now);
+    this.wanted = this.due(now);
+    this.pump();
+  }
+
+  step(frames: number): void {
+    this.pause();
+    const { times, first } = this.store;
+    const from = (this.wanted ?? this.index) - first;
+    this.seek(times[Math.min(times.length - 1, Math.max(0, from + frames))]!);
+  }
+
+  setSpeed(speed: number): void {
+    this.clock.setSpeed(speed, performance.now());
+    this.pump();
+  }
+
+  setLoop(loop: Loop | null): void {
+    this.clock.setLoop(loop, performance.now());
+    this.pump();
+  }
+
+  follow(): void {}
+
+  credit(n = 1): void {
+    this.credits += n;
+    this.pump();
+  }
+
+  stop(): void {
+    this.stopped = true;
+    window.clearTimeout(this.timer);
+  }
+
+  private due(now: number): number {
+    return this.first + this.clock.index(now);
+  }
+
+  // Sends what is due, or comes back when something is.
+  private pump(): void {
+    window.clearTimeout(this.timer);
+    this.changed();
+    if (this.stopped || this.sending || this.credits <= 0) return;
+    const now = performance.now();
+    const due = Math.max(this.first, this.wanted ?? this.due(now));
+    if (due !== this.last || this.wanted !== null) {
+      this.wanted = null;
+      --this.credits;
+      void this.send(due);
+      return;
+    }
+    const wait = this.clock.untilNext(now);
+    if (wait !== null) {
+      this.timer = window.setTimeout(() => this.pump(), wait);
+    } else if (this.running) {
+      this.running = false;
+      this.handed.ended?.();
+    }
+  }
+
+  private async send(index: number): Promise<void> {
+    this.sending = true;
+    this.last = index;
+    try {
+      const key = await this.store.keyBefore(index);
+      if (key === null) throw new Error('this frame builds on one that is not there');
+      for (const before of framesBefore(index, key, this.decoded, await this.store.buildsOnFrameBefore(index))) {
+        await this.hand(before, true);
+        if (this.stopped) return;
+        this.decoded = { key, last: before };
+      }
+      await this.hand(index, false);
+      this.decoded = { key, last: index };
+    } catch (error) {
+      ++this.credits;
+      if (!this.stopped) this.handed.nonsense(error instanceof Error ? error.message : String(error));
+    }
+    this.sending = false;
+    if (!this.stopped) this.handed.sent?.(index);
+    this.pump();
+  }
+
+  private async hand(index: number, forLater: boolean): Promise<void> {
+    const { prefix, message } = await this.store.read(index);
+    if (!this.stopped) this.handed.frame(prefix, message, forLater);
+  }
+}

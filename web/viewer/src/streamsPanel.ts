@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// What there is to see: live streams and recordings of the server, with a picture each, to be shown alone or beside
+// the others.
+import { button, chooser, make, setText } from './dom';
+import { kPlacements, type Placement } from './placement';
+import type { ListedStream } from './protocol';
+import { text } from './strings';
+import { kThumbnail, Thumbnails } from './thumbnails';
+
+const say = text.streams;
+const kFreshMs = 15_000; // between pictures of a stream that is not shown
+
+export interface StreamsPanelEvents {
+  choose(name: string): void;
+  beside(name: string, on: boolean): void;
+  /** A finished recording in the server's folder. */
+  recording(file: string): void;
+  placement(placement: Placement): void;
+}
+
+interface Row {
+  item: HTMLLIElement;
+  picture: HTMLCanvasElement;
+  about: HTMLElement;
+  show: HTMLButtonElement;
+  beside: HTMLButtonElement | null; // recordings of the folder are shown alone
+  pictureAt: number; // when it was asked for
+}
+
+export class StreamsPanel {
+  private readonly live = make('ul', { className: 'streams' });
+  private readonly none = make('p', { className: 'quiet' }, say.none);
+  private readonly folderTitle = make('h3', { hidden: true }, say.recordings);
+  private readonly folder = make('ul', { className: 'streams' });
+  private readonly placement: { row: HTMLElement; set(value: Placement): void };
+  private readonly note = make('p', { className: 'quiet' }, say.unknownPlaces);
+  private readonly rows = new Map<string, Row>();
+  private readonly thumbnails = new Thumbnails();
+  private isOpen = false;
+
+  constructor(
+    body: HTMLElement,
+    private readonly events: StreamsPanelEvents,
+  ) {
+    this.placement = chooser(
+      say.placement,
+      kPlacements.map((p) => [p, say.placements[p]] as const),
+      (placement) => events.placement(placement),
+    );
+    body.append(this.live, this.none, this.placement.row, this.note, this.folderTitle, this.folder);
+  }
+
+  set open(open: boolean) {
+    this.isOpen = open;
+    if (open) void this.listFolder();
+    else this.thumbnails.stop();
+  }
+
+  /** `first`: shown, and `besides` it. */
+  show(streams: readonly ListedStream[], first: string | null, besides: readonly string[]): void {
+    if (!this.isOpen) return;
+    this.none.hidden = streams.length > 0;
+    this.placement.row.hidden = this.note.hidden = besides.length === 0;
+    for (const [name, row] of this.rows) {
+      if (streams.some((s) => s.name === name)) continue;
+      row.item.remove();
+      this.rows.delete(name);
+    }
+    for (const stream of streams) {
+      const row = this.rows.get(stream.name) ?? this.add(stream.name);
+      setText(row.about, `${stream.source} · ${typeof stream.recording === 'string' ? say.recording : stream.state}`);
+      const isFirst = stream.name === first;
+      row.item.classList.toggle('shown', isFirst);
+      row.show.setAttribute('aria-pressed', String(isFirst));
+      row.beside!.setAttribute('aria-pressed', String(besides.includes(stream.name)));
+      row.beside!.disabled = isFirst;
+      this.draw(row, stream.name, stream.recording ?? null);
+    }
+  }
+
+  private draw(row: Row, name: string, recording: string | null): void {
+    const now = performance.now();
+    if (now - row.pictureAt < kFreshMs) return;
+    row.pictureAt = now;
+    this.thumbnails.ask({ name, recording, onto: row.picture });
+  }
+
+  private add(name: string): Row {
+    const beside = button(say.beside, say.besideTitle(name), () =>
+      this.events.beside(name, beside.getAttribute('aria-pressed') !== 'true'),
+    );
+    const row = makeRow(name, () => this.events.choose(name), beside);
+    this.rows.set(name, row);
+    this.live.append(row.item);
+    return row;
+  }
+
+  // Where the server records into a folder.
+  private async listFolder(): Promise<void> {
+    const response = await fetch(new URL('api/recordings', document.baseURI), { cache: 'no-store' }).catch(() => null);
+    if (response?.ok !== true) return;
+    const { recordings } = (await response.json()) as { recordings: { file: string; bytes: number }[] };
+    this.folderTitle.hidden = recordings.length === 0;
+    this.folder.replaceChildren();
+    for (const { file, bytes } of recordings) {
+      const row = makeRow(file, () => this.events.recording(file), null);
+      setText(row.about, `${(bytes / 1e6).toFixed(1)} MB`);
+      this.folder.append(row.item);
+      this.thumbnails.ask({ name: file, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
+    }
+  }
+}
+
+function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | null): Row {
+  const ratio = Math.min(window.devicePixelRatio, 2);
+  const picture = make('canvas', { width: kThumbnail.width * ratio, height: kThumbnail.height * ratio });
+  picture.setAttribute('role', 'img');
+  picture.setAttribute('aria-label', say.picture(name));
+  const about = make('small', { className: 'quiet' });
+  const show = button(say.show, say.showTitle(name), choose);
+  const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]));
+  const item = make('li', {}, picture, make('div', {}, make('b', { title: name }, name), about, buttons));
+  return { item, picture, about, show, beside, pictureAt: -Infinity };
+}

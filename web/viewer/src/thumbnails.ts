@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// A small picture of each stream: of one frame of it, by the same decoder as every other. One stream at a time.
+import { LiveSource } from './liveSource';
+import { openRemote } from './openFile';
+import { Session } from './session';
+
+export const kThumbnail = { width: 88, height: 66 }; // pixels of the page
+const kPatienceMs = 5000; // with a stream that sends nothing
+
+interface Job {
+  name: string;
+  recording: string | null;
+  onto: HTMLCanvasElement;
+}
+
+export class Thumbnails {
+  private session: Session | null = null; // while there is something to do
+  private jobs: Job[] = [];
+  private timer = 0;
+
+  /** Drawn when it has come; nothing where the stream has no picture. */
+  ask(job: Job): void {
+    if (this.jobs.some(({ onto }) => onto === job.onto)) return;
+    this.jobs.push(job);
+    if (this.jobs.length === 1) void this.begin();
+  }
+
+  /** Forgets what is not drawn yet. */
+  stop(): void {
+    this.jobs = [];
+    this.end();
+  }
+
+  private async begin(): Promise<void> {
+    const job = this.jobs[0];
+    if (job === undefined) return this.end();
+    const session = (this.session ??= new Session({
+      changed: () => undefined,
+      described: () => undefined,
+      ready: () => this.take(),
+      hint: () => undefined,
+      unusable: () => this.stop(),
+    }));
+    window.clearTimeout(this.timer);
+    this.timer = window.setTimeout(() => this.next(), kPatienceMs);
+    const { name, recording } = job;
+    const opened = recording === null ? null : await openRemote(new URL(recording, document.baseURI)).catch(() => null);
+    if (this.jobs[0] !== job) return;
+    session.watch(opened === null ? (events) => new LiveSource(name, events) : opened.source);
+  }
+
+  private take(): void {
+    const frame = this.session?.take() ?? null;
+    const job = this.jobs[0];
+    if (frame === null || job === undefined) return;
+    if (frame.texture !== null) drawThumbnail(frame.texture, job.onto);
+    frame.texture?.close();
+    this.next();
+  }
+
+  private next(): void {
+    this.session?.watch(null);
+    this.jobs.shift();
+    void this.begin();
+  }
+
+  private end(): void {
+    window.clearTimeout(this.timer);
+    this.session?.end();
+    this.session = null;
+  }
+}
+
+/** Filling it, the middle of the picture. */
+export function drawThumbnail(picture: ImageBitmap, onto: HTMLCanvasElement): void {
+  const scale = Math.max(onto.width / picture.width, onto.height / picture.height);
+  const [width, height] = [picture.width * scale, picture.height * scale];
+  const context = onto.getContext('2d')!;
+  context.imageSmoothingQuality = 'high';
+  context.drawImage(picture, (onto.width - width) / 2, (onto.height - height) / 2, width, height);
+  onto.dataset['drawn'] = '1';
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: what is written as CDR is what the reader of recordings reads.
+import { describe, expect, it } from 'vitest';
+import { readFrameHead, readStreamInfo } from '../src/cdr';
+import { writeFrame, writeStreamInfo } from '../src/cdrWriter';
+import type { StreamInfo } from '../src/protocol';
+
+const kCamera = { width: 640, height: 480, fx: 800, fy: 801, cx: 319.5, cy: 239.5, distortion: [0.1, -0.2, 0, 0.001, 0] };
+const kInfo: StreamInfo = {
+  stream: 'face',
+  source: 'sim:face',
+  frame_rate: 29.97,
+  scan: 'progressive',
+  stripes: 3,
+  camera: kCamera,
+  started_ns: 1_700_000_000_000_000_000,
+  projector: { ...kCamera, width: 1024, height: 768 },
+  projector_from_camera_rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1],
+  projector_from_camera_translation: [0.2, 0, 0],
+  field_order: 'top',
+  colour_matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1],
+  pattern: { base: 6, slides: 2, palette: [1, 2, 4, 6, 5, 3], sequence: [0, 7, 14], scheme: 'complementary' },
+};
+
+describe('a frame', () => {
+  it.each(['a', 'face', 'a-longer.name'])('of stream %s', (stream) => {
+    const data = Uint8Array.from([0x52, 0x4c, 0x56, 0x46, 1, 1, 9, 9, 9]);
+    const captureNs = 1_700_000_000_123_456_789n;
+    const sample = writeFrame({ stream, sequence: 7n, number: 9n, captureNs, publishNs: captureNs + 5_000_000n, data });
+    expect(sample.length % 4).toBe(0);
+    const head = readFrameHead(sample);
+    expect(head).toMatchObject({ stream, sequence: 7, number: 9, isKey: true, length: data.length });
+    expect(head.captureMs).toBeCloseTo(1_700_000_000_123.456, 2);
+    expect(sample.subarray(head.at, head.at + head.length)).toEqual(data);
+  });
+});
+
+describe('a description', () => {
+  it('is read back', () => {
+    const { stream, source, scan, frame_rate, camera } = readStreamInfo(writeStreamInfo(kInfo)!);
+    expect({ stream, source, scan, frame_rate, camera }).toEqual({
+      stream: 'face',
+      source: 'sim:face',
+      scan: 'progressive',
+      frame_rate: 29.97,
+      camera: kCamera,
+    });
+  });
+  it('is none where the server did not say enough', () => {
+    const { pattern: _, ...older } = kInfo;
+    expect(writeStreamInfo(older)).toBeNull();
+  });
+});

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: what is kept of a live stream is bounded, begins with a key frame, and is given back as it came.
+import { describe, expect, it } from 'vitest';
+import { History } from '../src/history';
+import type { FramePrefix } from '../src/protocol';
+
+const kPrefixBytes = 48;
+const kFrameBytes = 64 + 8 + 1;
+const kUtcMs = 1.7e12;
+
+/** A whole message: a grid without vertices, key or delta, behind its prefix. */
+function message(isKey: boolean): ArrayBuffer {
+  const bytes = new Uint8Array(kPrefixBytes + kFrameBytes);
+  const view = new DataView(bytes.buffer);
+  view.setUint32(0, kPrefixBytes, true);
+  bytes.set([0x52, 0x4c, 0x56, 0x46, 1, isKey ? 1 : 0], kPrefixBytes);
+  const at = kPrefixBytes;
+  view.setUint16(at + 6, 72, true);
+  view.setUint32(at + 40, 1, true); // vertices
+  view.setUint8(at + 56, 1);
+  view.setUint8(at + 57, 8);
+  view.setUint16(at + 58, 64, true);
+  view.setUint8(at + 64, 1); // geometry
+  view.setUint8(at + 65, 2); // a grid
+  view.setUint32(at + 68, 1, true);
+  return bytes.buffer;
+}
+const prefix = (sequence: number, atMs: number): FramePrefix => ({
+  bytes: kPrefixBytes,
+  sequence,
+  captureMs: kUtcMs + atMs,
+  publishMs: kUtcMs + atMs + 20,
+  sentMs: kUtcMs + atMs + 21,
+  drops: 0,
+});
+const kKeyEvery = 5;
+function filled(count: number, limits: { ms: number; bytes: number }): History {
+  const history = new History(limits);
+  for (let i = 0; i < count; ++i) history.add(prefix(i, i * 100), message(i % kKeyEvery === 0));
+  return history;
+}
+const kWide = { ms: 1e9, bytes: 1e9 };
+
+describe('History', () => {
+  it('gives back what came, as often as asked', async () => {
+    const history = filled(12, kWide);
+    expect([...history.times]).toEqual(Array.from({ length: 12 }, (_, i) => i * 100));
+    expect(history.startMs).toBe(kUtcMs);
+    expect(history.isKey(5)).toBe(true);
+    expect(history.isKey(6)).toBe(false);
+    expect(await history.keyBefore(9)).toBe(5);
+    expect(await history.buildsOnFrameBefore(9)).toBe(false);
+    const [one, two] = [await history.read(7), await history.read(7)];
+    expect(one.prefix.sequence).toBe(7);
+    expect(new Uint8Array(one.message)).toEqual(new Uint8Array(message(false)));
+    expect(two.message).not.toBe(one.message);
+  });
+
+  it('keeps no more than it may, and begins with a key frame', async () => {
+    const byTime = filled(100, { ms: 2000, bytes: 1e9 });
+    expect(byTime.spanMs).toBeLessThanOrEqual(2000);
+    expect(byTime.spanMs).toBeGreaterThan(1400);
+    expect(byTime.end).toBe(100); // indices stay
+    expect(byTime.isKey(byTime.first)).toBe(true);
+    expect((await byTime.read(99)).prefix.sequence).toBe(99);
+    await expect(byTime.read(byTime.first - 1)).rejects.toThrow('no longer');
+    const size = message(true).byteLength;
+    const byBytes = filled(100, { ms: 1e9, bytes: 10 * size });
+    expect(byBytes.bytes).toBe(byBytes.times.length * size);
+    expect(byBytes.times.length).toBeLessThanOrEqual(10);
+    expect(byBytes.times.length).toBeGreaterThan(5);
+  });
+
+  it('counts what is missing, and takes nothing twice', () => {
+    const history = filled(6, kWide);
+    history.add(prefix(5, 500), message(true)); // again after a connection was lost
+    history.add(prefix(9, 900), message(false));
+    expect(history.times.length).toBe(7);
+    expect(history.gapBefore(6)).toBe(3);
+    expect(history.gapBefore(5)).toBe(0);
+  });
+
+  it('begins anew with another clock, and with nothing that builds on what is not there', () => {
+    const history = filled(6, kWide);
+    history.add(prefix(6, -60_000), message(false));
+    expect(history.times.length).toBe(0);
+    history.add(prefix(7, -59_900), message(true));
+    expect([...history.times]).toEqual([0]);
+    expect(history.first).toBe(6);
+    expect(history.isKey(6)).toBe(true);
+  });
+
+  it('leaves out what is no frame', () => {
+    const history = filled(1, kWide);
+    history.add(prefix(1, 100), new ArrayBuffer(60));
+    expect(history.times.length).toBe(1);
+  });
+
+  it('takes the time of publishing where frames carry the time of a take', () => {
+    const history = new History(kWide);
+    history.add({ ...prefix(0, 0), captureMs: 0 }, message(true));
+    history.add({ ...prefix(1, 100), captureMs: 33 }, message(false));
+    expect([...history.times]).toEqual([0, 100]);
+  });
+});
