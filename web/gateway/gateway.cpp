@@ -113,6 +113,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .counts = counts_,
                                    .tokens = tokens_,
                                    .options = options_.web,
+                                   .recordings = options_.recordings,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});

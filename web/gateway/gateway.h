@@ -14,6 +14,7 @@
 #include "base/result.h"
 #include "base/stream.h"
 #include "base/web_options.h"
+#include "web/gateway/recording_control.h"
 
 namespace relievo {
 
@@ -34,6 +35,7 @@ struct GatewayOptions {
   // return at once and not call back.
   std::function<void(const std::string& stream)> key_frame_wanted{};
   std::optional<SampleFormat> samples{};           // none: no /foxglove
+  RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 
