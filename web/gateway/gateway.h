@@ -54,6 +54,10 @@ class Gateway {
   /// made for this run. Otherwise empty.
   virtual std::string made_token() const = 0;
 
+  /// Tokens, certificate, origins and limits are these from now on; who watches goes on watching. Fails, and
+  /// then nothing changes, as start() does, and where nobody could get the token that would be needed.
+  virtual Status apply(const WebOptions& web) = 0;
+
   /// A new stream, or new information on a known one. What is published of a stream before is ignored.
   virtual void announce(const StreamInfo& info) = 0;
   virtual void publish(const std::string& stream, const FrameMessage& frame) = 0;
