@@ -20,19 +20,14 @@ constexpr auto kTick = 100ms;
 constexpr auto kArrival = 500ms;     // of a stream's last frames
 constexpr std::size_t kAtOnce = 32;  // samples, before who asks for the state may look
 
-/// "face-2026-11-22T07-05-00Z.mcap", with -2, -3 ... where there is one already.
+/// "face-2026-11-22T07-05-00Z.mcap".
 std::string new_name(const std::filesystem::path& folder, const std::string& stream, std::int64_t now_ns) {
   const std::time_t now = now_ns / kNanosecondsPerSecond;
   std::tm utc{};
   gmtime_r(&now, &utc);
   char text[40];
   std::strftime(text, sizeof text, "-%Y-%m-%dT%H-%M-%SZ", &utc);
-  const std::string name = stream + text;
-  std::string out = name + ".mcap";
-  std::error_code ignored;
-  for (int n = 2; std::filesystem::exists(folder / out, ignored); ++n)
-    out = name + "-" + std::to_string(n) + ".mcap";
-  return out;
+  return unused_name(folder / (stream + text + ".mcap")).filename();
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "idl/recording_segments.h"
 
 namespace relievo {
 namespace {
@@ -45,6 +46,7 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
     auto& entry = entries_[name] = std::make_unique<Entry>();
     entry->config = *config;
     entry->retries = retries_ || was_applied_;
+    entry->again = was_applied_;
     entry->stopping = stopping_;
     entry->thread = std::thread([this, e = entry.get()] { run(*e); });
   }
@@ -120,7 +122,10 @@ void StreamSet::run(Entry& entry) {
 }
 
 Status StreamSet::run_once(Entry& entry) {
-  auto opened = ServedStream::open(entry.config, around_);
+  StreamConfig config = entry.config;
+  if (entry.again && !config.record.empty()) config.record = unused_name(config.record);
+  auto opened = ServedStream::open(config, around_);
+  entry.again = entry.again || opened;
   {
     const std::lock_guard lock(mutex_);
     if (opened && !entry.stopping) entry.stream = opened->get();

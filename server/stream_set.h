@@ -44,6 +44,7 @@ class StreamSet {
   struct Entry {
     StreamConfig config;
     bool retries = false;
+    bool again = false;  // it ran before: what is recorded goes to another file
     std::thread thread;
     ServedStream* stream = nullptr;  // while it runs
     bool stopping = false;
@@ -60,7 +61,7 @@ class StreamSet {
 
   const Surroundings around_;
   const bool retries_;
-  mutable std::mutex mutex_;  // of all that follows, but for an entry's first three
+  mutable std::mutex mutex_;  // of all that follows, but for an entry's first four
   mutable std::condition_variable changed_;
   std::map<std::string, std::unique_ptr<Entry>> entries_;
   bool stopping_ = false;

@@ -106,6 +106,8 @@ TEST_F(SeveralStreams, RunSideBySideAndStopTogether) {
 }
 
 TEST_F(SeveralStreams, OneThatFailsIsTriedAgainAndTheOtherLosesNothing) {
+  const fs::path file = folder_ / "right.mcap";
+  write(table("left", "one") + table("right", "two", "record = \"" + file.string() + "\"\n"));
   fs::rename(folder_ / "two", folder_ / "away");
   WebServer server(command());
   ASSERT_TRUE(server.process().wait_for_text("it is tried again")) << server.process().err();
@@ -116,6 +118,9 @@ TEST_F(SeveralStreams, OneThatFailsIsTriedAgainAndTheOtherLosesNothing) {
   EXPECT_TRUE(server.goes_on("right", 3)) << server.process().err();
   fs::rename(folder_ / "two", folder_ / "away");  // while it runs
   EXPECT_TRUE(eventually([&] { return server.stream("right").is_null(); }));
+  fs::rename(folder_ / "away", folder_ / "two");
+  EXPECT_TRUE(server.goes_on("right", 3)) << server.process().err();
+  EXPECT_TRUE(fs::exists(file) && fs::exists(folder_ / "right-2.mcap")) << "nothing is written over";
   EXPECT_TRUE(left.gets(5));
   EXPECT_EQ(left.gaps(), 0U);
   server.process().signal(SIGTERM);
