@@ -177,6 +177,25 @@ TEST_F(SeveralStreams, AReloadAppliesTokensAndSaysWhatNeedsARestart) {
   EXPECT_TRUE(eventually([&] { return request(server.port(), "GET", "/api/streams").status == 200; }));
 }
 
+TEST_F(SeveralStreams, TheOnlyStreamIsReloadedToo) {
+  const std::string one = "stream = \"left\"\nsource = \"take:" + (folder_ / "one").string() + "\"\n";
+  write(one);
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2)) << server.process().err();
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(left.gets(2));
+  EXPECT_EQ(left.starts().size(), 1U) << "nothing changed";
+  write(one + "texture_quality = 50\n");
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(eventually([&] { return left.starts().size() == 2; })) << server.process().err();
+  write(table("left", "one"));
+  ASSERT_TRUE(reloaded(server, "nothing was changed")) << server.process().err();
+  EXPECT_TRUE(left.gets(2));
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+}
+
 TEST_F(SeveralStreams, FlagsOfOneStreamAreRefused) {
   std::vector<std::string> with_source = command();
   with_source.insert(with_source.end(), {"--source", "sim:face"});
