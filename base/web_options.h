@@ -19,6 +19,8 @@ struct WebOptions {
   std::optional<int> max_per_address = {};
   std::optional<double> max_rate =
       {};  // requests a second from one address; not said: 200, and any from here
+
+  bool operator==(const WebOptions&) const = default;
 };
 
 }  // namespace relievo

@@ -21,6 +21,8 @@ struct RecordingTexts {
   std::string split_size, keep_size;  // quantities, "2GB"
   std::string split_every, keep_for;  // "10min"
   std::string sync;                   // "chunk", "none" or a duration
+
+  bool operator==(const RecordingTexts&) const = default;
 };
 
 /// Checked and filled while parsing.

@@ -16,6 +16,7 @@ namespace relievo {
 namespace {
 
 constexpr char kStop = 's';
+constexpr char kReload = 'r';
 constexpr char kQuit = 'q';
 constexpr int kSignalsUntilExit = 3;
 
@@ -31,6 +32,12 @@ void handle(int signal_number) {
   errno = saved;
 }
 
+void handle_reload(int) {
+  const int saved = errno;
+  [[maybe_unused]] const auto written = write(g_pipe_write, &kReload, 1);
+  errno = saved;
+}
+
 }  // namespace
 
 struct StopSignal::State {
@@ -38,10 +45,11 @@ struct StopSignal::State {
   mutable std::condition_variable changed;
   bool stopped = false;
   std::mutex callback_mutex;  // held while the callback runs
-  std::function<void()> callback;
+  std::function<void()> callback, reload;
   int pipe[2] = {-1, -1};
+  bool takes_hangup = false;
   struct sigaction old_int {
-  }, old_term{}, old_pipe{};
+  }, old_term{}, old_pipe{}, old_hangup{};
   std::thread thread;
 
   void run() {
@@ -50,6 +58,11 @@ struct StopSignal::State {
       const ssize_t n = read(pipe[0], &byte, 1);
       if (n < 0 && errno == EINTR) continue;
       if (n != 1 || byte == kQuit) return;
+      if (byte == kReload) {
+        std::lock_guard lock(callback_mutex);
+        if (reload) reload();
+        continue;
+      }
       {
         std::lock_guard lock(mutex);
         stopped = true;
@@ -88,6 +101,7 @@ StopSignal::~StopSignal() {
     sigaction(SIGINT, &state_->old_int, nullptr);
     sigaction(SIGTERM, &state_->old_term, nullptr);
     sigaction(SIGPIPE, &state_->old_pipe, nullptr);
+    if (state_->takes_hangup) sigaction(SIGHUP, &state_->old_hangup, nullptr);
     [[maybe_unused]] const auto written = write(state_->pipe[1], &kQuit, 1);
     state_->thread.join();
     g_pipe_write = -1;
@@ -123,6 +137,23 @@ void StopSignal::on_stop(std::function<void()> callback) {
 void StopSignal::clear_on_stop() {
   std::lock_guard lock(state_->callback_mutex);
   state_->callback = nullptr;
+}
+
+void StopSignal::on_reload(std::function<void()> callback) {
+  std::lock_guard lock(state_->callback_mutex);
+  state_->reload = std::move(callback);
+  if (state_->takes_hangup || !state_->thread.joinable()) return;
+  state_->takes_hangup = true;
+  struct sigaction action {};
+  action.sa_handler = handle_reload;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGHUP, &action, &state_->old_hangup);
+}
+
+void StopSignal::clear_on_reload() {
+  std::lock_guard lock(state_->callback_mutex);
+  state_->reload = nullptr;
 }
 
 void StopSignal::request() {

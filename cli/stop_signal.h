@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C and SIGTERM as a flag, a wait and a callback, so that a command ends with nothing lost.
+// Ctrl-C and SIGTERM as a flag, a wait and a callback, so that a command ends with nothing lost; SIGHUP as a
+// callback, for commands that read their configuration again.
 #pragma once
 
 #include <chrono>
@@ -28,6 +29,11 @@ class StopSignal {
   /// for a running callback.
   void on_stop(std::function<void()> callback);
   void clear_on_stop();
+
+  /// Takes over SIGHUP, which otherwise ends the process, and calls `callback` for each, on the thread of
+  /// on_stop(): stopping waits for it. Once; clear it before what it refers to is destroyed, as on_stop().
+  void on_reload(std::function<void()> callback);
+  void clear_on_reload();
 
   /// Stops as a signal would.
   void request();

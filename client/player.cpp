@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "base/time.h"
+#include "idl/cdr.h"
 
 namespace relievo {
 namespace {
@@ -19,10 +22,30 @@ TimeRange range_of(const PlayOptions& options, const RecordedStream& recorded) {
       TimeRange{.from_ns = recorded.summary().start_ns, .to_ns = std::numeric_limits<std::int64_t>::max()});
 }
 
+/// `sample` as if it were due to be received at this UTC time.
+RawSample restamped(RawSample sample, std::int64_t due_utc_ns, double speed) {
+  if (sample.topic != Topic::kFrame) return sample;
+  auto frame = read_frame_cdr(sample.cdr);
+  if (!frame) return sample;  // it is refused as it is
+  const auto moved = [&](std::int64_t time_ns) {
+    const auto before_ns = static_cast<double>(sample.receive_time_ns - time_ns);
+    return due_utc_ns - std::llround(before_ns / speed);
+  };
+  frame->capture_time_ns = moved(frame->capture_time_ns);
+  frame->publish_time_ns = moved(frame->publish_time_ns);
+  sample.cdr = write_frame_cdr(*frame);
+  return sample;
+}
+
 Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
                  const std::function<Status(const RawSample&)>& publish) {
   const TimeRange range = range_of(options, recorded);
   std::int64_t due_ns = steady_now_ns();
+  const std::int64_t utc_from_steady_ns = utc_now_ns() - due_ns;
+  const auto give = [&](RawSample sample) {
+    return publish(options.restamp ? restamped(std::move(sample), due_ns + utc_from_steady_ns, options.speed)
+                                   : std::move(sample));
+  };
   std::optional<std::int64_t> last_ns;
   for (;;) {
     auto sample = recorded.next();
@@ -30,7 +53,7 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
     if (!*sample || (*sample)->receive_time_ns > range.to_ns) return {};
     if ((*sample)->receive_time_ns < range.from_ns) {
       if (!needed_later(**sample)) continue;
-      if (auto status = publish(**sample); !status) return status;
+      if (auto status = give(**std::move(sample)); !status) return status;
       continue;
     }
     const std::int64_t time_ns = (*sample)->receive_time_ns;
@@ -39,7 +62,7 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
     last_ns = time_ns;
     due_ns += static_cast<std::int64_t>(static_cast<double>(step_ns) / options.speed);
     if (stop.wait_for(std::chrono::nanoseconds(due_ns - steady_now_ns()))) return {};
-    if (auto status = publish(**sample); !status) return status;
+    if (auto status = give(**std::move(sample)); !status) return status;
   }
 }
 

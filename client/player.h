@@ -14,8 +14,10 @@
 namespace relievo {
 
 struct PlayOptions {
-  double speed = 1;                     // 2: twice as fast
-  bool loop = false;                    // from the start again at the end, until stopped
+  double speed = 1;   // 2: twice as fast
+  bool loop = false;  // from the start again at the end, until stopped
+  // Frames are said to be captured now: in the recorded order, their times apart as recorded, at that speed.
+  bool restamp = false;
   std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none
 };
 

@@ -87,6 +87,14 @@ Status RecordingSegments::remove_old(const fs::path& open) const {
                 : Status();
 }
 
+fs::path unused_name(const fs::path& file) {
+  fs::path out = file;
+  std::error_code ignored;
+  for (int n = 2; fs::exists(out, ignored); ++n)
+    out = file.parent_path() / (file.stem().string() + "-" + std::to_string(n) + file.extension().string());
+  return out;
+}
+
 Status check_recording_target(const fs::path& file, bool split) {
   std::error_code error;
   if (!split && fs::exists(file, error))

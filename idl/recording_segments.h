@@ -34,6 +34,9 @@ class RecordingSegments {
   const SegmentOptions options_;
 };
 
+/// `file`, or where there is one already, its name with -2, -3 ...
+std::filesystem::path unused_name(const std::filesystem::path& file);
+
 /// Fails where `file` cannot be recorded to, found out before anything is received: it exists already (unless
 /// it is to be split, which names other files), or its folder does not.
 Status check_recording_target(const std::filesystem::path& file, bool split);

@@ -11,12 +11,15 @@
 #include <utility>
 #include <vector>
 
+#include "base/stream.h"
+#include "cli/listen_address.h"
 #include "cli/quantities.h"
 #include "cli/size_option.h"
 #include "cli/web_flags.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "server/camera_flags.h"
+#include "server/options.h"
 
 namespace relievo {
 namespace {
@@ -181,6 +184,27 @@ class Reader {
     if (const auto value = integer(key, least, most)) out = static_cast<int>(*value);
   }
 
+  /// [[KEY]], once or more.
+  bool has_tables(std::string_view key) const {
+    const toml::node* node = table_.get(key);
+    return node != nullptr && node->is_array_of_tables();
+  }
+  /// What `read` makes of each of them.
+  template <typename Read>
+  void tables(std::string_view key, const Read& read) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    for (const toml::node& entry : *node->as_array()) {
+      Reader inner(file_, *entry.as_table());
+      read(inner);
+      if (const Status done = inner.finish(); !done && !error_) error_ = done.error();
+    }
+  }
+  /// The whole table.
+  void refuse(const std::string& why) {
+    if (!error_) error_ = Error{place(file_, table_.source()) + why};
+  }
+
   Status finish() {
     for (const auto& [key, node] : table_) {
       if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) continue;
@@ -222,12 +246,57 @@ void read_camera(Reader& reader, CameraOptions& camera) {
   reader.controls("controls", camera.controls);
 }
 
-void read_recording(Reader& reader, RecordingTexts& recording) {
+void read_recording(Reader& reader, ServeConfig& config) {
+  reader.text("folder", config.record_folder);
+  reader.checked("pre_roll", pre_roll(), config.pre_roll);
+  RecordingTexts& recording = config.recording;
   reader.checked("split_size", byte_count(), recording.split_size);
   reader.checked("split_every", duration(), recording.split_every);
   reader.checked("keep_size", byte_count(), recording.keep_size);
   reader.checked("keep_for", duration(), recording.keep_for);
   reader.checked("sync", sync_policy(), recording.sync);
+}
+
+/// All but its name.
+void read_stream(Reader& reader, StreamConfig& config) {
+  reader.text("source", config.source);
+  reader.scheme("scheme", config.scheme);
+  reader.text("record", config.record);
+  if (const auto frames = reader.integer("frames", 1, std::numeric_limits<std::int64_t>::max())) {
+    config.frames = static_cast<std::uint64_t>(*frames);
+  }
+  reader.flag("loop", config.loop);
+  reader.flag("fast", config.fast);
+  reader.integer("threads", 1, 64, config.threads);
+  reader.decoder("decoder", config.decoder);
+  reader.flag("dense", config.surface.dense);
+  reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
+  reader.texture("texture", config.texture);
+  reader.integer("texture_quality", 1, 100, config.texture_quality);
+  if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))
+    config.bit_rate = static_cast<double>(*bits);
+  reader.geometry("geometry", config.geometry);
+  reader.integer("step_bits", 0, 8, config.step_bits);
+  reader.bound("bound", config.bound_px);
+  if (const auto frames = reader.integer("key_interval", 1, 1000))
+    config.key_interval = static_cast<int>(*frames);
+  reader.integer("draco_speed", 0, 9, config.draco_speed);
+  reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
+}
+
+/// A table [[stream]].
+void read_one_of_many(Reader& reader, ServeConfig& config) {
+  StreamConfig stream = config;
+  stream.camera.controls.clear();  // a camera's own
+  reader.checked("name", stream_name(), stream.stream);
+  read_stream(reader, stream);
+  for (const StreamConfig& other : config.streams) {
+    if (name_of(other) == name_of(stream))
+      reader.refuse("two streams are called '" + name_of(stream) + "': give each a name of its own");
+    if (!stream.record.empty() && other.record == stream.record)
+      reader.refuse("two streams are recorded to " + stream.record + ": give each a file of its own");
+  }
+  config.streams.push_back(std::move(stream));
 }
 
 void read_gateway(Reader& reader, WebOptions& gateway) {
@@ -247,7 +316,7 @@ void read_gateway(Reader& reader, WebOptions& gateway) {
 
 }  // namespace
 
-EncodeOptions encode_options(const ServeConfig& config) {
+EncodeOptions encode_options(const StreamConfig& config) {
   constexpr int kVideoInterval = 30;  // a second: what a late joiner waits at most
   EncodeOptions options;
   set_geometry_profile(config.geometry, options);
@@ -259,6 +328,80 @@ EncodeOptions encode_options(const ServeConfig& config) {
   options.key_interval = config.key_interval.value_or(std::max(usual, options.key_interval));
   if (options.bound_px > 0 && config.bound_px) options.bound_px = static_cast<float>(*config.bound_px);
   return options;
+}
+
+/// "take:../shared/takes/bunny" -> "bunny", "sim:face,stripes=70" -> "face".
+std::string name_of(const StreamConfig& config) {
+  if (!config.stream.empty()) return config.stream;
+  std::string name = config.source.substr(config.source.find(':') + 1);
+  name = name.substr(0, name.find(','));
+  while (!name.empty() && name.back() == '/') name.pop_back();
+  name = std::filesystem::path(name).stem().string();
+  for (char& c : name) {
+    if (!valid_stream_name(std::string(1, c)) && c != '.') c = '_';
+  }
+  return valid_stream_name(name) ? name : "stream";
+}
+
+std::vector<StreamConfig> ServeConfig::all_streams() const {
+  return streams.empty() ? std::vector<StreamConfig>{*this} : streams;
+}
+
+Result<double> parse_pre_roll_s(const std::string& text) {
+  if (text == "0" || text == "0s") return 0.0;
+  const auto seconds = parse_duration_s(text);
+  if (!seconds) return Error{"'" + text + "' is no duration such as 10s or 1min, and not 0"};
+  return *seconds;
+}
+
+ValueCheck pre_roll() {
+  return [](const std::string& text) {
+    const auto seconds = parse_pre_roll_s(text);
+    return seconds ? std::string() : seconds.error().message;
+  };
+}
+
+ValueCheck stream_name() {
+  return [](const std::string& name) {
+    return valid_stream_name(name)
+               ? std::string()
+               : "'" + name + "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.'";
+  };
+}
+
+namespace {
+
+Status check_stream(const StreamConfig& stream) {
+  if (const std::string wrong = stream_name()(name_of(stream)); !wrong.empty()) return Error{wrong};
+  if (const Status usable = check_texture_codec(stream.texture); !usable) return usable;
+  if (const auto source = with_scheme(stream.source, stream.scheme); !source) return source.error();
+  return check_rig(stream.source, stream.camera);
+}
+
+Status check_folder(const ServeConfig& config) {
+  if (config.record_folder.empty()) return {};
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(config.record_folder, ignored))
+    return Error{"cannot record to " + config.record_folder + ": there is no such folder"};
+  if (config.web == "none")
+    return Error{"recordings to " + config.record_folder +
+                 " are started by the web API: leave out --web none, or give --record FILE"};
+  return {};
+}
+
+}  // namespace
+
+Status check_config(const ServeConfig& config) {
+  for (const StreamConfig& stream : config.all_streams()) {
+    if (const Status sound = check_stream(stream); !sound)
+      return config.streams.empty() ? sound : sound.error().in("stream " + name_of(stream));
+  }
+  if (const Status sound = check_web_options(config.gateway); !sound) return sound;
+  if (const auto sound = recording_options(config.recording); !sound) return sound.error();
+  if (config.web != "none") {
+    if (const auto address = parse_listen_address(config.web); !address) return address.error();
+  }
+  return check_folder(config);
 }
 
 Status read_config(const std::filesystem::path& file, ServeConfig& config) {
@@ -275,36 +418,18 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
     return Error{place(file, error.source()) + std::string(error.description())};
   }
   Reader reader(file, table);
-  reader.text("source", config.source);
-  reader.text("stream", config.stream);
+  read_stream(reader, config);
   reader.integer("domain", 0, 230, config.domain);
   reader.text("interface", config.interface);
   reader.text("keys", config.keys);
   reader.text("web", config.web);
-  reader.text("record", config.record);
-  if (const auto frames = reader.integer("frames", 1, std::numeric_limits<std::int64_t>::max())) {
-    config.frames = static_cast<std::uint64_t>(*frames);
-  }
-  reader.flag("loop", config.loop);
-  reader.flag("fast", config.fast);
-  reader.integer("threads", 1, 64, config.threads);
-  reader.decoder("decoder", config.decoder);
-  reader.scheme("scheme", config.scheme);
-  reader.flag("dense", config.surface.dense);
-  reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
-  reader.texture("texture", config.texture);
-  reader.integer("texture_quality", 1, 100, config.texture_quality);
-  if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))
-    config.bit_rate = static_cast<double>(*bits);
-  reader.geometry("geometry", config.geometry);
-  reader.integer("step_bits", 0, 8, config.step_bits);
-  reader.bound("bound", config.bound_px);
-  if (const auto frames = reader.integer("key_interval", 1, 1000))
-    config.key_interval = static_cast<int>(*frames);
-  reader.integer("draco_speed", 0, 9, config.draco_speed);
-  reader.table("recording", [&](Reader& recording) { read_recording(recording, config.recording); });
+  reader.table("recording", [&](Reader& recording) { read_recording(recording, config); });
   reader.table("gateway", [&](Reader& gateway) { read_gateway(gateway, config.gateway); });
-  reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
+  // Last, since what is said outside of them holds for all.
+  if (!reader.has_tables("stream"))
+    reader.text("stream", config.stream);
+  else
+    reader.tables("stream", [&](Reader& stream) { read_one_of_many(stream, config); });
   return reader.finish();
 }
 

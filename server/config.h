@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "base/web_options.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/camera_options.h"
+#include "cli/checks.h"
 #include "cli/recording_flags.h"
 #include "codec/frame3d_codec.h"
 
@@ -20,18 +22,13 @@ inline constexpr double kLeastBound_px = 0.01, kMostBound_px = 8;  // of ServeCo
 /// Of --bitrate; below it the coarsest pictures are not worth showing.
 inline constexpr std::int64_t kLeastBitRate = 100'000, kMostBitRate = 1'000'000'000;
 
-struct ServeConfig {
+/// One stream that is served, and from what.
+struct StreamConfig {
   std::string source = "sim:face";
   std::string scheme;    // of a simulated source; empty: as the source says
   CameraOptions camera;  // of a camera, in the table [camera]
-  std::string stream;    // empty: named after the source
-  int domain = 0;
-  std::string interface;               // empty: Cyclone DDS chooses
-  std::string keys;                    // as DomainOptions::keys
-  std::string web = "127.0.0.1:8080";  // "none": no gateway
-  WebOptions gateway;                  // in the table [gateway]
-  std::string record;                  // empty: not recorded
-  RecordingTexts recording;            // in the table [recording]
+  std::string stream;    // its name; empty: as the source's, see name_of()
+  std::string record;    // empty: not recorded from the start
   std::optional<std::uint64_t> frames;
   bool loop = false;
   bool fast = false;
@@ -47,13 +44,44 @@ struct ServeConfig {
   std::optional<int> key_interval;
   std::optional<double> bound_px;  // of visual
   int draco_speed = 4;
+
+  bool operator==(const StreamConfig&) const = default;
 };
 
+/// What a server does for all of its streams; and the one stream, or what those of `streams` have in common.
+struct ServeConfig : StreamConfig {
+  std::vector<StreamConfig> streams;  // the tables [[stream]]; empty: one stream
+  int domain = 0;
+  std::string interface;               // empty: Cyclone DDS chooses
+  std::string keys;                    // as DomainOptions::keys
+  std::string web = "127.0.0.1:8080";  // "none": no gateway
+  WebOptions gateway;                  // in the table [gateway]
+  RecordingTexts recording;            // in the table [recording]
+  std::string record_folder;           // of recordings on request; empty: there are none
+  std::string pre_roll = "0";          // of those: a duration
+
+  /// All streams there are to be.
+  std::vector<StreamConfig> all_streams() const;
+};
+
+/// As it is called on the network.
+std::string name_of(const StreamConfig& config);
+
 /// How its frames are encoded.
-EncodeOptions encode_options(const ServeConfig& config);
+EncodeOptions encode_options(const StreamConfig& config);
 
 /// Sets the fields that `file` names. Errors say file, line and what is wrong: an unknown key, a wrong type,
-/// a value out of range.
+/// a value out of range, two streams of one name.
 Status read_config(const std::filesystem::path& file, ServeConfig& config);
+
+/// Fails where what is said cannot go together, or is not built in. Opens nothing.
+Status check_config(const ServeConfig& config);
+
+/// Of --pre-roll: a duration, or 0.
+Result<double> parse_pre_roll_s(const std::string& text);
+ValueCheck pre_roll();
+
+/// What cannot name a stream.
+ValueCheck stream_name();
 
 }  // namespace relievo

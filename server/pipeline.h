@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// capture -> reconstruct -> encode -> publish: one thread a stage, bounded queues between them. The only
-// place in the server that has threads and queues.
+// capture -> reconstruct -> encode -> publish: one thread a stage, bounded queues between them. Beside
+// stream_set.*, which runs a pipeline for each stream, the only place in the server that has threads.
 #pragma once
 
 #include <cstdint>

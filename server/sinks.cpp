@@ -58,6 +58,7 @@ class RecorderSink final : public FrameSink {
 
 class ServiceSink final : public FrameSink {
  public:
+  ServiceSink(ServiceBoard& board, std::string stream) : board_(board), stream_(std::move(stream)) {}
   Status consume(const FrameMessage&) override { return {}; }
   Status consume(const ServerStatus& status) override {
     const std::uint64_t dropped = status.drops_reconstruct + status.drops_encode + status.drops_publish;
@@ -66,18 +67,39 @@ class ServiceSink final : public FrameSink {
     dropped_ = dropped;
     std::string line = std::string(to_string(status.state)) + ", " + std::to_string(published_) + " frames";
     if (!status.message.empty()) line += ": " + status.message;
-    tell_state(line, !stuck);
+    board_.say(stream_, line, !stuck);
     return {};
   }
 
  private:
+  ServiceBoard& board_;
+  const std::string stream_;
   std::uint64_t published_ = 0, dropped_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<FrameSink> make_service_sink() {
-  return std::make_unique<ServiceSink>();
+void ServiceBoard::say(const std::string& stream, const std::string& line, bool alive) {
+  const std::lock_guard lock(mutex_);
+  const std::int64_t now_ns = steady_now_ns();
+  streams_[stream] = {line, alive, now_ns};
+  std::string all;
+  bool all_alive = true;
+  for (const auto& [name, entry] : streams_) {
+    if (streams_.size() > 1) all += (all.empty() ? "" : "; ") + name + ": ";
+    all += entry.line;
+    all_alive = all_alive && entry.alive && now_ns - entry.heard_ns < kHeardWithin_ns;
+  }
+  tell_state(all, all_alive);
+}
+
+void ServiceBoard::forget(const std::string& stream) {
+  const std::lock_guard lock(mutex_);
+  streams_.erase(stream);
+}
+
+std::unique_ptr<FrameSink> make_service_sink(ServiceBoard& board, const std::string& stream) {
+  return std::make_unique<ServiceSink>(board, stream);
 }
 
 std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder) {

@@ -2,8 +2,13 @@
 // Where a serving pipeline's frames go.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <string>
 
+#include "base/time.h"
 #include "idl/recorder.h"
 #include "idl/transport.h"
 #include "server/pipeline.h"
@@ -21,8 +26,28 @@ std::unique_ptr<FrameSink> make_gateway_sink(Gateway& gateway, const std::string
 /// failing recording is logged once and does not end the stream. `recorder` must outlive it.
 std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder);
 
-/// Tells the service manager that the stream lives, and what it does; not alive is one that gives up frames
-/// before a stage while nothing comes out of the last one.
-std::unique_ptr<FrameSink> make_service_sink();
+/// What the service manager is told of all streams together. Any thread.
+class ServiceBoard {
+ public:
+  /// The stream does that; `alive` where nothing needs a restart. To be said again within kHeardWithin_ns.
+  void say(const std::string& stream, const std::string& line, bool alive);
+  /// It has ended.
+  void forget(const std::string& stream);
+
+  static constexpr std::int64_t kHeardWithin_ns = 10 * kNanosecondsPerSecond;
+
+ private:
+  struct Entry {
+    std::string line;
+    bool alive = true;
+    std::int64_t heard_ns = 0;
+  };
+  std::mutex mutex_;
+  std::map<std::string, Entry> streams_;
+};
+
+/// Puts on the board, which must outlive it, that the stream lives, and what it does; not alive is one that
+/// gives up frames before a stage while nothing comes out of the last one.
+std::unique_ptr<FrameSink> make_service_sink(ServiceBoard& board, const std::string& stream);
 
 }  // namespace relievo

@@ -12,6 +12,8 @@ namespace relievo {
 struct CameraControl {
   std::string name;
   std::string value;
+
+  bool operator==(const CameraControl&) const = default;
 };
 
 /// Empty and 0 leave the choice to the rig's file or else to the driver.
@@ -31,6 +33,8 @@ struct CameraOptions {
   bool dmabuf = false;                  // read through exported DMA-BUFs instead of the driver's own mapping
   int buffers = 6;                      // that the driver fills in turn
   std::vector<CameraControl> controls;  // set in this order
+
+  bool operator==(const CameraOptions&) const = default;
 };
 
 }  // namespace relievo

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/time.h"
 #include "codec/recording.h"
 #include "idl/cdr.h"
 #include "idl/transport.h"
@@ -105,6 +106,43 @@ nlohmann::json info(const std::filesystem::path& file) {
   const auto done = test::run({program("relievo"), "info", file, "--json"});
   EXPECT_EQ(done.status, 0) << done.err;
   return nlohmann::json::parse(done.out, nullptr, false);
+}
+
+TEST(RecordPlay, RestampedFramesAreOfNowAndAsFarApartAsTheyWere) {
+  const test::TempFolder folder;
+  const auto file = folder / "then.mcap";
+  {
+    test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "10000", "1"});
+    const auto done = test::run(on_loopback({"record", "face", "--out", file, "--frames", "40"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  std::map<std::uint64_t, std::pair<std::int64_t, std::string>> then, now;  // by sequence
+  const auto keep = [](auto& into, const Bytes& cdr) {
+    const auto frame = read_frame_cdr(cdr);
+    if (frame) into[frame->sequence] = {frame->capture_time_ns, {frame->data.begin(), frame->data.end()}};
+  };
+  for (const Bytes& cdr : recorded_frames(file)) keep(then, cdr);
+  const std::int64_t before_ns = utc_now_ns();
+  {
+    Subscriber::Callbacks callbacks;
+    callbacks.raw = [&](const RawSample& sample) {
+      if (sample.topic == Topic::kFrame) keep(now, sample.cdr);
+    };
+    const auto subscriber = Subscriber::create({kDomainNumber, "lo"}, "face", callbacks);
+    ASSERT_TRUE(subscriber.ok());
+    const auto done =
+        test::run(on_loopback({"play", file, "--wait-readers", "1", "--restamp", "--speed", "2"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  ASSERT_GT(now.size(), 1U);
+  const auto& [first, first_now] = *now.begin();
+  EXPECT_GT(first_now.first, before_ns);
+  for (const auto& [sequence, frame] : now) {
+    ASSERT_TRUE(then.contains(sequence));
+    EXPECT_EQ(frame.second, then[sequence].second) << "the frame itself is as it was";
+    const std::int64_t apart_ns = (then[sequence].first - then[first].first) / 2;
+    EXPECT_NEAR(static_cast<double>(frame.first - first_now.first), static_cast<double>(apart_ns), 200);
+  }
 }
 
 TEST(RecordPlay, KilledRecorderLeavesAFileThatPlaysByteForByte) {

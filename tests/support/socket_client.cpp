@@ -114,6 +114,16 @@ Response request(TcpClient& client, std::uint16_t port, const std::string& metho
   return read_response(client, method == "HEAD");
 }
 
+Response post_json(std::uint16_t port, const std::string& target, const std::string& body,
+                   const std::string& headers) {
+  TcpClient client(port);
+  if (!client.connected()) return {};
+  client.send("POST " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+              "\r\nConnection: close\r\nContent-Type: application/json\r\nContent-Length: " +
+              std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body);
+  return read_response(client);
+}
+
 WsClient::WsClient(std::uint16_t port, const std::string& stream, const std::string& headers,
                    int receive_buffer_bytes)
     : WsClient(std::make_unique<TcpClient>(port, receive_buffer_bytes), port, "/ws/" + stream, headers) {}

@@ -54,6 +54,10 @@ Response request(std::uint16_t port, const std::string& method, const std::strin
 Response request(TcpClient& client, std::uint16_t port, const std::string& method, const std::string& target,
                  const std::string& headers = {});
 
+/// A POST of `body` as application/json on a connection of its own.
+Response post_json(std::uint16_t port, const std::string& target, const std::string& body,
+                   const std::string& headers = {});
+
 struct WsMessage {
   int opcode = 0;  // 1 text, 2 binary, 8 close
   std::string data;

@@ -37,29 +37,52 @@ constexpr double kBurst_s = 5;  // of requests at that rate, at once
 constexpr double kUnlimited = std::numeric_limits<int>::max();
 
 /// Of one address that is not this machine, or of each, where the options say so.
-AddressLimits limits_of(const WebOptions& options, bool loopback) {
-  const double rate = options.max_rate.value_or(loopback ? kUnlimited : kRequestsPerSecond);
-  return AddressLimits(
-      options.max_per_address.value_or(loopback ? std::numeric_limits<int>::max() : kPerAddress),
-      {.per_s = rate, .burst = std::max(1.0, kBurst_s * rate)});
+int connections_of(const WebOptions& options, bool loopback) {
+  return options.max_per_address.value_or(loopback ? std::numeric_limits<int>::max() : kPerAddress);
 }
+Rate requests_of(const WebOptions& options, bool loopback) {
+  const double rate = options.max_rate.value_or(loopback ? kUnlimited : kRequestsPerSecond);
+  return {.per_s = rate, .burst = std::max(1.0, kBurst_s * rate)};
+}
+
+/// What the options' files hold.
+struct Credentials {
+  Tokens tokens = Tokens::none();
+  std::optional<TlsFiles> tls;
+
+  static Result<Credentials> load(const WebOptions& web) {
+    Credentials out;
+    if (!web.token_file.empty()) {
+      auto loaded = Tokens::load(web.token_file);
+      if (!loaded) return loaded.error();
+      out.tokens = *std::move(loaded);
+    }
+    if (!web.tls_cert.empty()) {
+      auto loaded = TlsFiles::load(web.tls_cert, web.tls_key);
+      if (!loaded) return loaded.error();
+      out.tls = *std::move(loaded);
+    }
+    return out;
+  }
+};
 
 class Server : public Gateway, private ConnectionHost {
  public:
-  Server(const GatewayOptions& options, Tokens tokens, std::optional<TlsFiles> tls)
+  Server(const GatewayOptions& options, Credentials credentials)
       : options_(options),
-        tokens_(std::move(tokens)),
-        tls_(std::move(tls)),
+        web_(options.web),
+        credentials_(std::move(credentials)),
         hub_(options.empty_hint, options.key_frame_wanted),
-        limits_(limits_of(options.web, false)),
-        own_limits_(limits_of(options.web, true)) {}
+        limits_(connections_of(web_, false), requests_of(web_, false)),
+        own_limits_(connections_of(web_, true), requests_of(web_, true)) {}
   ~Server() override;
 
   Status listen();
   void run();
 
   std::uint16_t port() const override { return listener_->port(); }
-  std::string made_token() const override { return made_token_; }
+  std::string made_token() const override { return made_ ? made_->first() : std::string(); }
+  Status apply(const WebOptions& web) override;
   void announce(const StreamInfo& info) override { hub_.announce(info); }
   void publish(const std::string& stream, const FrameMessage& frame) override { hub_.publish(stream, frame); }
   void publish(const ServerStatus& status) override { hub_.publish(status); }
@@ -86,9 +109,9 @@ class Server : public Gateway, private ConnectionHost {
   void shut_down();
 
   const GatewayOptions options_;
-  Tokens tokens_;
-  std::optional<TlsFiles> tls_;
-  std::string made_token_;
+  WebOptions web_;  // as they are now
+  Credentials credentials_;
+  std::optional<Tokens> made_;  // for this run
   Hub hub_;
   AddressLimits limits_, own_limits_;
   net::io_context io_{1};
@@ -111,8 +134,9 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
   }
   return relievo::answer(request, {.hub = hub_,
                                    .counts = counts_,
-                                   .tokens = tokens_,
-                                   .options = options_.web,
+                                   .tokens = credentials_.tokens,
+                                   .options = web_,
+                                   .recordings = options_.recordings,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});
@@ -124,16 +148,34 @@ Status Server::listen() {
   listener_ = *std::move(listener);
   if (listener_->loopback()) return {};
   const std::string place = options_.host + ":" + std::to_string(listener_->port());
-  if (!options_.web.open && !tokens_.needed()) {
+  Tokens& tokens = credentials_.tokens;
+  if (!web_.open && !tokens.needed()) {
     auto made = Tokens::make();
     if (!made) return made.error();
-    tokens_ = *std::move(made);
-    made_token_ = tokens_.first();
+    made_ = tokens = *std::move(made);
   }
-  if (!tokens_.needed()) log_warning("anyone who reaches " + place + " can watch");
-  if (!tls_)
+  if (!tokens.needed()) log_warning("anyone who reaches " + place + " can watch");
+  if (!credentials_.tls)
     log_warning("what is watched at " + place + " can be read on the way" +
-                (tokens_.needed() ? ", and so can the token" : "") + ": --tls-cert and --tls-key encrypt it");
+                (tokens.needed() ? ", and so can the token" : "") + ": --tls-cert and --tls-key encrypt it");
+  return {};
+}
+
+Status Server::apply(const WebOptions& web) {
+  auto loaded = Credentials::load(web);
+  if (!loaded) return loaded.error();
+  const bool needs_token = !listener_->loopback() && !web.open && !loaded->tokens.needed();
+  if (needs_token && !made_)
+    return Error{"others reach " + options_.host +
+                 ": name a token file, or say open, or restart for a token that is made and printed"};
+  net::post(io_, [this, web, needs_token, credentials = *std::move(loaded)]() mutable {
+    if (needs_token) credentials.tokens = *made_;
+    credentials_ = std::move(credentials);
+    web_ = std::move(web);
+    const std::int64_t now_ns = steady_now_ns();
+    limits_.change(connections_of(web_, false), requests_of(web_, false), now_ns);
+    own_limits_.change(connections_of(web_, true), requests_of(web_, true), now_ns);
+  });
   return {};
 }
 
@@ -170,10 +212,10 @@ void Server::on_accept(std::shared_ptr<Transport> transport) {
   if (!limits.connect(transport->peer().address, steady_now_ns())) return counts_.refuse(Refusal::kAddress);
   auto place = std::make_shared<Place>(std::move(transport), limits);
   if (!make_room()) return counts_.refuse(Refusal::kPlaces);
-  tokens_.reload();
+  credentials_.tokens.reload();
   Transport* held = place->transport.get();
   const auto connection = HttpConnection::make(*this, std::shared_ptr<Transport>(std::move(place), held),
-                                               tls_ ? tls_->context() : nullptr);
+                                               credentials_.tls ? credentials_.tls->context() : nullptr);
   add(connection);
   connection->start();
 }
@@ -181,8 +223,7 @@ void Server::on_accept(std::shared_ptr<Transport> transport) {
 /// Where all places are taken, the connection that has waited longest for its client goes: who only holds
 /// connections open holds nobody else up.
 bool Server::make_room() {
-  if (connections_.size() <
-      static_cast<std::size_t>(options_.web.max_clients.value_or(kClients) + kSpareConnections))
+  if (connections_.size() < static_cast<std::size_t>(web_.max_clients.value_or(kClients) + kSpareConnections))
     return true;
   std::shared_ptr<Connection> longest;
   std::int64_t since_ns = std::numeric_limits<std::int64_t>::max();
@@ -226,19 +267,9 @@ Server::~Server() {
 }  // namespace
 
 Result<std::unique_ptr<Gateway>> Gateway::start(const GatewayOptions& options) {
-  Tokens tokens = Tokens::none();
-  if (!options.web.token_file.empty()) {
-    auto loaded = Tokens::load(options.web.token_file);
-    if (!loaded) return loaded.error();
-    tokens = *std::move(loaded);
-  }
-  std::optional<TlsFiles> tls;
-  if (!options.web.tls_cert.empty()) {
-    auto loaded = TlsFiles::load(options.web.tls_cert, options.web.tls_key);
-    if (!loaded) return loaded.error();
-    tls = *std::move(loaded);
-  }
-  auto server = std::make_unique<Server>(options, std::move(tokens), std::move(tls));
+  auto credentials = Credentials::load(options.web);
+  if (!credentials) return credentials.error();
+  auto server = std::make_unique<Server>(options, *std::move(credentials));
   if (auto status = server->listen(); !status) return status.error();
   server->run();
   return std::unique_ptr<Gateway>(std::move(server));

@@ -14,6 +14,7 @@
 #include "base/result.h"
 #include "base/stream.h"
 #include "base/web_options.h"
+#include "web/gateway/recording_control.h"
 
 namespace relievo {
 
@@ -34,6 +35,7 @@ struct GatewayOptions {
   // return at once and not call back.
   std::function<void(const std::string& stream)> key_frame_wanted{};
   std::optional<SampleFormat> samples{};           // none: no /foxglove
+  RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 
@@ -51,6 +53,10 @@ class Gateway {
   /// On an address that others reach, where the options neither name tokens nor say `open`: the one that was
   /// made for this run. Otherwise empty.
   virtual std::string made_token() const = 0;
+
+  /// Tokens, certificate, origins and limits are these from now on; who watches goes on watching. Fails, and
+  /// then nothing changes, as start() does, and where nobody could get the token that would be needed.
+  virtual Status apply(const WebOptions& web) = 0;
 
   /// A new stream, or new information on a known one. What is published of a stream before is ignored.
   virtual void announce(const StreamInfo& info) = 0;

@@ -136,7 +136,9 @@ void HttpSession::on_request() {
                                     .cookie = value(http::field::cookie),
                                     .range = value(http::field::range),
                                     .if_range = value(http::field::if_range),
+                                    .content_type = value(http::field::content_type),
                                     .subprotocols = value(http::field::sec_websocket_protocol),
+                                    .body = request.body(),
                                     .upgrade = beast::websocket::is_upgrade(request),
                                     .tls = transport_->is_tls()},
                                    transport_->peer());

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "base/recording_state.h"
 #include "base/stream.h"
 #include "web/gateway/histogram.h"
 
@@ -29,7 +30,8 @@ struct StreamSnapshot {
   std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
   std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
-  std::filesystem::path recording;  // that it is played from; empty: none that clients may read
+  std::filesystem::path recording;         // that it is played from; empty: none that clients may read
+  std::optional<RecordingState> recorded;  // on request; not the hub's to know, filled in by who asks
   // From the capture of each frame until it was published, was here, and was handed to a client's connection.
   Histogram published_after, here_after, sent_after;
 };

@@ -33,6 +33,12 @@ AddressLimits::Entry& AddressLimits::entry(const std::string& address, std::int6
   return entries_.try_emplace(address, Entry{0, Bucket(requests_, now_ns)}).first->second;
 }
 
+void AddressLimits::change(int connections, Rate requests, std::int64_t now_ns) {
+  connections_ = connections;
+  requests_ = requests;
+  for (auto& [address, known] : entries_) known.requests = Bucket(requests, now_ns);
+}
+
 bool AddressLimits::connect(const std::string& address, std::int64_t now_ns) {
   Entry& known = entry(address, now_ns);
   if (known.connections >= connections_) return false;

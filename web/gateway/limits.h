@@ -39,6 +39,9 @@ class AddressLimits {
   void disconnect(const std::string& address);
   bool request(const std::string& address, std::int64_t now_ns);
 
+  /// Of all addresses, from now on; connections that there are stay.
+  void change(int connections, Rate requests, std::int64_t now_ns);
+
   std::size_t size() const { return entries_.size(); }  // addresses remembered
 
  private:
@@ -48,8 +51,8 @@ class AddressLimits {
   };
   Entry& entry(const std::string& address, std::int64_t now_ns);
 
-  const int connections_;
-  const Rate requests_;
+  int connections_;
+  Rate requests_;
   std::unordered_map<std::string, Entry> entries_;
 };
 

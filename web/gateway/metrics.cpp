@@ -108,6 +108,26 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
     out.histogram(head + "\"sent\"", s.sent_after);
   }
 
+  out.family("relievo_recording_state", "gauge", "1 for what the stream's recording on request is doing.");
+  for (const auto& s : streams) {
+    if (!s.recorded) continue;
+    for (const auto a : {RecordingActivity::kOff, RecordingActivity::kRecording, RecordingActivity::kFailed})
+      out.sample("{stream=" + label(s.info.stream) + ",state=\"" + std::string(to_string(a)) + "\"}",
+                 s.recorded->activity == a ? 1 : 0);
+  }
+  const auto per_recording = [&](const char* name, const char* help, std::uint64_t RecordingState::*value) {
+    out.family(name, "gauge", help);
+    for (const auto& s : streams) {
+      if (s.recorded)
+        out.sample("{stream=" + label(s.info.stream) + "}", static_cast<double>((*s.recorded).*value));
+    }
+  };
+  per_recording("relievo_recording_frames", "Frames in the recording, or in the last one.",
+                &RecordingState::frames);
+  per_recording("relievo_recording_lost_frames", "Frames that should be in it and are not.",
+                &RecordingState::lost);
+  per_recording("relievo_recording_bytes", "Of samples in it.", &RecordingState::bytes);
+
   const auto per_status = [&](const char* name, const char* type, const char* help, auto value) {
     out.family(name, type, help);
     for (const auto& s : streams) {

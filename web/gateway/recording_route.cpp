@@ -10,6 +10,7 @@
 #include <cstdio>
 
 #include "web/gateway/byte_range.h"
+#include "web/gateway/recording_api.h"
 
 namespace relievo {
 namespace {
@@ -48,11 +49,16 @@ std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) c
   return n > 0 ? static_cast<std::size_t>(n) : 0;
 }
 
-HttpReply recording_reply(std::string_view name, const HttpRequest& request, const Hub& hub) {
+HttpReply recording_reply(std::string_view name, const HttpRequest& request, const RouteContext& context) {
   if (!name.ends_with(kSuffix)) return line(404, "no recording has such a name");
-  const auto file = hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
+  auto file = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
+  int follow = 0;
+  if (!file && context.recordings != nullptr) {
+    file = finished_recording(std::string(name), *context.recordings);
+    follow = O_NOFOLLOW;  // what somebody links to from there is none of ours
+  }
   if (!file) return line(404, "there is no such recording");
-  const int descriptor = open(file->c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = open(file->c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
   struct stat status {};
   if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     if (descriptor >= 0) close(descriptor);

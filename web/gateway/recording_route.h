@@ -31,8 +31,8 @@ class FilePart {
   const std::uint64_t at_, length_;
 };
 
-/// GET /recordings/NAME: "STREAM.mcap" of a stream whose recording is offered; any other is not found, so no
-/// name leads to another file.
-HttpReply recording_reply(std::string_view name, const HttpRequest& request, const Hub& hub);
+/// GET /recordings/NAME: "STREAM.mcap" of a stream whose recording is offered, or a finished file of the
+/// folder that streams are recorded to; any other is not found, so no name leads to another file.
+HttpReply recording_reply(std::string_view name, const HttpRequest& request, const RouteContext& context);
 
 }  // namespace relievo

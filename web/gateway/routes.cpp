@@ -6,6 +6,7 @@
 
 #include "web/gateway/assets.h"
 #include "web/gateway/foxglove_feed.h"
+#include "web/gateway/recording_api.h"
 #include "web/gateway/recording_route.h"
 #include "web/gateway/sign_in.h"
 
@@ -75,6 +76,12 @@ bool listed_host(std::string_view host, const RouteContext& context) {
                      [&](const std::string& one) { return same_origin(one, host); });
 }
 
+/// A program that sends no Origin is not a page.
+bool may_act(const HttpRequest& request, const RouteContext& context) {
+  return request.origin.empty() || same_origin(request.origin, request.host) ||
+         listed_origin(request.origin, context);
+}
+
 /// Upgrades to `target`, unless something speaks against it.
 HttpReply websocket(const HttpRequest& request, WsTarget target, const RouteContext& context) {
   if (!request.upgrade) {
@@ -82,10 +89,8 @@ HttpReply websocket(const HttpRequest& request, WsTarget target, const RouteCont
     reply.headers.emplace_back("Upgrade", "websocket");
     return reply;
   }
-  if (!request.origin.empty() && !same_origin(request.origin, request.host) &&
-      !listed_origin(request.origin, context)) {
+  if (!may_act(request, context))
     return refused(Refusal::kOrigin, 403, "a page of another site may not open this stream");
-  }
   const int places = context.options.max_clients.value_or(kClients);
   if (context.counts.clients >= places) {
     HttpReply reply = refused(Refusal::kClients, 503, "all " + std::to_string(places) + " places are taken");
@@ -178,7 +183,10 @@ HttpReply ready(const RouteContext& context) {
 HttpReply metrics(const RouteContext& context) {
   HttpReply reply = text(200, "");
   reply.content_type = "text/plain; version=0.0.4; charset=utf-8";
-  reply.body = metrics_text(context.hub.snapshot(), context.counts);
+  std::vector<StreamSnapshot> streams = context.hub.snapshot();
+  if (context.recordings != nullptr)
+    for (StreamSnapshot& s : streams) s.recorded = context.recordings->state(s.info.stream);
+  reply.body = metrics_text(streams, context.counts);
   return reply;
 }
 
@@ -187,6 +195,9 @@ struct Route {
   std::string_view path;
   bool needs_token;
   HttpReply (*answer)(std::string_view name, const HttpRequest& request, const RouteContext& context);
+  // To POST, where that is not refused.
+  HttpReply (*order)(std::string_view name, const HttpRequest& request,
+                     const RouteContext& context) = nullptr;
 };
 
 constexpr Route kRoutes[] = {
@@ -204,7 +215,16 @@ constexpr Route kRoutes[] = {
      }},
     {"/recordings/{recording}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
-       return recording_reply(name, request, context.hub);
+       return recording_reply(name, request, context);
+     }},
+    {"/api/recordings", true,
+     [](auto, auto&, const RouteContext& context) { return list_recordings(context.recordings); }},
+    {"/api/recording/{stream}", true,
+     [](std::string_view name, auto&, const RouteContext& context) {
+       return recording_state(name, context.recordings);
+     },
+     [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
+       return order_recording(name, request, context.recordings);
      }},
     {"/ws/{stream}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
@@ -220,18 +240,22 @@ std::optional<std::string_view> match(const Route& route, std::string_view path)
   return path.starts_with(before) ? std::optional(path.substr(before.size())) : std::nullopt;
 }
 
-HttpReply answer_get(const HttpRequest& request, const RouteContext& context) {
-  const std::string_view path = request.target.substr(0, request.target.find('?'));
-  for (const Route& route : kRoutes) {
-    const auto name = match(route, path);
-    if (!name) continue;
-    if (route.needs_token) {
-      if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
-    }
-    return route.answer(*name, request, context);
+HttpReply wrong_method(std::string allowed) {
+  HttpReply reply = text(405, "only " + allowed);
+  reply.headers.emplace_back("Allow", std::move(allowed));
+  return reply;
+}
+
+HttpReply answer_at(const Route& route, std::string_view name, const HttpRequest& request,
+                    const RouteContext& context) {
+  const bool is_order = request.method == "POST";
+  if (is_order && route.order == nullptr) return wrong_method("GET, HEAD");
+  if (is_order && !may_act(request, context))
+    return refused(Refusal::kOrigin, 403, "a page of another site may not do this");
+  if (route.needs_token) {
+    if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
   }
-  if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
-  return page(path, request);
+  return is_order ? route.order(name, request, context) : route.answer(name, request, context);
 }
 
 /// Pages of a listed site may read what they are answered.
@@ -247,20 +271,26 @@ void share_with_origin(const HttpRequest& request, const RouteContext& context, 
 HttpReply preflight() {
   HttpReply reply;
   reply.status = 204;
-  reply.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD");
-  reply.headers.emplace_back("Access-Control-Allow-Headers", "Authorization, Range");
+  reply.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD, POST");
+  reply.headers.emplace_back("Access-Control-Allow-Headers", "Authorization, Content-Type, Range");
   reply.headers.emplace_back("Access-Control-Max-Age", "600");
   return reply;
 }
 
 HttpReply answer_by_method(const HttpRequest& request, const RouteContext& context) {
   if (request.method == "OPTIONS" && listed_origin(request.origin, context)) return preflight();
-  if (request.method != "GET" && request.method != "HEAD") {
-    HttpReply reply = text(405, "only GET and HEAD");
-    reply.headers.emplace_back("Allow", "GET, HEAD");
-    return reply;
+  const bool is_get = request.method == "GET" || request.method == "HEAD";
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  for (const Route& route : kRoutes) {
+    const auto name = match(route, path);
+    if (!name) continue;
+    if (!is_get && request.method != "POST")
+      return wrong_method(route.order == nullptr ? "GET, HEAD" : "GET, HEAD, POST");
+    return answer_at(route, *name, request, context);
   }
-  return answer_get(request, context);
+  if (!is_get) return wrong_method("GET, HEAD");
+  if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);
+  return page(path, request);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "web/gateway/access.h"
 #include "web/gateway/hub.h"
 #include "web/gateway/protocol.h"
+#include "web/gateway/recording_control.h"
 
 namespace relievo {
 
@@ -27,9 +28,11 @@ struct HttpRequest {
   std::string_view cookie;
   std::string_view range;
   std::string_view if_range;
+  std::string_view content_type;
   std::string_view subprotocols;  // Sec-WebSocket-Protocol: "a, b"
-  bool upgrade = false;           // asks for a WebSocket
-  bool tls = false;               // came over TLS
+  std::string_view body;
+  bool upgrade = false;  // asks for a WebSocket
+  bool tls = false;      // came over TLS
 };
 
 /// What a WebSocket serves.
@@ -60,7 +63,8 @@ struct RouteContext {
   const GatewayCounts& counts;
   const Tokens& tokens;
   const WebOptions& options;
-  bool foxglove = false;  // there is an encoder for it
+  RecordingControl* recordings = nullptr;  // none: nothing is recorded here
+  bool foxglove = false;                   // there is an encoder for it
   std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only
 };

@@ -98,5 +98,13 @@ TEST_F(Segments, WhatCannotBeRemovedIsNamed) {
   EXPECT_THAT(there(), ElementsAre("a_000000.mcap")) << "the others go all the same";
 }
 
+TEST_F(Segments, AnUnusedNameIsBesideTheUsedOnes) {
+  EXPECT_EQ(unused_name(folder_ / "face.mcap"), folder_ / "face.mcap");
+  make("face.mcap", 1);
+  EXPECT_EQ(unused_name(folder_ / "face.mcap"), folder_ / "face-2.mcap");
+  make("face-2.mcap", 1);
+  EXPECT_EQ(unused_name(folder_ / "face.mcap"), folder_ / "face-3.mcap");
+}
+
 }  // namespace
 }  // namespace relievo

@@ -34,11 +34,16 @@ Read read(const std::string& text) {
 // The file that is installed is the manual: each setting is in it, and each line of it is one.
 TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
   const std::regex setting(R"(#?((\w+) = .*|\[\w+\]))");
+  const std::regex example(R"(#   ((\w+) = .*|\[\[stream\]\]))");  // what stands in place of other lines
   std::ifstream in(std::string(RELIEVO_SOURCE_DIR) + "/packaging/server.toml");
-  std::string all;
+  std::string all, several;
   std::set<std::string> named;
   for (std::string line; std::getline(in, line);) {
     std::smatch match;
+    if (std::regex_match(line, match, example)) {
+      several += match[1].str() + "\n";
+      named.insert(match[2]);
+    }
     if (!std::regex_match(line, match, setting)) continue;
     all += match[1].str() + "\n";
     named.insert(match[2]);
@@ -46,8 +51,11 @@ TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
   const Read whole = read(all);
   ASSERT_TRUE(whole.status) << whole.status.error().message;
   EXPECT_EQ(whole.config.camera.controls.size(), 3U);
+  const Read rigs = read(several);
+  ASSERT_TRUE(rigs.status) << rigs.status.error().message;
+  EXPECT_EQ(rigs.config.streams.size(), 2U);
 
-  for (const std::string table : {"", "[recording]\n", "[gateway]\n", "[camera]\n"}) {
+  for (const std::string table : {"", "[recording]\n", "[gateway]\n", "[camera]\n", "[[stream]]\n"}) {
     const Read wrong = read(table + "nonsense = 1\n");
     ASSERT_FALSE(wrong.status);
     std::istringstream known(wrong.status.error().message);
@@ -131,6 +139,55 @@ sync = "5s"
   EXPECT_LT(flags_win->sync_s, 0);
   EXPECT_FALSE(recording_options({.keep_size = "1GB"}).ok()) << "nothing ends that could be removed";
   EXPECT_EQ(recording_options({.sync = "chunk"})->sync_s, 0);
+}
+
+TEST(Config, RecordingsOnRequest) {
+  const Read r = read("[recording]\nfolder = \"takes\"\npre_roll = \"10s\"\n");
+  ASSERT_TRUE(r.status) << r.status.error().message;
+  EXPECT_EQ(r.config.record_folder, "takes");
+  EXPECT_EQ(parse_pre_roll_s(r.config.pre_roll).value(), 10);
+  EXPECT_EQ(parse_pre_roll_s(ServeConfig().pre_roll).value(), 0);
+  EXPECT_FALSE(parse_pre_roll_s("-1").ok());
+  EXPECT_FALSE(parse_pre_roll_s("soon").ok());
+}
+
+TEST(Config, SeveralStreamsHaveInCommonWhatIsSaidOutsideThem) {
+  const Read r = read(R"(texture = "webp"
+threads = 2
+[camera]
+format = "YUYV"
+[[stream]]
+name = "left"
+source = "v4l2:/dev/video0"
+[stream.camera]
+rig = "left.yaml"
+[[stream]]
+source = "sim:walk"
+threads = 3
+)");
+  ASSERT_TRUE(r.status) << r.status.error().message;
+  const std::vector<StreamConfig> streams = r.config.all_streams();
+  ASSERT_EQ(streams.size(), 2U);
+  EXPECT_EQ(name_of(streams[0]), "left");
+  EXPECT_EQ(streams[0].camera.rig, "left.yaml");
+  EXPECT_EQ(streams[0].camera.format, "YUYV");
+  EXPECT_EQ(streams[0].texture, TextureCodec::kWebp);
+  EXPECT_EQ(streams[0].threads, 2);
+  EXPECT_EQ(name_of(streams[1]), "walk");
+  EXPECT_EQ(streams[1].texture, TextureCodec::kWebp);
+  EXPECT_EQ(streams[1].threads, 3);
+  EXPECT_EQ(read("source = \"sim:walk\"\n").config.all_streams().size(), 1U);
+}
+
+TEST(Config, SeveralStreamsMustNotBeMixedUp) {
+  const Read names = read("[[stream]]\nname = \"a\"\n[[stream]]\nname = \"a\"\n");
+  ASSERT_FALSE(names.status);
+  EXPECT_EQ(names.status.error().message.find(names.file + ":3: two streams are called 'a'"), 0U)
+      << names.status.error().message;
+  const Read files = read("record = \"a.mcap\"\n[[stream]]\n[[stream]]\nname = \"b\"\n");
+  ASSERT_FALSE(files.status);
+  EXPECT_NE(files.status.error().message.find(":3: two streams are recorded to a.mcap"), std::string::npos)
+      << files.status.error().message;
 }
 
 TEST(Config, ACamerasTable) {
@@ -272,7 +329,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"steps_over", "step_bits = 9", "step_bits must be a whole number from 0 to 8"},
         Wrong{"bound_over", "bound = 9", "bound must be a number of pixels from 0.01 to 8"},
         Wrong{"keys_none", "key_interval = 0", "key_interval must be a whole number from 1 to 1000"},
-        Wrong{"unknown", "quality = 80", "quality is no setting; there are: source stream"},
+        Wrong{"unknown", "quality = 80", "quality is no setting; there are: source scheme"},
         Wrong{"bitrate_low", "bitrate = 4", "bitrate must be a whole number from 100000"},
         Wrong{"texture_unknown", "texture = \"gif\"", "texture must be jpeg, webp, png or h264"},
         Wrong{"part_of_a_name", "quality = 80", "quality is no setting"},
@@ -298,6 +355,10 @@ INSTANTIATE_TEST_SUITE_P(
               "split_size is wrong: 'big' is no size"},
         Wrong{"recording_sync", "recording = {sync = \"often\"}", "sync is wrong: 'often' is neither chunk"},
         Wrong{"recording_number", "recording = {keep_for = 7}", "keep_for must be a string in quotes"},
+        Wrong{"recording_pre_roll", "recording = {pre_roll = \"long\"}", "pre_roll is wrong: 'long' is no"},
+        Wrong{"stream_unknown", "stream = [{sorce = \"sim:face\"}]",
+              "sorce is no setting; there are: name source"},
+        Wrong{"stream_name", "stream = [7]", "stream must be a string"},
         Wrong{"unknown_table", "[server]", "server is no setting"}),
     [](const auto& wrong) { return wrong.param.name; });
 

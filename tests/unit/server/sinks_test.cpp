@@ -21,7 +21,8 @@ TEST(ServiceSink, WatchdogHearsNothingWhereFramesGoInAndNoneComesOut) {
   test::ServiceManager manager(path);
   ASSERT_TRUE(manager.bound());
   setenv("NOTIFY_SOCKET", path.c_str(), 1);
-  const auto sink = make_service_sink();
+  ServiceBoard board;
+  const auto sink = make_service_sink(board, "face");
   const auto told = [&](std::uint64_t published, std::uint64_t dropped) {
     ServerStatus status;
     status.frames_published = published;

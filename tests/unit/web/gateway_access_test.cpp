@@ -66,6 +66,48 @@ TEST_F(GatewayTokens, ProgramsSendAHeaderOrAQuery) {
   EXPECT_EQ(WsClient(port, "face?token=" + kToken).status(), 101);
 }
 
+TEST_F(GatewayTokens, OtherOptionsHoldFromThenOnAndNobodyIsDisconnected) {
+  WsClient client(port, "face", bearer(kToken));
+  ASSERT_TRUE(client.next_of("info"));
+  ASSERT_TRUE(gateway->apply({.origins = {"https://a.example"}, .max_clients = 1}));
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/api/streams").status == 200; }))
+      << "no token is needed now";
+  const std::string listed = "Origin: https://a.example\r\n";
+  EXPECT_EQ(request(port, "GET", "/api/streams", listed).headers.at("access-control-allow-origin"),
+            "https://a.example");
+  EXPECT_EQ(WsClient(port, "face", listed).status(), 503) << "the one place is taken";
+  ASSERT_TRUE(gateway->apply({.token_file = file, .max_per_address = 5, .max_rate = 1000}));
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/api/streams").status == 401; }));
+  EXPECT_TRUE(client.credit(1));
+  gateway->publish("face", make_frame(0));
+  EXPECT_TRUE(client.next_of("frame")) << "who watches goes on";
+}
+
+TEST_F(GatewayTokens, OptionsWithAMistakeChangeNothing) {
+  const Status missing = gateway->apply({.token_file = folder / "none"});
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().message.find("none"), std::string::npos) << missing.error().message;
+  EXPECT_FALSE(gateway->apply({.tls_cert = folder / "a.pem", .tls_key = folder / "a.key"}));
+  EXPECT_EQ(request(port, "GET", "/api/streams").status, 401);
+  EXPECT_EQ(request(port, "GET", "/api/streams", bearer(kToken)).status, 200);
+}
+
+TEST_F(GatewayTokens, WhereOthersReachItNoneIsNotMadeLater) {
+  start({.host = "0.0.0.0", .port = 0, .web = {.token_file = file}});
+  EXPECT_FALSE(gateway->apply({})) << "nobody would be told the token";
+  EXPECT_EQ(request(port, "GET", "/api/streams").status, 401);
+  ASSERT_TRUE(gateway->apply({.open = true}));
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/api/streams").status == 200; }));
+  start({.host = "0.0.0.0", .port = 0});
+  const std::string made = gateway->made_token();
+  ASSERT_FALSE(made.empty());
+  ASSERT_TRUE(gateway->apply({.token_file = file}));
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/api/streams", bearer(kToken)).status == 200; }));
+  ASSERT_TRUE(gateway->apply({.max_clients = 3}));
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/api/streams", bearer(made)).status == 200; }))
+      << "the one that was printed";
+}
+
 TEST_F(GatewayTokens, ABrowserKeepsItAsACookieAndNotInTheAddress) {
   const auto sent = request(port, "GET", "/?stream=face&token=" + kToken + "&x=1");
   ASSERT_EQ(sent.status, 303);

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "idl/stream_recorder.h"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "idl/cdr.h"
+
+namespace relievo {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kTick = 100ms;
+constexpr auto kArrival = 500ms;     // of a stream's last frames
+constexpr std::size_t kAtOnce = 32;  // samples, before who asks for the state may look
+
+/// "face-2026-11-22T07-05-00Z.mcap".
+std::string new_name(const std::filesystem::path& folder, const std::string& stream, std::int64_t now_ns) {
+  const std::time_t now = now_ns / kNanosecondsPerSecond;
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[40];
+  std::strftime(text, sizeof text, "-%Y-%m-%dT%H-%M-%SZ", &utc);
+  return unused_name(folder / (stream + text + ".mcap")).filename();
+}
+
+}  // namespace
+
+StreamRecorder::StreamRecorder(Options options)
+    : options_(std::move(options)), ring_(options_.pre_roll_s, options_.keep_bytes) {
+  state_.pre_roll_s = options_.pre_roll_s;
+  thread_ = std::thread([this] { run(); });
+}
+
+StreamRecorder::~StreamRecorder() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+    if (open_ && !end_) end_ = ring_.end();
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+Subscriber::Callbacks StreamRecorder::callbacks() {
+  Subscriber::Callbacks callbacks;
+  callbacks.raw = [this](const RawSample& sample) { add(sample); };
+  callbacks.lost = [this](const std::string&, std::uint64_t count) {
+    const std::lock_guard lock(mutex_);
+    frames_seen_ += count;
+    if (open_ && !end_) state_.lost += count;
+  };
+  return callbacks;
+}
+
+void StreamRecorder::add(const RawSample& sample) {
+  const std::lock_guard lock(mutex_);
+  if (sample.topic == Topic::kInfo) {
+    info_ = sample;
+  } else {
+    frames_seen_ += sample.topic == Topic::kFrame;
+    const std::uint64_t lost =
+        ring_.push(std::make_shared<const RawSample>(sample), open_ ? std::optional(next_) : std::nullopt);
+    if (!end_) state_.lost += lost;
+  }
+  if (open_) wake_.notify_all();
+}
+
+Status StreamRecorder::start() {
+  const std::lock_guard lock(mutex_);
+  if (open_)
+    return Error{end_ ? "the recording before is still being written to its end: try again"
+                      : "'" + options_.stream + "' is being recorded already"};
+  const std::int64_t now_ns = utc_now_ns();
+  state_ = {.activity = RecordingActivity::kRecording,
+            .file = new_name(options_.folder, options_.stream, now_ns),
+            .started_ns = now_ns,
+            .pre_roll_s = options_.pre_roll_s,
+            .message = {}};
+  open_ = true;
+  next_ = ring_.begin();
+  end_.reset();
+  wake_.notify_all();
+  return {};
+}
+
+Status StreamRecorder::stop() {
+  const std::lock_guard lock(mutex_);
+  if (!open_ || end_) return Error{"'" + options_.stream + "' is not being recorded"};
+  end_ = ring_.end();
+  state_.activity = RecordingActivity::kOff;
+  state_.message = "its last frames are still being written";
+  wake_.notify_all();
+  return {};
+}
+
+RecordingState StreamRecorder::state() const {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+bool StreamRecorder::is_open(const std::string& file) const {
+  const std::lock_guard lock(mutex_);
+  return open_ && state_.file == file;
+}
+
+void StreamRecorder::finish(std::uint64_t published) {
+  std::unique_lock lock(mutex_);
+  if (!open_) return;
+  wake_.wait_for(lock, kArrival, [&] { return frames_seen_ >= published; });
+  if (!end_) end_ = ring_.end();
+  wake_.notify_all();
+  wake_.wait(lock, [&] { return !open_; });
+}
+
+bool StreamRecorder::has_work() const {
+  return ending_ || (open_ && info_ && next_ < ring_.end()) || (open_ && end_);
+}
+
+void StreamRecorder::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    if (open_)
+      wake_.wait_for(lock, kTick, [&] { return has_work(); });
+    else
+      wake_.wait(lock, [&] { return open_ || ending_; });
+    if (open_)
+      write_some(lock);
+    else if (ending_)
+      return;
+  }
+}
+
+/// Of the ring into the file, which ends where that is asked for or the disk takes no more.
+void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
+  std::vector<std::shared_ptr<const RawSample>> samples;
+  next_ = std::max(next_, ring_.begin());
+  const std::uint64_t end = std::min(end_.value_or(ring_.end()), ring_.end());
+  while (info_ && next_ < end && samples.size() < kAtOnce) samples.push_back(ring_.at(next_++));
+  const bool is_last = end_ && (next_ >= *end_ || !info_);
+  const std::string file = state_.file;
+  std::optional<RawSample> info;
+  if (!recorder_ && !samples.empty()) {
+    info = info_;
+    info->receive_time_ns = samples.front()->receive_time_ns;  // before the frames that it describes
+  }
+  lock.unlock();
+
+  if (info) {
+    recorder_ = std::make_unique<Recorder>(Recorder::Options{
+        .file = options_.folder / file, .stream = options_.stream, .recording = {.sync_s = options_.sync_s}});
+    to_recorder_ = recorder_->callbacks();
+    write(*info);
+  }
+  for (const auto& sample : samples) write(*sample);
+  Status written;
+  Recorder::Counts counts;
+  if (recorder_) {
+    recorder_->tick(utc_now_ns());
+    written = recorder_->status();
+    if (is_last && written) written = recorder_->finish();
+    counts = recorder_->counts();
+    if (is_last || !written) recorder_.reset();  // which closes the file
+  }
+  if (!written) log_warning(written.error().message + "; the stream goes on without a recording");
+
+  lock.lock();
+  state_.frames = counts.frames;
+  state_.bytes = counts.bytes;
+  if (!is_last && written) return;
+  state_.activity = written ? RecordingActivity::kOff : RecordingActivity::kFailed;
+  state_.message = written ? "" : written.error().message;
+  if (written && counts.files == 0) state_.file.clear();  // nothing came
+  open_ = false;
+  wake_.notify_all();
+}
+
+void StreamRecorder::write(const RawSample& sample) {
+  to_recorder_.raw(sample);
+  if (sample.topic != Topic::kInfo) return;
+  if (const auto info = read_info_cdr(sample.cdr)) to_recorder_.info(*info);
+}
+
+}  // namespace relievo

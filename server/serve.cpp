@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/serve.h"
+
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "cli/listen_address.h"
+#include "cli/service_manager.h"
+#include "idl/cdr.h"
+#include "server/recording_desk.h"
+#include "server/stream_set.h"
+#include "web/gateway/gateway.h"
+#include "web/gateway/key_frame_wishes.h"
+
+namespace relievo {
+namespace {
+
+Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFrameWishes& wishes,
+                                               RecordingDesk* desk) {
+  if (config.web == "none") return std::unique_ptr<Gateway>();
+  const auto address = parse_listen_address(config.web);
+  if (!address) return address.error();
+  return Gateway::start({.host = address->host,
+                         .port = address->port,
+                         .web = config.gateway,
+                         .key_frame_wanted = [&wishes](const std::string& name) { wishes.wish(name); },
+                         .samples = SampleFormat{.type_name = topic_type(Topic::kFrame).type_name,
+                                                 .idl = topic_type(Topic::kFrame).idl,
+                                                 .encode =
+                                                     [](const std::string& name, const FrameMessage& frame) {
+                                                       return write_frame_cdr(name, frame);
+                                                     }},
+                         .recordings = desk});
+}
+
+void print_addresses(const ServeConfig& config, const std::vector<std::string>& streams,
+                     const Gateway* gateway) {
+  for (const std::string& name : streams)
+    std::printf("stream %s on DDS domain %d\n", name.c_str(), config.domain);
+  if (gateway != nullptr) {
+    const std::string host = parse_listen_address(config.web).value().host;
+    std::printf("viewer %s\n", browser_address({host, gateway->port()}, !config.gateway.tls_cert.empty(),
+                                               gateway->made_token())
+                                   .c_str());
+  }
+  std::fflush(stdout);  // whoever waits for the address reads a pipe
+}
+
+/// What a running server cannot change.
+void say_what_waits(const ServeConfig& now, const ServeConfig& wanted) {
+  std::string waits;
+  const auto compare = [&](const auto& a, const auto& b, const char* name) {
+    if (!(a == b)) waits += (waits.empty() ? "" : ", ") + std::string(name);
+  };
+  compare(now.domain, wanted.domain, "domain");
+  compare(now.interface, wanted.interface, "interface");
+  compare(now.keys, wanted.keys, "keys");
+  compare(now.web, wanted.web, "web");
+  compare(now.recording, wanted.recording, "[recording]");
+  compare(now.record_folder, wanted.record_folder, "the recordings' folder");
+  compare(now.pre_roll, wanted.pre_roll, "pre_roll");
+  if (!waits.empty()) log_warning("of the new configuration, " + waits + " needs a restart");
+}
+
+/// All of the new configuration, or nothing.
+Status reload(const ServeConfig& now, const ReadAgain& again, Gateway* gateway, StreamSet& streams) {
+  const auto wanted = again();
+  if (!wanted) return wanted.error();
+  if (now.streams.empty() != wanted->streams.empty())
+    return Error{"between one stream and tables [[stream]] the server must be restarted"};
+  if (gateway != nullptr) {
+    if (const Status applied = gateway->apply(wanted->gateway); !applied) return applied;
+  }
+  say_what_waits(now, *wanted);
+  streams.apply(wanted->all_streams());
+  log_info("the configuration was read again");
+  return {};
+}
+
+}  // namespace
+
+Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop) {
+  KeyFrameWishes wishes;  // outlives the gateway and the streams
+  ServiceBoard board;
+  std::optional<RecordingDesk> desk;
+  if (!config.record_folder.empty()) desk.emplace(config.record_folder);
+  RecordingDesk* const desk_or_none = desk ? &*desk : nullptr;
+  // The gateway first: a port in use should fail before anything is opened or announced.
+  const auto gateway = start_gateway(config, wishes, desk_or_none);
+  if (!gateway) return gateway.error();
+  StreamSet streams(
+      {.config = config, .wishes = wishes, .board = board, .gateway = gateway->get(), .desk = desk_or_none},
+      !config.streams.empty());
+  stop.on_stop([&] {
+    tell_stopping();
+    streams.stop();
+  });
+  wishes.answer_with([&](const std::string& name) { streams.request_key_frame(name); });
+  streams.apply(config.all_streams());
+  const std::vector<std::string> opened = streams.opened();
+  if (!opened.empty() || !config.streams.empty()) {
+    print_addresses(config, opened, gateway->get());
+    tell_ready();
+    if (again) {
+      stop.on_reload([&] {
+        const Status reloaded = reload(config, again, gateway->get(), streams);
+        if (!reloaded) log_error("nothing was changed: " + reloaded.error().message);
+      });
+    }
+  }
+  const Status done = streams.wait();
+  stop.clear_on_reload();
+  stop.clear_on_stop();
+  wishes.answer_with({});
+  return done;
+}
+
+}  // namespace relievo

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/served_stream.h"
+
+#include <atomic>
+#include <chrono>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "capture/source/field_source.h"
+#include "idl/recorder.h"
+#include "idl/stream_recorder.h"
+#include "server/options.h"
+#include "server/pipeline.h"
+
+namespace relievo {
+namespace {
+
+/// "12 frames captured, ..." or, of one of several, "left: 12 frames captured, ...".
+void say(const std::string& label, const std::string& line) {
+  log_info(label.empty() ? line : label + ": " + line);
+}
+
+void say_drops(const std::string& label, const ServerStatus& s) {
+  say(label, std::to_string(s.frames_captured) + " frames captured, " + std::to_string(s.frames_published) +
+                 " published; dropped: " + std::to_string(s.drops_capture) + " in capture, " +
+                 std::to_string(s.drops_reconstruct) + " before reconstruction, " +
+                 std::to_string(s.drops_encode) + " before encoding, " + std::to_string(s.drops_publish) +
+                 " before publishing");
+}
+
+void say_camera(const std::string& label, const SourceCounts& c) {
+  if (c.damaged_pictures + c.restarts + c.reconnects == 0) return;
+  say(label, "camera: " + std::to_string(c.damaged_pictures) + " damaged pictures, " +
+                 std::to_string(c.restarts) + " restarts of its driver, unplugged " +
+                 std::to_string(c.reconnects) + " times");
+}
+
+/// The server's own recorder: a reader of the stream like any other.
+struct Recording {
+  std::optional<Recorder> recorder;
+  std::unique_ptr<Subscriber> subscriber;
+
+  Status start(const std::string& file, const std::string& stream, const ServeConfig& config,
+               const Publisher& publisher) {
+    const auto options = recording_options(config.recording);
+    if (!options) return options.error();
+    // The recorder makes the file with the first sample; that it cannot should be said before.
+    if (const Status target = check_recording_target(file, options->segments.split()); !target) return target;
+    recorder.emplace(Recorder::Options{.file = file, .stream = stream, .recording = *options});
+    auto created = Subscriber::create(domain_options(config), stream, recorder->callbacks());
+    if (!created) return created.error();
+    subscriber = *std::move(created);
+    // The first frame should be in the file: wait until reader and writer have found each other.
+    for (int tries = 0; tries < 200 && publisher.matched_readers() == 0; ++tries) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return {};
+  }
+
+  /// After the last frame was published.
+  Status finish(const std::string& label, std::uint64_t published) {
+    if (!recorder) return {};
+    for (int tries = 0; tries < 100 && !recorder->done(); ++tries) {
+      const Recorder::Counts counts = recorder->counts();
+      if (counts.frames + counts.lost >= published) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    subscriber.reset();
+    const Status done = recorder->finish();
+    const Recorder::Counts counts = recorder->counts();
+    if (!done)
+      return done.error().in("the recording stopped after " + std::to_string(counts.frames) +
+                             " frames; the " + std::to_string(counts.missed) + " after them are not in it");
+    say(label, "recorded " + std::to_string(counts.frames) + " frames, " + std::to_string(counts.lost) +
+                   " lost" + (counts.files > 1 ? ", in " + std::to_string(counts.files) + " files" : ""));
+    return {};
+  }
+};
+
+/// The recorder that the gateway's API starts and stops.
+class OnRequest {
+ public:
+  OnRequest(RecordingDesk& desk, const std::string& stream) : desk_(desk), stream_(stream) {}
+  OnRequest(const OnRequest&) = delete;
+  OnRequest& operator=(const OnRequest&) = delete;
+  ~OnRequest() { desk_.remove(stream_); }
+
+  Status start(const ServeConfig& config) {
+    const auto pre_roll_s = parse_pre_roll_s(config.pre_roll);
+    if (!pre_roll_s) return pre_roll_s.error();
+    const auto options = recording_options(config.recording);
+    if (!options) return options.error();
+    recorder_.emplace(StreamRecorder::Options{
+        .folder = desk_.folder(), .stream = stream_, .pre_roll_s = *pre_roll_s, .sync_s = options->sync_s});
+    auto created = Subscriber::create(domain_options(config), stream_, recorder_->callbacks());
+    if (!created) return created.error();
+    subscriber_ = *std::move(created);
+    desk_.add(stream_, *recorder_);
+    return {};
+  }
+  void finish(std::uint64_t published) { recorder_->finish(published); }
+
+ private:
+  RecordingDesk& desk_;
+  const std::string stream_;
+  std::optional<StreamRecorder> recorder_;
+  std::unique_ptr<Subscriber> subscriber_;
+};
+
+PipelineOptions pipeline_options(const StreamConfig& config, const std::string& stream) {
+  PipelineOptions options;
+  options.stream = stream;
+  options.paced = !config.fast;
+  options.lossless = config.fast;
+  options.frames = config.frames;
+  options.reconstruct.threads = config.threads;
+  options.reconstruct.decoder = config.decoder;
+  options.reconstruct.surface = config.surface;
+  options.encode = encode_options(config);
+  options.bit_rate = config.bit_rate;
+  return options;
+}
+
+class RunningStream final : public ServedStream {
+ public:
+  RunningStream(const StreamConfig& config, const Surroundings& around)
+      : config_(config),
+        around_(around),
+        name_(name_of(config)),
+        label_(around.config.streams.empty() ? "" : name_) {}
+  ~RunningStream() override {
+    if (announced_) around_.gateway->withdraw(name_);
+    around_.board.forget(name_);
+  }
+
+  Status open();
+  Status run() override;
+  void stop() override {
+    stopped_ = true;
+    pipeline_->stop();
+  }
+  void request_key_frame() override { pipeline_->request_key_frame(); }
+
+ private:
+  Status announce(const std::string& uri);
+
+  const StreamConfig config_;
+  const Surroundings around_;
+  const std::string name_, label_;
+  std::unique_ptr<FieldSource> source_;
+  std::unique_ptr<Publisher> publisher_;
+  Recording recording_;
+  std::optional<OnRequest> on_request_;
+  std::vector<std::unique_ptr<FrameSink>> sinks_;
+  std::unique_ptr<Pipeline> pipeline_;
+  std::atomic<bool> stopped_{false};
+  bool announced_ = false;
+};
+
+Status RunningStream::open() {
+  const auto name = with_scheme(config_.source, config_.scheme);
+  if (!name) return name.error();
+  auto source = open_source(
+      *name, {.loop = config_.loop || config_.source.starts_with("sim:"), .camera = config_.camera});
+  if (!source) return source.error();
+  source_ = *std::move(source);
+  if (const Status announced = announce(*name); !announced) return announced;
+  std::vector<FrameSink*> sinks;
+  for (const auto& sink : sinks_) sinks.push_back(sink.get());
+  auto pipeline = Pipeline::create(*source_, sinks, pipeline_options(config_, name_));
+  if (!pipeline) return pipeline.error();
+  pipeline_ = *std::move(pipeline);
+  return {};
+}
+
+Status RunningStream::announce(const std::string& uri) {
+  StreamInfo info;
+  info.stream = name_;
+  info.source = uri;
+  info.started_ns = utc_now_ns();
+  info.rig = source_->info().rig;
+  info.pattern = source_->info().pattern;
+  auto publisher = Publisher::create(domain_options(around_.config), info,
+                                     [wishes = &around_.wishes, name = name_] { wishes->wish(name); });
+  if (!publisher) return publisher.error();
+  publisher_ = *std::move(publisher);
+  if (!config_.record.empty()) {
+    if (const Status started = recording_.start(config_.record, name_, around_.config, *publisher_); !started)
+      return started;
+  }
+  if (around_.desk != nullptr) {
+    on_request_.emplace(*around_.desk, name_);
+    if (const Status started = on_request_->start(around_.config); !started) return started;
+  }
+  sinks_.push_back(make_dds_sink(*publisher_));
+  if (around_.gateway != nullptr) {
+    around_.gateway->announce(info);
+    announced_ = true;
+    sinks_.push_back(make_gateway_sink(*around_.gateway, name_));
+  }
+  if (recording_.recorder) sinks_.push_back(make_recorder_sink(*recording_.recorder));
+  sinks_.push_back(make_service_sink(around_.board, name_));
+  return {};
+}
+
+Status RunningStream::run() {
+  const Status done = pipeline_->run();
+  const ServerStatus ended = pipeline_->status();
+  say_drops(label_, ended);
+  say_camera(label_, source_->counts());
+  if (on_request_) on_request_->finish(ended.frames_published);
+  const Status recorded = recording_.finish(label_, ended.frames_published);
+  if (!done || !recorded || stopped_) return done ? recorded : done;
+  if (ended.frames_published == 0) {
+    return Error{
+        config_.source + " ended before a frame could be published: " +
+        (ended.message.empty() ? "a surface needs two frames under different slides" : ended.message)};
+  }
+  return {};
+}
+
+}  // namespace
+
+DomainOptions domain_options(const ServeConfig& config) {
+  return {.domain = config.domain, .interface = config.interface, .keys = config.keys};
+}
+
+Result<std::unique_ptr<ServedStream>> ServedStream::open(const StreamConfig& config,
+                                                         const Surroundings& surroundings) {
+  auto stream = std::make_unique<RunningStream>(config, surroundings);
+  if (const Status opened = stream->open(); !opened) return opened.error();
+  return std::unique_ptr<ServedStream>(std::move(stream));
+}
+
+}  // namespace relievo

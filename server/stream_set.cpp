@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/stream_set.h"
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+#include <utility>
+
+#include "base/log.h"
+#include "idl/recording_segments.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::chrono::seconds kRetry{5};
+
+}  // namespace
+
+StreamSet::~StreamSet() {
+  stop();
+  for (auto& [name, entry] : entries_) entry->thread.join();
+}
+
+void StreamSet::apply(const std::vector<StreamConfig>& configs) {
+  std::map<std::string, const StreamConfig*> wanted;
+  for (const StreamConfig& config : configs) wanted[name_of(config)] = &config;
+  std::vector<std::unique_ptr<Entry>> old;
+  std::unique_lock lock(mutex_);
+  if (stopping_) return;
+  applying_ = true;
+  for (auto it = entries_.begin(); it != entries_.end();) {
+    const auto found = wanted.find(it->first);
+    if (found != wanted.end() && *found->second == it->second->config) {
+      wanted.erase(found);
+      ++it;
+      continue;
+    }
+    end(*it->second);
+    old.push_back(std::move(it->second));
+    it = entries_.erase(it);
+  }
+  lock.unlock();
+  for (const auto& entry : old) entry->thread.join();  // all have been told, so this takes one's time
+  lock.lock();
+  for (const auto& [name, config] : wanted) {
+    auto& entry = entries_[name] = std::make_unique<Entry>();
+    entry->config = *config;
+    entry->retries = retries_ || was_applied_;
+    entry->again = was_applied_;
+    entry->stopping = stopping_;
+    entry->thread = std::thread([this, e = entry.get()] { run(*e); });
+  }
+  applying_ = false;
+  was_applied_ = true;
+  changed_.notify_all();
+}
+
+Status StreamSet::wait() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] {
+    return !applying_ &&
+           std::all_of(entries_.begin(), entries_.end(), [](const auto& one) { return one.second->ended; });
+  });
+  for (const auto& [name, entry] : entries_)
+    if (!entry->result) return entry->result;
+  return {};
+}
+
+void StreamSet::stop() {
+  const std::lock_guard lock(mutex_);
+  stopping_ = true;
+  for (const auto& [name, entry] : entries_) end(*entry);
+}
+
+void StreamSet::request_key_frame(const std::string& stream) {
+  const std::lock_guard lock(mutex_);
+  const auto found = entries_.find(stream);
+  if (found != entries_.end() && found->second->stream != nullptr) found->second->stream->request_key_frame();
+}
+
+std::vector<std::string> StreamSet::opened() const {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] {
+    return std::all_of(entries_.begin(), entries_.end(), [](const auto& one) { return one.second->tried; });
+  });
+  std::vector<std::string> names;
+  for (const auto& [name, entry] : entries_)
+    if (entry->opened) names.push_back(name);
+  return names;
+}
+
+void StreamSet::end(Entry& entry) {
+  entry.stopping = true;
+  if (entry.stream != nullptr) entry.stream->stop();
+  changed_.notify_all();
+}
+
+void StreamSet::run(Entry& entry) {
+  std::string said;
+  Status result;
+  for (;;) {
+    result = run_once(entry);
+    if (result || !entry.retries) break;
+    const std::string name = name_of(entry.config);
+    const std::string& why = result.error().message;
+    if (said != why)
+      log_warning("stream " + name + ": " + why + "; it is tried again every " +
+                  std::to_string(kRetry.count()) + " s");
+    said = why;
+    around_.board.say(name, "to be tried again: " + why, true);
+    if (!wait_to_retry(entry)) break;
+    result = {};
+  }
+  if (entry.retries) {
+    around_.board.forget(name_of(entry.config));
+    result = {};
+  }
+  const std::lock_guard lock(mutex_);
+  entry.result = result;
+  entry.tried = entry.ended = true;
+  changed_.notify_all();
+}
+
+Status StreamSet::run_once(Entry& entry) {
+  StreamConfig config = entry.config;
+  if (entry.again && !config.record.empty()) config.record = unused_name(config.record);
+  auto opened = ServedStream::open(config, around_);
+  entry.again = entry.again || opened;
+  {
+    const std::lock_guard lock(mutex_);
+    if (opened && !entry.stopping) entry.stream = opened->get();
+    entry.opened = entry.opened || opened;
+    entry.tried = true;
+    changed_.notify_all();
+    if (entry.stopping) return {};
+  }
+  if (!opened) return opened.error();
+  const Status done = (*opened)->run();
+  const std::lock_guard lock(mutex_);
+  entry.stream = nullptr;
+  return done;
+}
+
+/// False where it is to end.
+bool StreamSet::wait_to_retry(Entry& entry) {
+  std::unique_lock lock(mutex_);
+  return !changed_.wait_for(lock, kRetry, [&] { return entry.stopping; });
+}
+
+}  // namespace relievo

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The streams of a server, each on a thread of its own: one that fails does not end the others, and what they
+// are can change while they run.
+#pragma once
+
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/result.h"
+#include "server/config.h"
+#include "server/served_stream.h"
+
+namespace relievo {
+
+/// Every function may be called from any thread; apply() by one at a time.
+class StreamSet {
+ public:
+  /// `retries`: a stream that could not be opened, or failed, is tried again a few seconds later, and never
+  /// ends with an error. Those of a second apply() always are.
+  StreamSet(const Surroundings& surroundings, bool retries) : around_(surroundings), retries_(retries) {}
+  StreamSet(const StreamSet&) = delete;
+  StreamSet& operator=(const StreamSet&) = delete;
+  /// Stops and waits.
+  ~StreamSet();
+
+  /// From now on these run: those that do already, as they are configured, go on untouched; others end, or
+  /// begin. Returns when those have ended.
+  void apply(const std::vector<StreamConfig>& configs);
+  /// Until all have ended. The first failure.
+  Status wait();
+  /// All end soon. Any number of times.
+  void stop();
+  void request_key_frame(const std::string& stream);
+  /// Waits until each was opened or could not be. The names of those that were, though some may have ended
+  /// since.
+  std::vector<std::string> opened() const;
+
+ private:
+  struct Entry {
+    StreamConfig config;
+    bool retries = false;
+    bool again = false;  // it ran before: what is recorded goes to another file
+    std::thread thread;
+    ServedStream* stream = nullptr;  // while it runs
+    bool stopping = false;
+    bool tried = false;  // to open it
+    bool opened = false;
+    bool ended = false;
+    Status result;
+  };
+
+  void run(Entry& entry);
+  Status run_once(Entry& entry);
+  bool wait_to_retry(Entry& entry);
+  void end(Entry& entry);
+
+  const Surroundings around_;
+  const bool retries_;
+  mutable std::mutex mutex_;  // of all that follows, but for an entry's first four
+  mutable std::condition_variable changed_;
+  std::map<std::string, std::unique_ptr<Entry>> entries_;
+  bool stopping_ = false;
+  bool applying_ = false;
+  bool was_applied_ = false;
+};
+
+}  // namespace relievo

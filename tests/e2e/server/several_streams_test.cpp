@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// One server with several streams: each its own, and what they are changed while they run.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <mutex>
+
+#include "idl/transport.h"
+#include "tests/e2e/server/web_server.h"
+
+namespace relievo::test {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+/// What a reader sees of a stream.
+class Reader {
+ public:
+  explicit Reader(const std::string& stream) {
+    Subscriber::Callbacks callbacks;
+    callbacks.info = [this](const StreamInfo& info) {
+      const std::lock_guard lock(mutex_);
+      started_.push_back(info.started_ns);
+    };
+    callbacks.frame = [this](const std::string&, const FrameMessage& frame) {
+      const std::lock_guard lock(mutex_);
+      if (!frames_.empty() && frame.sequence != frames_.back() + 1) ++gaps_;
+      frames_.push_back(frame.sequence);
+    };
+    auto subscriber = Subscriber::create({own_domain(), "lo"}, stream, callbacks);
+    EXPECT_TRUE(subscriber);
+    if (subscriber) subscriber_ = *std::move(subscriber);
+  }
+  std::size_t frames() const {
+    const std::lock_guard lock(mutex_);
+    return frames_.size();
+  }
+  std::uint64_t gaps() const {  // starting again is one
+    const std::lock_guard lock(mutex_);
+    return gaps_;
+  }
+  std::set<std::int64_t> starts() const {
+    const std::lock_guard lock(mutex_);
+    return {started_.begin(), started_.end()};
+  }
+  bool gets(std::size_t more) const {
+    const std::size_t until = frames() + more;
+    return eventually([&] { return frames() >= until; });
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::int64_t> started_;
+  std::vector<std::uint64_t> frames_;
+  std::uint64_t gaps_ = 0;
+  std::unique_ptr<Subscriber> subscriber_;
+};
+
+/// Two takes of 5 frames a second: a reader on a busy machine has time.
+class SeveralStreams : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    StripedScene scene = striped_scene();
+    scene.rig.frame_rate = 5;
+    for (const char* name : {"one", "two"}) ASSERT_TRUE(write_striped_take(scene, folder_ / name, 6));
+    write(table("left", "one") + table("right", "two"));
+  }
+  std::string table(const std::string& name, const std::string& take, const std::string& more = {}) const {
+    return "[[stream]]\nname = \"" + name + "\"\nsource = \"take:" + (folder_ / take).string() + "\"\n" +
+           more;
+  }
+  void write(const std::string& tables, const std::string& server = {}) const {
+    const fs::path next = folder_ / "next";
+    std::ofstream(next) << "loop = true\ninterface = \"lo\"\nweb = \"127.0.0.1:0\"\ndomain = " << own_domain()
+                        << "\n"
+                        << server << tables;
+    fs::rename(next, config_);
+  }
+  std::vector<std::string> command() const { return server({"serve", "--config", config_.string()}); }
+  static bool reloaded(WebServer& server, const std::string& says) {
+    const std::size_t before = server.process().err().size();
+    server.process().signal(SIGHUP);
+    return eventually([&] { return server.process().err().find(says, before) != std::string::npos; });
+  }
+
+  const TempFolder folder_;
+  const fs::path config_ = folder_ / "server.toml";
+};
+
+TEST_F(SeveralStreams, RunSideBySideAndStopTogether) {
+  WebServer server(command());
+  ASSERT_NE(server.port(), 0) << server.process().err();
+  EXPECT_THAT(server.process().out(), HasSubstr("stream left on DDS domain"));
+  EXPECT_THAT(server.process().out(), HasSubstr("stream right on DDS domain"));
+  const Reader left("left"), right("right");
+  EXPECT_TRUE(left.gets(5));
+  EXPECT_TRUE(right.gets(5));
+  EXPECT_TRUE(server.goes_on("left", 3));
+  EXPECT_TRUE(server.goes_on("right", 3));
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+  EXPECT_THAT(server.process().err(), HasSubstr("left: "));
+  EXPECT_THAT(server.process().err(), HasSubstr("right: "));
+}
+
+TEST_F(SeveralStreams, OneThatFailsIsTriedAgainAndTheOtherLosesNothing) {
+  const fs::path file = folder_ / "right.mcap";
+  write(table("left", "one") + table("right", "two", "record = \"" + file.string() + "\"\n"));
+  fs::rename(folder_ / "two", folder_ / "away");
+  WebServer server(command());
+  ASSERT_TRUE(server.process().wait_for_text("it is tried again")) << server.process().err();
+  const Reader left("left");
+  EXPECT_TRUE(left.gets(5));
+  EXPECT_TRUE(server.stream("right").is_null());
+  fs::rename(folder_ / "away", folder_ / "two");
+  EXPECT_TRUE(server.goes_on("right", 3)) << server.process().err();
+  fs::rename(folder_ / "two", folder_ / "away");  // while it runs
+  EXPECT_TRUE(eventually([&] { return server.stream("right").is_null(); }));
+  fs::rename(folder_ / "away", folder_ / "two");
+  EXPECT_TRUE(server.goes_on("right", 3)) << server.process().err();
+  EXPECT_TRUE(fs::exists(file) && fs::exists(folder_ / "right-2.mcap")) << "nothing is written over";
+  EXPECT_TRUE(left.gets(5));
+  EXPECT_EQ(left.gaps(), 0U);
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+}
+
+TEST_F(SeveralStreams, AReloadChangesWhatChangedAndNothingElse) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("right", 2)) << server.process().err();
+  const Reader left("left"), right("right");
+  ASSERT_TRUE(left.gets(3));
+  ASSERT_TRUE(right.gets(3));
+  write(table("left", "one") + table("right", "two", "texture_quality = 50\n") + table("third", "two"));
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(server.goes_on("third", 2)) << server.process().err();
+  EXPECT_TRUE(eventually([&] { return right.starts().size() == 2; })) << "it was started again";
+  write(table("left", "one") + table("third", "two"));
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(eventually([&] { return server.stream("right").is_null(); }));
+  EXPECT_TRUE(left.gets(3));
+  EXPECT_EQ(left.starts().size(), 1U) << "it went on untouched";
+  EXPECT_EQ(left.gaps(), 0U);
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+}
+
+TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2)) << server.process().err();
+  write(table("third", "two") + table("left", "one", "texture_quality = 500\n"));
+  ASSERT_TRUE(reloaded(server, config_.string() + ":11: texture_quality")) << server.process().err();
+  EXPECT_THAT(server.process().err(), HasSubstr("nothing was changed"));
+  EXPECT_TRUE(server.goes_on("right", 2));
+  EXPECT_TRUE(left.gets(2));
+  EXPECT_EQ(left.gaps(), 0U);
+  EXPECT_TRUE(server.stream("third").is_null());
+}
+
+TEST_F(SeveralStreams, AReloadAppliesTokensAndSaysWhatNeedsARestart) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("left", 2)) << server.process().err();
+  std::ofstream(folder_ / "tokens") << "0123456789abcdef0123456789abcdef\n";
+  const std::string tables = table("left", "one") + table("right", "two");
+  write(tables + "[gateway]\ntoken_file = \"" + (folder_ / "tokens").string() + "\"\n", "keys = \"none\"\n");
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_THAT(server.process().err(), HasSubstr("keys needs a restart"));
+  EXPECT_TRUE(eventually([&] { return request(server.port(), "GET", "/api/streams").status == 401; }));
+  write(tables + "[gateway]\ntoken_file = \"/nowhere\"\n");
+  ASSERT_TRUE(reloaded(server, "nothing was changed")) << server.process().err();
+  EXPECT_EQ(request(server.port(), "GET", "/api/streams").status, 401);
+  write(tables);
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(eventually([&] { return request(server.port(), "GET", "/api/streams").status == 200; }));
+}
+
+TEST_F(SeveralStreams, TheOnlyStreamIsReloadedToo) {
+  const std::string one = "stream = \"left\"\nsource = \"take:" + (folder_ / "one").string() + "\"\n";
+  write(one);
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2)) << server.process().err();
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(left.gets(2));
+  EXPECT_EQ(left.starts().size(), 1U) << "nothing changed";
+  write(one + "texture_quality = 50\n");
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(eventually([&] { return left.starts().size() == 2; })) << server.process().err();
+  write(table("left", "one"));
+  ASSERT_TRUE(reloaded(server, "nothing was changed")) << server.process().err();
+  EXPECT_TRUE(left.gets(2));
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+}
+
+TEST_F(SeveralStreams, FlagsOfOneStreamAreRefused) {
+  std::vector<std::string> with_source = command();
+  with_source.insert(with_source.end(), {"--source", "sim:face"});
+  expect_one_error(run(with_source), "leave out --source");
+}
+
+}  // namespace
+}  // namespace relievo::test

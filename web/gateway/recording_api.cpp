@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "web/gateway/recording_api.h"
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMostListed = 1000;
+constexpr std::size_t kLongestName = 128;
+
+HttpReply line(int status, std::string text) {
+  HttpReply reply;
+  reply.status = status;
+  reply.body = std::move(text) + "\n";
+  reply.headers.emplace_back("Cache-Control", "no-store");
+  return reply;
+}
+
+HttpReply json(const Json& value) {
+  HttpReply reply;
+  reply.content_type = "application/json";
+  reply.body = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+  reply.headers.emplace_back("Cache-Control", "no-store");
+  return reply;
+}
+
+HttpReply no_folder() {
+  return line(404, "nothing is recorded here: start relievo-server serve with --record-dir DIR");
+}
+
+HttpReply state_of(const std::string& stream, const RecordingControl& control) {
+  const auto state = control.state(stream);
+  if (!state) return line(404, "there is no such stream here");
+  return json({{"state", to_string(state->activity)},
+               {"file", state->file},
+               {"frames", state->frames},
+               {"lost", state->lost},
+               {"bytes", state->bytes},
+               {"started_ns", state->started_ns},
+               {"pre_roll_s", state->pre_roll_s},
+               {"message", state->message}});
+}
+
+/// "application/json; charset=utf-8" too. Pages of other sites cannot send it without being asked about.
+bool is_json(std::string_view content_type) {
+  std::string type(content_type.substr(0, content_type.find(';')));
+  while (!type.empty() && type.back() == ' ') type.pop_back();
+  std::transform(type.begin(), type.end(), type.begin(),
+                 [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
+  return type == "application/json";
+}
+
+bool is_recording_name(const std::string& name) {
+  const auto is_plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
+  };
+  return name.ends_with(".mcap") && name.front() != '.' && name.size() <= kLongestName &&
+         std::all_of(name.begin(), name.end(), is_plain);
+}
+
+std::int64_t utc_ns(fs::file_time_type time) {
+  using namespace std::chrono;
+  return duration_cast<nanoseconds>(file_clock::to_sys(time).time_since_epoch()).count();
+}
+
+}  // namespace
+
+HttpReply recording_state(std::string_view stream, const RecordingControl* control) {
+  return control == nullptr ? no_folder() : state_of(std::string(stream), *control);
+}
+
+HttpReply order_recording(std::string_view stream, const HttpRequest& request, RecordingControl* control) {
+  if (control == nullptr) return no_folder();
+  if (!is_json(request.content_type)) return line(415, "send application/json");
+  const auto order = nlohmann::json::parse(request.body, nullptr, false);
+  const auto action = order.is_object() ? order.value("action", nlohmann::json()) : nlohmann::json();
+  if (action != "start" && action != "stop")
+    return line(400, R"(send {"action":"start"} or {"action":"stop"})");
+  const std::string name(stream);
+  if (!control->state(name)) return line(404, "there is no such stream here");
+  const Status done = action == "start" ? control->start(name) : control->stop(name);
+  return done ? state_of(name, *control) : line(409, done.error().message);
+}
+
+HttpReply list_recordings(const RecordingControl* control) {
+  if (control == nullptr) return no_folder();
+  struct Found {
+    std::int64_t modified_ns;
+    std::string name;
+    std::uint64_t bytes;
+  };
+  std::vector<Found> found;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(control->folder(), error)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.symlink_status(error).type() != fs::file_type::regular || !finished_recording(name, *control))
+      continue;
+    const std::uint64_t bytes = entry.file_size(error);
+    const std::int64_t modified_ns = error ? 0 : utc_ns(entry.last_write_time(error));
+    if (!error) found.push_back({modified_ns, name, bytes});  // else it has just gone
+  }
+  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+    return std::tie(b.modified_ns, b.name) < std::tie(a.modified_ns, a.name);
+  });
+  if (found.size() > kMostListed) found.resize(kMostListed);
+  Json list = Json::array();
+  for (const Found& f : found)
+    list.push_back({{"file", f.name}, {"bytes", f.bytes}, {"modified_ns", f.modified_ns}});
+  return json({{"recordings", std::move(list)}});
+}
+
+std::optional<fs::path> finished_recording(const std::string& name, const RecordingControl& control) {
+  if (!is_recording_name(name) || control.is_open(name)) return std::nullopt;
+  return control.folder() / name;
+}
+
+}  // namespace relievo

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// /api/recording/STREAM and /api/recordings: recordings started, stopped and listed. `control` may be null:
+// nothing is recorded here.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "web/gateway/recording_control.h"
+#include "web/gateway/routes.h"
+
+namespace relievo {
+
+/// GET: what the recording of `stream` is doing, as JSON.
+HttpReply recording_state(std::string_view stream, const RecordingControl* control);
+
+/// POST of {"action":"start"} or "stop": the same, afterwards.
+HttpReply order_recording(std::string_view stream, const HttpRequest& request, RecordingControl* control);
+
+/// GET: the files that are whole, the newest first, a thousand of them at most.
+HttpReply list_recordings(const RecordingControl* control);
+
+/// The file of that name in the folder, which may not be there; nothing where it is being written, or where
+/// no recording has such a name.
+std::optional<std::filesystem::path> finished_recording(const std::string& name,
+                                                        const RecordingControl& control);
+
+}  // namespace relievo
