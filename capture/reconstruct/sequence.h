@@ -41,6 +41,8 @@ struct SequenceContext {
   const DifferenceImage* same = nullptr;   // the last frame before that under the slide that the edges are of
   const std::vector<ColumnRange>* expected = nullptr;  // of each boundary, from the depths before
   float other_share = 0.5F;  // where `other` lies in time on the way back to `same`: 0 now, 1 there
+  const FieldMotion* motion = nullptr;  // between the fields that the edges are of
+  float other_fields = 2;               // how many times as long ago `other` was as the fields lie apart
 };
 
 /// Constant after construction but for scratch memory. One thread.

@@ -38,6 +38,7 @@ struct Observation {
 struct SlideDecoder::State {
   State(const Rig& rig, const Pattern& p, const ReconstructOptions& options)
       : pattern(p),
+        field_ns(0.5e9 / rig.frame_rate),
         paper(options.decoder == Decoder::kPaper),
         detector(rig.colour_matrix, DetectOptions{}),
         table(p),
@@ -55,6 +56,7 @@ struct SlideDecoder::State {
                rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height) {}
 
   Pattern pattern;
+  double field_ns;  // between a slide's exposure and its complement's
   bool paper;
   Detector detector;
   TransitionTable table;
@@ -114,7 +116,11 @@ bool SlideDecoder::State::match_paper(SlideOrder tried, Match& out) {
 SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
   SequenceContext out{.order = tried};
   out.expected = expected;
-  if (have_older) out.other = &older.difference;
+  out.motion = &newer.difference.motion;
+  if (have_older) {
+    out.other = &older.difference;
+    out.other_fields = static_cast<float>(static_cast<double>(newer.time_ns - older.time_ns) / field_ns);
+  }
   if (have_same) {
     out.same = &same.difference;
     const auto back = static_cast<float>(newer.time_ns - same.time_ns);
@@ -195,7 +201,7 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
     s.detector.detect(pair, pool, s.newer.detection);
     report.boundaries = s.newer.detection.boundaries.size();
   } else {
-    s.differencer.difference(pair, pool, s.newer.difference);
+    s.differencer.aligned_difference(pair, pool, s.newer.difference);
     s.weak_signal.average(pool, s.newer.difference);
     s.edge_finder.find(s.newer.difference, pool, s.edges);
     report.boundaries = s.edges.edges.size();
@@ -253,7 +259,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
         counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
-      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered, pool);
+      s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
       const std::size_t grown = s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order)},
                                               s.result, s.edges, s.recovered);
