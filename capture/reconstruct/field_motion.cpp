@@ -25,17 +25,17 @@ std::size_t index_of(int shift_px) {
 
 }  // namespace
 
-void FieldMotion::of_columns(int line, int count, float* out) const {
+float FieldMotion::between(int line, float column_px) const {
   const float* row = px.data() + static_cast<std::size_t>(line / kCellLines) * static_cast<std::size_t>(cells);
-  for (int x = 0; x < count; ++x) {
-    const int cell = std::min(x / kCellWidth, cells - 1);
-    const int off = x - cell * kCellWidth - kCellWidth / 2;
-    const int beside = std::clamp(off < 0 ? cell - 1 : cell + 1, 0, cells - 1);
-    const float own = row[cell];
-    const float other = row[beside];
-    const float share = static_cast<float>(std::abs(off)) / kCellWidth;
-    out[x] = std::fabs(other - own) < kAlike_px ? own + share * (other - own) : own;
-  }
+  const int cell = std::clamp(static_cast<int>(column_px) / kCellWidth, 0, cells - 1);
+  const float off = column_px - static_cast<float>(cell * kCellWidth + kCellWidth / 2);
+  const float own = row[cell];
+  const float other = row[std::clamp(off < 0 ? cell - 1 : cell + 1, 0, cells - 1)];
+  return std::fabs(other - own) < kAlike_px ? own + std::fabs(off) / kCellWidth * (other - own) : own;
+}
+
+void FieldMotion::of_columns(int line, int count, float* out) const {
+  for (int x = 0; x < count; ++x) out[x] = between(line, static_cast<float>(x));
 }
 
 std::uint32_t* MotionFinder::costs(int cell_row, int shift_px) {

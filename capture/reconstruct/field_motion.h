@@ -27,15 +27,13 @@ struct FieldMotion {
   bool line_moves(int line) const {
     return !moves.empty() && moves[static_cast<std::size_t>(line / kCellLines)] != 0;
   }
-  /// At a place of the picture.
-  float at(int line, float column_px) const {
-    if (!line_moves(line)) return 0;
-    const int cell = std::clamp(static_cast<int>(column_px) / kCellWidth, 0, cells - 1);
-    return px[static_cast<std::size_t>(line / kCellLines) * static_cast<std::size_t>(cells) +
-              static_cast<std::size_t>(cell)];
-  }
-  /// Of each of `count` columns of a line, without jumps but where surfaces move unlike each other.
+  /// At a place of the picture, without jumps but where surfaces move unlike each other.
+  float at(int line, float column_px) const { return line_moves(line) ? between(line, column_px) : 0; }
+  /// At each of `count` columns of a line.
   void of_columns(int line, int count, float* out) const;
+
+ private:
+  float between(int line, float column_px) const;
 };
 
 /// Keeps its scratch memory from frame to frame. One thread.

@@ -43,6 +43,9 @@ struct SequenceContext {
   float other_share = 0.5F;  // where `other` lies in time on the way back to `same`: 0 now, 1 there
   const FieldMotion* motion = nullptr;  // between the fields that the edges are of
   float other_fields = 2;               // how many times as long ago `other` was as the fields lie apart
+
+  /// Whether what `other` shows `off_px` from a place moves unlike what is there now.
+  bool shows_another_surface(int line, float column_px, float off_px) const;
 };
 
 /// Constant after construction but for scratch memory. One thread.
@@ -91,6 +94,7 @@ class SequenceDecoder {
   struct Beside {
     SideEvidence left, right;
     bool tracked;  // the edge was found two frames ago, so this belongs to it
+    bool lost;     // it is another surface's, which moves otherwise
   };
 
   /// What an edge shows where nothing of it is in doubt.
@@ -105,6 +109,7 @@ class SequenceDecoder {
   static void clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
+  void follow_order(const EdgeImage& edges, int line, const SequenceContext& context, SequenceResult& out);
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);
