@@ -25,7 +25,6 @@ constexpr OrderRules kOrder{
 constexpr float kJump = -1.6F;       // a depth step: anything may follow
 constexpr float kUnexpected = 1.0F;  // less for a boundary where no depth seen before would put it
 constexpr int kMaxSkipped = 3;       // false edges between two that follow each other
-constexpr float kOtherSurface_px = 1.5F;  // between motions of what lies at one place in two frames
 constexpr float kClear = 0.5F;       // of a channel's evidence: leaves no doubt about its sign
 constexpr float kNoStripe = -100;    // agreement with what no stripe is
 
@@ -92,12 +91,6 @@ float other_gain(float left, float right, bool tracked) {
 }
 
 }  // namespace
-
-bool SequenceContext::shows_another_surface(int line, float column_px, float off_px) const {
-  if (motion == nullptr || other == nullptr) return false;
-  if (!motion->line_moves(line) && !other->motion.line_moves(line)) return false;
-  return std::fabs(motion->at(line, column_px) - other->motion.at(line, column_px + off_px)) > kOtherSurface_px;
-}
 
 SequenceDecoder::SequenceDecoder(const Pattern& pattern) : boundaries_(pattern.boundaries()) {
   for (int s = 0; s < 2; ++s) {
@@ -180,9 +173,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     // Of a clear edge; what a doubtful one shows is asked once its path is known.
     convincing_[index] = clear.own > kLeastOwn && (context.other == nullptr || clear.gain > kLeastGain);
     scratch.clear[static_cast<std::size_t>(e)] = clear.boundary >= 0;
-    if (beside_[index].lost) {
-      used = 0;  // many boundaries look alike to it: what comes before or behind it decides
-    } else if (clear.boundary >= 0) {
+    if (clear.boundary >= 0) {
       used = 1;
       *boundary = clear.boundary;
       *gains = clear.gain - kGains.threshold;
@@ -215,25 +206,6 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     ++scratch.in_order;
   }
   scratch.score += best_so_far;
-  follow_order(edges, line, context, out);
-}
-
-/// Calls edges that the other slide does not tell about what comes before or behind a decoded neighbour, if
-/// they look so.
-void SequenceDecoder::follow_order(const EdgeImage& edges, int line, const SequenceContext& context,
-                                   SequenceResult& out) {
-  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
-  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
-  const auto follow = [&](std::uint32_t e, std::uint32_t neighbour, int step) {
-    if (!beside_[e].lost || out.boundary[e] >= 0 || out.boundary[neighbour] < 0) return;
-    const int boundary = out.boundary[neighbour] + step;
-    if (boundary < 0 || boundary >= boundaries_) return;
-    if (!convincing(edges.edges[e], beside_[e], context, boundary)) return;
-    out.boundary[e] = static_cast<std::int16_t>(boundary);
-    convincing_[e] = 1;
-  };
-  for (std::uint32_t e = begin + 1; e < end; ++e) follow(e, e - 1, 1);
-  for (std::uint32_t e = end; e > begin + 1; --e) follow(e - 2, e - 1, -1);
 }
 
 float SequenceDecoder::gain(const Edge& edge, const Beside& beside, const SequenceContext& context,
@@ -275,7 +247,7 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   if (context.same != nullptr) scratch.sides.look(*context.same, line, of_line, count);
   const bool moves = context.motion != nullptr && context.motion->line_moves(line);
   for (std::size_t i = 0; i < count; ++i) {
-    beside[i] = {{}, {}, true, false};
+    beside[i] = {{}, {}, true};
     const float moved = moves ? -context.motion->at(line, of_line[i].column_px) * context.other_fields : 0;
     if (context.same != nullptr) {
       const Sides& there = scratch.sides[i];
@@ -289,7 +261,6 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
       beside[i].tracked = false;
       scratch.off_px[i] = moved;
     }
-    beside[i].lost = context.shows_another_surface(line, of_line[i].column_px, scratch.off_px[i]);
     out.still[begin + i] = beside[i].tracked;
   }
   if (context.other == nullptr) return;
@@ -317,11 +288,13 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
   beside_.resize(edges.edges.size());
   out.still.resize(edges.edges.size());
   convincing_.resize(edges.edges.size());
+  out.seen_px.resize(static_cast<std::size_t>(edges.lines) * static_cast<std::size_t>(boundaries_));
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
       look_beside(edges, line, context, scratch, out);
       decode_line(edges, line, context, scratch, out);
+      check_motion(edges, line, context, scratch, out);
     }
   });
   out.score = 0;

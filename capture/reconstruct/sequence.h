@@ -30,6 +30,7 @@ struct SequenceResult {
   std::vector<std::int16_t> boundary;  // one an edge: its index in the pattern, or -1
   std::vector<std::int16_t> doubted;   // one an edge: a boundary given up, which others may confirm, or -1
   std::vector<std::uint8_t> still;  // one an edge: two frames ago, under the same slide, it was where it is
+  std::vector<float> seen_px;  // [line][boundary]: where its line has it, NaN: nowhere. For the next frame
   SequenceCounts counts;
   double score = 0;  // sum over the lines: the greater, the better the slides' order explains the frame
 };
@@ -43,9 +44,9 @@ struct SequenceContext {
   float other_share = 0.5F;  // where `other` lies in time on the way back to `same`: 0 now, 1 there
   const FieldMotion* motion = nullptr;  // between the fields that the edges are of
   float other_fields = 2;               // how many times as long ago `other` was as the fields lie apart
-
-  /// Whether what `other` shows `off_px` from a place moves unlike what is there now.
-  bool shows_another_surface(int line, float column_px, float off_px) const;
+  const std::vector<float>* before_px = nullptr;  // SequenceResult::seen_px of the frame decoded before
+  const FieldMotion* before_motion = nullptr;     // between that frame's fields
+  float before_fields = 2;                        // how many times as long ago that was
 };
 
 /// Constant after construction but for scratch memory. One thread.
@@ -77,6 +78,7 @@ class SequenceDecoder {
     std::vector<float> off_px;  // of its edges: how far off the other slide's frame showed them
     PathCandidates candidates;
     std::vector<std::uint8_t> clear;  // one an edge of it
+    std::vector<std::uint8_t> trusted;  // of its edges: moves as its boundary did
     double score = 0;
     std::size_t in_order = 0;
     std::vector<Open> open;  // of the worker's lines
@@ -94,7 +96,6 @@ class SequenceDecoder {
   struct Beside {
     SideEvidence left, right;
     bool tracked;  // the edge was found two frames ago, so this belongs to it
-    bool lost;     // it is another surface's, which moves otherwise
   };
 
   /// What an edge shows where nothing of it is in doubt.
@@ -109,7 +110,12 @@ class SequenceDecoder {
   static void clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
-  void follow_order(const EdgeImage& edges, int line, const SequenceContext& context, SequenceResult& out);
+  void check_motion(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
+                    SequenceResult& out);
+  bool moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, float motion_px,
+                         const SequenceContext& context, int boundary) const;
+  void follow_order(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
+                    SequenceResult& out);
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);

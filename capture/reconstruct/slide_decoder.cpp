@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/slide_decoder.h"
 
+#include <optional>
 #include <utility>
 
 #include "capture/reconstruct/consistency.h"
@@ -83,6 +84,9 @@ struct SlideDecoder::State {
   SlideOrder order = SlideOrder::kNewerIsSecond;  // of the last decoded pair
   bool order_known = false;
 
+  std::vector<float> before_px;           // SequenceResult::seen_px of the frame decoded last,
+  FieldMotion before_motion;              // the motion in it,
+  std::optional<std::int64_t> before_ns;  // and its time
   const std::vector<ColumnRange>* expected = nullptr;  // of the frame being decoded
   Match match, other_match;
   EdgeImage edges;
@@ -117,6 +121,11 @@ SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
   SequenceContext out{.order = tried};
   out.expected = expected;
   out.motion = &newer.difference.motion;
+  if (before_ns) {
+    out.before_px = &before_px;
+    out.before_motion = &before_motion;
+    out.before_fields = static_cast<float>(static_cast<double>(newer.time_ns - *before_ns) / field_ns);
+  }
   if (have_older) {
     out.other = &older.difference;
     out.other_fields = static_cast<float>(static_cast<double>(newer.time_ns - older.time_ns) / field_ns);
@@ -233,6 +242,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const std::size_t traced =
         s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
     report.filters.traced = traced;
+    std::swap(s.before_px, s.result.seen_px);
+    s.before_motion = s.newer.difference.motion;
+    s.before_ns = pair.time_ns;
     const SharpLuma sharp(pair);
     s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
                      &sharp);

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// SequenceDecoder's check of edges that move. One slide's colours repeat along the pattern, and beside a
+// silhouette that moves on the other slide's frame shows the surface behind: then a run of edges is easily
+// taken for one of other boundaries. But how far an edge moves is measured, and so is where boundaries were.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr float kOff_px = 2;     // between where a boundary was and where its edge's motion says,
+constexpr float kOffShare = 0.2F;  // and of that motion more
+constexpr float kSurface_px = 2;   // between the motions of one surface in two frames
+constexpr int kLines = 2;        // above and below, on which that is looked for
+
+}  // namespace
+
+/// Whether a boundary was, in the frame before, where `motion_px` from field to field puts an edge then.
+bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, float motion_px,
+                                        const SequenceContext& context, int boundary) const {
+  const float moved = motion_px * context.before_fields;
+  const float was = edges.edges[e].column_px - moved;
+  const float off = kOff_px + kOffShare * std::fabs(moved);
+  for (int l = std::max(0, line - kLines); l <= std::min(edges.lines - 1, line + kLines); ++l) {
+    const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
+                              static_cast<std::size_t>(boundary);
+    const float before_px = (*context.before_px)[place];
+    if (!(std::fabs(before_px - was) < off)) continue;
+    if (std::fabs(context.before_motion->at(l, before_px) - motion_px) < kSurface_px) return true;
+  }
+  return false;
+}
+
+/// Gives up moving edges that the frame before does not confirm, nor a neighbour that they follow.
+void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const SequenceContext& context,
+                                   Scratch& scratch, SequenceResult& out) {
+  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
+  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  float* seen = out.seen_px.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
+  std::fill_n(seen, boundaries_, kNone);
+  for (std::uint32_t e = begin; e < end; ++e)
+    if (out.boundary[e] >= 0) seen[out.boundary[e]] = edges.edges[e].column_px;
+  if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line)) return;
+  scratch.trusted.assign(end - begin, 0);
+  for (std::uint32_t e = begin; e < end; ++e) {
+    const int boundary = out.boundary[e];
+    if (boundary < 0) continue;
+    const float motion = context.motion->at(line, edges.edges[e].column_px);
+    scratch.trusted[e - begin] =
+        beside_[e].tracked || moved_as_measured(edges, line, e, motion, context, boundary);
+  }
+  const auto trust = [&](std::uint32_t e, std::uint32_t neighbour, int step) {
+    if (out.boundary[e] >= 0 && scratch.trusted[neighbour - begin] != 0 &&
+        out.boundary[e] == out.boundary[neighbour] + step)
+      scratch.trusted[e - begin] = 1;
+  };
+  for (std::uint32_t e = begin + 1; e < end; ++e) trust(e, e - 1, 1);
+  for (std::uint32_t e = end; e > begin + 1; --e) trust(e - 2, e - 1, -1);
+  for (std::uint32_t e = begin; e < end; ++e) {
+    if (out.boundary[e] < 0 || scratch.trusted[e - begin] != 0) continue;
+    out.boundary[e] = -1;
+    --scratch.in_order;
+  }
+  follow_order(edges, line, context, scratch, out);
+}
+
+/// Calls moving edges that have no boundary what comes before or behind that of a neighbour, if they look so.
+void SequenceDecoder::follow_order(const EdgeImage& edges, int line, const SequenceContext& context,
+                                   Scratch& scratch, SequenceResult& out) {
+  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
+  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  const auto follow = [&](std::uint32_t e, std::uint32_t neighbour, int step) {
+    if (out.boundary[e] >= 0 || out.boundary[neighbour] < 0) return;
+    const int boundary = out.boundary[neighbour] + step;
+    if (boundary < 0 || boundary >= boundaries_) return;
+    if (context.motion->at(line, edges.edges[e].column_px) == 0) return;
+    if (!convincing(edges.edges[e], beside_[e], context, boundary)) return;
+    out.boundary[e] = static_cast<std::int16_t>(boundary);
+    convincing_[e] = 1;
+    ++scratch.in_order;
+  };
+  for (std::uint32_t e = begin + 1; e < end; ++e) follow(e, e - 1, 1);
+  for (std::uint32_t e = end; e > begin + 1; --e) follow(e - 2, e - 1, -1);
+}
+
+}  // namespace relievo
