@@ -78,7 +78,6 @@ class SequenceDecoder {
     std::vector<float> off_px;  // of its edges: how far off the other slide's frame showed them
     PathCandidates candidates;
     std::vector<std::uint8_t> clear;  // one an edge of it
-    std::vector<std::uint8_t> trusted;  // of its edges: moves as its boundary did
     double score = 0;
     std::size_t in_order = 0;
     std::vector<Open> open;  // of the worker's lines

@@ -35,7 +35,7 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
   return false;
 }
 
-/// Gives up moving edges that the frame before does not confirm, nor a neighbour that they follow.
+/// Gives up edges on lines where something moves that the frame before does not confirm.
 void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const SequenceContext& context,
                                    Scratch& scratch, SequenceResult& out) {
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
@@ -45,25 +45,27 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
   for (std::uint32_t e = begin; e < end; ++e)
     if (out.boundary[e] >= 0) seen[out.boundary[e]] = edges.edges[e].column_px;
   if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line)) return;
-  scratch.trusted.assign(end - begin, 0);
-  for (std::uint32_t e = begin; e < end; ++e) {
-    const int boundary = out.boundary[e];
-    if (boundary < 0) continue;
-    const float motion = context.motion->at(line, edges.edges[e].column_px);
-    scratch.trusted[e - begin] =
-        beside_[e].tracked || moved_as_measured(edges, line, e, motion, context, boundary);
-  }
-  const auto trust = [&](std::uint32_t e, std::uint32_t neighbour, int step) {
-    if (out.boundary[e] >= 0 && scratch.trusted[neighbour - begin] != 0 &&
-        out.boundary[e] == out.boundary[neighbour] + step)
-      scratch.trusted[e - begin] = 1;
-  };
-  for (std::uint32_t e = begin + 1; e < end; ++e) trust(e, e - 1, 1);
-  for (std::uint32_t e = end; e > begin + 1; --e) trust(e - 2, e - 1, -1);
-  for (std::uint32_t e = begin; e < end; ++e) {
-    if (out.boundary[e] < 0 || scratch.trusted[e - begin] != 0) continue;
-    out.boundary[e] = -1;
-    --scratch.in_order;
+  // Runs of edges that follow each other on one surface are judged together: at its ends a surface comes into
+  // view, where nothing was before.
+  for (std::uint32_t e = begin; e < end;) {
+    const std::uint32_t first = e;
+    float motion = context.motion->at(line, edges.edges[e].column_px);
+    std::uint32_t confirmed = 0;
+    bool goes_on = true;
+    while (goes_on) {
+      const int boundary = out.boundary[e];
+      confirmed += boundary >= 0 && (beside_[e].tracked ||
+                                     moved_as_measured(edges, line, e, motion, context, boundary));
+      if (++e == end) break;
+      const float before = motion;
+      motion = context.motion->at(line, edges.edges[e].column_px);
+      goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 && std::fabs(motion - before) < kSurface_px;
+    }
+    if (2 * confirmed >= e - first) continue;
+    for (std::uint32_t i = first; i < e; ++i) {
+      scratch.in_order -= out.boundary[i] >= 0;
+      out.boundary[i] = -1;
+    }
   }
   follow_order(edges, line, context, scratch, out);
 }
@@ -77,7 +79,9 @@ void SequenceDecoder::follow_order(const EdgeImage& edges, int line, const Seque
     if (out.boundary[e] >= 0 || out.boundary[neighbour] < 0) return;
     const int boundary = out.boundary[neighbour] + step;
     if (boundary < 0 || boundary >= boundaries_) return;
-    if (context.motion->at(line, edges.edges[e].column_px) == 0) return;
+    const float motion = context.motion->at(line, edges.edges[e].column_px);
+    const float beside = context.motion->at(line, edges.edges[neighbour].column_px);
+    if (motion == 0 || std::fabs(motion - beside) >= kSurface_px) return;
     if (!convincing(edges.edges[e], beside_[e], context, boundary)) return;
     out.boundary[e] = static_cast<std::int16_t>(boundary);
     convincing_[e] = 1;
