@@ -34,6 +34,12 @@ float FieldMotion::between(int line, float column_px) const {
   return std::fabs(other - own) < kAlike_px ? own + std::fabs(off) / kCellWidth * (other - own) : own;
 }
 
+float FieldMotion::between_frames(const FieldMotion& before, int line, float column_px, float fields) const {
+  const float now = at(line, column_px);
+  const float then = before.at(line, column_px - fields * now);
+  return fields * (std::fabs(then - now) < kSurface_px ? 0.5F * (now + then) : now);
+}
+
 void FieldMotion::of_columns(int line, int count, float* out) const {
   for (int x = 0; x < count; ++x) out[x] = between(line, static_cast<float>(x));
 }

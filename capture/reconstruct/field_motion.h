@@ -29,8 +29,14 @@ struct FieldMotion {
   }
   /// At a place of the picture, without jumps but where surfaces move unlike each other.
   float at(int line, float column_px) const { return line_moves(line) ? between(line, column_px) : 0; }
+  /// How far what is at a place came since the frame `before`, so many times as long ago as fields lie apart:
+  /// by the mean of its motions in both frames.
+  float between_frames(const FieldMotion& before, int line, float column_px, float fields) const;
   /// At each of `count` columns of a line.
   void of_columns(int line, int count, float* out) const;
+
+  /// Most between the motions of one surface in two frames, or of the parts of it in one.
+  static constexpr float kSurface_px = 2;
 
  private:
   float between(int line, float column_px) const;

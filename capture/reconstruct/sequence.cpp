@@ -245,10 +245,13 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   Beside* beside = beside_.data() + begin;
   scratch.off_px.assign(count, 0);
   if (context.same != nullptr) scratch.sides.look(*context.same, line, of_line, count);
-  const bool moves = context.motion != nullptr && context.motion->line_moves(line);
+  const FieldMotion* before = context.other != nullptr ? &context.other->motion : nullptr;
+  const bool moves = context.motion != nullptr && before != nullptr &&
+                     (context.motion->line_moves(line) || before->line_moves(line));
   for (std::size_t i = 0; i < count; ++i) {
     beside[i] = {{}, {}, true};
-    const float moved = moves ? -context.motion->at(line, of_line[i].column_px) * context.other_fields : 0;
+    const float moved =
+        moves ? -context.motion->between_frames(*before, line, of_line[i].column_px, context.other_fields) : 0;
     if (context.same != nullptr) {
       const Sides& there = scratch.sides[i];
       if (moved != 0 || !alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {

@@ -14,23 +14,25 @@ namespace {
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kOff_px = 2;     // between where a boundary was and where its edge's motion says,
 constexpr float kOffShare = 0.2F;  // and of that motion more
-constexpr float kSurface_px = 2;   // between the motions of one surface in two frames
 constexpr int kLines = 2;        // above and below, on which that is looked for
 
 }  // namespace
 
-/// Whether a boundary was, in the frame before, where `motion_px` from field to field puts an edge then.
-bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, float motion_px,
+/// Whether a boundary was, in the frame before, where the motion of an edge puts it then.
+bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e,
                                         const SequenceContext& context, int boundary) const {
-  const float moved = motion_px * context.before_fields;
-  const float was = edges.edges[e].column_px - moved;
+  const float column = edges.edges[e].column_px;
+  const float motion = context.motion->at(line, column);
+  const float moved =
+      context.motion->between_frames(*context.before_motion, line, column, context.before_fields);
+  const float was = column - moved;
   const float off = kOff_px + kOffShare * std::fabs(moved);
   for (int l = std::max(0, line - kLines); l <= std::min(edges.lines - 1, line + kLines); ++l) {
     const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
                               static_cast<std::size_t>(boundary);
     const float before_px = (*context.before_px)[place];
     if (!(std::fabs(before_px - was) < off)) continue;
-    if (std::fabs(context.before_motion->at(l, before_px) - motion_px) < kSurface_px) return true;
+    if (std::fabs(context.before_motion->at(l, before_px) - motion) < FieldMotion::kSurface_px) return true;
   }
   return false;
 }
@@ -55,11 +57,11 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
     while (goes_on) {
       const int boundary = out.boundary[e];
       confirmed += boundary >= 0 && (beside_[e].tracked ||
-                                     moved_as_measured(edges, line, e, motion, context, boundary));
+                                     moved_as_measured(edges, line, e, context, boundary));
       if (++e == end) break;
       const float before = motion;
       motion = context.motion->at(line, edges.edges[e].column_px);
-      goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 && std::fabs(motion - before) < kSurface_px;
+      goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 && std::fabs(motion - before) < FieldMotion::kSurface_px;
     }
     if (2 * confirmed >= e - first) continue;
     for (std::uint32_t i = first; i < e; ++i) {
@@ -81,7 +83,7 @@ void SequenceDecoder::follow_order(const EdgeImage& edges, int line, const Seque
     if (boundary < 0 || boundary >= boundaries_) return;
     const float motion = context.motion->at(line, edges.edges[e].column_px);
     const float beside = context.motion->at(line, edges.edges[neighbour].column_px);
-    if (motion == 0 || std::fabs(motion - beside) >= kSurface_px) return;
+    if (motion == 0 || std::fabs(motion - beside) >= FieldMotion::kSurface_px) return;
     if (!convincing(edges.edges[e], beside_[e], context, boundary)) return;
     out.boundary[e] = static_cast<std::int16_t>(boundary);
     convincing_[e] = 1;
