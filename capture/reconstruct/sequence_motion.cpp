@@ -14,6 +14,7 @@ namespace {
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kOff_px = 2;     // between where a boundary was and where its edge's motion says,
 constexpr float kOffShare = 0.2F;  // and of that motion more
+constexpr std::uint32_t kLeastInARow = 3;  // edges that confirm a run, whatever its others do
 constexpr int kLines = 2;        // above and below, on which that is looked for
 
 }  // namespace
@@ -53,17 +54,22 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
     const std::uint32_t first = e;
     float motion = context.motion->at(line, edges.edges[e].column_px);
     std::uint32_t confirmed = 0;
+    std::uint32_t in_a_row = 0;
+    std::uint32_t most_in_a_row = 0;
     bool goes_on = true;
     while (goes_on) {
       const int boundary = out.boundary[e];
-      confirmed += boundary >= 0 && (beside_[e].tracked ||
-                                     moved_as_measured(edges, line, e, context, boundary));
+      const bool is_confirmed =
+          boundary >= 0 && (beside_[e].tracked || moved_as_measured(edges, line, e, context, boundary));
+      confirmed += is_confirmed;
+      in_a_row = is_confirmed ? in_a_row + 1 : 0;
+      most_in_a_row = std::max(most_in_a_row, in_a_row);
       if (++e == end) break;
       const float before = motion;
       motion = context.motion->at(line, edges.edges[e].column_px);
       goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 && std::fabs(motion - before) < FieldMotion::kSurface_px;
     }
-    if (2 * confirmed >= e - first) continue;
+    if (2 * confirmed >= e - first || most_in_a_row >= kLeastInARow) continue;
     for (std::uint32_t i = first; i < e; ++i) {
       scratch.in_order -= out.boundary[i] >= 0;
       out.boundary[i] = -1;
