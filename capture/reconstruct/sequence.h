@@ -111,6 +111,8 @@ class SequenceDecoder {
                    SequenceResult& out);
   void check_motion(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                     SequenceResult& out);
+  bool unconfirmed(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                   int boundary) const;
   bool moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
                          int boundary) const;
   void follow_order(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,

@@ -38,6 +38,13 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
   return false;
 }
 
+/// Whether an edge that moves cannot be a boundary by where that was before.
+bool SequenceDecoder::unconfirmed(const EdgeImage& edges, int line, std::uint32_t e,
+                                  const SequenceContext& context, int boundary) const {
+  if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line)) return false;
+  return !beside_[e].tracked && !moved_as_measured(edges, line, e, context, boundary);
+}
+
 /// Gives up edges on lines where something moves that the frame before does not confirm.
 void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const SequenceContext& context,
                                    Scratch& scratch, SequenceResult& out) {
@@ -59,8 +66,7 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
     bool goes_on = true;
     while (goes_on) {
       const int boundary = out.boundary[e];
-      const bool is_confirmed =
-          boundary >= 0 && (beside_[e].tracked || moved_as_measured(edges, line, e, context, boundary));
+      const bool is_confirmed = boundary >= 0 && !unconfirmed(edges, line, e, context, boundary);
       confirmed += is_confirmed;
       in_a_row = is_confirmed ? in_a_row + 1 : 0;
       most_in_a_row = std::max(most_in_a_row, in_a_row);

@@ -273,8 +273,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
-      const std::size_t grown = s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order)},
-                                              s.result, s.edges, s.recovered);
+      const std::size_t grown = s.growth.grow(
+          {pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion}, s.edges,
+          s.result, s.recovered);
       report.filters.recovered += grown;
       report.matched += grown;
     }
