@@ -72,8 +72,8 @@ bool complement_on_even_rows(const CapturedFrame& frame) {
 /// `out` is `row` of RGB where columns are `share` of `motion_px` further on, 0 beyond the ends of it.
 void shift_row(const std::uint8_t* row, const float* motion_px, float share, int width, std::uint8_t* out) {
   for (int x = 0; x < width; ++x) {
-    const float from = std::clamp(static_cast<float>(x) + share * motion_px[x], 0.F,
-                                  static_cast<float>(width) - 1.001F);
+    const float from =
+        std::clamp(static_cast<float>(x) + share * motion_px[x], 0.F, static_cast<float>(width) - 1.001F);
     const int first = static_cast<int>(from);
     const auto part = static_cast<int>(256 * (from - static_cast<float>(first)));
     const std::uint8_t* p = row + 3 * first;

@@ -8,15 +8,15 @@
 namespace relievo {
 namespace {
 
-constexpr int kFurthest_px = 8;               // either way
+constexpr int kFurthest_px = 8;  // either way
 constexpr int kShifts = 2 * kFurthest_px + 1;
-constexpr int kFirstLook_px = 2;              // what holds still leaves more stripes at so far either way
-constexpr int kStep_px = 4;                   // stripes left over are steps over so many columns
-constexpr int kEveryLine = 4;                 // of a cell
-constexpr int kAround = 1;                    // cells on each side that are measured together
-constexpr float kClearer = 0.85F;             // of the stripes left without a shift, those left with it
-constexpr float kStill_px = 0.5F;             // less makes no difference
-constexpr float kAlike_px = 1.5F;             // between cells of one surface
+constexpr int kFirstLook_px = 2;   // what holds still leaves more stripes at so far either way
+constexpr int kStep_px = 4;        // stripes left over are steps over so many columns
+constexpr int kEveryLine = 4;      // of a cell
+constexpr int kAround = 1;         // cells on each side that are measured together
+constexpr float kClearer = 0.85F;  // of the stripes left without a shift, those left with it
+constexpr float kStill_px = 0.5F;  // less makes no difference
+constexpr float kAlike_px = 1.5F;  // between cells of one surface
 constexpr int kSamples = 3 * FieldMotion::kCellWidth;
 
 std::size_t index_of(int shift_px) {
@@ -26,7 +26,8 @@ std::size_t index_of(int shift_px) {
 }  // namespace
 
 float FieldMotion::between(int line, float column_px) const {
-  const float* row = px.data() + static_cast<std::size_t>(line / kCellLines) * static_cast<std::size_t>(cells);
+  const float* row =
+      px.data() + static_cast<std::size_t>(line / kCellLines) * static_cast<std::size_t>(cells);
   const int cell = std::clamp(static_cast<int>(column_px) / kCellWidth, 0, cells - 1);
   const float off = column_px - static_cast<float>(cell * kCellWidth + kCellWidth / 2);
   const float own = row[cell];
@@ -45,8 +46,8 @@ void FieldMotion::of_columns(int line, int count, float* out) const {
 }
 
 std::uint32_t* MotionFinder::costs(int cell_row, int shift_px) {
-  return costs_.data() +
-         (static_cast<std::size_t>(cell_row) * kShifts + index_of(shift_px)) * static_cast<std::size_t>(cells_);
+  return costs_.data() + (static_cast<std::size_t>(cell_row) * kShifts + index_of(shift_px)) *
+                             static_cast<std::size_t>(cells_);
 }
 
 /// Of a row of cells: what steps the sum has along its lines with the complement `shift_px` further left.
@@ -97,7 +98,8 @@ bool MotionFinder::may_move(int cell_row) {
 }
 
 void MotionFinder::measure(View8 slide, View8 complement, int cell_row, Scratch& scratch) {
-  for (const int shift : {-kFirstLook_px, 0, kFirstLook_px}) residue(slide, complement, cell_row, shift, scratch);
+  for (const int shift : {-kFirstLook_px, 0, kFirstLook_px})
+    residue(slide, complement, cell_row, shift, scratch);
   const bool all = may_move(cell_row);
   measured_[static_cast<std::size_t>(cell_row)] = all;
   if (!all) return;
@@ -154,7 +156,8 @@ void MotionFinder::find(View8 slide, View8 complement, WorkerPool& pool, FieldMo
   pool.for_ranges(rows_, [&](int begin, int end, int) {
     for (int row = begin; row < end; ++row) choose(row, out);
   });
-  if (std::none_of(out.moves.begin(), out.moves.end(), [](std::uint8_t m) { return m != 0; })) out.moves.clear();
+  if (std::none_of(out.moves.begin(), out.moves.end(), [](std::uint8_t m) { return m != 0; }))
+    out.moves.clear();
 }
 
 }  // namespace relievo

@@ -59,7 +59,7 @@ class MotionFinder {
   void choose(int cell_row, FieldMotion& out);
 
   int cells_ = 0, rows_ = 0;
-  std::vector<std::uint32_t> costs_;   // [row][shift][cell]: stripes left in the sum
+  std::vector<std::uint32_t> costs_;    // [row][shift][cell]: stripes left in the sum
   std::vector<std::uint8_t> measured_;  // [row]: at all shifts
   std::vector<Scratch> scratch_;
 };

@@ -289,7 +289,8 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
     const auto room = [](float px) { return known(px) ? std::clamp(px, kLeastRoom_px, kOpen_px) : kOpen_px; };
     const float left = room(column - here[b - 1]);
     const float right = room(here[b + 1] - column);
-    if (light.agreement(view.colours[static_cast<std::size_t>(b)], column, left, right) >= kDisagrees) continue;
+    if (light.agreement(view.colours[static_cast<std::size_t>(b)], column, left, right) >= kDisagrees)
+      continue;
     result.boundary[e] = -1;
     here[b] = kNone;
   }

@@ -251,7 +251,8 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   for (std::size_t i = 0; i < count; ++i) {
     beside[i] = {{}, {}, true};
     const float moved =
-        moves ? -context.motion->between_frames(*before, line, of_line[i].column_px, context.other_fields) : 0;
+        moves ? -context.motion->between_frames(*before, line, of_line[i].column_px, context.other_fields)
+              : 0;
     if (context.same != nullptr) {
       const Sides& there = scratch.sides[i];
       if (moved != 0 || !alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {

@@ -115,8 +115,6 @@ class SequenceDecoder {
                    int boundary) const;
   bool moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
                          int boundary) const;
-  void follow_order(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
-                    SequenceResult& out);
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);

@@ -12,10 +12,10 @@ namespace relievo {
 namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-constexpr float kOff_px = 2;     // between where a boundary was and where its edge's motion says,
-constexpr float kOffShare = 0.2F;  // and of that motion more
+constexpr float kOff_px = 2;               // between where a boundary was and where its edge's motion says,
+constexpr float kOffShare = 0.2F;          // and of that motion more
 constexpr std::uint32_t kLeastInARow = 3;  // edges that confirm a run, whatever its others do
-constexpr int kLines = 2;        // above and below, on which that is looked for
+constexpr int kLines = 2;                  // above and below, on which that is looked for
 
 }  // namespace
 
@@ -41,7 +41,8 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
 /// Whether an edge that moves cannot be a boundary by where that was before.
 bool SequenceDecoder::unconfirmed(const EdgeImage& edges, int line, std::uint32_t e,
                                   const SequenceContext& context, int boundary) const {
-  if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line)) return false;
+  if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line))
+    return false;
   return !beside_[e].tracked && !moved_as_measured(edges, line, e, context, boundary);
 }
 
@@ -73,7 +74,8 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
       if (++e == end) break;
       const float before = motion;
       motion = context.motion->at(line, edges.edges[e].column_px);
-      goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 && std::fabs(motion - before) < FieldMotion::kSurface_px;
+      goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 &&
+                std::fabs(motion - before) < FieldMotion::kSurface_px;
     }
     if (2 * confirmed >= e - first || most_in_a_row >= kLeastInARow) continue;
     for (std::uint32_t i = first; i < e; ++i) {
@@ -81,28 +83,6 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
       out.boundary[i] = -1;
     }
   }
-  follow_order(edges, line, context, scratch, out);
-}
-
-/// Calls moving edges that have no boundary what comes before or behind that of a neighbour, if they look so.
-void SequenceDecoder::follow_order(const EdgeImage& edges, int line, const SequenceContext& context,
-                                   Scratch& scratch, SequenceResult& out) {
-  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
-  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
-  const auto follow = [&](std::uint32_t e, std::uint32_t neighbour, int step) {
-    if (out.boundary[e] >= 0 || out.boundary[neighbour] < 0) return;
-    const int boundary = out.boundary[neighbour] + step;
-    if (boundary < 0 || boundary >= boundaries_) return;
-    const float motion = context.motion->at(line, edges.edges[e].column_px);
-    const float beside = context.motion->at(line, edges.edges[neighbour].column_px);
-    if (motion == 0 || std::fabs(motion - beside) >= FieldMotion::kSurface_px) return;
-    if (!convincing(edges.edges[e], beside_[e], context, boundary)) return;
-    out.boundary[e] = static_cast<std::int16_t>(boundary);
-    convincing_[e] = 1;
-    ++scratch.in_order;
-  };
-  for (std::uint32_t e = begin + 1; e < end; ++e) follow(e, e - 1, 1);
-  for (std::uint32_t e = end; e > begin + 1; --e) follow(e - 2, e - 1, -1);
 }
 
 }  // namespace relievo

@@ -84,9 +84,9 @@ struct SlideDecoder::State {
   SlideOrder order = SlideOrder::kNewerIsSecond;  // of the last decoded pair
   bool order_known = false;
 
-  std::vector<float> before_px;           // SequenceResult::seen_px of the frame decoded last,
-  FieldMotion before_motion;              // the motion in it,
-  std::optional<std::int64_t> before_ns;  // and its time
+  std::vector<float> before_px;                        // SequenceResult::seen_px of the frame decoded last,
+  FieldMotion before_motion;                           // the motion in it,
+  std::optional<std::int64_t> before_ns;               // and its time
   const std::vector<ColumnRange>* expected = nullptr;  // of the frame being decoded
   Match match, other_match;
   EdgeImage edges;
@@ -273,9 +273,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
-      const std::size_t grown = s.growth.grow(
-          {pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion}, s.edges,
-          s.result, s.recovered);
+      const std::size_t grown =
+          s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion},
+                        s.edges, s.result, s.recovered);
       report.filters.recovered += grown;
       report.matched += grown;
     }
