@@ -69,6 +69,19 @@ bool complement_on_even_rows(const CapturedFrame& frame) {
   return frame.scan == Scan::kInterlaced && frame.field_order == FieldOrder::kBottom;
 }
 
+/// `out` is `row` of RGB where columns are `share` of `motion_px` further on, 0 beyond the ends of it.
+void shift_row(const std::uint8_t* row, const float* motion_px, float share, int width, std::uint8_t* out) {
+  for (int x = 0; x < width; ++x) {
+    const float from =
+        std::clamp(static_cast<float>(x) + share * motion_px[x], 0.F, static_cast<float>(width) - 1.001F);
+    const int first = static_cast<int>(from);
+    const auto part = static_cast<int>(256 * (from - static_cast<float>(first)));
+    const std::uint8_t* p = row + 3 * first;
+    for (int c = 0; c < 3; ++c)
+      out[3 * x + c] = static_cast<std::uint8_t>((p[c] * (256 - part) + p[c + 3] * part + 128) >> 8);
+  }
+}
+
 }  // namespace
 
 Differencer::Differencer(const std::array<double, 9>& colour_matrix) {
@@ -97,12 +110,25 @@ void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int
     const int place = std::clamp(line, 0, out.lines - 1) % 3;
     return FieldRows{scratch_row(2 * place), scratch_row(2 * place + 1)};
   };
+  scratch.shifted.resize(3 * row);
+  scratch.motion.resize(static_cast<std::size_t>(out.width));
+  const float own_share = complement_on_even_rows(frame) ? 0.5F : -0.5F;
   const auto read = [&](int line) {
     if (line < 0 || line >= out.lines) return;
     // An interlaced picture's other rows lie half a line off: their mean is what they show at this row.
     const int before = frame.scan == Scan::kInterlaced ? line - 1 : line;
-    kernels.combine_fields(rows.own.row(line), rows.other.row(std::clamp(before, 0, rows.other.height - 1)),
-                           rows.other.row(std::min(line, rows.other.height - 1)), samples, fields_at(line));
+    std::array<const std::uint8_t*, 3> read_rows{rows.own.row(line),
+                                                 rows.other.row(std::clamp(before, 0, rows.other.height - 1)),
+                                                 rows.other.row(std::min(line, rows.other.height - 1))};
+    if (out.motion.line_moves(line)) {
+      out.motion.of_columns(line, out.width, scratch.motion.data());
+      for (std::size_t i = 0; i < read_rows.size(); ++i) {
+        std::uint8_t* shifted = scratch.shifted.data() + i * row;
+        shift_row(read_rows[i], scratch.motion.data(), i == 0 ? own_share : -own_share, out.width, shifted);
+        read_rows[i] = shifted;
+      }
+    }
+    kernels.combine_fields(read_rows[0], read_rows[1], read_rows[2], samples, fields_at(line));
   };
   std::int16_t* across = scratch_row(6);
   const FieldRows smooth{scratch_row(7), scratch_row(8)};
@@ -124,6 +150,16 @@ void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int
 }
 
 void Differencer::difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
+  out.motion.moves.clear();
+  difference_of_all(frame, pool, out);
+}
+
+void Differencer::aligned_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
+  motion_finder_.find(frame.slide_field(), frame.complement_field(), pool, out.motion);
+  difference_of_all(frame, pool, out);
+}
+
+void Differencer::difference_of_all(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
   const View8 lines = rows_of(frame).own;
   out.width = lines.width;
   out.lines = lines.height;

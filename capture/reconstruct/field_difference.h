@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/field_motion.h"
 #include "capture/reconstruct/rows.h"
 #include "capture/source/field_source.h"
 
@@ -35,6 +36,8 @@ struct DifferenceImage {
   int cells = 0;               // in a row of them, 0 where none was measured: all is strong
   std::vector<Signal> signal;  // [row of cells][cell], a cell is kCellWidth pixels of kCellLines lines
 
+  FieldMotion motion;  // between the fields, which both were shifted by half of it to meet half way
+
   Signal signal_at(int l, int x) const {
     if (cells == 0) return Signal::kStrong;
     return signal[static_cast<std::size_t>(l / kCellLines) * static_cast<std::size_t>(cells) +
@@ -58,19 +61,27 @@ class Differencer {
   /// Low-pass, colour matrix (Eq. 3) and difference. `out` is overwritten; its memory is reused.
   void difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
 
+  /// The same, of the fields where each shows its stripes half way between both exposures.
+  void aligned_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+
   /// Of the calibrated fields, low-passed along the line, all channels: 255 of the paper's normalised scale.
   float largest(const CapturedFrame& frame, WorkerPool& pool);
 
  private:
   struct Scratch {
     std::vector<std::int16_t> rows;
+    std::vector<float> motion;          // of each column of a line
+    std::vector<std::uint8_t> shifted;  // rows of the fields
     float largest = 0;
   };
   void difference_of_lines(const CapturedFrame& frame, int begin, int end, Scratch& scratch,
                            DifferenceImage& out) const;
 
+  void difference_of_all(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+
   std::array<float, 9> matrix_;
   PlaneWeights weights_;
+  MotionFinder motion_finder_;
   std::vector<Scratch> scratch_;
 };
 

@@ -28,6 +28,7 @@ constexpr float kDark = 12.F;         // grey levels; less is no light
 constexpr float kOff = 0.4F;          // of its brightest: in between on and off
 constexpr float kClear = 0.25F;       // to either side of that it is clear
 constexpr float kLeastAgree = 0.55F;  // of each side's colour, -1..1
+constexpr float kDisagrees = 0.2F;    // less: a side is of another colour
 constexpr float kMostSide_px = 4.5F;  // colours are read up to here
 
 constexpr float kLeastRoom_px = 3.F;  // to the next boundary
@@ -271,10 +272,36 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
   return added;
 }
 
-std::size_t Growth::grow(const SlideFieldView& view, const SequenceResult& result, const EdgeImage& edges,
+/// Gives up moving boundaries that the field does not show: a silhouette came over their place between the
+/// fields, or their code is another's.
+void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result) {
+  float* here = row(now_, line);
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int b = result.boundary[e];
+    if (b < 0) continue;
+    const float column = here[b];
+    const int centre = static_cast<int>(column + 0.5F);
+    if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) continue;
+    if (view.motion->at(line, column) == 0) continue;
+    Light light;
+    read(view.field.row(line), centre, light);
+    const auto room = [](float px) { return known(px) ? std::clamp(px, kLeastRoom_px, kOpen_px) : kOpen_px; };
+    const float left = room(column - here[b - 1]);
+    const float right = room(here[b + 1] - column);
+    if (light.agreement(view.colours[static_cast<std::size_t>(b)], column, left, right) >= kDisagrees)
+      continue;
+    result.boundary[e] = -1;
+    here[b] = kNone;
+  }
+}
+
+std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, SequenceResult& result,
                          std::vector<RecoveredBoundary>& recovered) {
   fill(view.field.width, result, edges, recovered);
   const int lines = std::min(lines_, view.field.height);
+  for (int line = 0; line < lines; ++line)
+    if (view.motion != nullptr && view.motion->line_moves(line)) drop_line(view, line, edges, result);
   std::size_t added = 0;
   for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
   for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);

@@ -14,16 +14,18 @@
 #include "base/image.h"
 #include "base/pattern.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/field_motion.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
 
 namespace relievo {
 
-/// A frame's field under the slide itself, a row a line, and the colours on both sides of each boundary of
-/// that slide.
+/// A frame's field under the slide itself, a row a line, the colours on both sides of each boundary of that
+/// slide, and the motion between the frame's fields.
 struct SlideFieldView {
   View8 field;
   const std::vector<std::array<Primary, 2>>& colours;
+  const FieldMotion* motion = nullptr;
 };
 
 /// Keeps the frame before and its scratch memory. One thread.
@@ -33,8 +35,9 @@ class Growth {
   Growth(const std::array<double, 9>& colour_matrix, int boundaries, int lines);
 
   /// Adds boundaries that neither `result` nor `recovered` has to `recovered`; what was added leads to more.
-  /// Once a frame. Columns must be those of the field's instant. Returns how many were added.
-  std::size_t grow(const SlideFieldView& view, const SequenceResult& result, const EdgeImage& edges,
+  /// What moved into view after the field's instant is given up first. Once a frame. Columns must be those of
+  /// the field's instant. Returns how many were added.
+  std::size_t grow(const SlideFieldView& view, const EdgeImage& edges, SequenceResult& result,
                    std::vector<RecoveredBoundary>& recovered);
 
  private:
@@ -51,6 +54,7 @@ class Growth {
   float* row(std::vector<float>& grid, int line) const;
   void fill(int width, const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered);
+  void drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result);
   bool moves(int line, float column_px) const;
   std::optional<Prediction> predict(int line, int boundary);
   void read(const std::uint8_t* pixels, int centre, Light& out) const;

@@ -16,7 +16,9 @@ constexpr float kWorst_px = 0.3F;     // standard deviation of a place that tell
 constexpr float kStill_px = 0.15F;    // less motion than this needs no neighbour that moves alike
 constexpr float kAlike_px = 0.3F;     // between a boundary's motion and a neighbour's,
 constexpr float kAlikeShare = 0.15F;  // and of the motion more
-constexpr float kFastest_px = 8.F;    // from one frame to the next
+constexpr float kFastest_px = 16.F;   // from one frame to the next
+constexpr float kHalfWay = 0.5F;      // of the motion between the fields
+constexpr float kMotion_px = 0.4F;    // standard deviation of that
 
 }  // namespace
 
@@ -48,13 +50,14 @@ void InstantFilter::fill(const SequenceResult& result, const EdgeImage& edges,
   for (const RecoveredBoundary& r : recovered) row(now_, r.line)[r.boundary] = {r.column_px, r.sigma_px};
 }
 
-void InstantFilter::adjust_one(int line, int boundary, float share, float& column_px, float& sigma_px) {
+/// False where the frame before tells nothing.
+bool InstantFilter::adjust_by_before(int line, int boundary, float share, float& column_px, float& sigma_px) {
   const Seen now = row(now_, line)[boundary];
   const Seen before = row(before_, line)[boundary];
-  if (!(now.sigma_px < kWorst_px) || !(before.sigma_px < kWorst_px)) return;
+  if (!(now.sigma_px < kWorst_px) || !(before.sigma_px < kWorst_px)) return false;
   const float moved = now.column_px - before.column_px;
   const float size = std::fabs(moved);
-  if (!(size < kFastest_px)) return;
+  if (!(size < kFastest_px)) return false;
   if (size > kStill_px) {
     // A code that was wrong, or another surface, moves alone.
     int alike = 0;
@@ -65,34 +68,42 @@ void InstantFilter::adjust_one(int line, int boundary, float share, float& colum
       if (n.sigma_px == kNone || p.sigma_px == kNone) continue;
       alike += std::fabs(n.column_px - p.column_px - moved) < kAlike_px + kAlikeShare * size;
     }
-    if (alike < 2) return;
+    if (alike < 2) return false;
   }
   column_px -= share * moved;
   const float kept = (1 - share) * now.sigma_px;
   const float added = share * before.sigma_px;
   sigma_px = std::sqrt(kept * kept + added * added);
+  return true;
 }
 
-void InstantFilter::adjust(std::int64_t time_ns, const SequenceResult& result, EdgeImage& edges,
+void InstantFilter::adjust(const FrameInstant& frame, const SequenceResult& result, EdgeImage& edges,
                            std::vector<RecoveredBoundary>& recovered, WorkerPool& pool) {
   fill(result, edges, recovered, pool);
-  const double frames = static_cast<double>(time_ns - before_ns_) / frame_ns_;
-  if (have_before_ && frames > 0.5 && frames < kFrames + 0.5) {
-    const auto share = static_cast<float>(kPhase / frames);
+  const double frames = static_cast<double>(frame.time_ns - before_ns_) / frame_ns_;
+  const bool by_before = have_before_ && frames > 0.5 && frames < kFrames + 0.5;
+  const auto share = static_cast<float>(by_before ? kPhase / frames : 0);
+  const auto adjust_one = [&](int line, int boundary, float& column_px, float& sigma_px) {
+    if (by_before && adjust_by_before(line, boundary, share, column_px, sigma_px)) return;
+    const float moved = frame.motion.at(line, column_px);
+    if (moved == 0) return;
+    column_px -= kHalfWay * moved;
+    sigma_px = std::hypot(sigma_px, kHalfWay * kMotion_px);
+  };
+  if (by_before || !frame.motion.moves.empty()) {
     pool.for_shares(edges.line_start, [&](int begin, int end, int) {
       for (int line = begin; line < end; ++line) {
         for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
              e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
           Edge& edge = edges.edges[e];
-          if (result.boundary[e] >= 0)
-            adjust_one(line, result.boundary[e], share, edge.column_px, edge.sigma_px);
+          if (result.boundary[e] >= 0) adjust_one(line, result.boundary[e], edge.column_px, edge.sigma_px);
         }
       }
     });
-    for (RecoveredBoundary& r : recovered) adjust_one(r.line, r.boundary, share, r.column_px, r.sigma_px);
+    for (RecoveredBoundary& r : recovered) adjust_one(r.line, r.boundary, r.column_px, r.sigma_px);
   }
   std::swap(now_, before_);
-  before_ns_ = time_ns;
+  before_ns_ = frame.time_ns;
   have_before_ = true;
 }
 

@@ -9,10 +9,17 @@
 
 #include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/field_motion.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
 
 namespace relievo {
+
+/// Of the frame whose boundaries are given.
+struct FrameInstant {
+  std::int64_t time_ns;
+  const FieldMotion& motion;
+};
 
 /// Remembers where the last frame had its boundaries. One thread.
 class InstantFilter {
@@ -20,9 +27,10 @@ class InstantFilter {
   /// `frame_ns` is the time from one frame to the next.
   InstantFilter(int boundaries, int lines, double frame_ns);
 
-  /// Moves columns of `edges` and `recovered` to `time_ns`, the frame's time stamp, where the boundary was
-  /// seen in the frame before, too, and moved no more than its neighbours; updates standard deviations.
-  void adjust(std::int64_t time_ns, const SequenceResult& result, EdgeImage& edges,
+  /// Moves columns of `edges` and `recovered` to the frame's time stamp, where the boundary was seen in the
+  /// frame before, too, and moved no more than its neighbours, or else by its motion between the fields;
+  /// updates standard deviations.
+  void adjust(const FrameInstant& frame, const SequenceResult& result, EdgeImage& edges,
               std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
 
  private:
@@ -33,7 +41,7 @@ class InstantFilter {
   Seen* row(std::vector<Seen>& grid, int line) const;
   void fill(const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
-  void adjust_one(int line, int boundary, float share, float& column_px, float& sigma_px);
+  bool adjust_by_before(int line, int boundary, float share, float& column_px, float& sigma_px);
 
   int boundaries_, lines_;
   double frame_ns_;

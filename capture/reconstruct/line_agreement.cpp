@@ -137,6 +137,7 @@ void SequenceDecoder::complete(const EdgeImage& edges, const SequenceContext& co
       const float distance = std::fabs(n->column_px - edge.column_px);
       if (distance > nearest) continue;
       if (gain(edge, beside_[o.edge], context, b) < kCompleteEvidence) continue;
+      if (unconfirmed(edges, o.line, o.edge, context, b)) continue;
       nearest = distance;
       best = b;
     }

@@ -31,6 +31,7 @@ constexpr float kNoStripe = -100;    // agreement with what no stripe is
 // How far an edge may have moved in two frames: 1 m/s in depth is 10 px where a stripe is 8 wide.
 constexpr float kSearch_px = 14;
 constexpr float kSearchStep_px = 2;
+constexpr float kSearchMoving_px = 4;  // around where its motion between the fields puts it
 
 // What a decoded edge must show by itself, whatever its neighbours are.
 constexpr float kLeastSide = 0.4F;  // of agreement on each side: no channel may clearly disagree
@@ -67,17 +68,20 @@ bool alike(const SideEvidence& a, const std::array<float, N>& b) {
   return dot > 0.5F * size;
 }
 
-/// Where it is not where it was.
-Displacement displacement(const DifferenceImage& same, int line, const Edge& edge) {
+/// Where it is not where it was, but may have been `expected_px` from there.
+Displacement displacement(const DifferenceImage& same, int line, const Edge& edge, float expected_px) {
   const auto matches = [&](float px) {
     const EvidenceBeside there = evidence_beside(same, line, edge, edge.column_px + px);
     return alike(edge.left, there.left) && alike(edge.right, there.right);
   };
-  for (float px = kSearchStep_px; px <= kSearch_px; px += kSearchStep_px) {
-    if (matches(px)) return {true, px};
-    if (matches(-px)) return {true, -px};
+  const bool moves = expected_px != 0;
+  if (moves && matches(expected_px)) return {true, expected_px};
+  const float furthest = moves ? kSearchMoving_px : kSearch_px;
+  for (float px = kSearchStep_px; px <= furthest; px += kSearchStep_px) {
+    if (matches(expected_px + px)) return {true, expected_px + px};
+    if (matches(expected_px - px)) return {true, expected_px - px};
   }
-  return {false, 0};
+  return {false, expected_px};
 }
 
 /// Gain from the other slide's frame, where the colours on the two sides agree with it by `left` and `right`.
@@ -241,14 +245,25 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
   Beside* beside = beside_.data() + begin;
   scratch.off_px.assign(count, 0);
   if (context.same != nullptr) scratch.sides.look(*context.same, line, of_line, count);
+  const FieldMotion* before = context.other != nullptr ? &context.other->motion : nullptr;
+  const bool moves = context.motion != nullptr && before != nullptr &&
+                     (context.motion->line_moves(line) || before->line_moves(line));
   for (std::size_t i = 0; i < count; ++i) {
     beside[i] = {{}, {}, true};
+    const float moved =
+        moves ? -context.motion->between_frames(*before, line, of_line[i].column_px, context.other_fields)
+              : 0;
     if (context.same != nullptr) {
       const Sides& there = scratch.sides[i];
-      if (!alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {
+      if (moved != 0 || !alike(of_line[i].left, there.left) || !alike(of_line[i].right, there.right)) {
         beside[i].tracked = false;
-        scratch.off_px[i] = context.other_share * displacement(*context.same, line, of_line[i]).px;
+        const Displacement d = displacement(*context.same, line, of_line[i], moved / context.other_share);
+        // Over two frames a place gains more speed than over one.
+        scratch.off_px[i] = moved != 0 ? moved : context.other_share * d.px;
       }
+    } else if (moved != 0) {
+      beside[i].tracked = false;
+      scratch.off_px[i] = moved;
     }
     out.still[begin + i] = beside[i].tracked;
   }
@@ -257,6 +272,7 @@ void SequenceDecoder::look_beside(const EdgeImage& edges, int line, const Sequen
     scratch.sides.look_again(*context.other, line, of_line, scratch.off_px.data());
   } else {
     scratch.sides.look(*context.other, line, of_line, count);
+    if (moves) scratch.sides.look_again(*context.other, line, of_line, scratch.off_px.data());
   }
   for (std::size_t i = 0; i < count; ++i) {
     std::memcpy(beside[i].left.data(), scratch.sides[i].left.data(), sizeof beside[i].left);
@@ -276,11 +292,13 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
   beside_.resize(edges.edges.size());
   out.still.resize(edges.edges.size());
   convincing_.resize(edges.edges.size());
+  out.seen_px.resize(static_cast<std::size_t>(edges.lines) * static_cast<std::size_t>(boundaries_));
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
       look_beside(edges, line, context, scratch, out);
       decode_line(edges, line, context, scratch, out);
+      check_motion(edges, line, context, scratch, out);
     }
   });
   out.score = 0;

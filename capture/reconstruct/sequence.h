@@ -30,6 +30,7 @@ struct SequenceResult {
   std::vector<std::int16_t> boundary;  // one an edge: its index in the pattern, or -1
   std::vector<std::int16_t> doubted;   // one an edge: a boundary given up, which others may confirm, or -1
   std::vector<std::uint8_t> still;  // one an edge: two frames ago, under the same slide, it was where it is
+  std::vector<float> seen_px;  // [line][boundary]: where its line has it, NaN: nowhere. For the next frame
   SequenceCounts counts;
   double score = 0;  // sum over the lines: the greater, the better the slides' order explains the frame
 };
@@ -41,6 +42,11 @@ struct SequenceContext {
   const DifferenceImage* same = nullptr;   // the last frame before that under the slide that the edges are of
   const std::vector<ColumnRange>* expected = nullptr;  // of each boundary, from the depths before
   float other_share = 0.5F;  // where `other` lies in time on the way back to `same`: 0 now, 1 there
+  const FieldMotion* motion = nullptr;  // between the fields that the edges are of
+  float other_fields = 2;               // how many times as long ago `other` was as the fields lie apart
+  const std::vector<float>* before_px = nullptr;  // SequenceResult::seen_px of the frame decoded before
+  const FieldMotion* before_motion = nullptr;     // between that frame's fields
+  float before_fields = 2;                        // how many times as long ago that was
 };
 
 /// Constant after construction but for scratch memory. One thread.
@@ -103,6 +109,12 @@ class SequenceDecoder {
   static void clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
+  void check_motion(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
+                    SequenceResult& out);
+  bool unconfirmed(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                   int boundary) const;
+  bool moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                         int boundary) const;
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);

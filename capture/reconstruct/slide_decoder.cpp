@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/slide_decoder.h"
 
+#include <optional>
 #include <utility>
 
 #include "capture/reconstruct/consistency.h"
@@ -38,6 +39,7 @@ struct Observation {
 struct SlideDecoder::State {
   State(const Rig& rig, const Pattern& p, const ReconstructOptions& options)
       : pattern(p),
+        field_ns(0.5e9 / rig.frame_rate),
         paper(options.decoder == Decoder::kPaper),
         detector(rig.colour_matrix, DetectOptions{}),
         table(p),
@@ -55,6 +57,7 @@ struct SlideDecoder::State {
                rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height) {}
 
   Pattern pattern;
+  double field_ns;  // between a slide's exposure and its complement's
   bool paper;
   Detector detector;
   TransitionTable table;
@@ -81,6 +84,9 @@ struct SlideDecoder::State {
   SlideOrder order = SlideOrder::kNewerIsSecond;  // of the last decoded pair
   bool order_known = false;
 
+  std::vector<float> before_px;                        // SequenceResult::seen_px of the frame decoded last,
+  FieldMotion before_motion;                           // the motion in it,
+  std::optional<std::int64_t> before_ns;               // and its time
   const std::vector<ColumnRange>* expected = nullptr;  // of the frame being decoded
   Match match, other_match;
   EdgeImage edges;
@@ -114,7 +120,16 @@ bool SlideDecoder::State::match_paper(SlideOrder tried, Match& out) {
 SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
   SequenceContext out{.order = tried};
   out.expected = expected;
-  if (have_older) out.other = &older.difference;
+  out.motion = &newer.difference.motion;
+  if (before_ns) {
+    out.before_px = &before_px;
+    out.before_motion = &before_motion;
+    out.before_fields = static_cast<float>(static_cast<double>(newer.time_ns - *before_ns) / field_ns);
+  }
+  if (have_older) {
+    out.other = &older.difference;
+    out.other_fields = static_cast<float>(static_cast<double>(newer.time_ns - older.time_ns) / field_ns);
+  }
   if (have_same) {
     out.same = &same.difference;
     const auto back = static_cast<float>(newer.time_ns - same.time_ns);
@@ -195,7 +210,7 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
     s.detector.detect(pair, pool, s.newer.detection);
     report.boundaries = s.newer.detection.boundaries.size();
   } else {
-    s.differencer.difference(pair, pool, s.newer.difference);
+    s.differencer.aligned_difference(pair, pool, s.newer.difference);
     s.weak_signal.average(pool, s.newer.difference);
     s.edge_finder.find(s.newer.difference, pool, s.edges);
     report.boundaries = s.edges.edges.size();
@@ -227,6 +242,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const std::size_t traced =
         s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
     report.filters.traced = traced;
+    std::swap(s.before_px, s.result.seen_px);
+    s.before_motion = s.newer.difference.motion;
+    s.before_ns = pair.time_ns;
     const SharpLuma sharp(pair);
     s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
                      &sharp);
@@ -253,10 +271,11 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
         counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
-      s.instant.adjust(pair.time_ns, s.result, s.edges, s.recovered, pool);
+      s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
-      const std::size_t grown = s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order)},
-                                              s.result, s.edges, s.recovered);
+      const std::size_t grown =
+          s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion},
+                        s.edges, s.result, s.recovered);
       report.filters.recovered += grown;
       report.matched += grown;
     }

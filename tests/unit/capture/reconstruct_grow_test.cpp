@@ -59,7 +59,7 @@ struct Frame {
     for (int b = 0; b < kBoundaries; ++b) result.still[at(line, b)] = 0;
   }
   std::size_t grow() {
-    return Growth(kIdentity, kBoundaries, kLines).grow({picture.view(), colours}, result, edges, recovered);
+    return Growth(kIdentity, kBoundaries, kLines).grow({picture.view(), colours}, edges, result, recovered);
   }
 };
 
@@ -122,7 +122,7 @@ TEST(Growth, WhatTheFrameBeforeHadThereMayBeCoveredByNow) {
       f.move(line);
       f.lose(line, kBoundaries - 1);
     }
-    return growth.grow({f.picture.view(), f.colours}, f.result, f.edges, f.recovered);
+    return growth.grow({f.picture.view(), f.colours}, f.edges, f.result, f.recovered);
   };
   EXPECT_EQ(grown(kLines), 0U) << "all are there";
   EXPECT_EQ(grown(12), 0U);

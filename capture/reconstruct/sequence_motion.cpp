@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// SequenceDecoder's check of edges that move. One slide's colours repeat along the pattern, and beside a
+// silhouette that moves on the other slide's frame shows the surface behind: then a run of edges is easily
+// taken for one of other boundaries. But how far an edge moves is measured, and so is where boundaries were.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr float kOff_px = 2;               // between where a boundary was and where its edge's motion says,
+constexpr float kOffShare = 0.2F;          // and of that motion more
+constexpr std::uint32_t kLeastInARow = 3;  // edges that confirm a run, whatever its others do
+constexpr int kLines = 2;                  // above and below, on which that is looked for
+
+}  // namespace
+
+/// Whether a boundary was, in the frame before, where the motion of an edge puts it then.
+bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e,
+                                        const SequenceContext& context, int boundary) const {
+  const float column = edges.edges[e].column_px;
+  const float motion = context.motion->at(line, column);
+  const float moved =
+      context.motion->between_frames(*context.before_motion, line, column, context.before_fields);
+  const float was = column - moved;
+  const float off = kOff_px + kOffShare * std::fabs(moved);
+  for (int l = std::max(0, line - kLines); l <= std::min(edges.lines - 1, line + kLines); ++l) {
+    const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
+                              static_cast<std::size_t>(boundary);
+    const float before_px = (*context.before_px)[place];
+    if (!(std::fabs(before_px - was) < off)) continue;
+    if (std::fabs(context.before_motion->at(l, before_px) - motion) < FieldMotion::kSurface_px) return true;
+  }
+  return false;
+}
+
+/// Whether an edge that moves cannot be a boundary by where that was before.
+bool SequenceDecoder::unconfirmed(const EdgeImage& edges, int line, std::uint32_t e,
+                                  const SequenceContext& context, int boundary) const {
+  if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line))
+    return false;
+  return !beside_[e].tracked && !moved_as_measured(edges, line, e, context, boundary);
+}
+
+/// Gives up edges on lines where something moves that the frame before does not confirm.
+void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const SequenceContext& context,
+                                   Scratch& scratch, SequenceResult& out) {
+  const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
+  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  float* seen = out.seen_px.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
+  std::fill_n(seen, boundaries_, kNone);
+  for (std::uint32_t e = begin; e < end; ++e)
+    if (out.boundary[e] >= 0) seen[out.boundary[e]] = edges.edges[e].column_px;
+  if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line)) return;
+  // Runs of edges that follow each other on one surface are judged together: at its ends a surface comes into
+  // view, where nothing was before.
+  for (std::uint32_t e = begin; e < end;) {
+    const std::uint32_t first = e;
+    float motion = context.motion->at(line, edges.edges[e].column_px);
+    std::uint32_t confirmed = 0;
+    std::uint32_t in_a_row = 0;
+    std::uint32_t most_in_a_row = 0;
+    bool goes_on = true;
+    while (goes_on) {
+      const int boundary = out.boundary[e];
+      const bool is_confirmed = boundary >= 0 && !unconfirmed(edges, line, e, context, boundary);
+      confirmed += is_confirmed;
+      in_a_row = is_confirmed ? in_a_row + 1 : 0;
+      most_in_a_row = std::max(most_in_a_row, in_a_row);
+      if (++e == end) break;
+      const float before = motion;
+      motion = context.motion->at(line, edges.edges[e].column_px);
+      goes_on = boundary >= 0 && out.boundary[e] == boundary + 1 &&
+                std::fabs(motion - before) < FieldMotion::kSurface_px;
+    }
+    if (2 * confirmed >= e - first || most_in_a_row >= kLeastInARow) continue;
+    for (std::uint32_t i = first; i < e; ++i) {
+      scratch.in_order -= out.boundary[i] >= 0;
+      out.boundary[i] = -1;
+    }
+  }
+}
+
+}  // namespace relievo
