@@ -69,9 +69,11 @@ bool complement_on_even_rows(const CapturedFrame& frame) {
   return frame.scan == Scan::kInterlaced && frame.field_order == FieldOrder::kBottom;
 }
 
-/// `out` is `row` of RGB where columns are `share` of `motion_px` further on, 0 beyond the ends of it.
+/// `out` is `row` of RGB where columns are `share` of `motion_px` further on, its ends beyond them.
 void shift_row(const std::uint8_t* row, const float* motion_px, float share, int width, std::uint8_t* out) {
+  std::copy_n(row, 3 * static_cast<std::size_t>(width), out);  // most holds still on most lines
   for (int x = 0; x < width; ++x) {
+    if (motion_px[x] == 0) continue;
     const float from =
         std::clamp(static_cast<float>(x) + share * motion_px[x], 0.F, static_cast<float>(width) - 1.001F);
     const int first = static_cast<int>(from);

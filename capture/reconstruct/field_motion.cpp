@@ -42,7 +42,15 @@ float FieldMotion::between_frames(const FieldMotion& before, int line, float col
 }
 
 void FieldMotion::of_columns(int line, int count, float* out) const {
-  for (int x = 0; x < count; ++x) out[x] = between(line, static_cast<float>(x));
+  const float* row =
+      px.data() + static_cast<std::size_t>(line / kCellLines) * static_cast<std::size_t>(cells);
+  for (int cell = 0; cell < cells; ++cell) {
+    const int begin = cell * kCellWidth;
+    const int end = std::min(begin + kCellWidth, count);
+    const bool still =
+        row[cell] == 0 && row[std::max(cell - 1, 0)] == 0 && row[std::min(cell + 1, cells - 1)] == 0;
+    for (int x = begin; x < end; ++x) out[x] = still ? 0.F : between(line, static_cast<float>(x));
+  }
 }
 
 std::uint32_t* MotionFinder::costs(int cell_row, int shift_px) {
