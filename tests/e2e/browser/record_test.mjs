@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: where the server has no folder for recordings, the record button saves what the page
-// keeps and what follows as a recording that `relievo` reads whole and the page shows as it was.
+// keeps and what follows as a recording that `relievo` reads whole and the page shows as it was; where it has one, the
+// server records there, with what came before, and lists the file.
 // Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, rmSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, readdirSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -14,10 +15,15 @@ import { Server } from './server.mjs';
 const [serverPath, relievoPath] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-record-'));
 const saved = join(scratch, 'saved.mcap');
-const server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5']);
+const folder = join(scratch, 'folder');
+mkdirSync(folder);
+const serve = ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5'];
+const server = await Server.start(serverPath, serve);
+const recordingServer = await Server.start(serverPath, [...serve, '--stream', 'kept', '--record-dir', folder, '--pre-roll', '30s']);
 const browser = await launchChromium();
 const complaints = [];
 const { open } = pagesOf(browser, server.address, complaints);
+const { open: openRecording } = pagesOf(browser, recordingServer.address, complaints);
 const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
 const kKept = 12;
 let last; // the surface shown last while it was recorded
@@ -74,6 +80,29 @@ const checks = {
     assert.equal((await look(page)).errors, 0);
   },
 
+  async 'a server with a folder records there'() {
+    const page = await openRecording();
+    await shownPast(page, 4);
+    const { shown } = await look(page);
+    await page.click('#tool-record');
+    await page.waitForFunction(() => document.querySelector('#tool-record').getAttribute('aria-pressed') === 'true');
+    await shownPast(page, shown + 3);
+    await page.click('#tool-record');
+    await page.waitForFunction(() => /kept-.*\.mcap/.test(document.querySelector('#recording').textContent));
+    assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'false');
+    let listed;
+    await eventually('the file is not listed', async () => {
+      listed = await page.evaluate(async () => (await (await fetch('api/recordings')).json()).recordings[0]);
+      return listed !== undefined;
+    });
+    assert.deepEqual(readdirSync(folder), [listed.file]);
+    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, listed.file)], { encoding: 'utf8' }));
+    assert.equal(told.stream, 'kept');
+    assert.ok(told.frames >= shown - 1 + 3, `${told.frames} frames, ${shown} shown before`);
+    assert.equal(told.damaged_parts, 0);
+    await page.close();
+  },
+
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder, or knows no such thing.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);
@@ -87,6 +116,7 @@ try {
 } finally {
   await browser.close();
   await server.kill();
+  await recordingServer.kill();
   rmSync(scratch, { recursive: true, force: true });
 }
 process.exit(failed === 0 ? 0 : 1);
