@@ -103,6 +103,30 @@ const checks = {
     await page.close();
   },
 
+  async 'a link to a recording in the folder shows it at its time'() {
+    const page = await openRecording();
+    await page.click('#tool-streams');
+    await page.click('#panel-streams li:has-text(".mcap") button:has-text("Show")');
+    await inState(page, 'file');
+    assert.match(page.url(), /\/\?recording=kept-[^#&]*\.mcap$/);
+    await page.waitForFunction(() => !window.relievo.diagnostics().playback.playing); // at its end
+    await page.focus('#view');
+    await page.keyboard.press('Home');
+    for (let i = 0; i < 3; ++i) await page.keyboard.press('.');
+    await eventually('the fourth frame is not shown', async () => (await playback(page)).index === 3);
+    await page.waitForFunction(() => !window.relievo.diagnostics().busy);
+    const link = await page.evaluate(() => window.relievo.link());
+    const { number } = await page.evaluate(() => window.relievo.surface());
+    const file = await page.evaluate(() => window.relievo.diagnostics().file);
+    await page.close();
+    const other = await openRecording(link.slice(recordingServer.address.length));
+    await other.waitForFunction((n) => window.relievo.diagnostics().frame === n, number);
+    assert.equal((await look(other)).file, file);
+    const now = await playback(other);
+    assert.deepEqual([now.index, now.playing], [3, false]);
+    await other.close();
+  },
+
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder, or knows no such thing.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);

@@ -45,6 +45,23 @@ async function seek(page, index) {
   }, times[index] + 1e-3);
 }
 
+/** `relievo web` of the recording; stop() ends it. */
+async function startWeb(options = []) {
+  const web = spawn(relievoPath, ['web', recorded, '--listen', '127.0.0.1:0', ...options, '--domain', process.env.RELIEVO_TEST_DOMAIN], {
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
+  const ended = new Promise((resolve) => web.once('exit', resolve));
+  const said = await new Promise((resolve, reject) => {
+    web.stdout.once('data', (data) => resolve(String(data)));
+    web.once('exit', (code) => reject(new Error(`relievo web ended with ${code}`)));
+  });
+  const stop = async () => {
+    web.kill('SIGTERM');
+    await ended;
+  };
+  return { address: said.trim().replace('viewer ', ''), stop };
+}
+
 const surfaces = new Map(); // by camera frame, as they came one after the other
 let numbers = []; // of the camera frames, in order
 
@@ -203,15 +220,8 @@ const checks = {
   async 'a recording of the server plays for each page by itself, once the person has a token'() {
     const tokens = join(scratch, 'tokens');
     writeFileSync(tokens, 'a-token-for-this-test\n', { mode: 0o600 });
-    const web = spawn(relievoPath, ['web', recorded, '--listen', '127.0.0.1:0', '--token-file', tokens, '--domain', process.env.RELIEVO_TEST_DOMAIN], {
-      stdio: ['ignore', 'pipe', 'inherit'],
-    });
+    const { address, stop } = await startWeb(['--token-file', tokens]);
     try {
-      const said = await new Promise((resolve, reject) => {
-        web.stdout.once('data', (data) => resolve(String(data)));
-        web.once('exit', (code) => reject(new Error(`relievo web ended with ${code}`)));
-      });
-      const address = said.trim().replace('viewer ', '');
       const context = await browser.newContext({ viewport: { width: 800, height: 500 } });
       const pages = [await context.newPage(), await context.newPage()];
       for (const page of pages) page.setDefaultTimeout(kPatienceMs);
@@ -235,9 +245,46 @@ const checks = {
       }
       await context.close();
     } finally {
-      const ended = new Promise((resolve) => web.once('exit', resolve));
-      web.kill('SIGTERM');
-      await ended;
+      await stop();
+    }
+  },
+
+  async 'a link to a recording of the server restores time, view and whether it plays'() {
+    const { address, stop } = await startWeb();
+    const { open: openThere } = pagesOf(browser, address.replace(/\/$/, ''), complaints);
+    const follow = (link) => openThere(link.slice(address.length - 1));
+    try {
+      const page = await openThere('/?stream=object');
+      await inState(page, 'file');
+      await page.waitForFunction(() => window.relievo.diagnostics().playback?.playing === false);
+      await seek(page, 13);
+      await onFrame(page, numbers[13]);
+      await page.keyboard.press('ArrowLeft');
+      await still(page);
+      const pose = await page.evaluate(() => window.relievo.pose());
+      const link = await page.evaluate(() => window.relievo.link());
+      assert.match(link, /\?stream=object#.*&time=\d+\.\d{3}&play=0$/);
+      await page.close();
+
+      const other = await follow(link);
+      await inState(other, 'file');
+      await onFrame(other, numbers[13]);
+      await still(other);
+      const now = await playback(other);
+      assert.equal(now.index, 13);
+      assert.equal(now.playing, false);
+      assert.equal((await shownSurface(other)).hash, surfaces.get(numbers[13]));
+      const { position } = await other.evaluate(() => window.relievo.pose());
+      for (const i of [0, 1, 2]) assert.ok(Math.abs(position[i] - pose.position[i]) < 1e-3, `${position}, not ${pose.position}`);
+      await other.close();
+
+      const playing = await follow(link.replace('play=0', 'play=1'));
+      await playing.waitForFunction((n) => window.relievo.diagnostics().frame > n, numbers[13]);
+      await eventually('it does not play to its end', async () => (await playback(playing)).index === numbers.length - 1);
+      assert.equal((await look(playing)).errors, 0);
+      await playing.close();
+    } finally {
+      await stop();
     }
   },
 

@@ -82,6 +82,17 @@ const onFeeder = {
     await page.waitForFunction(() => document.querySelector('#badge-text').textContent === 'Paused');
   },
 
+  async 'a link says the time of day, and whoever has not kept it is told'(page) {
+    const link = await page.evaluate(() => window.relievo.link());
+    assert.match(link, /&time=\d{4}-\d\d-\d\dT[^&]*Z&play=0$/);
+    const other = await open(link.slice(new URL(link).origin.length));
+    await inState(other, 'live');
+    await other.waitForFunction(() => /is not kept any more/.test(document.querySelector('#source').textContent));
+    await shownPast(other, 1);
+    assert.match(await other.evaluate(() => window.relievo.link()), /&time=live$/);
+    await other.close();
+  },
+
   async 'each frame that was is the one it was'(page) {
     const { first, index } = await playback(page);
     await seek(page, index - 4);

@@ -9,17 +9,15 @@ import { fillHelp } from './helpPanel';
 import { listenToKeys } from './keys';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
-import { crc32 } from './crc32';
 import { MeasurePanel } from './measurePanel';
 import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Picture } from './picture';
-import { pixelsOf, type PixelReport } from './pixels';
 import type { DecodedFrame } from './messages';
-import type { Pose } from './navigator';
 import type { ListedStream, StreamList } from './protocol';
 import { RecordControl } from './recordControl';
-import { readShared, shareLink } from './share';
+import { report } from './reports';
+import { momentOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
@@ -47,7 +45,8 @@ class Viewer {
   private readonly session: Session;
   readonly view: View | null;
   private display: Display;
-  private sharedPose: Pose | null; // of a link, until there is a surface
+  private shared: Shared | null; // by the link that was opened, until something else is chosen
+  private posed = false; // the link's view is shown
 
   private problem: string | null = null;
   private listed = false; // the last list arrived
@@ -61,6 +60,7 @@ class Viewer {
   private stream: string | null = null;
   private triedRecording = false; // of that stream
   private file: string | null = null; // shown instead of a stream
+  private serverFile: string | null = null; // the same where it is one of the server's
   private fileProblem: { name: string; why: string } | null = null;
   private presentation: Presentation | null = null;
 
@@ -76,9 +76,8 @@ class Viewer {
         this.nextListAt = 0;
       },
     });
-    const shared = readShared(location.hash, loadDisplay());
-    this.display = shared.display;
-    this.sharedPose = shared.pose;
+    this.shared = readShared(location.hash, loadDisplay());
+    this.display = this.shared.display;
     this.view = this.makeView();
     this.session = new Session({
       changed: () => this.refresh(),
@@ -101,14 +100,22 @@ class Viewer {
     fillHelp(this.panels.panel('help', text.help.title));
     this.listen();
     this.change({});
-    const [asked, ...besides] = (new URLSearchParams(location.search).get('stream') ?? '').split(',').filter((n) => n !== '');
+    this.openAddressed(new URLSearchParams(location.search));
+    window.setInterval(() => this.refresh(), kRefreshMs);
+    this.refresh();
+  }
+
+  private openAddressed(address: URLSearchParams): void {
+    const [asked, ...besides] = (address.get('stream') ?? '').split(',').filter((n) => n !== '');
+    const recording = address.get('recording');
     if (asked !== undefined) {
       this.chosenByPerson = true;
       this.watch(asked);
       this.wantedBesides = besides.filter((name) => name !== asked);
+    } else if (recording !== null) {
+      this.chosenByPerson = true;
+      void this.openServerFile(recording, this.shared).then(() => (this.chosenByPerson = this.file !== null));
     }
-    window.setInterval(() => this.refresh(), kRefreshMs);
-    this.refresh();
   }
 
   /** From now on; kept for the next visit. */
@@ -185,7 +192,7 @@ class Viewer {
         else this.companions?.remove(name);
         this.writeAddress();
       },
-      recording: (file) => void this.openServerFile(file),
+      recording: (file) => void this.openServerFile(file, null),
       placement: (placement) => {
         if (this.view !== null) this.view.placement = placement;
       },
@@ -214,7 +221,9 @@ class Viewer {
   link(): string {
     const navigator = this.view?.navigator;
     const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
-    return shareLink(location.href, this.shownStreams, this.display, pose);
+    const playback = this.session.source?.playback;
+    const moment = playback === undefined || playback.times.length === 0 ? null : momentOf(playback);
+    return shareLink(location.href, this.addressed, this.display, pose, moment);
   }
 
   // What the decoder should bring along.
@@ -268,26 +277,30 @@ class Viewer {
 
   private choose(name: string): void {
     this.chosenByPerson = true;
+    this.shared = null;
     for (const beside of this.companions?.names ?? []) this.companions!.remove(beside);
     this.watch(name);
     this.writeAddress();
   }
 
-  private get shownStreams(): string | null {
-    return this.stream === null ? null : [this.stream, ...(this.companions?.names ?? [])].join(',');
+  /** What of the server is shown, as an address says it. */
+  private get addressed(): Shown | null {
+    if (this.stream === null) return this.serverFile === null ? null : { kind: 'recording', name: this.serverFile };
+    return { kind: 'stream', name: [this.stream, ...(this.companions?.names ?? [])].join(',') };
   }
 
   private writeAddress(): void {
-    if (this.shownStreams === null) return;
+    if (this.addressed === null) return;
     const url = new URL(location.href);
-    url.search = `?stream=${this.shownStreams}`; // names hold no character that would have to be escaped
+    url.search = `?${this.addressed.kind}=${this.addressed.name}`; // names hold no character that would have to be escaped
+    if (this.shared === null) url.hash = ''; // was of something else
     history.replaceState(null, '', url);
   }
 
   private watch(name: string): void {
     if (name === this.stream) return;
     this.stream = name;
-    this.file = null;
+    this.file = this.serverFile = null;
     this.note = '';
     this.triedRecording = false;
     if (this.view !== null) this.view.name = name;
@@ -304,14 +317,16 @@ class Viewer {
   /** A stream that is played from a file is watched by the file, each page at its own place of it. */
   private async preferRecording(): Promise<void> {
     const listed = this.streams.find((s) => s.name === this.stream);
-    if (this.triedRecording || typeof listed?.recording !== 'string') return;
+    if (this.triedRecording || listed === undefined) return;
+    if (typeof listed.recording !== 'string') return this.missMoment();
     this.triedRecording = true;
     try {
       const opened = await openRemote(new URL(listed.recording, document.baseURI));
       if (this.stream !== listed.name) return;
       this.view?.restart(null, false);
+      this.posed = false; // the stream's own frames may have been shown meanwhile
       this.record.watch(null);
-      this.session.watch(opened.source);
+      this.session.watch((events) => opened.source(events, this.shared?.moment));
       this.note = opened.note ?? '';
       this.timeline.show(this.session.source?.playback ?? null);
     } catch (error) {
@@ -320,32 +335,48 @@ class Viewer {
     this.refresh();
   }
 
-  private openFile(file: File): Promise<void> {
+  // A live stream is kept by the pages that watched it, not by the server.
+  private missMoment(): void {
+    if ((this.shared?.moment ?? null) === null) return;
+    this.shared = { ...this.shared!, moment: null };
+    this.note = text.momentGone;
+  }
+
+  private openFile(file: File): Promise<boolean> {
     return this.showFile(file.name, () => openFile(file));
   }
 
-  private openServerFile(name: string): Promise<void> {
-    return this.showFile(name, () => openRemote(new URL(`recordings/${encodeURIComponent(name)}`, document.baseURI)));
+  private async openServerFile(name: string, shared: Shared | null): Promise<void> {
+    const open = (): Promise<Opened> => openRemote(new URL(`recordings/${encodeURIComponent(name)}`, document.baseURI));
+    if (!(await this.showFile(name, open, shared))) return;
+    this.serverFile = name;
+    this.writeAddress();
   }
 
-  private async showFile(name: string, open: () => Promise<Opened>): Promise<void> {
+  /** Whether it is shown. */
+  private async showFile(name: string, open: () => Promise<Opened>, shared: Shared | null = null): Promise<boolean> {
+    let shown = false;
     try {
       const opened = await open();
       this.chosenByPerson = true;
       this.stream = null;
       this.file = name;
+      this.serverFile = null;
+      this.shared = shared;
       if (this.view !== null) this.view.name = name;
       this.fileProblem = null;
       this.view?.restart(null, false);
       this.record.watch(null);
-      this.session.watch(opened.kind === 'recording' ? opened.source : null);
+      this.session.watch(opened.kind === 'recording' ? (events) => opened.source(events, shared?.moment) : null);
       this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';
       if (opened.kind === 'surface') this.show(opened.frame);
+      shown = true;
     } catch (error) {
       this.fileProblem = { name, why: error instanceof Error ? error.message : String(error) };
     }
     this.timeline.show(this.session.source?.playback ?? null);
     this.refresh();
+    return shown;
   }
 
   // On the screen's beat.
@@ -362,10 +393,9 @@ class Viewer {
     if (this.view === null) return;
     this.view.show(frame);
     this.ui.showNotice(frame.notice);
-    if (this.sharedPose !== null) {
-      if (!this.view.navigator.isRigView) this.view.navigator.pose = this.sharedPose;
-      this.sharedPose = null;
-    }
+    const pose = this.posed ? null : (this.shared?.pose ?? null);
+    this.posed = true;
+    if (pose !== null && !this.view.navigator.isRigView) this.view.navigator.pose = pose;
     this.view.invalidate();
     this.picture.show(frame.texture);
     this.wish();
@@ -442,43 +472,4 @@ class Viewer {
   }
 }
 
-declare global {
-  interface Window {
-    /** For tests and bug reports; not a stable interface. */
-    relievo: {
-      diagnostics(): object;
-      readPixels(): PixelReport | null;
-      /** RGBA at a place of the canvas, in pixels of the page. */
-      pixelAt(x: number, y: number): number[];
-      pick(x: number, y: number): object | null;
-      toPage(point: [number, number, number]): object | null;
-      pose(): object | null;
-      link(): string;
-      extent(): object | null;
-      /** The surface shown, told apart from others by a hash of its numbers. */
-      surface(): { number: number; hash: number } | null;
-    };
-  }
-}
-
-const viewer = new Viewer();
-window.relievo = {
-  diagnostics: () => viewer.diagnostics(),
-  readPixels: () => viewer.view?.readPixels() ?? null,
-  pixelAt: (x, y) => {
-    const { width, height, rgba } = pixelsOf(viewer.view!.still());
-    const { clientWidth, clientHeight } = viewer.view!.canvas;
-    const column = Math.floor((x / clientWidth) * width);
-    const row = height - 1 - Math.floor((y / clientHeight) * height);
-    return [...rgba.slice((row * width + column) * 4, (row * width + column) * 4 + 4)];
-  },
-  pick: (x, y) => viewer.view?.pick({ x, y }) ?? null,
-  toPage: (point) => viewer.view?.navigator.toPage(point) ?? null,
-  extent: () => viewer.view?.shown?.extent ?? null,
-  surface: () => {
-    const frame = viewer.view?.shown ?? null;
-    return frame === null ? null : { number: frame.number, hash: crc32(new Uint8Array(frame.positions.buffer)) };
-  },
-  link: () => viewer.link(),
-  pose: () => viewer.view?.navigator.pose ?? null,
-};
+report(new Viewer());

@@ -2,11 +2,11 @@
 // What kind of file it is, and what to read it with. The readers are loaded when they are needed.
 import type { Bytes } from './mcap';
 import type { DecodedFrame } from './messages';
-import type { FrameSource, SourceEvents } from './source';
+import type { FrameSource, Moment, SourceEvents } from './source';
 
 export interface OpenedRecording {
   kind: 'recording';
-  source(events: SourceEvents): FrameSource;
+  source(events: SourceEvents, begin?: Moment | null): FrameSource;
   note: string | null;
 }
 
@@ -17,7 +17,7 @@ export type Opened =
 async function openRecording(bytes: Bytes): Promise<OpenedRecording> {
   const [{ Recording }, { RecordingSource }] = await Promise.all([import('./recording'), import('./recordingSource')]);
   const recording = await Recording.open(bytes);
-  return { kind: 'recording', source: (events) => new RecordingSource(recording, events), note: recording.damage };
+  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage };
 }
 
 /** A recording of the server. Throws as openFile. */

@@ -1,14 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-// A link that shows somebody else the same: stream, view and display. The part behind # is not sent to any server. Pure.
+// A link that shows somebody else the same: stream or recording, time, view and display. The part behind # is not sent to any server. Pure.
 import { parseDisplay, writeDisplay, type Display } from './display';
 import type { Pose } from './navigator';
 import type { Vec3 } from './pick';
+import type { Moment, Playback } from './source';
+
+/** What a link is of: streams of the server, the first and those beside it, or a recording in its folder. */
+export interface Shown {
+  readonly kind: 'stream' | 'recording';
+  readonly name: string;
+}
+
+export interface Shared {
+  readonly display: Display;
+  readonly pose: Pose | null;
+  readonly moment: Moment | null;
+}
+
+/** The time that is shown. Of a live stream: none, or that of day where a person went back in it. */
+export function momentOf(playback: Playback): Moment | 'live' {
+  const { position, startMs, following, playing } = playback;
+  if (following === true) return 'live';
+  const utc = following === false;
+  return { atMs: position + (utc ? startMs : 0), utc, playing };
+}
 
 /** Over the address of the page; `pose` null: the first view. */
-export function shareLink(page: string, stream: string | null, display: Display, pose: Pose | null): string {
+export function shareLink(
+  page: string,
+  shown: Shown | null,
+  display: Display,
+  pose: Pose | null,
+  moment: Moment | 'live' | null,
+): string {
   const url = new URL(page);
   url.search = '';
-  if (stream !== null) url.searchParams.set('stream', stream);
+  if (shown !== null) url.searchParams.set(shown.kind, shown.name);
   const state = writeDisplay(display, null);
   state.delete('theme'); // is the reader's own
   if (pose !== null) {
@@ -16,12 +43,16 @@ export function shareLink(page: string, stream: string | null, display: Display,
     state.set('eye', write(pose.position));
     state.set('at', write(pose.target));
   }
+  if (shown !== null && moment !== null) {
+    state.set('time', moment === 'live' ? 'live' : timeText(moment));
+    if (moment !== 'live') state.set('play', moment.playing ? '1' : '0');
+  }
   url.hash = state.toString();
   return url.href;
 }
 
 /** What a link's part behind # asks for; any input. */
-export function readShared(hash: string, fallback: Display): { display: Display; pose: Pose | null } {
+export function readShared(hash: string, fallback: Display): Shared {
   const text = hash.replace(/^#/, '');
   const given = new URLSearchParams(text);
   const read = (key: string): Vec3 | null => {
@@ -30,5 +61,20 @@ export function readShared(hash: string, fallback: Display): { display: Display;
   };
   const [position, target] = [read('eye'), read('at')];
   const apart = position !== null && target !== null && position.some((c, i) => Math.abs(c - target[i]!) > 1e-6);
-  return { display: parseDisplay(text, fallback), pose: apart ? { position: position!, target: target! } : null };
+  const pose = apart ? { position: position!, target: target! } : null;
+  return { display: parseDisplay(text, fallback), pose, moment: readMoment(given) };
+}
+
+// Rounded up: a frame is there from its time on.
+function timeText({ atMs, utc }: Moment): string {
+  const whole = Math.ceil(atMs);
+  return utc ? new Date(whole).toISOString() : (whole / 1000).toFixed(3);
+}
+
+function readMoment(given: URLSearchParams): Moment | null {
+  const time = given.get('time') ?? '';
+  const playing = given.get('play') !== '0';
+  if (/^\d{1,7}(\.\d{1,3})?$/.test(time)) return { atMs: Math.round(Number(time) * 1000), utc: false, playing };
+  const atMs = /^\d{4}-\d\d-\d\dT[\d:.]+Z$/.test(time) ? Date.parse(time) : NaN;
+  return Number.isNaN(atMs) ? null : { atMs, utc: true, playing };
 }

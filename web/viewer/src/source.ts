@@ -35,6 +35,13 @@ export interface Kept {
   readonly limits: { readonly ms: number; readonly bytes: number };
 }
 
+/** A time to begin at, and whether it plays from there. */
+export interface Moment {
+  readonly atMs: number; // since the recording's start, or UTC where `utc`
+  readonly utc: boolean;
+  readonly playing: boolean;
+}
+
 /** What a time line drives: a source that can show more than what comes next. Times in ms from `startMs`. */
 export interface Playback {
   readonly times: Float64Array; // of the frames there are; of a live stream it changes

@@ -6,7 +6,8 @@ import { kDefaultDisplay } from '../src/display';
 import { writeGlb } from '../src/exportGlb';
 import { writePly } from '../src/exportPly';
 import type { Surface } from '../src/pick';
-import { readShared, shareLink } from '../src/share';
+import { momentOf, readShared, shareLink } from '../src/share';
+import type { Moment, Playback } from '../src/source';
 
 const surface: Surface = {
   positions: new Float32Array([0, 0, 1, 0.5, 0, 1, 0.5, 0.5, 2]),
@@ -21,17 +22,42 @@ describe('a link', () => {
   const pose = { position: [0.1, -0.25, 1.5], target: [0, 0, -1] } as { position: [number, number, number]; target: [number, number, number] };
 
   it('brings back stream, display and view, but not the theme', () => {
-    const link = new URL(shareLink('http://host:8080/?stream=old&x=1#mode=points', 'face', display, pose));
+    const link = new URL(shareLink('http://host:8080/?stream=old&x=1#mode=points', { kind: 'stream', name: 'face' }, display, pose, 'live'));
     expect(link.searchParams.get('stream')).toBe('face');
     expect([...link.searchParams.keys()]).toEqual(['stream']);
     const shared = readShared(link.hash, kDefaultDisplay);
     expect(shared.display).toEqual({ ...display, theme: 'auto' });
     expect(shared.pose).toEqual(pose);
+    expect(new URLSearchParams(link.hash.slice(1)).get('time')).toBe('live');
+    expect(shared.moment).toBeNull();
   });
+
+  const recording = { kind: 'recording', name: 'face-2026-11-22T07-05-00Z.mcap' } as const;
+  const momentBack = (moment: Moment): Moment | null =>
+    readShared(new URL(shareLink('http://host/', recording, display, null, moment)).hash, kDefaultDisplay).moment;
+
+  it('brings back the time, not before the frame that is there since a part of a millisecond', () => {
+    expect(momentBack({ atMs: 166.333, utc: false, playing: false })).toEqual({ atMs: 167, utc: false, playing: false });
+    expect(momentBack({ atMs: 3_600_000, utc: false, playing: true })).toEqual({ atMs: 3_600_000, utc: false, playing: true });
+    expect(momentBack({ atMs: 1_795_338_300_000.25, utc: true, playing: false })?.atMs).toBe(1_795_338_300_001);
+    expect(new URL(shareLink('http://host/', recording, display, null, null)).search).toBe(`?recording=${recording.name}`);
+  });
+
+  it('says the time of day where a person went back in a live stream', () => {
+    const playback = { position: 500, startMs: 1_795_338_300_000, playing: true } as Playback;
+    expect(momentOf({ ...playback, following: true })).toBe('live');
+    expect(momentOf({ ...playback, following: false })).toEqual({ atMs: 1_795_338_300_500, utc: true, playing: true });
+    expect(momentOf({ ...playback, following: null })).toEqual({ atMs: 500, utc: false, playing: true });
+  });
+
+  it.each(['', 'time=', 'time=live', 'time=-1', 'time=1e9', 'time=NaN', 'time=2026-13-45T00:00:00Z', 'time=12345678'])(
+    'without a time that makes sense has none: %s',
+    (hash) => expect(readShared(hash, kDefaultDisplay).moment).toBeNull(),
+  );
 
   it.each(['', '#', '#eye=1_2&at=0_0_0', '#eye=1_2_x&at=0_0_0', '#eye=1__2&at=0_0_0', '#eye=1_1_1&at=1_1_1', '#eye=1e99_0_0&at=0_0_0', '#eye=0_0_1'])(
     'without a whole view shows the first one: %s',
-    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null }),
+    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null, moment: null }),
   );
 });
 

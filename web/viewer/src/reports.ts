@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the page tells tests and bug reports of itself.
+import { crc32 } from './crc32';
+import { pixelsOf, type PixelReport } from './pixels';
+import type { View } from './view';
+
+declare global {
+  interface Window {
+    /** For tests and bug reports; not a stable interface. */
+    relievo: {
+      diagnostics(): object;
+      readPixels(): PixelReport | null;
+      /** RGBA at a place of the canvas, in pixels of the page. */
+      pixelAt(x: number, y: number): number[];
+      pick(x: number, y: number): object | null;
+      toPage(point: [number, number, number]): object | null;
+      pose(): object | null;
+      link(): string;
+      extent(): object | null;
+      /** The surface shown, told apart from others by a hash of its numbers. */
+      surface(): { number: number; hash: number } | null;
+    };
+  }
+}
+
+export interface Reporting {
+  readonly view: View | null;
+  diagnostics(): object;
+  link(): string;
+}
+
+export function report(viewer: Reporting): void {
+  window.relievo = {
+    diagnostics: () => viewer.diagnostics(),
+    readPixels: () => viewer.view?.readPixels() ?? null,
+    pixelAt: (x, y) => {
+      const { width, height, rgba } = pixelsOf(viewer.view!.still());
+      const { clientWidth, clientHeight } = viewer.view!.canvas;
+      const column = Math.floor((x / clientWidth) * width);
+      const row = height - 1 - Math.floor((y / clientHeight) * height);
+      return [...rgba.slice((row * width + column) * 4, (row * width + column) * 4 + 4)];
+    },
+    pick: (x, y) => viewer.view?.pick({ x, y }) ?? null,
+    toPage: (point) => viewer.view?.navigator.toPage(point) ?? null,
+    extent: () => viewer.view?.shown?.extent ?? null,
+    surface: () => {
+      const frame = viewer.view?.shown ?? null;
+      return frame === null ? null : { number: frame.number, hash: crc32(new Uint8Array(frame.positions.buffer)) };
+    },
+    link: () => viewer.link(),
+    pose: () => viewer.view?.navigator.pose ?? null,
+  };
+}
