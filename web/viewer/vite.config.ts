@@ -1,17 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
+import { createHash } from 'node:crypto';
+import { readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import type { Plugin } from 'vite';
 import { defineConfig } from 'vitest/config';
+
+const kServiceWorker = 'sw.js';
+
+/** Tells the service worker what the page is made of. */
+const listFiles: Plugin = {
+  name: 'relievo-list-files',
+  apply: 'build',
+  writeBundle({ dir }) {
+    const all = readdirSync(dir!, { recursive: true, encoding: 'utf8' }).sort();
+    const files = all.filter((file) => file !== kServiceWorker && statSync(join(dir!, file)).isFile());
+    const hash = createHash('sha256');
+    for (const file of files) hash.update(file).update(readFileSync(join(dir!, file)));
+    const worker = join(dir!, kServiceWorker);
+    const names = files.map((file) => (file === 'index.html' ? './' : file));
+    const code = readFileSync(worker, 'utf8')
+      .replaceAll('RELIEVO_FILES', JSON.stringify(names))
+      .replaceAll('RELIEVO_VERSION', JSON.stringify(hash.digest('hex').slice(0, 16)));
+    writeFileSync(worker, code);
+  },
+};
 
 // The gateway a developer's `npm run dev` page talks to.
 const gateway = process.env['RELIEVO_GATEWAY'] ?? 'http://127.0.0.1:8080';
 
 export default defineConfig({
   base: './',
+  plugins: [listFiles],
   build: {
     target: 'es2022',
     // Inlined assets would be data: URLs, which the gateway's content policy forbids for scripts and wasm.
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 1024,
     reportCompressedSize: false,
+    rollupOptions: {
+      input: { index: 'index.html', sw: 'src/serviceWorker.ts' },
+      // A service worker is told to be new by its content, at an address that stays.
+      output: { entryFileNames: ({ name }) => (name === 'sw' ? kServiceWorker : 'assets/[name]-[hash].js') },
+    },
   },
   worker: { format: 'es' },
   server: {

@@ -473,3 +473,7 @@ class Viewer {
 }
 
 report(new Viewer());
+// Only in secure contexts; without it the page needs its server, as before.
+if (import.meta.env.PROD && 'serviceWorker' in navigator) {
+  window.addEventListener('load', () => void navigator.serviceWorker.register('sw.js').catch(() => undefined));
+}

@@ -73,7 +73,8 @@ export function present(facts: Facts): Presentation {
     }
     const again =
       facts.retryInS === null || facts.retryInS <= 0 ? 'Trying again now.' : `Trying again in ${facts.retryInS} s.`;
-    const what = facts.seen ? 'What you see is the last picture that arrived. ' : '';
+    const files = 'Recordings and surfaces of this device open all the same. ';
+    const what = facts.seen ? 'What you see is the last picture that arrived. ' : facts.everConnected ? '' : files;
     return make('lost', 'Offline', { title: 'Connection lost', text: what + again, dim: true });
   }
   if (facts.stream === null) {
