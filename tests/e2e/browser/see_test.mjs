@@ -138,8 +138,9 @@ const checks = {
 
   async 'a double-click sets the pivot, which then stays in the middle'(page) {
     const { frame } = await look(page);
-    const pivot = pointOf(0.4, 0.6, frame);
+    const pivot = pointOf(0.4, 0.4, frame);
     const at = await toPage(page, pivot);
+    assert.equal(await page.evaluate(({ x, y }) => document.elementFromPoint(x, y).id, at), 'view');
     await page.mouse.dblclick(at.x, at.y);
     await still(page);
     for (const key of [null, 'ArrowLeft', 'ArrowUp']) {
@@ -172,6 +173,19 @@ const checks = {
     assert.ok(Math.hypot(...looked.target.map((t, i) => t - ahead.target[i])) > 0.01, 'looking around did nothing');
     await press(page, 'o');
     await press(page, 'r');
+  },
+
+  async 'what is said of a stalled stream covers no control'(page) {
+    await page.setViewportSize({ width: 700, height: 500 }); // the footer's parts stand above each other
+    await inState(page, 'stalled');
+    await eventually('the message stands over the time line', () =>
+      page.evaluate(() => {
+        const bottom = document.querySelector('#card').getBoundingClientRect().bottom;
+        return bottom > 0 && bottom < document.querySelector('#timeline').getBoundingClientRect().top;
+      }),
+    );
+    await page.setViewportSize({ width: kPage.width, height: kPage.height });
+    await still(page);
   },
 
   async 'fingers turn and zoom'() {

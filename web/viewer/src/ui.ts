@@ -32,6 +32,9 @@ export class Ui {
       events.stream((event.target as HTMLSelectElement).value);
       this.canvas.focus();
     };
+    // Its parts stand above each other where the page is narrow.
+    const footer = document.querySelector('footer')!;
+    new ResizeObserver(() => document.body.style.setProperty('--footer', `${footer.offsetHeight}px`)).observe(footer);
   }
 
   showState(state: Presentation, seen: boolean, dismissible: boolean): void {
