@@ -17,6 +17,8 @@
 namespace relievo::test {
 namespace {
 
+constexpr auto kLastOnesArrive = 6s;  // after the publisher is done, with what had to be sent again
+
 class NetworkTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { unavailable_ = Network::enter(); }
@@ -77,7 +79,7 @@ TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {
   const auto one_percent = recorder(2), five_percent = recorder(3);
   const auto server = publisher(200'000, kRate_Hz, kFrames, 2);
   ASSERT_TRUE(server->wait_for_text("done")) << server->err();
-  std::this_thread::sleep_for(1s);
+  std::this_thread::sleep_for(kLastOnesArrive);
   const Counts at_one = stop(*one_percent), at_five = stop(*five_percent);
   EXPECT_EQ(at_one.frames, kFrames);
   EXPECT_EQ(at_one.lost, 0);
@@ -100,7 +102,7 @@ TEST_F(NetworkTest, WhoIsStoppedOrCutOffComesBackKnowsWhatHeLostAndDisturbsNobod
   network.join(4);
   const std::int64_t back_ns = utc_now_ns();
   ASSERT_TRUE(server->wait_for_text("done")) << server->err();
-  std::this_thread::sleep_for(1s);
+  std::this_thread::sleep_for(kLastOnesArrive);
 
   const Counts all = stop(*steady);
   EXPECT_EQ(all.frames, kFrames);
