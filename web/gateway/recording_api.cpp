@@ -17,29 +17,17 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostListed = 1000;
 constexpr std::size_t kLongestName = 128;
 
-HttpReply line(int status, std::string text) {
-  HttpReply reply;
-  reply.status = status;
-  reply.body = std::move(text) + "\n";
-  reply.headers.emplace_back("Cache-Control", "no-store");
-  return reply;
-}
-
 HttpReply json(const Json& value) {
-  HttpReply reply;
-  reply.content_type = "application/json";
-  reply.body = value.dump(-1, ' ', false, Json::error_handler_t::replace);
-  reply.headers.emplace_back("Cache-Control", "no-store");
-  return reply;
+  return json_reply(value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 HttpReply no_folder() {
-  return line(404, "nothing is recorded here: start relievo-server serve with --record-dir DIR");
+  return text_reply(404, "nothing is recorded here: start relievo-server serve with --record-dir DIR");
 }
 
 HttpReply state_of(const std::string& stream, const RecordingControl& control) {
   const auto state = control.state(stream);
-  if (!state) return line(404, "there is no such stream here");
+  if (!state) return text_reply(404, "there is no such stream here");
   return json({{"state", to_string(state->activity)},
                {"file", state->file},
                {"frames", state->frames},
@@ -81,15 +69,15 @@ HttpReply recording_state(std::string_view stream, const RecordingControl* contr
 
 HttpReply order_recording(std::string_view stream, const HttpRequest& request, RecordingControl* control) {
   if (control == nullptr) return no_folder();
-  if (!is_json(request.content_type)) return line(415, "send application/json");
+  if (!is_json(request.content_type)) return text_reply(415, "send application/json");
   const auto order = nlohmann::json::parse(request.body, nullptr, false);
   const auto action = order.is_object() ? order.value("action", nlohmann::json()) : nlohmann::json();
   if (action != "start" && action != "stop")
-    return line(400, R"(send {"action":"start"} or {"action":"stop"})");
+    return text_reply(400, R"(send {"action":"start"} or {"action":"stop"})");
   const std::string name(stream);
-  if (!control->state(name)) return line(404, "there is no such stream here");
+  if (!control->state(name)) return text_reply(404, "there is no such stream here");
   const Status done = action == "start" ? control->start(name) : control->stop(name);
-  return done ? state_of(name, *control) : line(409, done.error().message);
+  return done ? state_of(name, *control) : text_reply(409, done.error().message);
 }
 
 HttpReply list_recordings(const RecordingControl* control) {

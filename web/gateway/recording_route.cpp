@@ -17,14 +17,6 @@ namespace {
 
 constexpr std::string_view kSuffix = ".mcap";
 
-HttpReply line(int status, std::string text) {
-  HttpReply reply;
-  reply.status = status;
-  reply.body = std::move(text) + "\n";
-  reply.headers.emplace_back("Cache-Control", "no-store");
-  return reply;
-}
-
 /// Another one where the file is another, or was written to.
 std::string etag_of(const struct stat& file) {
   char text[80];
@@ -50,19 +42,19 @@ std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) c
 }
 
 HttpReply recording_reply(std::string_view name, const HttpRequest& request, const RouteContext& context) {
-  if (!name.ends_with(kSuffix)) return line(404, "no recording has such a name");
+  if (!name.ends_with(kSuffix)) return text_reply(404, "no recording has such a name");
   auto file = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
   int follow = 0;
   if (!file && context.recordings != nullptr) {
     file = finished_recording(std::string(name), *context.recordings);
     follow = O_NOFOLLOW;  // what somebody links to from there is none of ours
   }
-  if (!file) return line(404, "there is no such recording");
+  if (!file) return text_reply(404, "there is no such recording");
   const int descriptor = open(file->c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
   struct stat status {};
   if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     if (descriptor >= 0) close(descriptor);
-    return line(404, "the recording is gone");
+    return text_reply(404, "the recording is gone");
   }
   const auto size = static_cast<std::uint64_t>(status.st_size);
   const std::string etag = etag_of(status);

@@ -11,9 +11,8 @@
 #include "web/gateway/sign_in.h"
 
 namespace relievo {
-namespace {
 
-HttpReply text(int status, std::string line) {
+HttpReply text_reply(int status, std::string line) {
   HttpReply reply;
   reply.status = status;
   reply.body = std::move(line) + "\n";
@@ -21,17 +20,19 @@ HttpReply text(int status, std::string line) {
   return reply;
 }
 
-HttpReply refused(Refusal why, int status, std::string line) {
-  HttpReply reply = text(status, std::move(line));
-  reply.refusal = why;
-  return reply;
-}
-
-HttpReply json(std::string body) {
+HttpReply json_reply(std::string body) {
   HttpReply reply;
   reply.content_type = "application/json";
   reply.body = std::move(body);
   reply.headers.emplace_back("Cache-Control", "no-store");
+  return reply;
+}
+
+namespace {
+
+HttpReply refused(Refusal why, int status, std::string line) {
+  HttpReply reply = text_reply(status, std::move(line));
+  reply.refusal = why;
   return reply;
 }
 
@@ -85,7 +86,7 @@ bool may_act(const HttpRequest& request, const RouteContext& context) {
 /// Upgrades to `target`, unless something speaks against it.
 HttpReply websocket(const HttpRequest& request, WsTarget target, const RouteContext& context) {
   if (!request.upgrade) {
-    HttpReply reply = text(426, "this address speaks WebSocket only");
+    HttpReply reply = text_reply(426, "this address speaks WebSocket only");
     reply.headers.emplace_back("Upgrade", "websocket");
     return reply;
   }
@@ -105,7 +106,7 @@ HttpReply websocket(const HttpRequest& request, WsTarget target, const RouteCont
 
 HttpReply stream_socket(const std::string& stream, const HttpRequest& request, const RouteContext& context) {
   if (!valid_stream_name(stream)) {
-    return text(400, "no stream has such a name: 1 to 64 of A-Z a-z 0-9 _ . - and no dot first");
+    return text_reply(400, "no stream has such a name: 1 to 64 of A-Z a-z 0-9 _ . - and no dot first");
   }
   return websocket(request, {.stream = stream, .subprotocol = {}}, context);
 }
@@ -123,9 +124,9 @@ bool offers(std::string_view subprotocols, std::string_view wanted) {
 }
 
 HttpReply foxglove_socket(const HttpRequest& request, const RouteContext& context) {
-  if (!context.foxglove) return text(404, "nothing here");
+  if (!context.foxglove) return text_reply(404, "nothing here");
   if (request.upgrade && !offers(request.subprotocols, kFoxgloveProtocol))
-    return text(400, "this address speaks the subprotocol " + std::string(kFoxgloveProtocol) + " only");
+    return text_reply(400, "this address speaks the subprotocol " + std::string(kFoxgloveProtocol) + " only");
   return websocket(request, {.stream = {}, .subprotocol = std::string(kFoxgloveProtocol)}, context);
 }
 
@@ -171,17 +172,17 @@ HttpReply page(std::string_view path, const HttpRequest& request) {
   for (const Asset& asset : assets()) {
     if (asset.path == wanted) return asset_reply(asset, request.if_none_match);
   }
-  return text(404, "nothing here");
+  return text_reply(404, "nothing here");
 }
 
 HttpReply ready(const RouteContext& context) {
   const std::size_t streams = context.hub.snapshot().size();
-  if (streams == 0) return text(503, "there is no stream yet");
-  return text(200, "ready: " + std::to_string(streams) + (streams == 1 ? " stream" : " streams"));
+  if (streams == 0) return text_reply(503, "there is no stream yet");
+  return text_reply(200, "ready: " + std::to_string(streams) + (streams == 1 ? " stream" : " streams"));
 }
 
 HttpReply metrics(const RouteContext& context) {
-  HttpReply reply = text(200, "");
+  HttpReply reply = text_reply(200, "");
   reply.content_type = "text/plain; version=0.0.4; charset=utf-8";
   std::vector<StreamSnapshot> streams = context.hub.snapshot();
   if (context.recordings != nullptr)
@@ -201,14 +202,15 @@ struct Route {
 };
 
 constexpr Route kRoutes[] = {
-    {"/healthz", false, [](auto, auto&, auto&) { return text(200, "ok"); }},
+    {"/healthz", false, [](auto, auto&, auto&) { return text_reply(200, "ok"); }},
     {"/readyz", false, [](auto, auto&, const RouteContext& context) { return ready(context); }},
     {"/metrics", true, [](auto, auto&, const RouteContext& context) { return metrics(context); }},
     {"/api/streams", true,
      [](auto, auto&, const RouteContext& context) {
-       return json(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
+       return json_reply(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
      }},
-    {"/api/openapi.json", true, [](auto, auto&, auto&) { return json(std::string(openapi_document())); }},
+    {"/api/openapi.json", true,
+     [](auto, auto&, auto&) { return json_reply(std::string(openapi_document())); }},
     {"/foxglove", true,
      [](auto, const HttpRequest& request, const RouteContext& context) {
        return foxglove_socket(request, context);
@@ -241,7 +243,7 @@ std::optional<std::string_view> match(const Route& route, std::string_view path)
 }
 
 HttpReply wrong_method(std::string allowed) {
-  HttpReply reply = text(405, "only " + allowed);
+  HttpReply reply = text_reply(405, "only " + allowed);
   reply.headers.emplace_back("Allow", std::move(allowed));
   return reply;
 }
@@ -309,8 +311,8 @@ HttpReply answer(const HttpRequest& request, const RouteContext& context) {
   }
   const bool is_https = !context.options.tls_cert.empty();
   if (is_https && !request.tls) {
-    if (request.host.empty()) return text(400, "this server speaks https");
-    HttpReply reply = text(308, "this server speaks https");
+    if (request.host.empty()) return text_reply(400, "this server speaks https");
+    HttpReply reply = text_reply(308, "this server speaks https");
     reply.headers.emplace_back("Location",
                                "https://" + std::string(request.host) + std::string(request.target));
     return reply;

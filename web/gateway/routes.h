@@ -56,6 +56,10 @@ struct HttpReply {
   std::string_view bytes() const { return fixed_body.empty() ? std::string_view(body) : fixed_body; }
 };
 
+/// A line of text, or a document, that nobody is to keep.
+HttpReply text_reply(int status, std::string line);
+HttpReply json_reply(std::string body);
+
 constexpr int kClients = 64;  // where the options do not say how many
 
 struct RouteContext {
