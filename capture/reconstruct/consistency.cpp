@@ -29,10 +29,10 @@ constexpr float kBendAlong_px = 0.25F;     // second difference over lines
 
 // Standard deviations of what neighbours predict, measured on simulated scenes.
 constexpr float kPrediction_px = 0.06F;  // from three of them, in line
-constexpr float kPredictionBend = 0.5F;  // more for each pixel that the three are out of line
+constexpr float kPredictionBend = 1.4F;  // more for each pixel that the three are out of line
 constexpr float kBendShare = 0.7F;       // of a bend that is taken to go on
-constexpr float kTwoAcross_px = 0.5F;    // more, from two only
-constexpr float kTwoAlong_px = 0.1F;
+constexpr float kTwoAcross_px = 1.F;     // more, from two only
+constexpr float kTwoAlong_px = 0.2F;
 constexpr float kTrusted_px = 0.15F;      // neighbours worse than this predict nothing
 constexpr float kOwn_px = 0.02F;          // least for a boundary's own place, and more of it
 constexpr float kDoubtAlong_px = 0.2F;    // where lines above or below are other surfaces
@@ -290,7 +290,9 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
   };
   const bool above = !edge.above_differs && goes_on(-1);
   const bool below = !edge.below_differs && goes_on(1);
-  if ((state & (kOpenAlong | kBentAlong)) && !above && !below) return std::nullopt;
+  // Unless each line differs from the next, as in fine texture, and this one goes straight on.
+  const bool textured = edge.above_differs && edge.below_differs && !(state & (kOpenAcross | kBentAcross));
+  if ((state & (kOpenAlong | kBentAlong)) && !above && !below && !textured) return std::nullopt;
   const bool step = beside_step(state);
   const float noise_px = kNoisy * row(noise_, line)[boundary];
   const float alone_px = std::max(kAlone_px * scale_, noise_px);
@@ -376,7 +378,7 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
         }
         std::optional<Estimate> settled = Estimate{row(smooth_, line)[b], edge.sigma_px};
         const bool replaced = row(measured_, line)[b] != edge.column_px;
-        const bool is_step = edge.at_step && beside_step(s);
+        const bool is_step = edge.at_step && (s & kOpenAcross) != 0;
         const bool suspect =
             s != 0 || edge.above_differs || edge.below_differs || edge.sigma_px > kSuspect_px;
         if (replaced || squeezed(row(smooth_, line) + b) || piece_size(cell) < kLeastPiece) {

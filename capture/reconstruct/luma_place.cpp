@@ -19,12 +19,15 @@ int column_of(float column_px) {
 
 }  // namespace
 
-LumaPlacer::LumaPlacer(const std::array<double, 9>& colour_matrix) {
+std::array<float, 3> luma_weights(const std::array<double, 9>& colour_matrix) {
   const Eigen::Matrix3d m =
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(colour_matrix.data());
   const Eigen::RowVector3d rec601(0.299, 0.587, 0.114);
-  const Eigen::RowVector3d weights = rec601 * m.inverse();
-  for (int i = 0; i < 3; ++i) weights_[static_cast<std::size_t>(i)] = static_cast<float>(weights[i]);
+  const Eigen::RowVector3f weights = (rec601 * m.inverse()).cast<float>();
+  return {weights[0], weights[1], weights[2]};
+}
+
+LumaPlacer::LumaPlacer(const std::array<double, 9>& colour_matrix) : weights_(luma_weights(colour_matrix)) {
   const auto& w = weights_;
   for (std::size_t c = 0; c < 8; ++c)
     ratio_[c] =

@@ -39,6 +39,9 @@ class LumaLine {
   std::vector<std::uint8_t> ends_;
 };
 
+/// Weights of the difference's channels in the luma of the captured colours. The matrix must have an inverse.
+std::array<float, 3> luma_weights(const std::array<double, 9>& colour_matrix);
+
 /// Constant; any thread.
 class LumaPlacer {
  public:

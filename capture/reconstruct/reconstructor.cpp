@@ -106,6 +106,7 @@ struct Reconstructor::State {
   Image8 last_texture;  // white-field: of the frame before
   std::int64_t last_texture_time_ns = 0;
   ReconstructReport report;
+  const CapturedFrame* pair = nullptr;  // of the last add()
 
   std::mutex spare_mutex;
   std::vector<Frame3D> spare;  // handed back; guarded by spare_mutex
@@ -227,6 +228,10 @@ const ReconstructReport& Reconstructor::report() const {
   return state_->report;
 }
 
+const CapturedFrame* Reconstructor::decoded() const {
+  return state_->pair;
+}
+
 std::uint64_t Reconstructor::textures() const {
   return state_->pairs.textures();
 }
@@ -240,6 +245,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured)
   if (auto fits = check_fits(captured, s.rig); !fits) return fits.error();
   s.report = {};
   s.waiting.reset();
+  s.pair = nullptr;
   StageClock clock;
   const CapturedFrame* in_step = s.steps.read(captured);
   s.report.step = s.steps.report();
@@ -249,6 +255,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured)
   const CapturedFrame* pair = s.pairs.read(frame, s.pool);
   s.report.white = pair == nullptr;
   if (pair == nullptr) return std::optional<Frame3D>();
+  s.pair = pair;
   s.decoder.observe(*pair, s.pool, s.report);
   s.report.detect_ms = clock.lap_ms();
   const bool complete = s.decoder.decode({*pair, s.depths.columns()}, s.pool, s.report, s.decoded);

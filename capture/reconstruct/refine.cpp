@@ -10,11 +10,12 @@ namespace {
 constexpr float kVarianceOfMedian = 2.198F;  // variance over median of the squares, of normal deviates
 // What the scene's contrast, 0..1, adds to a standard deviation. Zero crossings keep their place on texture
 // but are blurred as colour is, which the frame itself tells; luma is sharp but its levels are uncertain.
-constexpr float kLevelShare = 0.16F;         // of the luma ratio
-constexpr float kLeastColourBias_px = 0.4F;  // of a zero crossing
+constexpr float kLevelShare = 0.16F;          // of the luma ratio
+constexpr float kLeastColourBias_px = 0.25F;  // of a zero crossing
 constexpr float kMostColourBias_px = 2.F;
-constexpr float kDrawnTogether = 1.6F;      // what draws colour draws luma too, the same way
+constexpr float kDrawnTogether = 1.5F;      // what draws colour draws luma too, the same way
 constexpr float kModel_px = 0.012F;         // of any place: edges are not straight between samples
+constexpr float kAtStep_px = 0.1F;          // and where it lies on a step of the scene
 constexpr float kPlain = 0.05F;             // contrast that is none,
 constexpr float kContrasty = 0.1F;          // and one by which the bias is measured
 constexpr float kSteep = 0.15F;             // slope of the luma ratio that places a boundary well, a pixel
@@ -25,6 +26,13 @@ constexpr float kNoLumaContrast_px = 0.6F;  // times contrast more
 constexpr float kLeastRise = 0.12F;         // of luma, between the sides of a boundary that luma shows
 constexpr float kLeastSlope = 0.2F;         // of that, a pixel
 constexpr float kWideStripe_px = 12.F;
+constexpr float kShifting = 0.04F;    // contrast from which on zero crossings are put back
+constexpr float kNoEnd_px = 1e4F;     // of a stripe that ends nowhere near
+constexpr float kFarApart_px = 1.5F;  // colour and luma that do not tell the blur of chroma
+constexpr float kMostCost_px = 0.5F;
+constexpr float kKeptOfCost = 0.9F;         // from frame to frame: the camera stays what it is
+constexpr std::uint32_t kLeastOfBlur = 40;  // edges that tell it
+constexpr std::uint32_t kMostOfBlur = 128;
 constexpr float kStepContrast = 0.12F;  // a step of the scene that is one
 constexpr int kRowReach_px = 4;         // columns compared with the lines above and below
 constexpr float kRowStep = 0.12F;       // difference, of the sum, that is another surface's
@@ -96,7 +104,8 @@ bool same_surface(View8 slide, int line, int other, float column_px) {
          kRowStep * static_cast<float>(sum) + kRowNoise * static_cast<float>(6 * kRowReach_px + 3);
 }
 
-Refiner::Refiner(const std::array<double, 9>& colour_matrix) : placer_(colour_matrix) {}
+Refiner::Refiner(const std::array<double, 9>& colour_matrix)
+    : placer_(colour_matrix), shift_(colour_matrix) {}
 
 Refiner::Place Refiner::find(const DifferenceImage& image, int line, float column_px,
                              const Sides& sides) const {
@@ -114,10 +123,9 @@ Refiner::Place Refiner::find(const DifferenceImage& image, int line, float colum
   return {luma.column_px, std::sqrt(sigma * sigma + level * level), true, true};
 }
 
-/// What is around an edge, into it and `out`; `luma` is where luma has it. What tells how far chroma draws
-/// edges goes to the worker's samples.
+/// What is around an edge, into it and `out`; `luma` is where luma has it.
 void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
-                      bool sharp, int worker, Edge& edge, LumaSeen& out) {
+                      bool sharp, Edge& edge, LumaSeen& out) const {
   const int centre = column_of(edge.column_px);
   if (centre + kLumaReach_px < image.width) {
     edge.contrast = light.contrast(centre);
@@ -128,13 +136,74 @@ void Refiner::look_at(const DifferenceImage& image, int line, const LumaLine& li
   if (!luma.found) return;
   const float sigma = placer_.sigma_px(image, line, luma) * (sharp ? kSharpNoise : 1.F);
   const float level = (sharp ? kSharpLevelShare : kLevelShare) * light.luma_contrast(centre) / luma.slope;
-  out = {luma.column_px, sigma, level, true};
+  out = {luma.column_px, sigma, level, luma.slope > kSteep, true};
+}
+
+ShiftQuery Refiner::shift_query(const DifferenceImage& image, int line, const SequenceResult& result,
+                                const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
+                                std::uint32_t e) {
+  const auto own = static_cast<std::size_t>(result.boundary[e]);
+  ShiftQuery query{image.white_line(line),
+                   image.width,
+                   edges.edges[e].column_px,
+                   colours[own],
+                   kNoEnd_px * -1,
+                   kNoEnd_px,
+                   colours[own]};
+  const bool left = e > edges.line_start[static_cast<std::size_t>(line)] && own > 0 &&
+                    result.boundary[e - 1] + 1 == result.boundary[e];
+  const bool right = e + 1 < edges.line_start[static_cast<std::size_t>(line) + 1] &&
+                     result.boundary[e + 1] == result.boundary[e] + 1;
+  if (left) {
+    query.left_end_px = edges.edges[e - 1].column_px;
+    query.beyond_colours[0] = colours[own - 1][0];
+  }
+  if (right) {
+    query.right_end_px = edges.edges[e + 1].column_px;
+    query.beyond_colours[1] = colours[own + 1][1];
+  }
+  return query;
+}
+
+/// The blur by which zero crossings would be drawn off luma's places as they are, in this frame and, ever
+/// less, those before. Where little tells it, it stays as it was.
+void Refiner::find_blur(const DifferenceImage& image, const SequenceResult& result,
+                        const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) {
+  const auto tells = [&](std::uint32_t e) {
+    const LumaSeen& luma = seen_[e];
+    return result.boundary[e] >= 0 && luma.found && edges.edges[e].contrast > kContrasty &&
+           std::fabs(luma.column_px - edges.edges[e].column_px) < kFarApart_px;
+  };
+  std::uint32_t total = 0;
+  for (std::uint32_t e = 0; e < edges.edges.size(); ++e) total += tells(e);
+  if (total < kLeastOfBlur) return;
+  const std::uint32_t every = std::max(1U, total / kMostOfBlur);
+  for (float& cost : blur_cost_) cost *= kKeptOfCost;
+  std::uint32_t seen = 0;
+  for (int line = 0; line < edges.lines; ++line) {
+    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+      if (!tells(e) || seen++ % every != 0) continue;
+      const ShiftQuery query = shift_query(image, line, result, colours, edges, e);
+      const float apart = edges.edges[e].column_px - seen_[e].column_px;
+      for (std::size_t b = 0; b < blur_cost_.size(); ++b)
+        blur_cost_[b] += std::min(kMostCost_px, std::fabs(apart - shift_.shift_px(query, b)));
+    }
+  }
+  blur_ =
+      static_cast<std::size_t>(std::min_element(blur_cost_.begin(), blur_cost_.end()) - blur_cost_.begin());
+}
+
+/// What tells how far colour is still off luma goes to the worker's samples.
+void Refiner::sample(const Edge& edge, const LumaSeen& luma, int worker) {
+  if (!luma.found) return;
   const float apart = luma.column_px - edge.column_px;
-  const float excess = apart * apart - sigma * sigma - edge.sigma_px * edge.sigma_px;
+  const float excess = apart * apart - luma.sigma_px * luma.sigma_px - edge.sigma_px * edge.sigma_px;
   if (edge.contrast < kPlain) {
     always_.of(worker).push_back(excess);
-  } else if (edge.contrast > kContrasty && luma.slope > kSteep) {
-    by_contrast_.of(worker).push_back((excess - level * level) / (edge.contrast * edge.contrast));
+  } else if (edge.contrast > kContrasty && luma.steep) {
+    by_contrast_.of(worker).push_back((excess - luma.level_px * luma.level_px) /
+                                      (edge.contrast * edge.contrast));
   }
 }
 
@@ -188,7 +257,7 @@ void Refiner::look_at_line(const DifferenceImage& image, int line, const Sequenc
                        centre + kLumaReach_px < image.width &&
                        scratch.light.contrast(centre) > kSharpContrast;
     if (sharp) place_sharply(line, scratch.light, image.width, scratch.queries[i], scratch.places[i]);
-    look_at(image, line, scratch.light, scratch.places[i], sharp, worker, edges.edges[e], seen_[e]);
+    look_at(image, line, scratch.light, scratch.places[i], sharp, edges.edges[e], seen_[e]);
   }
 }
 
@@ -212,7 +281,8 @@ void Refiner::refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge) 
       luma.found
           ? kApartShare * std::max(0.F, std::fabs(luma.column_px - own) - kApartNoise * std::sqrt(noise))
           : kNoLuma_px + kNoLumaContrast_px * edge.contrast;
-  edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + apart * apart + kModel_px * kModel_px);
+  const float model = edge.at_step ? kAtStep_px : kModel_px;
+  edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + apart * apart + model * model);
   edge.noise_px = 1 / std::sqrt(pure_weight);
 }
 
@@ -274,6 +344,18 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
   by_contrast_.reset(pool.threads());
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) look_at_line(image, line, result, colours, worker, edges);
+  });
+  find_blur(image, result, colours, edges);
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line)
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        if (result.boundary[e] < 0) continue;
+        Edge& edge = edges.edges[e];
+        if (edge.contrast > kShifting && result.still[e] != 0)
+          edge.column_px -= shift_.shift_px(shift_query(image, line, result, colours, edges, e), blur_);
+        sample(edge, seen_[e], worker);
+      }
   });
   const Drawn drawn = colour_drawn();
   pool.for_shares(edges.line_start, [&](int begin_line, int end_line, int) {

@@ -8,6 +8,7 @@
 
 #include "base/image.h"
 #include "base/parallel.h"
+#include "capture/reconstruct/colour_shift.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/luma_place.h"
@@ -47,6 +48,7 @@ class Refiner {
   /// Where luma has the boundary of an edge, and what noise and contrast make of it.
   struct LumaSeen {
     float column_px, sigma_px, level_px;
+    bool steep;  // luma places it well
     bool found;
   };
   /// Standard deviations of what blurred chroma does to zero crossings.
@@ -66,11 +68,21 @@ class Refiner {
   void place_sharply(int line, const LumaLine& light, int width, const LumaQuery& query,
                      LumaPlace& out) const;
   void look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
-               bool sharp, int worker, Edge& edge, LumaSeen& out);
+               bool sharp, Edge& edge, LumaSeen& out) const;
+  static ShiftQuery shift_query(const DifferenceImage& image, int line, const SequenceResult& result,
+                                const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
+                                std::uint32_t e);
+  void find_blur(const DifferenceImage& image, const SequenceResult& result,
+                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges);
+  void sample(const Edge& edge, const LumaSeen& luma, int worker);
   Drawn colour_drawn();
   static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);
 
   LumaPlacer placer_;
+  ColourShift shift_;
+  std::size_t blur_ = 2;  // of chroma, of ColourShift::kBlur_px
+  // What each would leave colour off luma, in pixels, summed.
+  std::array<float, ColourShift::kBlurs> blur_cost_{};
   bool wide_stripes_ = false;         // in the last frame, so wide that two dark pixels are speckle
   float share_ = 1;                   // projected_share of the last frame
   const SharpLuma* sharp_ = nullptr;  // of the frame being refined

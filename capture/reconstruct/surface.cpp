@@ -10,6 +10,7 @@ namespace relievo {
 namespace {
 
 constexpr int kPlanes = 5;
+constexpr float kSure_px = 0.12F;  // of columns that tell that a boundary goes on
 
 /// One call's grid: what the steps below share.
 class Grid {
@@ -192,7 +193,17 @@ class Grid {
     return out;
   }();
 
-  /// Runs of vertices that triangles join along a line, and those that they join across lines.
+  /// A boundary that goes on from line to line is a surface, even one too narrow for triangles.
+  bool goes_on_from_above(int line, int b) const {
+    if (options_.links == nullptr || line == 0 || options_.links->along[cell(line - 1, b)] == 0) return false;
+    const auto sigma_px = [&](int l) {
+      return vertices_[static_cast<std::size_t>(places_[cell(l, b)])].at.sigma_px;
+    };
+    return sigma_px(line - 1) < kSure_px && sigma_px(line) < kSure_px;
+  }
+
+  /// Runs of vertices that triangles join along a line, and those that they, or boundaries, join across
+  /// lines. Sizes are twice the vertices, but of those that no triangle joins to the next on the line.
   void find_components() {
     std::int32_t* run = scratch_.index.data();
     scratch_.parent.clear();
@@ -206,7 +217,7 @@ class Grid {
       std::int32_t joined_above = -1;  // the last run above that this one was joined to
       std::int32_t length = 0;
       const auto end_run = [&] {
-        if (length > 0) scratch_.size[static_cast<std::size_t>(root(now))] += length;
+        if (length > 0) scratch_.size[static_cast<std::size_t>(root(now))] += length > 1 ? 2 * length : 1;
         length = 0;
       };
       for (int b = 0; b < boundaries_; ++b) {
@@ -224,7 +235,7 @@ class Grid {
           }
           run[at] = now;
           ++length;
-          if (down || (sides_above & 1)) {
+          if (down || (sides_above & 1) || goes_on_from_above(line, b)) {
             const std::int32_t other = run[at - static_cast<std::size_t>(boundaries_)];
             if (other != joined_above) join(now, other);
             joined_above = other;
@@ -243,8 +254,8 @@ class Grid {
     const std::size_t runs = scratch_.parent.size();
     scratch_.kept.resize(runs);
     for (std::size_t r = 0; r < runs; ++r) {
-      scratch_.kept[r] = scratch_.size[static_cast<std::size_t>(root(static_cast<std::int32_t>(r)))] >=
-                         options_.least_component;
+      scratch_.kept[r] = scratch_.size[static_cast<std::size_t>(root(static_cast<std::int32_t>(r)))] + 1 >=
+                         2 * options_.least_component;
     }
     auto& vertices = scratch_.vertices_before;
     auto& triangles = scratch_.triangles_before;

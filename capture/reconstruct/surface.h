@@ -31,7 +31,8 @@ struct SurfaceOptions {
   // Triangles seen more edge-on than this are the curtains that wrong points hang between surfaces: 0.2 keeps
   // surfaces up to 78 degrees off the view's plane.
   float least_facing = 0.2F;
-  // Connected pieces with fewer vertices are most often wrong codes; 0 keeps vertices in no triangle, too.
+  // Connected pieces with fewer vertices are most often wrong codes; 0 keeps vertices in no triangle, too. Of
+  // one boundary that goes on from line to line by itself, as links tell, twice as many are asked.
   int least_component = 10;
   // Where the surface goes on from one grid place to the next: triangles keep to it. Null: depth alone tells.
   const GridLinks* links = nullptr;

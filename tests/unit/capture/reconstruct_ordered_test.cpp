@@ -228,6 +228,7 @@ TEST(Refiner, TakesASharpLumaStepOverABlurredColour) {
   for (Edge& e : edges.edges) e.sigma_px = 0.5F;
   SequenceResult result;
   result.boundary.assign(kLines, 10);
+  result.still.assign(kLines, 1);
   WorkerPool pool(1);
   const SequenceDecoder decoder(pattern);
   Refiner(kPlain).refine(image, grey_slide().view(), result, decoder.shown_colours(SlideOrder::kNewerIsFirst),
@@ -249,6 +250,7 @@ TEST(Refiner, SaysWhereTheSceneItselfHasAStep) {
   EdgeImage edges = edges_of(pattern, 0, {{10, 199.6F}});
   SequenceResult result;
   result.boundary.assign(kLines, 10);
+  result.still.assign(kLines, 1);
   WorkerPool pool(1);
   const SequenceDecoder decoder(pattern);
   Refiner(kPlain).refine(image, grey_slide().view(), result, decoder.shown_colours(SlideOrder::kNewerIsFirst),
@@ -309,7 +311,7 @@ TEST(Consistency, PutsBackWhatAStepDrewOff) {
   for (int l = 0; l < kLines; ++l) {
     const auto i = static_cast<std::size_t>(l * 20 + 19);
     EXPECT_NEAR(s.edges.edges[i].column_px, truth(i), 0.2) << l;
-    EXPECT_LT(s.edges.edges[i].sigma_px, 0.15F);
+    EXPECT_LT(s.edges.edges[i].sigma_px, 0.2F);
   }
 }
 

@@ -208,6 +208,31 @@ TEST(Surface, SmallPiecesGoAndAreCounted) {
   EXPECT_EQ(with.normals.back(), (Vec3f{0, 0, -1}));
 }
 
+TEST(Surface, ABoundaryThatGoesOnAloneIsKept) {
+  constexpr int kLines = 30;
+  const auto kept = [](int lines, float sigma_px, bool linked) {
+    std::vector<GridVertex> vertices;
+    for (int l = 0; l < lines; ++l) {
+      vertices.push_back(vertex(2, l));
+      vertices.back().at.sigma_px = sigma_px;
+    }
+    GridLinks links;
+    links.across.assign(5 * kLines, 0);
+    links.along.assign(5 * kLines, 0);
+    for (int l = 0; linked && l + 1 < lines; ++l) links.along[static_cast<std::size_t>(5 * l + 2)] = 1;
+    SurfaceScratch scratch;
+    Surface out;
+    build_surface(vertices, 5, kLines, {.links = &links}, scratch, out);
+    expect_sound(out);
+    EXPECT_TRUE(out.triangles.empty());
+    return out.positions.size();
+  };
+  EXPECT_EQ(kept(25, 0.05F, true), 25U);
+  EXPECT_EQ(kept(12, 0.05F, true), 0U);   // shorter ones are most often wrong codes
+  EXPECT_EQ(kept(25, 0.05F, false), 0U);  // as are those that jump from line to line
+  EXPECT_EQ(kept(25, 0.3F, true), 0U);    // and none can tell of doubtful ones
+}
+
 TEST(Surface, OfTwoAtOnePlaceTheSteeperStays) {
   for (const bool first : {true, false}) {
     std::vector<GridVertex> vertices = wall(3, 3);
