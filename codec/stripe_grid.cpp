@@ -57,6 +57,49 @@ std::uint8_t filled_cell(const GridPoint* at, const Triangle& first, const Trian
                     : static_cast<std::uint8_t>(choose(grid_cell::kStraight, grid_cell::kTurned));
 }
 
+/// Two numbers of vertices side by side, as they lie in memory.
+std::uint64_t pair_of(std::uint32_t first, std::uint32_t second) {
+  return static_cast<std::uint64_t>(second) << 32 | first;
+}
+constexpr std::uint64_t kNextPair = (std::uint64_t{1} << 32) + 1;
+
+/// 0 or 1, without a branch, which on the diagonal is hard to foresee.
+unsigned is_not_0(std::uint64_t x) {
+  return static_cast<unsigned>((x | (0 - x)) >> 63);
+}
+
+/// Filled cells that follow one on its line, of vertices numbered one after the other: `upper` and `lower`
+/// are that cell's left corners, `cell` where it is kept. `right[v]`: vertex v + 1 is the place right of v.
+/// How many there were; their triangles begin at `triangle`.
+std::size_t fill_run(const Triangle* triangle, const Triangle* end, const std::uint8_t* right,
+                     std::uint32_t upper, std::uint32_t lower, std::uint8_t* cell) {
+  static_assert(sizeof(Triangle) == 3 * sizeof(std::uint32_t) && std::endian::native == std::endian::little);
+  const Triangle* const begin = triangle;
+  // Both rings of four corners as two triangles, four numbers in 64 bits each: a b c | c d a.
+  std::uint64_t straight0 = pair_of(upper, lower), both1 = pair_of(lower, lower) + kNextPair;
+  std::uint64_t straight2 = pair_of(upper + 1, upper);
+  for (;;) {
+    straight0 += kNextPair;
+    both1 += kNextPair;
+    straight2 += kNextPair;
+    ++upper;
+    ++lower;
+    ++cell;
+    if (end - triangle < 2 || (right[upper] & right[lower]) == 0 || *cell != 0) break;
+    std::uint64_t have[3];
+    std::memcpy(have, triangle, sizeof have);
+    const std::uint64_t turned1 = pair_of(upper, upper) + kNextPair;
+    const std::uint64_t not_straight = (have[0] ^ straight0) | (have[1] ^ both1) | (have[2] ^ straight2);
+    const std::uint64_t not_turned =
+        (have[0] ^ pair_of(lower, lower + 1)) | (have[1] ^ turned1) | (have[2] ^ straight0);
+    if ((is_not_0(not_straight) & is_not_0(not_turned)) != 0) break;
+    *cell = static_cast<std::uint8_t>(grid_cell::kStraight ^
+                                      (is_not_0(not_straight) * (grid_cell::kStraight ^ grid_cell::kTurned)));
+    triangle += 2;
+  }
+  return static_cast<std::size_t>(triangle - begin) / 2;
+}
+
 std::int32_t floor_of(float x) {
   const auto whole = static_cast<std::int32_t>(x);
   return whole - (x < static_cast<float>(whole) ? 1 : 0);
@@ -162,8 +205,13 @@ Status to_grid(const Surface& surface, const GridCalibration& calibration, int s
   const auto lines = static_cast<unsigned>(out.lines);
   const std::ptrdiff_t stride = out.stride();
   bool far = false;
+  std::vector<std::uint8_t> right(count + 1, 0);  // of each vertex: the next one lies right of it
+  std::uint32_t before = ~0U;
   for (std::size_t i = 0; i < count; ++i) {
     const GridPoint& p = surface.grid[i];
+    const std::uint32_t key = key_of(p);
+    if (i > 0) right[i - 1] = key - before == kRight;
+    before = key;
     if (p.boundary >= boundaries || p.line >= lines || !(p.column_px > -0.5F && p.column_px < width))
       return Error{"surface has a vertex outside the grid of its calibration"};
     const std::size_t at = out.at(p.line, p.boundary);
@@ -189,8 +237,16 @@ Status to_grid(const Surface& surface, const GridCalibration& calibration, int s
       const std::uint8_t filled = filled_cell(surface.grid.data(), triangle, surface.triangles[n + 1], cell);
       if (filled != 0 && out.cells[cells_at(cell)] == 0) {
         out.cells[cells_at(cell)] = filled;
-        out.triangles += 2;
-        ++n;
+        const bool straight = filled == grid_cell::kStraight;
+        const Triangle& next = surface.triangles[n + 1];
+        const std::uint32_t upper = straight ? triangle[0] : next[1], lower = triangle[straight ? 1 : 0];
+        std::size_t run = 0;
+        // Of this cell, too, so that the run begins where it ends.
+        if ((right[upper] & right[lower]) != 0)
+          run = fill_run(surface.triangles.data() + n + 2, surface.triangles.data() + triangles, right.data(),
+                         upper, lower, &out.cells[cells_at(cell)]);
+        out.triangles += static_cast<std::uint32_t>(2 * (1 + run));
+        n += 1 + 2 * run;
         continue;
       }
     }

@@ -15,6 +15,7 @@ export class Decoder {
   want = { normals: false, edges: false, quality: false };
   private worker: Worker;
   private nextId = 1;
+  private spares: ArrayBuffer[] = []; // go with the next request
   private readonly pending = new Map<number, number>(); // id -> when it was handed over
   private ready = false;
   private readonly timer: number;
@@ -28,9 +29,18 @@ export class Decoder {
   decode(bytes: ArrayBuffer, offset: number): number {
     const id = this.nextId++;
     this.pending.set(id, performance.now());
-    const request: DecodeRequest = { type: 'decode', id, bytes, offset, want: { ...this.want } };
-    this.worker.postMessage(request, [bytes]);
+    const spares = this.spares.splice(0);
+    const request: DecodeRequest = { type: 'decode', id, bytes, offset, want: { ...this.want }, spares };
+    this.worker.postMessage(request, [bytes, ...spares]);
     return id;
+  }
+
+  /** Takes the memory of a frame that nobody looks at any more. */
+  giveBack(frame: DecodedFrame): void {
+    if (frame.kept === true) return;
+    const { positions, coordinates, normals, triangles, edges, quality } = frame;
+    const arrays = [positions, coordinates, normals, triangles, edges, quality?.sigmas, quality?.interpolated];
+    this.spares = [...new Set(arrays.flatMap((array) => (array == null || array.byteLength === 0 ? [] : [array.buffer])))];
   }
 
   /** For good. */

@@ -4,6 +4,7 @@ import wasmUrl from 'draco3d/draco_decoder.wasm?url';
 import { DracoDecoder, type Geometry } from './draco';
 import { kGeometryDracoGrid, kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
 import { GridFrames } from './grid';
+import gridWasmUrl from './grid.wasm?url';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
 import { kNoVideoHere, VideoTextures } from './videoTexture';
@@ -17,6 +18,7 @@ const kStills: Record<number, string> = { [kTextureJpeg]: 'image/jpeg', [kTextur
 
 const grids = new GridFrames();
 const videos = new VideoTextures();
+let kernelAsked = false;
 const decoder = load();
 let queue: Promise<void> = decoder.then(
   () => post({ type: 'ready' }),
@@ -25,6 +27,7 @@ let queue: Promise<void> = decoder.then(
 
 self.onmessage = (event: MessageEvent<DecodeRequest>) => {
   const request = event.data;
+  grids.spares.add(request.spares);
   queue = queue.then(async () => {
     try {
       const frame = await decode(request);
@@ -72,9 +75,23 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
   };
 }
 
+/** Where there are grids; until it is there, and where the browser cannot run it, they are decoded without. */
+function askForKernel(): void {
+  if (kernelAsked) return;
+  kernelAsked = true;
+  Promise.all([fetch(gridWasmUrl), import('./gridKernel')])
+    .then(async ([response, { GridKernel }]) => {
+      if (response.ok) grids.kernel = await GridKernel.create(await response.arrayBuffer());
+    })
+    .catch(() => undefined);
+}
+
 /** Of a grid the quality is there with the positions; of Draco it is decoded where it is wanted. */
 function decodeGeometry(draco: DracoDecoder, frame: Frame, wantQuality: boolean): Geometry & { quality: VertexQuality | null } {
-  if (frame.geometryCodec === kGeometryGrid) return { normals: null, ...grids.decode(frame) };
+  if (frame.geometryCodec === kGeometryGrid) {
+    askForKernel();
+    return { normals: null, ...grids.decode(frame) };
+  }
   if (frame.geometryCodec === kGeometryDracoGrid) return { normals: null, ...grids.decodeInDraco(frame, draco) };
   const geometry = draco.decode(frame);
   const told = wantQuality && frame.quality.length > 0 && geometry.coordinates !== null;

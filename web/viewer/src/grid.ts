@@ -3,9 +3,11 @@
 import type { DracoDecoder } from './draco';
 import { decodeDracoGrid } from './dracoGrid';
 import { kTextureH264, type Frame } from './frame';
-import { decodeGrid, type KeyGrid } from './gridDecoder';
+import { decodeSlices, openGrid, type KeyGrid } from './gridDecoder';
 import { gridId, type GridFields } from './gridHead';
+import type { GridKernel } from './gridKernel';
 import { GridPoints, type GridSurface } from './gridPoints';
+import { Spares } from './spares';
 import { videoTextureIsKey } from './videoTexture';
 
 /** Keeps the last key frame and what its calibration costs to work out. */
@@ -14,17 +16,27 @@ export class GridFrames {
   private points: GridPoints | null = null;
   private calibrationBytes = new Uint8Array(0);
 
+  /** What decodes faster, as soon as it is there; without it all is done here. */
+  kernel: GridKernel | null = null;
+  readonly spares = new Spares();
+
   /** Throws where the geometry is not what the frame's header declares, or its key frame was not received. Any input. */
   decode(frame: Frame): GridSurface {
     const { vertices, triangles } = frame.header;
     if (vertices === 0) return emptySurface();
-    const { head, grid } = decodeGrid(frame.geometry, vertices, triangles, this.key);
+    const coded = openGrid(frame.geometry, vertices, triangles, this.key);
+    const { head } = coded;
+    const kernel = this.kernel !== null && this.kernel.takes(head) ? this.kernel : null;
+    // What the kernel decodes lies there, and is copied only where it is needed here.
+    const whole = kernel === null ? decodeSlices(coded) : null;
+    kernel?.decode(coded);
     const isDelta = !head.isKey || (frame.textureCodec === kTextureH264 && !videoTextureIsKey(frame.texture));
     if (isDelta === frame.isKey) throw new Error('frame and geometry do not agree whether this is a key frame');
     const points = this.use(head);
-    if (head.isKey) this.key = { id: gridId(frame.geometry), grid };
     if (points === null) throw new Error('geometry has no calibration');
-    return points.toSurface(grid);
+    const there = kernel !== null && kernel.takesPoints(points);
+    if (head.isKey) this.key = { id: gridId(frame.geometry), grid: whole ?? kernel!.copyKey() };
+    return there ? kernel.toSurface(points, this.spares) : points.toSurface(whole ?? kernel!.copy());
   }
 
   /** The same of codec 3. */

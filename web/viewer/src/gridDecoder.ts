@@ -27,27 +27,39 @@ const kSigmaTables = 5;
 export const kFirstSigma = 32;
 const kDirect = 48;
 
-export interface Grid {
+export interface GridShape {
   boundaries: number;
   lines: number;
   stepBits: number;
   stride: number; // places of a line with its margins; the first place is at line * stride + kMargin
-  columns: Int32Array; // steps; kAbsent: no vertex
-  cells: Uint8Array;
-  sigmas: Uint8Array | null; // codes
-  interpolated: Uint8Array | null;
   vertices: number;
   triangles: number;
 }
 
+export interface Grid extends GridShape {
+  columns: Int32Array; // steps; kAbsent: no vertex
+  cells: Uint8Array;
+  sigmas: Uint8Array | null; // codes
+  interpolated: Uint8Array | null;
+}
+
+/** What others build on. */
 export interface KeyGrid {
   id: number;
-  grid: Grid;
+  grid: Pick<Grid, 'boundaries' | 'lines' | 'stepBits' | 'columns'>;
+}
+
+/** A grid whose slices are still to be decoded. */
+export interface CodedGrid {
+  head: GridHead;
+  tables: Tables;
+  slices: (SliceHead | null)[]; // null: lost
+  key: KeyGrid | null; // what it builds on
 }
 
 export const damaged = (): Error => new Error('geometry is damaged');
 
-interface Tables {
+export interface Tables {
   first: Uint16Array; // of alphabets of two
   cells: Table[];
   residuals: Table[];
@@ -69,7 +81,8 @@ function readTables(bytes: Uint8Array, hasSigmas: boolean): Tables {
   return { first, cells, residuals, sigmas };
 }
 
-interface SliceHead {
+export interface SliceHead {
+  bytes: number;
   vertices: number;
   triangles: number;
   control: Uint8Array;
@@ -103,7 +116,7 @@ function readSliceHead(bytes: Uint8Array): SliceHead {
     return bytes.subarray(at - size, at);
   };
   const [control, residuals, sigmas] = sizes.map(take) as [Uint8Array, Uint8Array, Uint8Array];
-  return { vertices, triangles, control, residuals, sigmas, raw: bytes.subarray(at) };
+  return { bytes: bytes.length, vertices, triangles, control, residuals, sigmas, raw: bytes.subarray(at) };
 }
 
 function numberOf(symbol: number, raw: BitReader): number {
@@ -134,7 +147,7 @@ class Slice {
   constructor(
     private readonly head: GridHead,
     private readonly all: Tables,
-    private readonly key: Grid | null,
+    private readonly key: KeyGrid['grid'] | null,
     private readonly grid: Grid,
     private readonly begin: number,
     private readonly end: number,
@@ -394,36 +407,40 @@ const kTrianglesOf = Uint8Array.from({ length: 256 }, (_, cell) =>
   cell === kBoth ? 2 : (cell & 1) + ((cell >> 1) & 1) + ((cell >> 2) & 1) + ((cell >> 3) & 1),
 );
 
+export function shapeOf({ boundaries, lines, stepBits }: GridFields): GridShape {
+  return { boundaries, lines, stepBits, stride: ((boundaries + 7) >> 3) * 8 + 2 * kMargin, vertices: 0, triangles: 0 };
+}
+export const placesOf = ({ lines, stride }: GridShape): number => lines * stride + kMargin;
+
 /** Of that size, with nothing in it. */
-export function emptyGrid({ boundaries, lines, stepBits, hasSigmas, hasInterpolated }: GridFields): Grid {
-  const stride = ((boundaries + 7) >> 3) * 8 + 2 * kMargin;
-  const size = lines * stride + kMargin;
+export function emptyGrid(fields: GridFields): Grid {
+  const shape = shapeOf(fields);
+  const size = placesOf(shape);
   return {
-    boundaries,
-    lines,
-    stepBits,
-    stride,
+    ...shape,
     columns: new Int32Array(size).fill(kAbsent),
     cells: new Uint8Array(size),
-    sigmas: hasSigmas ? new Uint8Array(size) : null,
-    interpolated: hasInterpolated ? new Uint8Array(size) : null,
-    vertices: 0,
-    triangles: 0,
+    sigmas: fields.hasSigmas ? new Uint8Array(size) : null,
+    interpolated: fields.hasInterpolated ? new Uint8Array(size) : null,
   };
 }
 
+/** Takes the triangles below a line away, and says how many there were. */
+export function dropCells(cells: Uint8Array, { stride, boundaries }: GridShape, line: number): number {
+  const at = line * stride + kMargin;
+  let dropped = 0;
+  for (let b = 0; b < boundaries; ++b) dropped += kTrianglesOf[cells[at + b]!]!;
+  cells.fill(0, at, at + boundaries);
+  return dropped;
+}
+
 /** Fails unless the grid holds what the frame declares, less where slices are lost. Any input. */
-export function decodeGrid(
-  bytes: Uint8Array,
-  vertices: number,
-  triangles: number,
-  key: KeyGrid | null,
-): { head: GridHead; grid: Grid } {
+export function openGrid(bytes: Uint8Array, vertices: number, triangles: number, key: KeyGrid | null): CodedGrid {
   const head = readGridHead(bytes);
-  const keyGrid = head.isKey ? null : key === null || key.id !== head.key ? undefined : key.grid;
-  if (keyGrid === undefined) throw new Error('geometry builds on a key frame that was not received');
+  if (!head.isKey && (key === null || key.id !== head.key)) throw new Error('geometry builds on a key frame that was not received');
+  const known = head.isKey ? null : key;
   const { boundaries, lines, stepBits } = head;
-  if (keyGrid !== null && (keyGrid.boundaries !== boundaries || keyGrid.lines !== lines || keyGrid.stepBits !== stepBits)) {
+  if (known !== null && (known.grid.boundaries !== boundaries || known.grid.lines !== lines || known.grid.stepBits !== stepBits)) {
     throw new Error('geometry is of another size than its key frame');
   }
   const slices = head.slices.map((slice) => (slice.length === 0 ? null : readSliceHead(slice)));
@@ -432,23 +449,23 @@ export function decodeGrid(
   if (v > vertices || t > triangles || (!slices.includes(null) && (v !== vertices || t !== triangles))) {
     throw new Error('geometry is not of the size that the frame declares');
   }
-  const tables = readTables(head.tables, head.hasSigmas);
+  return { head, tables: readTables(head.tables, head.hasSigmas), slices, key: known };
+}
+
+/** Throws. Any input. */
+export function decodeSlices({ head, tables, slices, key }: CodedGrid): Grid {
   const grid = emptyGrid(head);
-  const { stride } = grid;
   slices.forEach((slice, s) => {
     const begin = s * head.sliceLines;
     if (slice !== null) {
-      const decoder = new Slice(head, tables, keyGrid, grid, begin, Math.min(begin + head.sliceLines, lines), slice);
+      const decoder = new Slice(head, tables, key === null ? null : key.grid, grid, begin, Math.min(begin + head.sliceLines, head.lines), slice);
       decoder.decode();
       grid.vertices += decoder.vertices;
       grid.triangles += decoder.triangles;
     } else if (s > 0) {
-      // Triangles on vertices that are lost.
-      const at = (begin - 1) * stride + kMargin;
-      for (let b = 0; b < boundaries; ++b) grid.triangles -= kTrianglesOf[grid.cells[at + b]!]!;
-      grid.cells.fill(0, at, at + boundaries);
+      grid.triangles -= dropCells(grid.cells, grid, begin - 1); // on vertices that are lost
     }
   });
   chooseDiagonals(grid, head.spacing);
-  return { head, grid };
+  return grid;
 }

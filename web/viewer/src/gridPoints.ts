@@ -17,24 +17,25 @@ export interface GridSurface {
   quality: VertexQuality | null;
 }
 
-const kSigmas = Float32Array.from({ length: 64 }, (_, code) => (code === 0 ? 0 : 1e-4 * 2 ** ((code - 1) / 4)));
+/** Of a column, pixels, by its code. */
+export const kSigmas = Float32Array.from({ length: 64 }, (_, code) => (code === 0 ? 0 : 1e-4 * 2 ** ((code - 1) / 4)));
 
 export class GridPoints {
   private readonly raysX: (Float32Array | null)[]; // of a line, every kRayStep columns
   private readonly raysY: (Float32Array | null)[];
   private readonly sheets: (Float32Array | null)[]; // of a boundary
-  private readonly straightRays: boolean;
-  private readonly straightSheets: boolean;
-  private readonly samples: number;
-  private readonly sheetFirst: number;
-  private readonly sheetStep: number;
+  readonly straightRays: boolean;
+  readonly straightSheets: boolean;
+  readonly samples: number;
+  readonly sheetFirst: number;
+  readonly sheetStep: number;
   // Of straight sheets: z = numerator / (a x + b y + c).
-  private readonly numerator: Float64Array;
-  private readonly a: Float64Array;
-  private readonly b: Float64Array;
-  private readonly c: Float64Array;
+  readonly numerator: Float64Array;
+  readonly a: Float64Array;
+  readonly b: Float64Array;
+  readonly c: Float64Array;
 
-  constructor(private readonly calibration: Calibration) {
+  constructor(readonly calibration: Calibration) {
     const { camera, projector, rotation, translation, stripes, lineStep } = calibration;
     const lines = Math.floor((camera.height + lineStep - 1) / lineStep);
     const boundaries = stripes - 1;
@@ -144,14 +145,7 @@ export class GridPoints {
       for (let i = 0; i < count; ++i) [x[i], y[i]] = undistort(camera, column[i]!, row) ?? [NaN, NaN];
       return;
     }
-    if (this.raysX[line] === null) {
-      const [rx, ry] = [new Float32Array(this.samples), new Float32Array(this.samples)];
-      for (let s = 0; s < this.samples; ++s) [rx[s], ry[s]] = undistort(camera, s * kRayStep, row) ?? [NaN, NaN];
-      this.raysX[line] = rx;
-      this.raysY[line] = ry;
-    }
-    const rx = this.raysX[line]!;
-    const ry = this.raysY[line]!;
+    const [rx, ry] = this.raysOf(line);
     for (let i = 0; i < count; ++i) {
       const at = column[i]! / kRayStep;
       const s = Math.min(Math.max(Math.trunc(at), 0), this.samples - 2);
@@ -159,6 +153,32 @@ export class GridPoints {
       x[i] = rx[s]! + f * (rx[s + 1]! - rx[s]!);
       y[i] = ry[s]! + f * (ry[s + 1]! - ry[s]!);
     }
+  }
+
+  /** Of a line of a camera that distorts: x and y every kRayStep columns. */
+  private raysOf(line: number): [Float32Array, Float32Array] {
+    const [known, knownY] = [this.raysX[line] ?? null, this.raysY[line] ?? null];
+    if (known !== null && knownY !== null) return [known, knownY];
+    const { camera, lineStep } = this.calibration;
+    const [rx, ry] = [new Float32Array(this.samples), new Float32Array(this.samples)];
+    for (let s = 0; s < this.samples; ++s) [rx[s], ry[s]] = undistort(camera, s * kRayStep, line * lineStep) ?? [NaN, NaN];
+    this.raysX[line] = rx;
+    this.raysY[line] = ry;
+    return [rx, ry];
+  }
+
+  /** The same of all lines: [line][x, y][sample]. */
+  allRays(): Float32Array {
+    const all = new Float32Array(this.raysX.length * 2 * this.samples);
+    this.raysX.forEach((_, line) => this.raysOf(line).forEach((values, i) => all.set(values, (2 * line + i) * this.samples)));
+    return all;
+  }
+
+  /** Of a projector that distorts: [boundary][sample]. */
+  allSheets(): Float32Array {
+    const all = new Float32Array(this.sheets.length * kSheetSamples);
+    this.sheets.forEach((_, boundary) => all.set(this.sheet(boundary), boundary * kSheetSamples));
+    return all;
   }
 
   private meetStraight(

@@ -9,6 +9,7 @@ export interface DecodeRequest {
   bytes: ArrayBuffer;
   offset: number; // of the frame in `bytes`
   want: { normals: boolean; edges: boolean; quality: boolean };
+  spares: ArrayBuffer[]; // of frames that are not shown any more: to be filled again
 }
 
 export interface DecodedFrame {
@@ -26,6 +27,7 @@ export interface DecodedFrame {
   notice: string | null; // for the person, while frames are like this one
   extent: Extent | null;
   decodeMs: number;
+  kept?: boolean; // somebody holds on to its arrays
 }
 
 export type DecodeReply =

@@ -34,6 +34,7 @@ export class Session {
   everConnected = false;
   private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
   private waiting: Waiting | null = null; // decoded, not drawn
+  private taken: DecodedFrame | null = null; // drawn now
   private live = false; // the frame that came last
   private readonly pause = (): void => this.meter.pause();
 
@@ -80,7 +81,7 @@ export class Session {
     });
   }
 
-  /** The frame to draw now, if there is one. Its credit goes back only here, so a hidden page receives nothing. */
+  /** The frame to draw now instead of the one before, whose memory is used again, if there is one. Its credit goes back only here, so a hidden page receives nothing. */
   take(): DecodedFrame | null {
     if (this.waiting === null) return null;
     const { frame, prefix } = this.waiting;
@@ -88,6 +89,8 @@ export class Session {
     this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.live === true);
     this.source?.credit();
     this.seen = true;
+    if (this.taken !== null) this.decoder.giveBack(this.taken); // the one that is returned takes its place
+    this.taken = frame;
     return frame;
   }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where frames come from: a live stream, or a recording. One kind of events, whichever it is.
+import type { FrameStore } from './frameStore';
 import type { Loop } from './playback';
 import type { FramePrefix, ServerMessage } from './protocol';
 
@@ -44,6 +45,8 @@ export interface Moment {
 
 /** What a time line drives: a source that can show more than what comes next. Times in ms from `startMs`. */
 export interface Playback {
+  /** The frames themselves, to be read in any order. */
+  readonly store: FrameStore;
   readonly times: Float64Array; // of the frames there are; of a live stream it changes
   readonly startMs: number; // UTC
   readonly first: number; // index of the frame at times[0]

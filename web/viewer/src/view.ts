@@ -55,6 +55,8 @@ export class View {
   private stillTimer = 0;
   private range: Range | null = null;
   private grid = false;
+  private readonly head = new THREE.PerspectiveCamera(); // of a person with a headset, who moves it
+  private readonly lamp = new THREE.Group(); // with whoever looks
   drawn = 0;
 
   /** Throws where there is no WebGL 2. `overlay` lies over `canvas`; `keys`: where those are listened to that move. */
@@ -198,8 +200,32 @@ export class View {
     this.renderer.dispose();
   }
 
+  /** Draws for a headset until its session ends. Its origin, where the person is now, is the rig's camera. */
+  async immerse(session: XRSession): Promise<void> {
+    const { xr } = this.renderer;
+    session.addEventListener('end', () => {
+      this.renderer.setAnimationLoop(null);
+      xr.enabled = false;
+      this.navigator.camera.add(this.lamp);
+      this.resize();
+      this.invalidate();
+    });
+    xr.enabled = true;
+    xr.setReferenceSpaceType('local');
+    await xr.setSession(session);
+    this.head.add(this.lamp);
+    this.scene.add(this.head);
+    this.renderer.setAnimationLoop(() => {
+      if (this.ended || !xr.isPresenting) return;
+      this.events.beforeDraw();
+      this.draw();
+      ++this.drawn;
+    });
+  }
+
   invalidate(): void {
-    if (this.scheduled || this.ended) return;
+    // A headset draws at its own beat, and the page's stands still.
+    if (this.scheduled || this.ended || this.renderer.xr.isPresenting) return;
     this.scheduled = true;
     requestAnimationFrame((now) => {
       this.scheduled = false;
@@ -242,15 +268,19 @@ export class View {
 
   // The rig's camera sees none.
   private get showsGround(): boolean {
-    return this.grid && this.surface.shown !== null && !this.navigator.isRigView;
+    return this.grid && this.surface.shown !== null && !this.isRigView;
+  }
+
+  private get isRigView(): boolean {
+    return this.navigator.isRigView && !this.renderer.xr.isPresenting;
   }
 
   private draw(): void {
     this.ground.object.visible = this.showsGround;
     // Another rig's camera sees something else.
-    for (const { mesh } of this.besides) mesh.object.visible = !this.navigator.isRigView;
-    this.surface.setLens(this.navigator.isRigView ? this.navigator.rigCamera : null);
-    this.renderer.render(this.scene, this.navigator.camera);
+    for (const { mesh } of this.besides) mesh.object.visible = !this.isRigView;
+    this.surface.setLens(this.isRigView ? this.navigator.rigCamera : null);
+    this.renderer.render(this.scene, this.renderer.xr.isPresenting ? this.head : this.navigator.camera);
   }
 
   private render(): void {
@@ -319,12 +349,13 @@ export class View {
     const key = new THREE.DirectionalLight(0xfff3e2, 2.1);
     key.position.set(-0.9, 1.1, 0.6);
     key.target.position.set(0, 0, -1);
-    this.navigator.camera.add(key, key.target);
+    this.lamp.add(key, key.target);
+    this.navigator.camera.add(this.lamp);
   }
 
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
-    if (clientWidth === 0 || clientHeight === 0) return;
+    if (clientWidth === 0 || clientHeight === 0 || this.renderer.xr.isPresenting) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.navigator.resize({ width: clientWidth, height: clientHeight });
   }
