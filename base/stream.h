@@ -13,6 +13,7 @@
 #include "base/filter_counts.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "base/rung.h"
 
 namespace relievo {
 
@@ -34,6 +35,8 @@ struct FrameMessage {
   std::int64_t capture_time_ns = 0;   // UTC, start of the camera frame's first field
   std::int64_t publish_time_ns = 0;   // UTC, when the server handed it to its sinks
   std::shared_ptr<const Bytes> data;  // shared by all sinks, never changed
+  // The rung of the ladder it is of; each rung counts its own sequence.
+  Rung rung = Rung::kFull;
 };
 
 enum class StreamState : std::uint8_t { kStarting, kRunning, kStalled, kEnded };
@@ -63,6 +66,18 @@ struct StepStatus {
   bool operator==(const StepStatus&) const = default;
 };
 
+/// A lower rung of a stream's quality ladder, which costs nothing while nobody reads it.
+struct RungStatus {
+  Rung rung = Rung::kReduced;
+  std::uint32_t readers = 0;  // now: of DDS, and browsers of the server's own gateway
+  std::uint64_t frames = 0;   // published since the start
+  std::uint64_t drops = 0;    // not encoded, since the one before took too long
+  double encode_ms = 0;       // median over the last frames
+  double bit_rate = 0;        // bits a second over the last few seconds
+
+  bool operator==(const RungStatus&) const = default;
+};
+
 /// Running counts of one stream, published about once a second.
 struct ServerStatus {
   std::string stream;
@@ -84,6 +99,7 @@ struct ServerStatus {
       0;                 // of a stream that keeps a bit rate: how much coarser than asked for, 0 not at all
   FilterCounts filters;  // since the start
   StepStatus step;       // its mixed frames are among drops_capture
+  std::vector<RungStatus> rungs;  // of the ladder, best first, without the stream itself
 };
 
 /// True where `name` may name a stream: [A-Za-z0-9_.-]{1,64}, not starting with a dot.

@@ -7,6 +7,7 @@
 namespace relievo {
 
 Command streams_command();
+Command stats_command();
 Command record_command();
 Command play_command();
 Command info_command();

@@ -3,9 +3,9 @@
 
 int main(int argc, char** argv) {
   using namespace relievo;
-  return run_program(
-      "relievo", "Views, records and plays live 3D video",
-      {streams_command(), record_command(), play_command(), info_command(), recover_command(),
-       export_command(), convert_command(), web_command(), keys_command(), doctor_command(), shot_command()},
-      argc, argv);
+  return run_program("relievo", "Views, records and plays live 3D video",
+                     {streams_command(), stats_command(), record_command(), play_command(), info_command(),
+                      recover_command(), export_command(), convert_command(), web_command(), keys_command(),
+                      doctor_command(), shot_command()},
+                     argc, argv);
 }

@@ -25,6 +25,7 @@ struct Options {
   std::shared_ptr<DomainOptions> domain;
   std::string stream;
   std::string file;
+  std::string quality = "full";
   std::uint64_t frames = 0;
   double seconds = 0;
   double wait_s = -1;  // below 0: for ever
@@ -102,7 +103,8 @@ Status run(Options options, StopSignal& stop) {
                      .max_s = options.seconds,
                      .foxglove = options.foxglove,
                      .recording = *recording});
-  auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks());
+  auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks(),
+                                       rung_named(options.quality).value_or(Rung::kFull));
   if (!subscriber) return subscriber.error();
   const Status watched = watch(options, recorder, stop);
   subscriber->reset();
@@ -134,6 +136,12 @@ Command record_command() {
         app.add_option("stream", options->stream, "Name of the stream")->type_name("NAME")->required();
         app.add_option("--out", options->file, "New file to write (default: STREAM-TIME.mcap)")
             ->type_name("FILE");
+        app.add_option("--quality", options->quality,
+                       "full, or one of the server's ladder: reduced (every second line, half the texture's "
+                       "size), texture (that texture alone)")
+            ->check(CLI::IsMember({"full", "reduced", "texture"}))
+            ->capture_default_str()
+            ->type_name("NAME");
         app.add_option("--frames", options->frames, "Stop after this many frames")->check(whole_number(1));
         app.add_option("--seconds", options->seconds, "Stop this many seconds after the first frame")
             ->check(number(0.001, 1e9));

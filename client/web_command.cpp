@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <set>
@@ -15,6 +16,7 @@
 #include "client/options.h"
 #include "client/player.h"
 #include "client/recorded_stream.h"
+#include "client/rung_relay.h"
 #include "idl/cdr.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -29,14 +31,22 @@ struct Options {
   std::shared_ptr<WebOptions> web;
 };
 
-Subscriber::Callbacks forward_to(Gateway& gateway) {
+constexpr std::chrono::milliseconds kRelayTick{200};
+
+Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   Subscriber::Callbacks callbacks;
-  callbacks.info = [&](const StreamInfo& info) { gateway.announce(info); };
+  callbacks.info = [&](const StreamInfo& info) {
+    gateway.announce(info);
+    relay.add(info.stream);
+  };
   callbacks.frame = [&](const std::string& stream, const FrameMessage& frame) {
     gateway.publish(stream, frame);
   };
   callbacks.status = [&](const ServerStatus& status) { gateway.publish(status); };
-  callbacks.gone = [&](const std::string& stream) { gateway.withdraw(stream); };
+  callbacks.gone = [&](const std::string& stream) {
+    relay.remove(stream);
+    gateway.withdraw(stream);
+  };
   return callbacks;
 }
 
@@ -141,9 +151,10 @@ Status run(const Options& options, StopSignal& stop) {
                                }}});
   if (!gateway) return gateway.error();
 
+  RungRelay relay(*options.domain, **gateway);
   std::vector<std::unique_ptr<Subscriber>> subscribers;
   for (const std::string& stream : inputs->live) {
-    auto subscriber = Subscriber::create(*options.domain, stream, forward_to(**gateway));
+    auto subscriber = Subscriber::create(*options.domain, stream, forward_to(**gateway, relay));
     if (!subscriber) return subscriber.error();
     subscribers.push_back(std::move(*subscriber));
   }
@@ -160,7 +171,7 @@ Status run(const Options& options, StopSignal& stop) {
                                  .c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
   tell_ready();
-  stop.wait();
+  while (!stop.wait_for(kRelayTick)) relay.update();
   tell_stopping();
   wishes.answer_with({});
   return {};

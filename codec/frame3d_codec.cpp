@@ -217,8 +217,10 @@ struct FrameEncoder::State {
   }
 };
 
-FrameEncoder::FrameEncoder(const Rig& rig, const Pattern& pattern) : state_(std::make_unique<State>()) {
+FrameEncoder::FrameEncoder(const Rig& rig, const Pattern& pattern, int line_stride)
+    : state_(std::make_unique<State>()) {
   state_->calibration = grid_calibration(rig, pattern);
+  state_->calibration.line_step_px *= line_stride;
 }
 FrameEncoder::FrameEncoder(FrameEncoder&&) noexcept = default;
 FrameEncoder& FrameEncoder::operator=(FrameEncoder&&) noexcept = default;
@@ -231,7 +233,8 @@ void FrameEncoder::request_key_frame() {
 Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& options) {
   State& s = *state_;
   if (auto status = check_frame(frame, options); !status) return status.error();
-  if (auto status = check_surface(frame.surface); !status) return status.error();
+  // Triangles are checked by those who read them: to_grid() and encode_draco().
+  if (auto status = check_vertices(frame.surface); !status) return status.error();
   const bool asked = s.key_asked.exchange(false);
   const bool other_texture = s.texture_codec != options.texture;
   if (other_texture) s.texture = make_texture_encoder(options.texture);

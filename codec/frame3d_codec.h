@@ -87,7 +87,9 @@ bool is_key_frame(std::span<const std::uint8_t> bytes);
 /// where said.
 class FrameEncoder {
  public:
-  FrameEncoder(const Rig& rig, const Pattern& pattern);
+  /// `line_stride`: surfaces have every so many of the rig's detection lines, and count those
+  /// (codec/reduce.h).
+  FrameEncoder(const Rig& rig, const Pattern& pattern, int line_stride = 1);
   FrameEncoder(FrameEncoder&&) noexcept;
   FrameEncoder& operator=(FrameEncoder&&) noexcept;
   ~FrameEncoder();

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 namespace relievo {
@@ -38,7 +39,7 @@ bool normalise(Vec3f& v) {
 
 }  // namespace
 
-Status check_surface(const Surface& surface) {
+Status check_vertices(const Surface& surface) {
   const std::size_t count = surface.positions.size();
   const auto matches = [count](std::size_t size) { return size == 0 || size == count; };
   if (!matches(surface.normals.size()) || !matches(surface.texture_coordinates.size()))
@@ -51,17 +52,28 @@ Status check_surface(const Surface& surface) {
                  std::to_string(surface.sigmas_m.size()) + " sigmas and " +
                  std::to_string(surface.interpolated.size()) +
                  " marks of interpolation: give none or one a vertex"};
+  bool lengths = true;
   for (const float sigma : surface.sigmas_m)
-    if (!(std::isfinite(sigma) && sigma >= 0))
-      return Error{"surface has a sigma that is no length in metres"};
+    lengths &= static_cast<bool>((sigma >= 0) & (sigma <= std::numeric_limits<float>::max()));
+  if (!lengths) return Error{"surface has a sigma that is no length in metres"};
   if (!all_finite(surface.positions) || !all_finite(surface.normals) ||
       !all_finite(surface.texture_coordinates))
     return Error{"surface has a position, normal or texture coordinate that is not finite"};
+  return {};
+}
+
+Status check_triangles(const Surface& surface) {
+  const std::size_t count = surface.positions.size();
   if (const std::uint32_t largest = largest_index(surface.triangles);
       !surface.triangles.empty() && largest >= count)
     return Error{"surface has a triangle on vertex " + std::to_string(largest) + " of " +
                  std::to_string(count)};
   return {};
+}
+
+Status check_surface(const Surface& surface) {
+  const Status status = check_vertices(surface);
+  return status ? check_triangles(surface) : status;
 }
 
 std::vector<Vec3f> surface_normals(const Surface& surface) {

@@ -159,10 +159,12 @@ std::string permissions(const std::string& name, KeyRole role) {
          "\"><subject_name>CN=" + name + "</subject_name><validity><not_before>" + date(now - 24 * 3600) +
          "</not_before><not_after>" + date(now + kIdentityYears * kSecondsOfAYear) +
          "</not_after></validity><allow_rule>" + std::string(kAllDomains) +
-         (publisher ? topics("publish", {"info", "frame", "status", "key_frame_request"})
-                    : topics("publish", {"key_frame_request"})) +
-         (publisher ? topics("subscribe", {"info", "frame", "status", "key_frame_request"})
-                    : topics("subscribe", {"info", "frame", "status"})) +
+         (publisher ? topics("publish", {"info", "frame", "status", "key_frame_request", "clock_question",
+                                         "clock_answer"})
+                    : topics("publish", {"key_frame_request", "clock_question"})) +
+         (publisher ? topics("subscribe", {"info", "frame", "status", "key_frame_request", "clock_question",
+                                           "clock_answer"})
+                    : topics("subscribe", {"info", "frame", "status", "clock_answer"})) +
          "</allow_rule><default>DENY</default></grant></permissions></dds>\n";
 }
 

@@ -212,6 +212,29 @@ Pattern read_pattern(Cursor& in, bool& possible) {
   return pattern;
 }
 
+/// Those of a quality that this version knows.
+std::vector<RungStatus> read_rungs(Cursor& in) {
+  const auto kinds = in.bytes();
+  std::vector<RungStatus> rungs(std::min(kinds.size(), kRungs.size()));
+  const auto each = [&](auto set) {
+    const auto count = in.get<std::uint32_t>();
+    RungStatus unknown;
+    for (std::uint32_t i = 0; i < count && in.ok(); ++i) set(i < rungs.size() ? rungs[i] : unknown);
+  };
+  each([&](RungStatus& rung) { rung.readers = in.get<std::uint32_t>(); });
+  each([&](RungStatus& rung) { rung.frames = in.get<std::uint64_t>(); });
+  each([&](RungStatus& rung) { rung.drops = in.get<std::uint64_t>(); });
+  each([&](RungStatus& rung) { rung.encode_ms = in.number(); });
+  each([&](RungStatus& rung) { rung.bit_rate = in.number(); });
+  std::vector<RungStatus> known;
+  for (std::size_t i = 0; i < rungs.size(); ++i) {
+    if (kinds[i] == 0 || kinds[i] >= kRungs.size()) continue;
+    rungs[i].rung = static_cast<Rung>(kinds[i]);
+    known.push_back(rungs[i]);
+  }
+  return known;
+}
+
 }  // namespace
 
 Result<FrameView> read_frame_cdr(std::span<const std::uint8_t> cdr) {
@@ -325,6 +348,8 @@ Result<ServerStatus> read_status_cdr(std::span<const std::uint8_t> cdr) {
     if (!in.more()) return;  // of a server that did not count bytes
     status.bit_rate = in.number();
     status.rate_level = in.get<std::uint32_t>();
+    if (!in.more()) return;  // of a server without a ladder
+    status.rungs = read_rungs(in);
   });
   if (!in.ok()) return truncated("status");
   if (auto bad = bad_stream(status.stream)) return *bad;

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <functional>
-#include <limits>
 #include <utility>
 
+#include "idl/clock.h"
 #include "idl/domain.h"
+#include "idl/frame_writer.h"
 #include "idl/live_streams.h"
 #include "idl/security.h"
 #include "idl/topics.h"
@@ -87,7 +88,7 @@ Status written(dds_return_t code, Topic topic) {
 class DdsPublisher final : public Publisher {
  public:
   static Result<std::unique_ptr<Publisher>> open(const DomainOptions& options, const StreamInfo& info,
-                                                 std::function<void()> key_frame_wanted) {
+                                                 std::function<void()> key_frame_wanted, Clock clock) {
     if (!valid_stream_name(info.stream)) {
       return Error{"'" + info.stream +
                    "' cannot name a stream: use up to 64 letters, digits, '_', '-' and '.', no dot first"};
@@ -113,6 +114,7 @@ class DdsPublisher final : public Publisher {
     auto notice = SecuredNotice::create(*publisher->domain_, info.stream);
     if (!notice) return notice.error();
     publisher->notice_ = std::move(notice).value();
+    publisher->clock_ = create_clock_service(*publisher->domain_, info.stream, std::move(clock));
     if (key_frame_wanted) {
       if (auto status = publisher->listen(std::move(key_frame_wanted)); !status) return status.error();
     }
@@ -120,17 +122,7 @@ class DdsPublisher final : public Publisher {
   }
 
   Status publish(const FrameMessage& frame) override {
-    if (frame.data->size() > std::numeric_limits<std::uint32_t>::max() / 2) {
-      return Error{"a frame of " + std::to_string(frame.data->size()) + " bytes is too large to publish"};
-    }
-    relievo_Frame sample{};
-    sample.stream = borrow(stream_);
-    sample.sequence_number = frame.sequence;
-    sample.frame_number = frame.number;
-    sample.capture_time_ns = frame.capture_time_ns;
-    sample.publish_time_ns = frame.publish_time_ns;
-    sample.data = borrow(*frame.data);
-    return written(dds_write(writer(Topic::kFrame), &sample), Topic::kFrame);
+    return write_frame(writer(Topic::kFrame), stream_, frame);
   }
 
   Status publish(const ServerStatus& status) override {
@@ -166,14 +158,32 @@ class DdsPublisher final : public Publisher {
     double drift = 0;
     none_or_one(sample.phase, status.step.phase, phase);
     none_or_one(sample.drift, status.step.drift_fields_s, drift);
+    std::vector<std::uint8_t> rungs;
+    std::vector<std::uint32_t> readers;
+    std::vector<std::uint64_t> frames, drops;
+    std::vector<double> encode_ms, bit_rates;
+    for (const RungStatus& rung : status.rungs) {
+      rungs.push_back(static_cast<std::uint8_t>(rung.rung));
+      readers.push_back(rung.readers);
+      frames.push_back(rung.frames);
+      drops.push_back(rung.drops);
+      encode_ms.push_back(rung.encode_ms);
+      bit_rates.push_back(rung.bit_rate);
+    }
+    const auto lend = [](auto& sequence, auto& values) {
+      sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
+      sequence._buffer = values.data();
+    };
+    lend(sample.rungs, rungs);
+    lend(sample.rung_readers, readers);
+    lend(sample.rung_frames, frames);
+    lend(sample.rung_drops, drops);
+    lend(sample.rung_encode_ms, encode_ms);
+    lend(sample.rung_bit_rates, bit_rates);
     return written(dds_write(writer(Topic::kStatus), &sample), Topic::kStatus);
   }
 
-  int matched_readers() const override {
-    dds_publication_matched_status_t status{};
-    dds_get_publication_matched_status(writer(Topic::kFrame), &status);
-    return static_cast<int>(status.current_count);
-  }
+  int matched_readers() const override { return matched_readers_of(writer(Topic::kFrame)); }
 
   ~DdsPublisher() override {
     // Waits for a call in progress; `wanted_` outlives it.
@@ -235,6 +245,7 @@ class DdsPublisher final : public Publisher {
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
   SecuredNotice notice_;
+  std::unique_ptr<ClockService> clock_;
   Entity request_group_;
   Entity requests_;
   std::function<void()> wanted_;
@@ -243,8 +254,9 @@ class DdsPublisher final : public Publisher {
 }  // namespace
 
 Result<std::unique_ptr<Publisher>> Publisher::create(const DomainOptions& domain, const StreamInfo& info,
-                                                     std::function<void()> key_frame_wanted) {
-  return DdsPublisher::open(domain, info, std::move(key_frame_wanted));
+                                                     std::function<void()> key_frame_wanted,
+                                                     std::function<std::int64_t()> clock) {
+  return DdsPublisher::open(domain, info, std::move(key_frame_wanted), std::move(clock));
 }
 
 }  // namespace relievo

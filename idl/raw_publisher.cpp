@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "idl/cdr.h"
+#include "idl/clock.h"
 #include "idl/domain.h"
 #include "idl/live_streams.h"
 #include "idl/security.h"
@@ -106,6 +107,7 @@ class DdsRawPublisher final : public RawPublisher {
     auto notice = SecuredNotice::create(*publisher->domain_, stream);
     if (!notice) return notice.error();
     publisher->notice_ = std::move(notice).value();
+    publisher->clock_ = create_clock_service(*publisher->domain_, stream);
     for (const Topic topic : kTopics) {
       const auto index = static_cast<std::size_t>(topic);
       auto type = sertype_of(participant, topic);
@@ -148,6 +150,7 @@ class DdsRawPublisher final : public RawPublisher {
   std::string stream_;
   std::shared_ptr<Domain> domain_;
   SecuredNotice notice_;
+  std::unique_ptr<ClockService> clock_;  // of times that are restamped
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
   std::array<ddsi_sertype*, kTopics.size()> types_{};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <map>
 #include <set>
 #include <thread>
@@ -11,8 +12,10 @@
 
 #include "base/log.h"
 #include "base/time.h"
+#include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 #include "idl/domain.h"
+#include "idl/frame_link.h"
 #include "idl/security.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
@@ -22,27 +25,8 @@ namespace relievo {
 namespace {
 
 constexpr std::uint32_t kTakeAtOnce = 16;
-constexpr std::size_t kMaxStreams = 256;  // what a hostile peer can make us remember
-
-// The serialised bytes of a taken sample, lent without a copy.
-class LentBytes {
- public:
-  explicit LentBytes(ddsi_serdata* data) : data_(data) {
-    reference_ = ddsi_serdata_to_ser_ref(data_, 0, ddsi_serdata_size(data_), &bytes_);
-  }
-  LentBytes(const LentBytes&) = delete;
-  LentBytes& operator=(const LentBytes&) = delete;
-  ~LentBytes() { ddsi_serdata_to_ser_unref(reference_, &bytes_); }
-
-  std::span<const std::uint8_t> span() const {
-    return {static_cast<const std::uint8_t*>(bytes_.iov_base), bytes_.iov_len};
-  }
-
- private:
-  ddsi_serdata* data_;
-  ddsi_serdata* reference_;
-  ddsrt_iovec_t bytes_{};
-};
+constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;  // for the first key frame of a lower rung
+constexpr std::size_t kMaxStreams = 256;                      // what a hostile peer can make us remember
 
 // What is remembered of a stream. It is there while it writes to any topic: DDS marks a topic's instance as
 // not alive when its writer leaves, dies or is silent for its lease, and as alive again only with the topic's
@@ -64,7 +48,9 @@ struct Known {
 class DdsSubscriber final : public Subscriber {
  public:
   static Result<std::unique_ptr<Subscriber>> open(const DomainOptions& options, const std::string& stream,
-                                                  Callbacks callbacks) {
+                                                  Callbacks callbacks, Rung rung) {
+    if (stream.empty() && rung != Rung::kFull)
+      return Error{"a rung of the ladder is one stream's: name the stream"};
     if (!stream.empty() && !valid_stream_name(stream)) {
       return Error{"'" + stream +
                    "' cannot name a stream: names are up to 64 letters, digits, '_', '-' and '.'"};
@@ -72,7 +58,8 @@ class DdsSubscriber final : public Subscriber {
     auto domain = Domain::open(options);
     if (!domain) return domain.error();
     auto subscriber = std::make_unique<DdsSubscriber>();
-    if (auto status = subscriber->start(std::move(domain).value(), stream, std::move(callbacks)); !status) {
+    if (auto status = subscriber->start(std::move(domain).value(), stream, std::move(callbacks), rung);
+        !status) {
       return status.error();
     }
     return std::unique_ptr<Subscriber>(std::move(subscriber));
@@ -84,6 +71,11 @@ class DdsSubscriber final : public Subscriber {
     thread_.join();
   }
 
+  void set_rung(Rung rung) override {
+    if (stream_.empty() || !wants_frames() || wanted_rung_.exchange(rung) == rung) return;
+    dds_set_guardcondition(change_.get(), true);
+  }
+
   void request_key_frame(const std::string& stream) override {
     relievo_KeyFrameRequest request{};
     request.stream = const_cast<char*>(stream.c_str());  // only read
@@ -91,7 +83,7 @@ class DdsSubscriber final : public Subscriber {
   }
 
  private:
-  Status start(std::shared_ptr<Domain> domain, const std::string& stream, Callbacks callbacks) {
+  Status start(std::shared_ptr<Domain> domain, const std::string& stream, Callbacks callbacks, Rung rung) {
     domain_ = std::move(domain);
     stream_ = stream;
     callbacks_ = std::move(callbacks);
@@ -105,8 +97,11 @@ class DdsSubscriber final : public Subscriber {
     if (auto s = keep(take_entity(dds_create_waitset(participant), "waitset"), waitset_); !s) return s;
     if (auto s = keep(take_entity(dds_create_guardcondition(participant), "condition"), stop_); !s) return s;
     dds_waitset_attach(waitset_.get(), stop_.get(), 0);
+    if (auto s = keep(take_entity(dds_create_guardcondition(participant), "condition"), change_); !s)
+      return s;
+    dds_waitset_attach(waitset_.get(), change_.get(), 0);
     for (const Topic topic : kTopics) {
-      if (topic == Topic::kFrame && !wants_frames()) continue;
+      if (topic == Topic::kFrame) continue;
       const auto i = static_cast<std::size_t>(topic);
       if (auto s = keep(create_reader(participant, group_.get(), topic), readers_[i]); !s) return s;
       if (auto s = keep(take_entity(dds_create_readcondition(readers_[i].get(), DDS_ANY_STATE), "condition"),
@@ -117,6 +112,11 @@ class DdsSubscriber final : public Subscriber {
       dds_waitset_attach(waitset_.get(), conditions_[i].get(), 0);
     }
     if (wants_frames()) {
+      wanted_rung_ = rung;
+      auto frames = FrameLink::open(participant, stream, rung);
+      if (!frames) return frames.error();
+      frames_ = *std::move(frames);
+      dds_waitset_attach(waitset_.get(), frames_.condition.get(), 0);
       if (auto s = keep(create_group(participant, Role::kWatcher, true, stream), request_group_); !s)
         return s;
       if (auto s =
@@ -134,20 +134,75 @@ class DdsSubscriber final : public Subscriber {
   void run() {
     for (;;) {
       dds_attach_t triggered[4];
-      const auto count = dds_waitset_wait(waitset_.get(), triggered, 4, DDS_INFINITY);
+      const auto count = dds_waitset_wait(waitset_.get(), triggered, 4, next_ ? kMakeTime_ns : DDS_INFINITY);
       bool stopping = false;
       if (count < 0 || dds_read_guardcondition(stop_.get(), &stopping) < 0 || stopping) return;
       ended_.clear();
-      for (const Topic topic : kTopics) {
-        if (readers_[static_cast<std::size_t>(topic)].get() != 0) take(topic);
-      }
+      take_change();
+      for (const Topic topic : kTopics) take(topic);
+      if (next_) take_next();
+      if (next_) break_before_make();
       // Only now, so that a stream's last frames come before its end.
       for (const std::string& stream : ended_) tell_if_gone(stream);
     }
   }
 
+  // A rung that is to be read is read beside the one before until that can be let go.
+  void take_change() {
+    bool changed = false;
+    if (dds_take_guardcondition(change_.get(), &changed) < 0 || !changed) return;
+    const Rung wanted = wanted_rung_;
+    if (next_ && next_->rung == wanted) return;
+    next_.reset();
+    if (wanted == frames_.rung) return;
+    auto link = FrameLink::open(domain_->participant(), stream_, wanted);
+    if (!link)
+      return log_warning("cannot go to quality " + std::string(to_string(wanted)) + ": " +
+                         link.error().message);
+    next_ = *std::move(link);
+    next_since_ns_ = steady_now_ns();
+    dds_waitset_attach(waitset_.get(), next_->condition.get(), 0);
+  }
+
+  // Where the way here is too narrow for the rung before, nothing of a lower one may come through beside it:
+  // that is let go then.
+  void break_before_make() {
+    if (next_->rung < frames_.rung || steady_now_ns() - next_since_ns_ < kMakeTime_ns) return;
+    dds_subscription_matched_status_t matched{};
+    dds_get_subscription_matched_status(next_->reader.get(), &matched);
+    if (matched.current_count == 0) return;  // there is no such rung
+    frames_ = *std::move(next_);
+    next_.reset();
+    known_[stream_].alive[static_cast<std::size_t>(Topic::kFrame)] = false;  // until its first sample
+    request_key_frame(stream_);
+  }
+
+  // Up to its first key frame, from which on it is what is read.
+  void take_next() {
+    ddsi_serdata* sample = nullptr;
+    dds_sample_info_t info;
+    while (dds_takecdr(next_->reader.get(), &sample, 1, &info, DDS_ANY_STATE) == 1) {
+      const LentBytes bytes(sample);
+      const auto frame = info.valid_data ? read_frame_cdr(bytes.span()) : Error{};
+      const bool is_key = frame && frame->stream == stream_ && is_key_frame(frame->data);
+      if (is_key) {
+        frames_ = *std::move(next_);
+        next_.reset();
+        if (auto status = deliver(Topic::kFrame, bytes.span(), info); !status)
+          refuse(Topic::kFrame, status.error());
+      }
+      ddsi_serdata_unref(sample);
+      if (is_key) return take(Topic::kFrame);
+    }
+  }
+
+  std::int32_t reader(Topic topic) const {
+    return topic == Topic::kFrame ? frames_.reader.get() : readers_[static_cast<std::size_t>(topic)].get();
+  }
+
   // Everything there is, but bounded, so that no topic starves the others.
   void take(Topic topic) {
+    if (reader(topic) == 0) return;
     for (int round = 0; round < 4; ++round) {
       if (take_some(topic) < static_cast<std::int32_t>(kTakeAtOnce)) return;
     }
@@ -156,8 +211,7 @@ class DdsSubscriber final : public Subscriber {
   std::int32_t take_some(Topic topic) {
     ddsi_serdata* samples[kTakeAtOnce] = {};
     dds_sample_info_t infos[kTakeAtOnce];
-    const auto count = dds_takecdr(readers_[static_cast<std::size_t>(topic)].get(), samples, kTakeAtOnce,
-                                   infos, DDS_ANY_STATE);
+    const auto count = dds_takecdr(reader(topic), samples, kTakeAtOnce, infos, DDS_ANY_STATE);
     for (std::int32_t i = 0; i < count; ++i) {
       if (infos[i].valid_data) {
         const LentBytes bytes(samples[i]);
@@ -199,6 +253,7 @@ class DdsSubscriber final : public Subscriber {
         message.capture_time_ns = frame->capture_time_ns;
         message.publish_time_ns = frame->publish_time_ns;
         message.data = std::make_shared<const Bytes>(frame->data.begin(), frame->data.end());
+        message.rung = frames_.rung;
         callbacks_.frame(frame->stream, message);
         return {};
       }
@@ -254,8 +309,7 @@ class DdsSubscriber final : public Subscriber {
     const bool first = known.writer_handle == 0;
     known.writer_handle = handle;
     const dds_guid_t before = known.writer;
-    auto* const endpoint =
-        dds_get_matched_publication_data(readers_[static_cast<std::size_t>(Topic::kFrame)].get(), handle);
+    auto* const endpoint = dds_get_matched_publication_data(reader(Topic::kFrame), handle);
     if (endpoint == nullptr) {  // it has left already
       known.writer = {};
       return false;
@@ -300,15 +354,19 @@ class DdsSubscriber final : public Subscriber {
   Callbacks callbacks_;
   std::shared_ptr<Domain> domain_;
   Entity group_;
-  std::array<Entity, kTopics.size()> readers_;
+  std::array<Entity, kTopics.size()> readers_;  // but of frames
   std::array<Entity, kTopics.size()> conditions_;
+  std::atomic<Rung> wanted_rung_{Rung::kFull};
   std::unique_ptr<SecuredNoticeListener> notices_;
   Entity request_group_;
   Entity requests_;
-  Entity stop_;
+  Entity stop_, change_;
   Entity waitset_;
   std::thread thread_;
-  // Of the thread alone:
+  // Of the thread alone, once it runs:
+  FrameLink frames_;
+  std::optional<FrameLink> next_;  // that it is to be
+  std::int64_t next_since_ns_ = 0;
   std::map<std::string, Known> known_;
   std::map<std::pair<Topic, std::uint64_t>, std::string> stream_of_;  // by a topic's instance
   std::set<std::string> ended_;
@@ -318,8 +376,8 @@ class DdsSubscriber final : public Subscriber {
 }  // namespace
 
 Result<std::unique_ptr<Subscriber>> Subscriber::create(const DomainOptions& domain, const std::string& stream,
-                                                       Callbacks callbacks) {
-  return DdsSubscriber::open(domain, stream, std::move(callbacks));
+                                                       Callbacks callbacks, Rung rung) {
+  return DdsSubscriber::open(domain, stream, std::move(callbacks), rung);
 }
 
 }  // namespace relievo

@@ -57,19 +57,23 @@ struct SideRow {
   const dds_topic_descriptor_t* type;
   const char* name;
   dds_durability_kind_t durability;
+  bool reliable;
+  int depth;  // 1: only the last one of a stream counts
 };
 const SideRow& row(SideTopic topic) {
   static const SideRow rows[] = {
-      {&relievo_KeyFrameRequest_desc, "relievo/key_frame_request", DDS_DURABILITY_VOLATILE},
-      {&relievo_SecuredNotice_desc, "relievo/secured", DDS_DURABILITY_TRANSIENT_LOCAL},
+      {&relievo_KeyFrameRequest_desc, "relievo/key_frame_request", DDS_DURABILITY_VOLATILE, true, 1},
+      {&relievo_SecuredNotice_desc, "relievo/secured", DDS_DURABILITY_TRANSIENT_LOCAL, true, 1},
+      {&relievo_ClockQuestion_desc, "relievo/clock_question", DDS_DURABILITY_VOLATILE, false, 32},
+      {&relievo_ClockAnswer_desc, "relievo/clock_answer", DDS_DURABILITY_VOLATILE, false, 32},
   };
   return rows[static_cast<std::size_t>(topic)];
 }
 
-// Only the last one of a stream counts.
 Qos side_qos(SideTopic topic) {
   Qos qos = reliable_qos(row(topic).durability);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+  if (!row(topic).reliable) dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, row(topic).depth);
   dds_qset_resource_limits(qos.get(), DDS_LENGTH_UNLIMITED, kMaxStreams, DDS_LENGTH_UNLIMITED);
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;
@@ -96,6 +100,12 @@ Result<Entity> create_group(std::int32_t participant, Role role, bool writing, c
   }
   return writing ? take_entity(dds_create_publisher(participant, qos.get(), nullptr), "publisher")
                  : take_entity(dds_create_subscriber(participant, qos.get(), nullptr), "subscriber");
+}
+
+Result<Entity> create_group(std::int32_t participant, Role role, bool writing, const std::string& stream,
+                            Rung rung) {
+  if (rung == Rung::kFull) return create_group(participant, role, writing, stream);
+  return create_group(participant, Role::kWatcher, writing, stream + "/" + std::string(to_string(rung)));
 }
 
 Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic) {

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "base/rung.h"
 #include "idl/entity.h"
 #include "idl/transport.h"
 
@@ -25,6 +26,11 @@ enum class Role { kServer, kWatcher };
 /// that no other stream's data travels to them, watchers of all in the unnamed one.
 Result<Entity> create_group(std::int32_t participant, Role role, bool writing, const std::string& stream);
 
+/// The same for a lower rung of a stream's ladder, which has a partition of its own, "STREAM/QUALITY": no
+/// watcher of all streams is sent it unasked. kFull is the stream itself.
+Result<Entity> create_group(std::int32_t participant, Role role, bool writing, const std::string& stream,
+                            Rung rung);
+
 /// A writer or reader of `topic` in `group`, with the table's QoS. The DDS topic is made as needed and lives
 /// with the participant.
 Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic);
@@ -34,6 +40,8 @@ Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic
 enum class SideTopic : std::uint8_t {
   kKeyFrameRequest,  // watchers to servers; one that nobody hears is gone
   kSecuredNotice,    // servers to watchers, kept for those that come late
+  kClockQuestion,    // watchers to servers; one that is late is of no use, so none is sent again
+  kClockAnswer,      // servers to watchers, likewise
 };
 Result<Entity> create_writer(std::int32_t participant, std::int32_t group, SideTopic topic);
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, SideTopic topic);

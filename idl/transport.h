@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/clock_offset.h"
 #include "base/result.h"
 #include "base/stream.h"
 
@@ -49,8 +50,11 @@ class Publisher {
   /// Publishes `info` for late joiners at once. Fails where another live writer in the domain has that stream
   /// name. `key_frame_wanted`, where given, is called when a reader of the frames joined or asked for one: on
   /// a thread of DDS, so it must return at once and not call back; never after the destructor has returned.
+  /// `clock` says what time it is to clients that compare theirs (ClockProbe), on such a thread too; empty:
+  /// the system's UTC.
   static Result<std::unique_ptr<Publisher>> create(const DomainOptions& domain, const StreamInfo& info,
-                                                   std::function<void()> key_frame_wanted = {});
+                                                   std::function<void()> key_frame_wanted = {},
+                                                   std::function<std::int64_t()> clock = {});
   virtual ~Publisher() = default;
 
   /// Serialises and sends on the caller's thread and keeps nothing of the argument. Never waits for a reader;
@@ -58,6 +62,19 @@ class Publisher {
   virtual Status publish(const FrameMessage& frame) = 0;
   virtual Status publish(const ServerStatus& status) = 0;
   /// Readers of the frames, in all processes.
+  virtual int matched_readers() const = 0;
+};
+
+/// Writes a lower rung of a stream's quality ladder, beside the Publisher of the stream itself; its readers
+/// have the description and status from there. Any thread, one call at a time.
+class RungPublisher {
+ public:
+  /// `key_frame_wanted` as of Publisher::create(), when a reader joined.
+  static Result<std::unique_ptr<RungPublisher>> create(const DomainOptions& domain, const std::string& stream,
+                                                       Rung rung, std::function<void()> key_frame_wanted);
+  virtual ~RungPublisher() = default;
+  /// As Publisher::publish().
+  virtual Status publish(const FrameMessage& frame) = 0;
   virtual int matched_readers() const = 0;
 };
 
@@ -88,13 +105,32 @@ class Subscriber {
     std::function<void(const std::string& stream)> gone;  // the stream's writer left or died
     std::function<void(const std::string& stream, std::uint64_t count)> lost;  // gap in the frame sequence
   };
+  /// `rung`: the one of the ladder whose frames come; another than kFull needs a name. Description and
+  /// status are the stream's own.
   static Result<std::unique_ptr<Subscriber>> create(const DomainOptions& domain, const std::string& stream,
-                                                    Callbacks callbacks);
+                                                    Callbacks callbacks, Rung rung = Rung::kFull);
   virtual ~Subscriber() = default;
+
+  /// Frames are of this rung soon: those of the one before come until its first key frame is here (of a
+  /// lower rung for a second at most, if there is one), so that nothing stands still. Any thread; callbacks
+  /// may call it. Does nothing to who reads every stream, or asks for a rung that there is not.
+  virtual void set_rung(Rung rung) = 0;
 
   /// Asks the server of `stream`, which must be one that this reads, for a frame that decodes alone: for who
   /// lost one that others build on. (Who joins gets one unasked.) Any thread; callbacks may call it.
   virtual void request_key_frame(const std::string& stream) = 0;
+};
+
+/// Compares this machine's clock with that of a stream's server. Any thread.
+class ClockProbe {
+ public:
+  static Result<std::unique_ptr<ClockProbe>> create(const DomainOptions& domain, const std::string& stream);
+  virtual ~ClockProbe() = default;
+
+  /// Once a second or so; the answer comes by itself, or never.
+  virtual void ask() = 0;
+  /// What the last answers say; nothing where there was none: a server of an older version, or none.
+  virtual std::optional<ClockOffset> offset() const = 0;
 };
 
 }  // namespace relievo

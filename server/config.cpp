@@ -95,6 +95,25 @@ class Reader {
       return refuse(*node, key, "must be " + geometry_profile_names() + " in quotes");
     out = *value;
   }
+  /// A list of lower rungs.
+  void ladder(std::string_view key, std::vector<Rung>& out) {
+    std::vector<std::string> names;
+    const bool given = table_.contains(key);
+    checked(
+        key,
+        [](const std::string& name) {
+          const auto rungs = parse_ladder(name);
+          return name == "none" || name.find(',') != std::string::npos
+                     ? "there are \"reduced\" and \"texture\", and [] for none"
+                 : rungs ? std::string()
+                         : rungs.error().message;
+        },
+        names);
+    if (!given || error_) return;
+    std::string all;
+    for (const std::string& name : names) all += (all.empty() ? "" : ",") + name;
+    out = parse_ladder(all.empty() ? "none" : all).value();
+  }
   void texture(std::string_view key, TextureCodec& out) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
@@ -257,6 +276,11 @@ void read_recording(Reader& reader, ServeConfig& config) {
   reader.checked("sync", sync_policy(), recording.sync);
 }
 
+void read_projector(Reader& reader, ProjectorConfig& projector) {
+  reader.text("output", projector.output);
+  reader.integer("refreshes", 1, kMostRefreshes, projector.refreshes);
+}
+
 /// All but its name.
 void read_stream(Reader& reader, StreamConfig& config) {
   reader.text("source", config.source);
@@ -281,6 +305,7 @@ void read_stream(Reader& reader, StreamConfig& config) {
   if (const auto frames = reader.integer("key_interval", 1, 1000))
     config.key_interval = static_cast<int>(*frames);
   reader.integer("draco_speed", 0, 9, config.draco_speed);
+  reader.ladder("ladder", config.ladder);
   reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
 }
 
@@ -361,6 +386,24 @@ ValueCheck pre_roll() {
   };
 }
 
+Result<std::vector<Rung>> parse_ladder(const std::string& text) {
+  std::vector<Rung> out;
+  if (text == "none") return out;
+  std::stringstream names(text);
+  for (std::string name; std::getline(names, name, ',');) {
+    const auto rung = rung_named(name);
+    if (!rung || *rung == Rung::kFull)
+      return Error{
+          "'" + name +
+          "' is no lower quality: there are reduced and texture, with a comma between them, and none"};
+    out.push_back(*rung);
+  }
+  if (out.empty()) return Error{"give reduced, texture, both with a comma between them, or none"};
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
 ValueCheck stream_name() {
   return [](const std::string& name) {
     return valid_stream_name(name)
@@ -424,6 +467,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.text("keys", config.keys);
   reader.text("web", config.web);
   reader.table("recording", [&](Reader& recording) { read_recording(recording, config); });
+  reader.table("projector", [&](Reader& projector) { read_projector(projector, config.projector); });
   reader.table("gateway", [&](Reader& gateway) { read_gateway(gateway, config.gateway); });
   // Last, since what is said outside of them holds for all.
   if (!reader.has_tables("stream"))

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/rung.h"
 #include "base/web_options.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/camera_options.h"
@@ -19,6 +20,7 @@
 namespace relievo {
 
 inline constexpr double kLeastBound_px = 0.01, kMostBound_px = 8;  // of ServeConfig::bound_px
+inline constexpr int kMostRefreshes = 4;                           // of ProjectorConfig::refreshes
 /// Of --bitrate; below it the coarsest pictures are not worth showing.
 inline constexpr std::int64_t kLeastBitRate = 100'000, kMostBitRate = 1'000'000'000;
 
@@ -44,8 +46,17 @@ struct StreamConfig {
   std::optional<int> key_interval;
   std::optional<double> bound_px;  // of visual
   int draco_speed = 4;
+  std::vector<Rung> ladder = {Rung::kReduced, Rung::kTexture};  // qualities besides the full one, best first
 
   bool operator==(const StreamConfig&) const = default;
+};
+
+/// The projector that pages may drive (/rig); docs/RIG.md.
+struct ProjectorConfig {
+  std::string output;  // as `project --output`; "auto": as `project` chooses; empty: pages drive none
+  int refreshes = 1;   // that each picture stays
+
+  bool operator==(const ProjectorConfig&) const = default;
 };
 
 /// What a server does for all of its streams; and the one stream, or what those of `streams` have in common.
@@ -59,6 +70,7 @@ struct ServeConfig : StreamConfig {
   RecordingTexts recording;            // in the table [recording]
   std::string record_folder;           // of recordings on request; empty: there are none
   std::string pre_roll = "0";          // of those: a duration
+  ProjectorConfig projector;           // in the table [projector]
 
   /// All streams there are to be.
   std::vector<StreamConfig> all_streams() const;
@@ -80,6 +92,9 @@ Status check_config(const ServeConfig& config);
 /// Of --pre-roll: a duration, or 0.
 Result<double> parse_pre_roll_s(const std::string& text);
 ValueCheck pre_roll();
+
+/// Of --ladder: "none", or lower rungs with commas between them.
+Result<std::vector<Rung>> parse_ladder(const std::string& text);
 
 /// What cannot name a stream.
 ValueCheck stream_name();

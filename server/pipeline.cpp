@@ -64,6 +64,7 @@ class ThreadedPipeline final : public Pipeline {
     encode.join();
     to_publish_.close();
     publish.join();
+    if (options_.rungs != nullptr) options_.rungs->end();
     const Status done = outcome(captured);
     set_state(StreamState::kEnded, done ? "" : done.error().message);
     to_sinks(status());
@@ -87,6 +88,7 @@ class ThreadedPipeline final : public Pipeline {
     s.drops_reconstruct = to_reconstruct_.drops();
     s.drops_encode = to_encode_.drops();
     s.drops_publish = to_publish_.drops();
+    if (options_.rungs != nullptr) s.rungs = options_.rungs->status();
     std::lock_guard lock(mutex_);
     s.state = state_;
     s.message = message_.empty() ? step_message_ : message_;
@@ -206,6 +208,7 @@ class ThreadedPipeline final : public Pipeline {
       const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
       steps.add(item->frame.time_ns, reconstructor_.report().step);
       say_step(steps);
+      if (!*result) offer(item->frame, nullptr, steps);
       if (reconstructor_.report().step.mixed) {
         stats_.lost_in_capture(1);
         // A projector that drifts comes round; a source that can be played again is given up in the end.
@@ -230,10 +233,24 @@ class ThreadedPipeline final : public Pipeline {
       const double ms = milliseconds(steady_now_ns() - begin);
       for (std::optional<Frame3D> made = *std::move(result); made; made = reconstructor_.next()) {
         stats_.reconstructed(ms, reconstructor_.report().filters);
+        if (!made->between) offer(item->frame, &made->surface, steps);
         const std::int64_t later_ns = made->time_ns - item->frame.time_ns;  // below 0: of a field before
         push(to_encode_, Reconstructed{*std::move(made), item->capture_time_ns + later_ns});
       }
     }
+  }
+
+  /// To somebody who looks at single frames: a copy, where one was asked for.
+  void offer(const CapturedFrame& captured, const Surface* surface, const StepWatch& steps) {
+    if (options_.tap == nullptr || !options_.tap->wants(surface != nullptr)) return;
+    const CapturedFrame* decoded = reconstructor_.decoded();
+    TappedFrame out{.captured = captured.clone(),
+                    .report = reconstructor_.report(),
+                    .step = steps.status(),
+                    .step_advice = steps.message()};
+    if (decoded != nullptr) out.decoded = decoded->clone();
+    if (surface != nullptr) out.grid = surface->grid;
+    options_.tap->put(std::move(out));
   }
 
   void encode_stage() {
@@ -261,7 +278,10 @@ class ThreadedPipeline final : public Pipeline {
       stats_.encoded(milliseconds(steady_now_ns() - begin));
       FrameMessage message;
       message.number = item->frame.number;
-      reconstructor_.recycle(std::move(item->frame));
+      if (options_.rungs != nullptr && options_.rungs->wanted())
+        options_.rungs->take(std::move(item->frame), item->capture_time_ns);
+      else
+        reconstructor_.recycle(std::move(item->frame));
       message.capture_time_ns = item->capture_time_ns;
       message.data = std::make_shared<const Bytes>(*std::move(bytes));
       const std::uint64_t dropped = to_publish_.drops();

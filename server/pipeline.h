@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // capture -> reconstruct -> encode -> publish: one thread a stage, bounded queues between them. Beside
-// stream_set.*, which runs a pipeline for each stream, the only place in the server that has threads.
+// stream_set.*, which runs a pipeline for each stream, and ladder.*, which makes its lower qualities, the
+// only place in the server that has threads.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
 #include "codec/frame3d_codec.h"
+#include "server/frame_tap.h"
 
 namespace relievo {
 
@@ -27,6 +29,19 @@ class FrameSink {
   virtual Status consume(const ServerStatus& status) = 0;
 };
 
+/// Makes lower qualities of the frames that were encoded. The caller keeps it.
+class LowerRungs {
+ public:
+  virtual ~LowerRungs() = default;
+  /// Whether take() is to be called. This and take() are called on the encoding thread and return at once.
+  virtual bool wanted() = 0;
+  virtual void take(Frame3D frame, std::int64_t capture_time_ns) = 0;
+  /// No more comes. Returns when all that was begun is done; what was not is not.
+  virtual void end() = 0;
+  /// What the rungs made of it have done. Any thread.
+  virtual std::vector<RungStatus> status() const = 0;
+};
+
 struct PipelineOptions {
   std::string stream;
   bool paced = true;      // a source that is not live is played at its own time stamps
@@ -36,7 +51,9 @@ struct PipelineOptions {
   EncodeOptions encode;  // volume.size_m 0: fitted to the first frame, grown when a frame leaves it
   // Step of coded positions, of the distance to the nearest part of the scene; overrides position_bits.
   double depth_resolution = 1e-4;
-  double bit_rate = 0;  // bits a second that frames may take; 0: as `encode` says
+  double bit_rate = 0;          // bits a second that frames may take; 0: as `encode` says
+  FrameTap* tap = nullptr;      // must outlive the pipeline; null: nobody looks at single frames
+  LowerRungs* rungs = nullptr;  // must outlive the pipeline; null: there is the full quality only
 };
 
 class Pipeline {

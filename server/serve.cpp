@@ -13,6 +13,7 @@
 #include "cli/service_manager.h"
 #include "idl/cdr.h"
 #include "server/recording_desk.h"
+#include "server/rig_desk.h"
 #include "server/stream_set.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -21,7 +22,7 @@ namespace relievo {
 namespace {
 
 Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFrameWishes& wishes,
-                                               RecordingDesk* desk) {
+                                               RecordingDesk* desk, RigDesk& rigs) {
   if (config.web == "none") return std::unique_ptr<Gateway>();
   const auto address = parse_listen_address(config.web);
   if (!address) return address.error();
@@ -35,7 +36,8 @@ Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFra
                                                      [](const std::string& name, const FrameMessage& frame) {
                                                        return write_frame_cdr(name, frame);
                                                      }},
-                         .recordings = desk});
+                         .recordings = desk,
+                         .rigs = &rigs});
 }
 
 void print_addresses(const ServeConfig& config, const std::vector<std::string>& streams,
@@ -64,6 +66,7 @@ void say_what_waits(const ServeConfig& now, const ServeConfig& wanted) {
   compare(now.recording, wanted.recording, "[recording]");
   compare(now.record_folder, wanted.record_folder, "the recordings' folder");
   compare(now.pre_roll, wanted.pre_roll, "pre_roll");
+  compare(now.projector, wanted.projector, "[projector]");
   if (!waits.empty()) log_warning("of the new configuration, " + waits + " needs a restart");
 }
 
@@ -90,12 +93,17 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
   std::optional<RecordingDesk> desk;
   if (!config.record_folder.empty()) desk.emplace(config.record_folder);
   RecordingDesk* const desk_or_none = desk ? &*desk : nullptr;
+  RigDesk rigs(config.projector);
   // The gateway first: a port in use should fail before anything is opened or announced.
-  const auto gateway = start_gateway(config, wishes, desk_or_none);
+  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs);
   if (!gateway) return gateway.error();
-  StreamSet streams(
-      {.config = config, .wishes = wishes, .board = board, .gateway = gateway->get(), .desk = desk_or_none},
-      !config.streams.empty());
+  StreamSet streams({.config = config,
+                     .wishes = wishes,
+                     .board = board,
+                     .gateway = gateway->get(),
+                     .desk = desk_or_none,
+                     .rigs = &rigs},
+                    !config.streams.empty());
   stop.on_stop([&] {
     tell_stopping();
     streams.stop();

@@ -20,11 +20,13 @@ namespace {
 
 /// Flags as given; what is not given leaves the file's or the default value.
 struct Flags {
-  std::optional<std::string> config, source, stream, interface, keys, web, record, record_folder, pre_roll;
-  std::optional<std::string> decoder, geometry, texture, bit_rate;
+  std::optional<std::string> config, source, stream, interface, keys, web, record, record_folder, pre_roll,
+      projector;
+  std::optional<std::string> decoder, geometry, texture, bit_rate, ladder;
   std::string scheme;
   std::shared_ptr<RecordingTexts> recording;
   std::shared_ptr<WebOptions> gateway;
+  std::optional<int> refreshes;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<double> bound_px;
   std::optional<std::uint64_t> frames;
@@ -50,6 +52,7 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   set(flags.key_interval, config.key_interval);
   set(flags.bound_px, config.bound_px);
   set(flags.draco_speed, config.draco_speed);
+  if (flags.ladder) config.ladder = parse_ladder(*flags.ladder).value();  // the option is checked
   set(flags.fill_holes, config.surface.fill_holes);
   config.surface.dense = config.surface.dense || flags.dense;
   if (flags.frames) config.frames = flags.frames;
@@ -87,6 +90,8 @@ Result<ServeConfig> read(const Flags& flags) {
   set(flags.domain, config.domain);
   set(flags.record_folder, config.record_folder);
   set(flags.pre_roll, config.pre_roll);
+  set(flags.projector, config.projector.output);
+  set(flags.refreshes, config.projector.refreshes);
   config.recording = merged(*flags.recording, std::move(config.recording));
   config.gateway = merged(*flags.gateway, std::move(config.gateway));
   set_stream(flags, config);
@@ -149,6 +154,12 @@ Command serve_command() {
                "the last key frame on)")
             ->type_name("TIME")
             ->check(pre_roll());
+        app.add_option("--projector", f->projector,
+                       "Output of this machine that the page /rig may show the pattern on, as in `project "
+                       "--list`; auto for the only, or the second one (default: pages drive no projector)")
+            ->type_name("NAME");
+        app.add_option("--refreshes", f->refreshes, "With --projector: refreshes that each picture stays")
+            ->check(CLI::Range(1, kMostRefreshes));
         app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
         app.add_option("--decoder", f->decoder,
                        "ordered (default: more exact) or paper (as published: three times as fast)")
@@ -208,6 +219,16 @@ Command serve_command() {
             ->type_name("N");
         app.add_option("--draco-speed", f->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest (default 4)")
             ->check(CLI::Range(0, 9));
+        app.add_option(
+               "--ladder", f->ladder,
+               "Lower qualities to be had of the stream, made while somebody reads them: reduced (every "
+               "second line, half the texture's size), texture (that texture alone) or none (default "
+               "reduced,texture)")
+            ->check([](const std::string& names) {
+              const auto rungs = parse_ladder(names);
+              return rungs ? std::string() : rungs.error().message;
+            })
+            ->type_name("NAMES");
         app.add_flag("--loop", f->loop, "Start a take again at its end");
         app.add_flag("--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");
         add_rig_flags(app, f->camera);

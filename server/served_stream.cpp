@@ -13,6 +13,7 @@
 #include "capture/source/field_source.h"
 #include "idl/recorder.h"
 #include "idl/stream_recorder.h"
+#include "server/ladder.h"
 #include "server/options.h"
 #include "server/pipeline.h"
 
@@ -134,6 +135,7 @@ class RunningStream final : public ServedStream {
         label_(around.config.streams.empty() ? "" : name_) {}
   ~RunningStream() override {
     if (announced_) around_.gateway->withdraw(name_);
+    if (around_.rigs != nullptr) around_.rigs->remove(name_);
     around_.board.forget(name_);
   }
 
@@ -143,10 +145,14 @@ class RunningStream final : public ServedStream {
     stopped_ = true;
     pipeline_->stop();
   }
-  void request_key_frame() override { pipeline_->request_key_frame(); }
+  void request_key_frame() override {
+    pipeline_->request_key_frame();
+    if (ladder_) ladder_->request_key_frame();
+  }
 
  private:
   Status announce(const std::string& uri);
+  Status raise_ladder(const PipelineOptions& options);
 
   const StreamConfig config_;
   const Surroundings around_;
@@ -156,7 +162,10 @@ class RunningStream final : public ServedStream {
   Recording recording_;
   std::optional<OnRequest> on_request_;
   std::vector<std::unique_ptr<FrameSink>> sinks_;
-  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<RigProbe> probe_;
+  std::unique_ptr<Ladder> ladder_;
+  std::vector<std::unique_ptr<RungPublisher>> rungs_;  // call the ladder, and are called by its thread
+  std::unique_ptr<Pipeline> pipeline_;                 // ends that thread
   std::atomic<bool> stopped_{false};
   bool announced_ = false;
 };
@@ -171,8 +180,17 @@ Status RunningStream::open() {
   if (const Status announced = announce(*name); !announced) return announced;
   std::vector<FrameSink*> sinks;
   for (const auto& sink : sinks_) sinks.push_back(sink.get());
-  auto pipeline = Pipeline::create(*source_, sinks, pipeline_options(config_, name_));
+  PipelineOptions options = pipeline_options(config_, name_);
+  if (around_.rigs != nullptr) {
+    const SourceInfo& info = source_->info();
+    probe_ = std::make_unique<RigProbe>(name_, info.rig, info.pattern);
+    options.tap = probe_.get();
+  }
+  if (const Status raised = raise_ladder(options); !raised) return raised;
+  options.rungs = ladder_.get();
+  auto pipeline = Pipeline::create(*source_, sinks, options);
   if (!pipeline) return pipeline.error();
+  if (probe_) around_.rigs->add(name_, *probe_);
   pipeline_ = *std::move(pipeline);
   return {};
 }
@@ -204,6 +222,31 @@ Status RunningStream::announce(const std::string& uri) {
   }
   if (recording_.recorder) sinks_.push_back(make_recorder_sink(*recording_.recorder));
   sinks_.push_back(make_service_sink(around_.board, name_));
+  return {};
+}
+
+Status RunningStream::raise_ladder(const PipelineOptions& options) {
+  if (config_.ladder.empty()) return {};
+  ladder_ = std::make_unique<Ladder>(source_->info().rig, source_->info().pattern, options.encode,
+                                     options.depth_resolution);
+  for (const Rung rung : config_.ladder) {
+    auto made = RungPublisher::create(domain_options(around_.config), name_, rung,
+                                      [ladder = ladder_.get()] { ladder->request_key_frame(); });
+    if (!made) return made.error();
+    RungPublisher* const publisher = rungs_.emplace_back(*std::move(made)).get();
+    Gateway* const gateway = around_.gateway;
+    ladder_->add({.rung = rung,
+                  .readers =
+                      [publisher, gateway, rung, name = name_] {
+                        const int browsers = gateway == nullptr ? 0 : gateway->watchers(name, rung);
+                        return publisher->matched_readers() + browsers;
+                      },
+                  .publish =
+                      [publisher, gateway, name = name_](const FrameMessage& frame) {
+                        if (gateway != nullptr) gateway->publish(name, frame);
+                        return publisher->publish(frame);
+                      }});
+  }
   return {};
 }
 

@@ -9,6 +9,7 @@
 #include "base/stream.h"
 #include "server/config.h"
 #include "server/recording_desk.h"
+#include "server/rig_desk.h"
 #include "server/sinks.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -22,6 +23,7 @@ struct Surroundings {
   ServiceBoard& board;
   Gateway* gateway = nullptr;     // null: none
   RecordingDesk* desk = nullptr;  // null: nothing is recorded on request
+  RigDesk* rigs = nullptr;        // null: nobody looks at the rigs
 };
 
 DomainOptions domain_options(const ServeConfig& config);

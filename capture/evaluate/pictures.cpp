@@ -10,31 +10,20 @@
 #include <string>
 #include <vector>
 
+#include "capture/evaluate/drawing.h"
 #include "capture/reconstruct/field_difference.h"
 
 namespace relievo {
 namespace {
 
-using Colour = std::array<float, 3>;  // 0..1
-
 constexpr Colour kBackground{0.07F, 0.08F, 0.10F};
 constexpr Colour kWrong{1, 0, 1};
 constexpr int kLegendHeight = 44;
-constexpr float kDimmed = 0.35F;
-
-std::uint8_t byte(float value) {
-  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.F, 1.F)));
-}
-
-void set(Image8& picture, int x, int y, const Colour& colour) {
-  if (x < 0 || y < 0 || x >= picture.width() || y >= picture.height()) return;
-  for (std::size_t c = 0; c < 3; ++c) picture.row(y)[3 * x + static_cast<int>(c)] = byte(colour[c]);
-}
 
 Image8 blank(int width, int height) {
   Image8 out(width, height, 3);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) set(out, x, y, kBackground);
+    for (int x = 0; x < width; ++x) set_pixel(out, x, y, kBackground);
   return out;
 }
 
@@ -81,7 +70,7 @@ Image8 with_legend(const Image8& picture, const std::vector<Colour>& stops,
   const int top = picture.height() + 8;
   for (int x = left; x < right; ++x)
     for (int y = top; y < top + 12; ++y)
-      set(out, x, y, ramp(stops, static_cast<float>(x - left) / static_cast<float>(right - left - 1)));
+      set_pixel(out, x, y, ramp(stops, static_cast<float>(x - left) / static_cast<float>(right - left - 1)));
   cv::Mat canvas(out.height(), out.width(), CV_8UC3, out.data());
   for (const Label& label : labels) {
     constexpr double kScale = 0.4;
@@ -89,19 +78,6 @@ Image8 with_legend(const Image8& picture, const std::vector<Colour>& stops,
     const int centre = left + static_cast<int>(label.at * static_cast<float>(right - left));
     cv::putText(canvas, label.text, {centre - size.width / 2, top + 28}, cv::FONT_HERSHEY_SIMPLEX, kScale,
                 cv::Scalar(225, 225, 225), 1, cv::LINE_AA);
-  }
-  return out;
-}
-
-Image8 dimmed(const CapturedFrame& frame) {
-  Image8 out = frame.picture.clone();
-  for (int y = 0; y < out.height(); ++y) {
-    std::uint8_t* row = out.row(y);
-    for (int x = 0; x < out.width(); ++x) {
-      const int grey = (row[3 * x] + row[3 * x + 1] + row[3 * x + 2]) / 3;
-      for (int c = 0; c < 3; ++c)
-        row[3 * x + c] = static_cast<std::uint8_t>(kDimmed * static_cast<float>(grey));
-    }
   }
   return out;
 }
@@ -123,8 +99,8 @@ Image8 draw_surface(const Surface& surface, const Rig& rig,
     pixel[v] = {uv[0] * static_cast<float>(out.width()) - 0.5F,
                 uv[1] * static_cast<float>(out.height()) - 0.5F};
     colours[v] = colour_of(v);
-    set(out, static_cast<int>(std::lround(pixel[v][0])), static_cast<int>(std::lround(pixel[v][1])),
-        colours[v]);
+    set_pixel(out, static_cast<int>(std::lround(pixel[v][0])), static_cast<int>(std::lround(pixel[v][1])),
+              colours[v]);
   }
   for (const Triangle& t : surface.triangles) {
     const Vec2f &a = pixel[t[0]], &b = pixel[t[1]], &c = pixel[t[2]];
@@ -142,7 +118,7 @@ Image8 draw_surface(const Surface& surface, const Rig& rig,
         Colour mixed{};
         for (std::size_t k = 0; k < 3; ++k)
           mixed[k] = (1 - wb - wc) * colours[t[0]][k] + wb * colours[t[1]][k] + wc * colours[t[2]][k];
-        set(out, x, y, mixed);
+        set_pixel(out, x, y, mixed);
       }
     }
   }
@@ -174,8 +150,8 @@ Image8 draw_difference(const CapturedFrame& frame, const Rig& rig) {
   for (int y = 0; y < out.height(); ++y) {
     const float* d = image.line(std::min(y / step, image.lines - 1));
     for (int x = 0; x < image.width; ++x) {
-      set(out, x, y,
-          {0.5F + unit * d[x], 0.5F + unit * d[image.width + x], 0.5F + unit * d[2 * image.width + x]});
+      set_pixel(out, x, y,
+                {0.5F + unit * d[x], 0.5F + unit * d[image.width + x], 0.5F + unit * d[2 * image.width + x]});
     }
   }
   return out;
@@ -183,7 +159,7 @@ Image8 draw_difference(const CapturedFrame& frame, const Rig& rig) {
 
 Image8 draw_boundaries(const CapturedFrame& frame, const Surface& surface, const Pattern& pattern,
                        int slide) {
-  Image8 out = dimmed(frame);
+  Image8 out = dimmed(frame.picture);
   const auto light = [](Primary p) {
     return Colour{p & 1 ? 1.F : 0.F, p & 2 ? 1.F : 0.F, p & 4 ? 1.F : 0.F};
   };
@@ -193,8 +169,8 @@ Image8 draw_boundaries(const CapturedFrame& frame, const Surface& surface, const
     const int x = static_cast<int>(std::floor(at.column_px + 0.5F));
     for (int dy = 0; dy < step; ++dy) {
       for (int side = 0; side < 2; ++side) {
-        set(out, x - 2 + side, at.line * step + dy, light(pattern.colour(at.boundary, slide)));
-        set(out, x + side, at.line * step + dy, light(pattern.colour(at.boundary + 1, slide)));
+        set_pixel(out, x - 2 + side, at.line * step + dy, light(pattern.colour(at.boundary, slide)));
+        set_pixel(out, x + side, at.line * step + dy, light(pattern.colour(at.boundary + 1, slide)));
       }
     }
   }
@@ -235,13 +211,13 @@ Image8 draw_sigma(const Surface& surface, const Rig& rig) {
 }
 
 Image8 draw_errors(const CapturedFrame& frame, const Judgement& judgement, float range) {
-  Image8 out = dimmed(frame);
+  Image8 out = dimmed(frame.picture);
   const int step = frame.scan == Scan::kInterlaced ? 2 : 1;
   const auto dot = [&](const JudgedVertex& v, int from, int to, const Colour& colour) {
     const int x = static_cast<int>(std::lround(v.column_px));
     const int y = static_cast<int>(std::lround(v.row_px));
     for (int dy = 0; dy < step; ++dy)
-      for (int dx = from; dx <= to; ++dx) set(out, x + dx, y + dy, colour);
+      for (int dx = from; dx <= to; ++dx) set_pixel(out, x + dx, y + dy, colour);
   };
   for (const JudgedVertex& v : judgement.vertices)
     if (v.right) dot(v, -1, 1, ramp(diverging(), 0.5F + 0.5F * v.error / range));
@@ -255,15 +231,15 @@ Image8 draw_errors(const CapturedFrame& frame, const Judgement& judgement, float
 Image8 draw_completeness(const CapturedFrame& frame, const Judgement& judgement) {
   constexpr Colour kFound{0.15F, 0.85F, 0.35F};
   constexpr Colour kMissed{1, 0.15F, 0.1F};
-  Image8 out = dimmed(frame);
+  Image8 out = dimmed(frame.picture);
   const int step = frame.scan == Scan::kInterlaced ? 2 : 1;
   for (const bool found : {true, false}) {
     for (const JudgedBoundary& b : judgement.boundaries) {
       if (b.found != found) continue;
       const int x = static_cast<int>(std::lround(b.column_px));
       for (int dy = 0; dy < step; ++dy) {
-        set(out, x, b.row + dy, found ? kFound : kMissed);
-        if (!found) set(out, x + 1, b.row + dy, kMissed);
+        set_pixel(out, x, b.row + dy, found ? kFound : kMissed);
+        if (!found) set_pixel(out, x + 1, b.row + dy, kMissed);
       }
     }
   }
@@ -271,8 +247,8 @@ Image8 draw_completeness(const CapturedFrame& frame, const Judgement& judgement)
     if (v.right) continue;
     for (int dy = 0; dy < step; ++dy)
       for (int dx = -2; dx <= 2; ++dx)
-        set(out, static_cast<int>(std::lround(v.column_px)) + dx,
-            static_cast<int>(std::lround(v.row_px)) + dy, kWrong);
+        set_pixel(out, static_cast<int>(std::lround(v.column_px)) + dx,
+                  static_cast<int>(std::lround(v.row_px)) + dy, kWrong);
   }
   return out;
 }

@@ -33,6 +33,16 @@ struct CapturedFrame {
   /// The exposure after it: the other rows of an interlaced picture, or the whole second picture.
   View8 complement_field() const { return scan == Scan::kInterlaced ? field(1) : complement.view(); }
 
+  CapturedFrame clone() const {
+    return {.number = number,
+            .time_ns = time_ns,
+            .scan = scan,
+            .field_order = field_order,
+            .picture = picture.clone(),
+            .complement = complement.clone(),
+            .lost_before = lost_before};
+  }
+
  private:
   View8 field(int half) const {
     return picture.view().field(field_order == FieldOrder::kTop ? half : 1 - half);

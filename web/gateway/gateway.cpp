@@ -89,6 +89,10 @@ class Server : public Gateway, private ConnectionHost {
   void offer(const std::string& stream, const std::filesystem::path& recording) override {
     hub_.offer(stream, recording);
   }
+  int watchers(const std::string& stream, Rung rung) const override { return hub_.watchers(stream, rung); }
+  void set_clock(const std::string& stream, std::int64_t offset_ns) override {
+    hub_.set_clock(stream, offset_ns);
+  }
   void withdraw(const std::string& stream) override { hub_.withdraw(stream); }
 
  private:
@@ -137,6 +141,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .tokens = credentials_.tokens,
                                    .options = web_,
                                    .recordings = options_.recordings,
+                                   .rigs = options_.rigs,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});

@@ -12,9 +12,11 @@
 #include <string>
 
 #include "base/result.h"
+#include "base/rung.h"
 #include "base/stream.h"
 #include "base/web_options.h"
 #include "web/gateway/recording_control.h"
+#include "web/gateway/rig_control.h"
 
 namespace relievo {
 
@@ -36,6 +38,7 @@ struct GatewayOptions {
   std::function<void(const std::string& stream)> key_frame_wanted{};
   std::optional<SampleFormat> samples{};           // none: no /foxglove
   RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
+  RigControl* rigs = nullptr;                      // likewise; null: no camera is here
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 
@@ -60,11 +63,16 @@ class Gateway {
 
   /// A new stream, or new information on a known one. What is published of a stream before is ignored.
   virtual void announce(const StreamInfo& info) = 0;
+  /// Frames of lower rungs (FrameMessage::rung) go to the clients that wish for those.
   virtual void publish(const std::string& stream, const FrameMessage& frame) = 0;
   virtual void publish(const ServerStatus& status) = 0;
   /// The stream, which was announced, is played from this file: clients may read it
   /// (/recordings/STREAM.mcap), each at its own place. Until it is withdrawn.
   virtual void offer(const std::string& stream, const std::filesystem::path& recording) = 0;
+  /// Clients of that rung of a stream, which are to be given its frames by publish().
+  virtual int watchers(const std::string& stream, Rung rung) const = 0;
+  /// How far the clock of the stream's server is ahead of this machine's.
+  virtual void set_clock(const std::string& stream, std::int64_t offset_ns) = 0;
   /// The stream is gone: clients are told and stay connected, since it may come back.
   virtual void withdraw(const std::string& stream) = 0;
 };

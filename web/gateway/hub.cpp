@@ -26,7 +26,11 @@ struct Hub::Watcher {
   std::optional<FrameMessage> latest;  // the slot
   bool needs_key = false;              // it lacks a frame that others build on
   std::uint64_t drops = 0;
-  std::uint64_t seen_info = 0;  // versions it has been sent; 0: none
+  Rung rung = Rung::kFull;          // it is on,
+  Rung wished = Rung::kFull;        // and is to be on
+  std::uint64_t renumber = 0;       // to add to its rung's numbers
+  std::uint64_t last_sequence = 0;  // with that
+  std::uint64_t seen_info = 0;      // versions it has been sent; 0: none
   std::uint64_t seen_status = 0;
   bool told_live = false;
   bool told_waiting = false;
@@ -40,9 +44,16 @@ struct Hub::Entry {
   // So that a late joiner sees a stalled stream's last picture: the last frame, and where that builds on
   // others the last one that does not.
   std::optional<FrameMessage> latest, latest_key;
+  std::array<std::optional<std::uint64_t>, kRungs.size()> last_sequence;  // of each rung
   std::optional<std::int64_t> key_asked_ns;
   std::vector<std::shared_ptr<Watcher>> watchers;
+
+  std::int64_t server_now_ns() const { return utc_now_ns() + facts.clock_offset_ns.value_or(0); }
 };
+
+bool Hub::is_on(const Watcher& watcher, Rung rung) {
+  return watcher.rung == rung || watcher.wished == rung;
+}
 
 Hub::Hub(std::string empty_hint, std::function<void(const std::string&)> key_frame_wanted)
     : empty_hint_(std::move(empty_hint)), key_frame_wanted_(std::move(key_frame_wanted)) {}
@@ -92,16 +103,26 @@ void Hub::publish(const std::string& stream, const FrameMessage& frame) {
   const auto it = streams_.find(stream);
   if (it == streams_.end() || !it->second->live || !frame.data) return;
   Entry& entry = *it->second;
-  ++entry.facts.published;
-  entry.facts.published_after.add(seconds(frame.publish_time_ns - frame.capture_time_ns));
-  entry.facts.here_after.add(seconds(utc_now_ns() - frame.capture_time_ns));
+  const bool is_key = builds_on(frame) == BuildsOn::kNothing;
   // Lost on its way here: what builds on it is of no use to anybody.
-  const bool has_gap = entry.latest && frame.sequence != entry.latest->sequence + 1;
+  auto& last = entry.last_sequence[static_cast<std::size_t>(frame.rung)];
+  const bool has_gap = last && frame.sequence != *last + 1;
   const bool is_broken = has_gap && builds_on(frame) == BuildsOn::kFrameBefore;
-  entry.latest = frame;
-  if (builds_on(frame) == BuildsOn::kNothing) entry.latest_key = frame;
+  last = frame.sequence;
+  if (frame.rung == Rung::kFull) {
+    ++entry.facts.published;
+    entry.facts.published_after.add(seconds(frame.publish_time_ns - frame.capture_time_ns));
+    entry.facts.here_after.add(seconds(entry.server_now_ns() - frame.capture_time_ns));
+    entry.latest = frame;
+    if (is_key) entry.latest_key = frame;
+  }
   bool key_needed = false;
   for (const auto& watcher : entry.watchers) {
+    if (is_key && watcher->rung != watcher->wished && watcher->wished == frame.rung) {
+      watcher->rung = frame.rung;
+      watcher->renumber = watcher->last_sequence + 1 - frame.sequence;
+    }
+    if (watcher->rung != frame.rung) continue;
     watcher->needs_key = watcher->needs_key || is_broken;
     offer(entry, *watcher, frame);
     key_needed = key_needed || watcher->needs_key;
@@ -121,7 +142,11 @@ void Hub::offer(Entry& entry, Watcher& watcher, const FrameMessage& frame) {
     ++watcher.drops;
     ++entry.facts.client_drops;
   }
-  if (!useless) watcher.latest = frame;
+  watcher.last_sequence = frame.sequence + watcher.renumber;
+  if (!useless) {
+    watcher.latest = frame;
+    watcher.latest->sequence = watcher.last_sequence;
+  }
   if (useless && needed == BuildsOn::kFrameBefore) watcher.needs_key = true;
 }
 
@@ -155,9 +180,13 @@ void Hub::withdraw(const std::string& stream) {
   entry.latest_key.reset();
   entry.facts.status.reset();
   entry.facts.recording.clear();
+  entry.facts.clock_offset_ns.reset();
+  entry.last_sequence = {};
   entry.status_version = 0;
   for (const auto& watcher : entry.watchers) {
     watcher->needs_key = true;  // whatever comes next
+    watcher->rung = Rung::kFull;
+    watcher->renumber = watcher->last_sequence = 0;
     if (!watcher->latest) continue;
     watcher->latest.reset();
     ++watcher->drops;
@@ -190,6 +219,7 @@ std::shared_ptr<Hub::Watcher> Hub::watch(const std::string& stream, std::functio
   if (!entry) entry = std::make_unique<Entry>();
   const BuildsOn needed = entry->latest ? builds_on(*entry->latest) : BuildsOn::kNothing;
   watcher->latest = needed == BuildsOn::kNothing ? entry->latest : entry->latest_key;
+  if (watcher->latest) watcher->last_sequence = watcher->latest->sequence;
   watcher->needs_key = !watcher->latest || needed == BuildsOn::kFrameBefore;
   if (watcher->needs_key && entry->latest) ask_for_key_frame(*entry);
   entry->watchers.push_back(watcher);
@@ -202,6 +232,42 @@ void Hub::unwatch(const std::shared_ptr<Watcher>& watcher) {
   if (it == streams_.end()) return;
   std::erase(it->second->watchers, watcher);
   erase_if_unused(watcher->stream);
+}
+
+void Hub::choose(Watcher& watcher, Rung rung) {
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(watcher.wished, rung) == rung || watcher.rung == rung) return;
+  const auto it = streams_.find(watcher.stream);
+  if (it != streams_.end() && it->second->live) ask_for_key_frame(*it->second);
+}
+
+std::vector<Rung> Hub::rungs(const Watcher& watcher) const {
+  const std::lock_guard lock(mutex_);
+  std::vector<Rung> out;
+  const auto it = streams_.find(watcher.stream);
+  if (it == streams_.end() || !it->second->facts.status) return out;
+  for (const RungStatus& rung : it->second->facts.status->rungs) out.push_back(rung.rung);
+  return out;
+}
+
+int Hub::watchers(const std::string& stream, Rung rung) const {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it == streams_.end()) return 0;
+  return static_cast<int>(
+      std::ranges::count_if(it->second->watchers, [&](const auto& w) { return is_on(*w, rung); }));
+}
+
+void Hub::set_clock(const std::string& stream, std::int64_t offset_ns) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it != streams_.end() && it->second->live) it->second->facts.clock_offset_ns = offset_ns;
+}
+
+std::int64_t Hub::clock_offset_ns(const std::string& stream) const {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  return it == streams_.end() ? 0 : it->second->facts.clock_offset_ns.value_or(0);
 }
 
 std::optional<Hub::Delivery> Hub::take(Watcher& watcher, bool want_frame) {
@@ -240,9 +306,10 @@ void Hub::count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t cap
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(watcher.stream);
   if (it == streams_.end()) return;
+  const std::int64_t now_ns = it->second->server_now_ns();
   ++it->second->facts.sent;
   it->second->facts.sent_bytes += bytes;
-  it->second->facts.sent_after.add(seconds(utc_now_ns() - capture_time_ns));
+  it->second->facts.sent_after.add(seconds(now_ns - capture_time_ns));
 }
 
 std::vector<StreamSnapshot> Hub::snapshot() const {
@@ -252,6 +319,9 @@ std::vector<StreamSnapshot> Hub::snapshot() const {
     if (!entry->live) continue;
     out.push_back(entry->facts);
     out.back().watchers = entry->watchers.size();
+    for (const Rung rung : kRungs)
+      for (const auto& watcher : entry->watchers)
+        out.back().watchers_of[static_cast<std::size_t>(rung)] += is_on(*watcher, rung);
   }
   return out;
 }

@@ -3,6 +3,7 @@
 // looks, and then finds the latest of everything, so nothing queues up behind a slow client.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "base/recording_state.h"
+#include "base/rung.h"
 #include "base/stream.h"
 #include "web/gateway/histogram.h"
 
@@ -30,8 +32,11 @@ struct StreamSnapshot {
   std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
   std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
-  std::filesystem::path recording;         // that it is played from; empty: none that clients may read
-  std::optional<RecordingState> recorded;  // on request; not the hub's to know, filled in by who asks
+  std::array<std::size_t, kRungs.size()> watchers_of{};  // of each rung, on it or on their way to it
+  std::optional<std::int64_t> clock_offset_ns;  // of the server's clock to this one, where it is known
+  std::filesystem::path recording;              // that it is played from; empty: none that clients may read
+  std::optional<RecordingState> recorded;       // on request; not the hub's to know, filled in by who asks
+  bool looked_at = false;                       // likewise: its camera's frames can be (/api/rig)
   // From the capture of each frame until it was published, was here, and was handed to a client's connection.
   Histogram published_after, here_after, sent_after;
 };
@@ -58,6 +63,10 @@ class Hub {
   /// Frames and status of a stream that is not announced are ignored.
   void publish(const std::string& stream, const FrameMessage& frame);
   void publish(const ServerStatus& status);
+  /// What to add to this machine's time for that of the stream's server; what is said of the time since
+  /// capture counts on it. Forgotten when the stream is withdrawn.
+  void set_clock(const std::string& stream, std::int64_t offset_ns);
+  std::int64_t clock_offset_ns(const std::string& stream) const;  // 0 where it is not known
   void withdraw(const std::string& stream);
   /// A stream that was announced is played from this file, until it is withdrawn.
   void offer(const std::string& stream, const std::filesystem::path& recording);
@@ -69,6 +78,13 @@ class Hub {
   /// `wake` is called, as above, when a stream has come or gone; until what this returns is destroyed.
   std::shared_ptr<void> watch_list(std::function<void()> wake);
   void unwatch(const std::shared_ptr<Watcher>& watcher);
+  /// Its frames are of this rung from the rung's next key frame on, and until then those of before. The
+  /// numbers of its frames go on. Where the stream has no such rung nothing changes.
+  void choose(Watcher& watcher, Rung rung);
+  /// Lower rungs that the stream says it has.
+  std::vector<Rung> rungs(const Watcher& watcher) const;
+  /// On that rung of a stream, or on their way to it.
+  int watchers(const std::string& stream, Rung rung) const;
 
   /// The next thing to send, `want_frame` saying whether a frame may be among it; nothing where there is
   /// none, and then the watcher will be woken.
@@ -84,6 +100,7 @@ class Hub {
   void wake_list();
   void offer(Entry& entry, Watcher& watcher, const FrameMessage& frame);
   void ask_for_key_frame(Entry& entry);
+  static bool is_on(const Watcher& watcher, Rung rung);
   void erase_if_unused(const std::string& stream);
 
   const std::string empty_hint_;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/time.h"
 #include "web/gateway/protocol.h"
 
 namespace relievo {
@@ -153,6 +154,38 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   per_status("relievo_stream_rate_level", "gauge",
              "How much coarser than asked for, to keep a bit rate; 0 not at all.",
              [](T s) { return s.rate_level; });
+
+  const auto per_rung = [&](const char* name, const char* type, const char* help, auto value) {
+    out.family(name, type, help);
+    for (const auto& s : streams) {
+      if (!s.status) continue;
+      for (const RungStatus& rung : s.status->rungs)
+        out.sample(
+            "{stream=" + label(s.info.stream) + ",quality=\"" + std::string(to_string(rung.rung)) + "\"}",
+            static_cast<double>(value(rung)));
+    }
+  };
+  using R = const RungStatus&;
+  per_rung("relievo_stream_rung_readers", "gauge", "Who reads a lower quality of the stream at its server.",
+           [](R r) { return r.readers; });
+  per_rung("relievo_stream_rung_frames_total", "counter", "Frames published of it.",
+           [](R r) { return r.frames; });
+  per_rung("relievo_stream_rung_drops_total", "counter",
+           "Frames not made of it, since one before took too long.", [](R r) { return r.drops; });
+  per_rung("relievo_stream_rung_encode_seconds", "gauge", "Median time to make a frame of it.",
+           [](R r) { return r.encode_ms * 1e-3; });
+  per_rung("relievo_stream_rung_bits_per_second", "gauge", "Of its frames, over the last few seconds.",
+           [](R r) { return r.bit_rate; });
+  out.family("relievo_gateway_quality_clients", "gauge",
+             "WebSocket clients on a quality of the stream, or on their way to it.");
+  for (const auto& s : streams)
+    for (const Rung rung : kRungs)
+      out.sample("{stream=" + label(s.info.stream) + ",quality=\"" + std::string(to_string(rung)) + "\"}",
+                 static_cast<double>(s.watchers_of[static_cast<std::size_t>(rung)]));
+  out.family("relievo_gateway_clock_offset_seconds", "gauge",
+             "How far the clock of the stream's server is ahead of the gateway's.");
+  for (const auto& s : streams)
+    if (s.clock_offset_ns) out.sample("{stream=" + label(s.info.stream) + "}", seconds(*s.clock_offset_ns));
 
   out.family("relievo_stream_drops_total", "counter", "Frames the server lost, by place.");
   for (const auto& s : streams) {

@@ -39,6 +39,14 @@ Json rig_json(const StreamInfo& info) {
 Json status_json(const ServerStatus& status) {
   Json filters;
   for (const Filter& filter : kFilters) filters[std::string(filter.name)] = status.filters.*filter.count;
+  Json rungs = Json::array();
+  for (const RungStatus& rung : status.rungs)
+    rungs.push_back({{"quality", to_string(rung.rung)},
+                     {"readers", rung.readers},
+                     {"frames", rung.frames},
+                     {"drops", rung.drops},
+                     {"encode_ms", rung.encode_ms},
+                     {"bit_rate", rung.bit_rate}});
   Json step = {{"mixed", status.step.mixed},
                {"regrouped", status.step.regrouped},
                {"phase", nullptr},
@@ -60,8 +68,20 @@ Json status_json(const ServerStatus& status) {
           {"latency_ms", status.latency_ms},
           {"bit_rate", status.bit_rate},
           {"rate_level", status.rate_level},
+          {"rungs", rungs},
           {"filters", filters},
           {"step", step}};
+}
+
+Json recording_json(const RecordingState& state) {
+  return {{"state", to_string(state.activity)},
+          {"file", state.file},
+          {"frames", state.frames},
+          {"lost", state.lost},
+          {"bytes", state.bytes},
+          {"started_ns", state.started_ns},
+          {"pre_roll_s", state.pre_roll_s},
+          {"message", state.message}};
 }
 
 void put_u64(std::uint8_t* at, std::uint64_t value) {
@@ -97,6 +117,12 @@ std::string waiting_message(const std::string& hint) {
 
 std::string gone_message() {
   return R"({"type":"gone"})";
+}
+
+std::string quality_message(Rung now, const std::vector<Rung>& lower) {
+  Json of = Json::array({to_string(Rung::kFull)});
+  for (const Rung rung : lower) of.push_back(to_string(rung));
+  return text_of({{"type", "quality"}, {"now", to_string(now)}, {"of", std::move(of)}});
 }
 
 std::string time_message(double t0, std::int64_t now_ns) {
@@ -135,13 +161,27 @@ Result<ClientMessage> parse_client_message(std::string_view text) {
     if (t0 == json.end() || !t0->is_number()) return Error{"time without a number \"t0\""};
     message.type = ClientMessage::Type::kTime;
     message.t0 = t0->get<double>();
+  } else if (*type == "quality") {
+    const auto want = json.find("want");
+    const std::string name = want != json.end() && want->is_string() ? want->get<std::string>() : "";
+    message.want = rung_named(name);
+    if (!message.want && name != "auto")
+      return Error{"quality without a \"want\" of auto, full, reduced or texture"};
+    message.type = ClientMessage::Type::kQuality;
   }
   return message;
+}
+
+std::string recording_message(const RecordingState& state) {
+  return text_of(recording_json(state));
 }
 
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint) {
   Json list = Json::array();
   for (const auto& s : streams) {
+    Json clients_of;
+    for (const Rung rung : kRungs)
+      clients_of[std::string(to_string(rung))] = s.watchers_of[static_cast<std::size_t>(rung)];
     list.push_back(
         {{"name", s.info.stream},
          {"source", s.info.source},
@@ -151,7 +191,10 @@ std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::
          {"rig", rig_json(s.info)},
          {"status", s.status ? status_json(*s.status) : Json()},
          {"recording", s.recording.empty() ? Json() : Json("recordings/" + s.info.stream + ".mcap")},
+         {"recorder", s.recorded ? recording_json(*s.recorded) : Json()},
+         {"camera", s.looked_at},
          {"clients", s.watchers},
+         {"clients_of", std::move(clients_of)},
          {"frames", s.published}});
   }
   return text_of({{"version", RELIEVO_VERSION}, {"hint", hint}, {"streams", std::move(list)}});

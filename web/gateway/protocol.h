@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "base/result.h"
+#include "base/rung.h"
 #include "base/stream.h"
 #include "web/gateway/hub.h"
 
@@ -18,6 +20,9 @@ std::string info_message(const StreamInfo& info);
 std::string status_message(const ServerStatus& status);
 std::string waiting_message(const std::string& hint);
 std::string gone_message();
+
+/// Which rung a client that chose its quality is on from the next frame on, and which there are.
+std::string quality_message(Rung now, const std::vector<Rung>& lower);
 
 /// The answer to a client's {"type":"time","t0":T}: T unchanged and the server's UTC.
 std::string time_message(double t0, std::int64_t now_ns);
@@ -30,9 +35,10 @@ std::array<std::uint8_t, kFramePrefixBytes> frame_prefix(const FrameMessage& fra
 
 /// A text message of a client. `kOther`: well formed, of a type this version does not know.
 struct ClientMessage {
-  enum class Type { kCredit, kTime, kOther } type = Type::kOther;
+  enum class Type { kCredit, kTime, kQuality, kOther } type = Type::kOther;
   int credit = 0;  // 1..kMaxCredit
   double t0 = 0;
+  std::optional<Rung> want{};  // nothing: whatever suits it
 };
 constexpr int kMaxCredit = 8;
 
@@ -65,6 +71,9 @@ struct GatewayCounts {
 
   void refuse(Refusal why) { ++refused[static_cast<std::size_t>(why)]; }
 };
+
+/// What /api/recording/STREAM answers.
+std::string recording_message(const RecordingState& state);
 
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint);
 std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts);

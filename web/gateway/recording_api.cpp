@@ -28,23 +28,7 @@ HttpReply no_folder() {
 HttpReply state_of(const std::string& stream, const RecordingControl& control) {
   const auto state = control.state(stream);
   if (!state) return text_reply(404, "there is no such stream here");
-  return json({{"state", to_string(state->activity)},
-               {"file", state->file},
-               {"frames", state->frames},
-               {"lost", state->lost},
-               {"bytes", state->bytes},
-               {"started_ns", state->started_ns},
-               {"pre_roll_s", state->pre_roll_s},
-               {"message", state->message}});
-}
-
-/// "application/json; charset=utf-8" too. Pages of other sites cannot send it without being asked about.
-bool is_json(std::string_view content_type) {
-  std::string type(content_type.substr(0, content_type.find(';')));
-  while (!type.empty() && type.back() == ' ') type.pop_back();
-  std::transform(type.begin(), type.end(), type.begin(),
-                 [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
-  return type == "application/json";
+  return json_reply(recording_message(*state));
 }
 
 bool is_recording_name(const std::string& name) {
@@ -69,7 +53,7 @@ HttpReply recording_state(std::string_view stream, const RecordingControl* contr
 
 HttpReply order_recording(std::string_view stream, const HttpRequest& request, RecordingControl* control) {
   if (control == nullptr) return no_folder();
-  if (!is_json(request.content_type)) return text_reply(415, "send application/json");
+  if (!is_json(request)) return text_reply(415, "send application/json");
   const auto order = nlohmann::json::parse(request.body, nullptr, false);
   const auto action = order.is_object() ? order.value("action", nlohmann::json()) : nlohmann::json();
   if (action != "start" && action != "stop")

@@ -8,6 +8,7 @@
 #include "web/gateway/foxglove_feed.h"
 #include "web/gateway/recording_api.h"
 #include "web/gateway/recording_route.h"
+#include "web/gateway/rig_api.h"
 #include "web/gateway/sign_in.h"
 
 namespace relievo {
@@ -26,6 +27,14 @@ HttpReply json_reply(std::string body) {
   reply.body = std::move(body);
   reply.headers.emplace_back("Cache-Control", "no-store");
   return reply;
+}
+
+bool is_json(const HttpRequest& request) {
+  std::string type(request.content_type.substr(0, request.content_type.find(';')));
+  while (!type.empty() && type.back() == ' ') type.pop_back();
+  std::transform(type.begin(), type.end(), type.begin(),
+                 [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
+  return type == "application/json";
 }
 
 namespace {
@@ -168,7 +177,7 @@ bool loopback_host(std::string_view host) {
 namespace {
 
 HttpReply page(std::string_view path, const HttpRequest& request) {
-  const std::string_view wanted = path == "/" ? "/index.html" : path;
+  const std::string_view wanted = path == "/" ? "/index.html" : path == "/rig" ? "/rig.html" : path;
   for (const Asset& asset : assets()) {
     if (asset.path == wanted) return asset_reply(asset, request.if_none_match);
   }
@@ -181,17 +190,25 @@ HttpReply ready(const RouteContext& context) {
   return text_reply(200, "ready: " + std::to_string(streams) + (streams == 1 ? " stream" : " streams"));
 }
 
+/// With what others than the hub know of them.
+std::vector<StreamSnapshot> all_streams(const RouteContext& context) {
+  std::vector<StreamSnapshot> streams = context.hub.snapshot();
+  for (StreamSnapshot& s : streams) {
+    if (context.recordings != nullptr) s.recorded = context.recordings->state(s.info.stream);
+    s.looked_at = context.rigs != nullptr && context.rigs->has(s.info.stream);
+  }
+  return streams;
+}
+
 HttpReply metrics(const RouteContext& context) {
   HttpReply reply = text_reply(200, "");
   reply.content_type = "text/plain; version=0.0.4; charset=utf-8";
-  std::vector<StreamSnapshot> streams = context.hub.snapshot();
-  if (context.recordings != nullptr)
-    for (StreamSnapshot& s : streams) s.recorded = context.recordings->state(s.info.stream);
-  reply.body = metrics_text(streams, context.counts);
+  reply.body = metrics_text(all_streams(context), context.counts);
   return reply;
 }
 
-/// One address, or, ending in a name in braces, all below it. web/gateway/openapi.json describes each.
+/// One address, or, ending in a name in braces, all below it; or in two, all with a '/' below it.
+/// web/gateway/openapi.json describes each.
 struct Route {
   std::string_view path;
   bool needs_token;
@@ -207,7 +224,7 @@ constexpr Route kRoutes[] = {
     {"/metrics", true, [](auto, auto&, const RouteContext& context) { return metrics(context); }},
     {"/api/streams", true,
      [](auto, auto&, const RouteContext& context) {
-       return json_reply(streams_json(context.hub.snapshot(), context.hub.empty_hint()));
+       return json_reply(streams_json(all_streams(context), context.hub.empty_hint()));
      }},
     {"/api/openapi.json", true,
      [](auto, auto&, auto&) { return json_reply(std::string(openapi_document())); }},
@@ -228,6 +245,19 @@ constexpr Route kRoutes[] = {
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
        return order_recording(name, request, context.recordings);
      }},
+    {"/api/rig/{stream}/{picture}", true,
+     [](std::string_view names, auto&, const RouteContext& context) {
+       return rig_picture(names, context.rigs);
+     }},
+    {"/api/rig/{stream}", true,
+     [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
+       return rig_look(name, request, context.rigs);
+     }},
+    {"/api/projector", true,
+     [](auto, auto&, const RouteContext& context) { return projector_state(context.rigs); },
+     [](auto, const HttpRequest& request, const RouteContext& context) {
+       return order_projector(request, context.rigs);
+     }},
     {"/ws/{stream}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {
        return stream_socket(std::string(name), request, context);
@@ -239,7 +269,10 @@ std::optional<std::string_view> match(const Route& route, std::string_view path)
   const auto brace = route.path.find('{');
   if (brace == std::string_view::npos) return path == route.path ? std::optional("") : std::nullopt;
   const std::string_view before = route.path.substr(0, brace);
-  return path.starts_with(before) ? std::optional(path.substr(before.size())) : std::nullopt;
+  if (!path.starts_with(before)) return std::nullopt;
+  const std::string_view names = path.substr(before.size());
+  const bool two = route.path.find('/', brace) != std::string_view::npos;
+  return two && names.find('/') == std::string_view::npos ? std::nullopt : std::optional(names);
 }
 
 HttpReply wrong_method(std::string allowed) {

@@ -15,6 +15,7 @@
 #include "web/gateway/hub.h"
 #include "web/gateway/protocol.h"
 #include "web/gateway/recording_control.h"
+#include "web/gateway/rig_control.h"
 
 namespace relievo {
 
@@ -60,6 +61,9 @@ struct HttpReply {
 HttpReply text_reply(int status, std::string line);
 HttpReply json_reply(std::string body);
 
+/// "application/json; charset=utf-8" too. Pages of other sites cannot send it without being asked about.
+bool is_json(const HttpRequest& request);
+
 constexpr int kClients = 64;  // where the options do not say how many
 
 struct RouteContext {
@@ -68,6 +72,7 @@ struct RouteContext {
   const Tokens& tokens;
   const WebOptions& options;
   RecordingControl* recordings = nullptr;  // none: nothing is recorded here
+  RigControl* rigs = nullptr;              // none: no camera is here
   bool foxglove = false;                   // there is an encoder for it
   std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only

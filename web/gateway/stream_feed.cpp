@@ -5,11 +5,13 @@
 #include <deque>
 #include <utility>
 
+#include "base/quality_choice.h"
 #include "base/time.h"
 
 namespace relievo {
 namespace {
 
+constexpr std::int64_t kAway_ns = 3 * kNanosecondsPerSecond;  // without a frame
 constexpr std::size_t kReplyLimit = 16;  // answers owed to a client that sends but does not read
 
 class StreamFeed : public WsFeed {
@@ -27,6 +29,7 @@ class StreamFeed : public WsFeed {
     return WsClose{1003, "text messages only"};
   }
   std::optional<WsOutgoing> next() override;
+  void look_at(const Hub::Delivery& delivery);
   void on_sent(const WsOutgoing& message) override {
     if (message.data) hub_.count_sent(*watcher_, message.data->size(), capture_time_ns_);
   }
@@ -36,6 +39,13 @@ class StreamFeed : public WsFeed {
   const std::string stream_;
   std::shared_ptr<Hub::Watcher> watcher_;
   std::deque<std::shared_ptr<const std::string>> replies_;
+  std::optional<Hub::Delivery> held_;  // what is said of its quality goes first
+  bool chooses_ = false;               // the client has said what quality it wants,
+  bool automatic_ = false;             // namely whatever suits it
+  QualityChoice choice_;
+  std::optional<Rung> told_;
+  std::uint64_t seen_drops_ = 0;
+  std::int64_t seen_ns_ = 0;
   int credit_ = 0;
   std::int64_t capture_time_ns_ = 0;  // of the frame that is being sent
 };
@@ -47,7 +57,14 @@ std::optional<WsClose> StreamFeed::on_text(std::string_view text) {
     credit_ = std::min(credit_ + message->credit, kMaxCredit);
   } else if (message->type == ClientMessage::Type::kTime) {
     if (replies_.size() >= kReplyLimit) return WsClose{1008, "too many questions"};
-    replies_.push_back(std::make_shared<const std::string>(time_message(message->t0, utc_now_ns())));
+    const std::int64_t server_ns = utc_now_ns() + hub_.clock_offset_ns(stream_);
+    replies_.push_back(std::make_shared<const std::string>(time_message(message->t0, server_ns)));
+  } else if (message->type == ClientMessage::Type::kQuality) {
+    chooses_ = true;
+    automatic_ = !message->want;
+    choice_ = QualityChoice();
+    told_.reset();
+    hub_.choose(*watcher_, message->want.value_or(Rung::kFull));
   }
   return std::nullopt;
 }
@@ -58,13 +75,32 @@ std::optional<WsOutgoing> StreamFeed::next() {
     replies_.pop_front();
     return out;
   }
-  auto delivery = hub_.take(*watcher_, credit_ > 0);
+  auto delivery = held_ ? std::exchange(held_, std::nullopt) : hub_.take(*watcher_, credit_ > 0);
   if (!delivery) return std::nullopt;
   if (delivery->text) return WsOutgoing{.text = std::move(delivery->text)};
+  if (chooses_ && told_ != delivery->frame->rung) {
+    told_ = delivery->frame->rung;
+    held_ = std::move(delivery);
+    return WsOutgoing{
+        .text = std::make_shared<const std::string>(quality_message(*told_, hub_.rungs(*watcher_)))};
+  }
+  if (automatic_) look_at(*delivery);
   --credit_;
   capture_time_ns_ = delivery->frame->capture_time_ns;
   const auto prefix = frame_prefix(*delivery->frame, delivery->drops, utc_now_ns());
   return WsOutgoing{.head = {prefix.begin(), prefix.end()}, .data = delivery->frame->data};
+}
+
+/// Frames that the client had no credit for, or that its connection was too slow for, are what is wrong with
+/// its quality.
+void StreamFeed::look_at(const Hub::Delivery& delivery) {
+  const std::int64_t now_ns = steady_now_ns();
+  const bool was_away = now_ns - seen_ns_ > kAway_ns;  // a page in the background wants no frames
+  const std::uint64_t lost = was_away ? 0 : delivery.drops - seen_drops_;
+  seen_ns_ = now_ns;
+  seen_drops_ = delivery.drops;
+  choice_.offer(hub_.rungs(*watcher_));
+  hub_.choose(*watcher_, choice_.add(now_ns, {.arrived = 1, .lost = lost}));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /** How the surface is drawn. */
 export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points' | 'normals' | 'depth' | 'confidence';
+export type Theme = 'auto' | 'dark' | 'light';
 
 /** `idle`: no src. `live` and `stalled`: a live stream. `behind`: a live stream as it was. `file`: a recording. */
 export type PlayerState = 'idle' | 'loading' | 'live' | 'stalled' | 'ended' | 'lost' | 'behind' | 'file' | 'failed';
@@ -28,6 +29,8 @@ export interface RelievoPlayerElement extends HTMLElement {
   src: string;
   /** Default: textured. Any other text is that. */
   mode: Mode;
+  /** Default: dark. auto: as the reader's system. */
+  theme: Theme;
   /** Whether the time line is shown. */
   controls: boolean;
   /** Whether floor and axes are shown, in metres. */

@@ -38,7 +38,7 @@ export default defineConfig({
     chunkSizeWarningLimit: 1024,
     reportCompressedSize: false,
     rollupOptions: {
-      input: { index: 'index.html', sw: 'src/serviceWorker.ts' },
+      input: { index: 'index.html', rig: 'rig.html', sw: 'src/serviceWorker.ts' },
       // A service worker is told to be new by its content, at an address that stays.
       output: { entryFileNames: ({ name }) => (name === 'sw' ? kServiceWorker : 'assets/[name]-[hash].js') },
     },

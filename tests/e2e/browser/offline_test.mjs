@@ -3,13 +3,14 @@
 // it keeps its own files alone, and nothing of what a token opens; a new version takes over at the next load.
 // Run as: in_own_domain node offline_test.mjs RELIEVO_SERVER RELIEVO VIEWER_DIST, in web/viewer. Exit 77: no Chromium.
 import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
+import { execFileSync } from 'node:child_process';
 import { cpSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { tmpdir } from 'node:os';
 import { extname, join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { inState, look, runChecks, shownPast, still } from './feeder.mjs';
+import { startWeb } from './web.mjs';
 
 const [serverPath, relievoPath, dist] = process.argv.slice(2);
 const kToken = 'a-token-for-this-test';
@@ -29,22 +30,6 @@ for (const format of ['ply', 'glb']) {
 const exported = (format) => join(scratch, format, readdirSync(join(scratch, format)).filter((f) => f.endsWith(format)).sort()[2]);
 const tokens = join(scratch, 'tokens');
 writeFileSync(tokens, `${kToken}\n`, { mode: 0o600 });
-
-async function startWeb() {
-  const web = spawn(relievoPath, ['web', recorded, '--listen', '127.0.0.1:0', '--token-file', tokens, '--domain', domain], {
-    stdio: ['ignore', 'pipe', 'inherit'],
-  });
-  const ended = new Promise((resolve) => web.once('exit', resolve));
-  const said = await new Promise((resolve, reject) => {
-    web.stdout.once('data', (data) => resolve(String(data)));
-    web.once('exit', (code) => reject(new Error(`relievo web ended with ${code}`)));
-  });
-  const stop = async () => {
-    web.kill('SIGTERM');
-    await ended;
-  };
-  return { address: said.trim().replace('viewer ', ''), stop };
-}
 
 /** Until the page opens without its server, and this page's requests go through the service worker. */
 const ready = (page) =>
@@ -103,7 +88,7 @@ class Files {
 
 const browser = await launchChromium();
 const context = await browser.newContext({ viewport: { width: 800, height: 500 } });
-const web = await startWeb();
+const web = await startWeb(relievoPath, recorded, ['--token-file', tokens]);
 
 const checks = {
   async 'it can be installed'(page) {

@@ -118,6 +118,23 @@ void blob;
     await when(page, (p) => p.state === 'live');
   },
 
+  async 'it is dark, light, or as the system is'(page) {
+    const ground = (theme) =>
+      page.evaluate((name) => {
+        const element = document.querySelector('relievo-player');
+        if (name === null) element.removeAttribute('theme');
+        else element.setAttribute('theme', name);
+        return Number(/\d+/.exec(getComputedStyle(element).backgroundColor)[0]);
+      }, theme);
+    assert.ok((await ground('light')) > 200);
+    await page.emulateMedia({ colorScheme: 'light' });
+    assert.ok((await ground('auto')) > 200);
+    assert.ok((await ground('dark')) < 50);
+    await page.emulateMedia({ colorScheme: 'dark' });
+    assert.ok((await ground('auto')) < 50);
+    assert.ok((await ground(null)) < 50);
+  },
+
   async 'its time line, its keys, and none of the page\'s'(page) {
     assert.ok(await page.isVisible('relievo-player #timeline'));
     await page.click('relievo-player #timeline button[title^="Pause"]');

@@ -127,10 +127,30 @@ const checks = {
     await other.close();
   },
 
+  async 'the button follows what somebody else records'() {
+    const page = await openRecording();
+    await shownPast(page, 2);
+    const order = async (action) => {
+      const answer = await fetch(`${recordingServer.address}/api/recording/kept`, {
+        method: 'POST',
+        body: JSON.stringify({ action }),
+        headers: { 'content-type': 'application/json' },
+      });
+      assert.equal(answer.status, 200, await answer.text());
+    };
+    const isPressed = (is) =>
+      page.waitForFunction((p) => document.querySelector('#tool-record').getAttribute('aria-pressed') === p, is);
+    await order('start');
+    await isPressed('true');
+    await order('stop');
+    await isPressed('false');
+    await page.close();
+  },
+
   async 'no error, no request to another host'() {
-    // Chromium tells of what the server refuses: that it has no folder, or knows no such thing.
+    // Chromium tells of what the server refuses: that it has no folder, where the list did not say so before.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);
-    assert.equal(complaints.length, 1);
+    assert.ok(complaints.length <= 1);
   },
 };
 

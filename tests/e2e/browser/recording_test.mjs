@@ -3,12 +3,14 @@
 // with the right surfaces, also where frames build on others; surfaces that were exported are shown where they are.
 // Run as: in_own_domain node recording_test.mjs GATEWAY_FEEDER RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium.
 import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
-import { mkdtempSync, readdirSync, readFileSync, rmSync, truncateSync, writeFileSync, copyFileSync, statSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { copyFileSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync, truncateSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
+import { pointAt } from './timeline.mjs';
+import { startWeb } from './web.mjs';
 
 const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
 const kFrames = 24;
@@ -43,23 +45,6 @@ async function seek(page, index) {
     slider.value = String(ms);
     slider.dispatchEvent(new Event('input', { bubbles: true }));
   }, times[index] + 1e-3);
-}
-
-/** `relievo web` of the recording; stop() ends it. */
-async function startWeb(options = []) {
-  const web = spawn(relievoPath, ['web', recorded, '--listen', '127.0.0.1:0', ...options, '--domain', process.env.RELIEVO_TEST_DOMAIN], {
-    stdio: ['ignore', 'pipe', 'inherit'],
-  });
-  const ended = new Promise((resolve) => web.once('exit', resolve));
-  const said = await new Promise((resolve, reject) => {
-    web.stdout.once('data', (data) => resolve(String(data)));
-    web.once('exit', (code) => reject(new Error(`relievo web ended with ${code}`)));
-  });
-  const stop = async () => {
-    web.kill('SIGTERM');
-    await ended;
-  };
-  return { address: said.trim().replace('viewer ', ''), stop };
 }
 
 const surfaces = new Map(); // by camera frame, as they came one after the other
@@ -118,6 +103,25 @@ const checks = {
     await page.keyboard.press(',');
     assert.equal((await playback(page)).index, 0);
     assert.equal((await look(page)).errors, 0);
+  },
+
+  async 'under the cursor of the time line is the picture of the frame there'(page) {
+    await seek(page, 2);
+    await onFrame(page, numbers[2]);
+    const { times } = await playback(page);
+    const pictures = new Map();
+    for (const index of [15, 6, times.length - 1, 15]) {
+      const seen = await pointAt(page, index);
+      assert.equal(seen.frame, numbers[index], 'another frame is under the cursor');
+      assert.ok(seen.deviation > 10, `its picture is flat: ${seen.deviation}`);
+      assert.ok(seen.width >= 100 && Math.abs(seen.width / seen.height - 4 / 3) < 0.05, `${seen.width}x${seen.height}`);
+      assert.match(seen.time, /^\d+:\d\d\.\d{3} \//);
+      pictures.set(index, seen.hash);
+    }
+    assert.equal(new Set(pictures.values()).size, 3, 'the pictures are all alike');
+    assert.equal((await playback(page)).index, 2, 'looking is no seeking');
+    await page.mouse.move(300, 200);
+    assert.equal(await page.isVisible('.preview'), false);
   },
 
   async 'a range is repeated, at another speed'(page) {
@@ -220,7 +224,7 @@ const checks = {
   async 'a recording of the server plays for each page by itself, once the person has a token'() {
     const tokens = join(scratch, 'tokens');
     writeFileSync(tokens, 'a-token-for-this-test\n', { mode: 0o600 });
-    const { address, stop } = await startWeb(['--token-file', tokens]);
+    const { address, stop } = await startWeb(relievoPath, recorded, ['--token-file', tokens]);
     try {
       const context = await browser.newContext({ viewport: { width: 800, height: 500 } });
       const pages = [await context.newPage(), await context.newPage()];
@@ -243,6 +247,13 @@ const checks = {
         assert.equal((await look(pages[i])).errors, 0);
         assert.ok(await pages[i].isVisible('#timeline'));
       }
+      const seen = await pointAt(pages[0], 11);
+      assert.equal(seen.frame, numbers[11]);
+      assert.equal((await playback(pages[0])).index, 3);
+      await pages[1].waitForFunction(() => window.relievo.diagnostics().playback.keys.every((k) => k !== null));
+      const { keys } = await playback(pages[1]);
+      const marked = keys.flatMap((k, at) => (k ? [at] : []));
+      assert.ok(marked.length > 1 && marked.slice(1).every((k, at) => k - marked[at] === kKeyEvery), `key frames at ${marked}`);
       await context.close();
     } finally {
       await stop();
@@ -250,7 +261,7 @@ const checks = {
   },
 
   async 'a link to a recording of the server restores time, view and whether it plays'() {
-    const { address, stop } = await startWeb();
+    const { address, stop } = await startWeb(relievoPath, recorded);
     const { open: openThere } = pagesOf(browser, address.replace(/\/$/, ''), complaints);
     const follow = (link) => openThere(link.slice(address.length - 1));
     try {

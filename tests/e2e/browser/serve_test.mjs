@@ -52,6 +52,20 @@ try {
   assert.equal(health.status(), 200);
   if (screenshot) await page.screenshot({ path: screenshot });
 
+  const modest = new URL(address);
+  modest.searchParams.set('quality', 'reduced');
+  await page.goto(modest.href);
+  await page.waitForFunction((full) => {
+    const { vertices } = window.relievo.diagnostics();
+    return vertices > 0.3 * full && vertices < 0.7 * full;
+  }, second.vertices);
+  const reduced = await look();
+  assert.equal(reduced.errors, 0, reduced.lastError);
+  assert.ok(reduced.pixels.covered > 0.15, `the reduced surface covers ${reduced.pixels.covered} of the page`);
+  const { streams } = await (await page.request.get(new URL('/api/streams', address).href)).json();
+  assert.deepEqual(streams[0].clients_of, { full: 0, reduced: 1, texture: 0 });
+  console.log(`${second.vertices} vertices in full, ${reduced.vertices} reduced`);
+
   server.kill('SIGINT');
   assert.deepEqual(await exited, { code: 0, signal: null });
   await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');

@@ -5,13 +5,16 @@ import { spawn } from 'node:child_process';
 import { createInterface } from 'node:readline';
 
 export class Server {
-  /** `options`: of serve, beside those for the network. */
-  static async start(path, options) {
+  /** `options`: of serve, beside those for the network; `environment`: beside this process's own. */
+  static async start(path, options, environment = {}) {
     const domain = process.env.RELIEVO_TEST_DOMAIN;
     assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
     const network = ['--web', '127.0.0.1:0', '--domain', domain, '--interface', 'lo'];
     const server = new Server();
-    server.process = spawn(path, ['serve', ...options, ...network], { stdio: ['ignore', 'pipe', 'inherit'] });
+    server.process = spawn(path, ['serve', ...options, ...network], {
+      stdio: ['ignore', 'pipe', 'inherit'],
+      env: { ...process.env, ...environment },
+    });
     server.exited = new Promise((resolve) => server.process.once('exit', (code, signal) => resolve({ code, signal })));
     const address = await new Promise((resolve, reject) => {
       createInterface({ input: server.process.stdout }).on('line', (line) => {

@@ -6,6 +6,7 @@ import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
 import { depthOf, Feeder, inState, kPicture, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
 import { Server } from './server.mjs';
+import { pointAt } from './timeline.mjs';
 
 const [feederPath, serverPath] = process.argv.slice(2);
 const feeder = await Feeder.start(feederPath);
@@ -119,6 +120,18 @@ const onFeeder = {
     await press(page, 'Home');
     assert.equal((await playback(page)).index, first);
     await errors(page);
+  },
+
+  async 'what is kept has pictures under the cursor'(page) {
+    const { first, index } = await playback(page);
+    const seen = await pointAt(page, first + 4);
+    assert.ok(seen.deviation > 5, `its picture is flat: ${seen.deviation}`);
+    assert.match(seen.time, /^−\d+:\d\d/);
+    assert.equal((await playback(page)).index, index, 'looking is no seeking');
+    await seek(page, first + 4);
+    assert.equal((await surface(page)).number, seen.frame);
+    await press(page, 'Home');
+    await page.mouse.move(300, 150);
   },
 
   async 'it plays on behind live'(page) {

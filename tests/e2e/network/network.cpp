@@ -18,6 +18,7 @@ namespace {
 
 const std::string kIp = "/usr/sbin/ip";
 const std::string kNft = "/usr/sbin/nft";
+const std::string kTc = "/usr/sbin/tc";
 
 std::string host_name(int host) {
   return "h" + std::to_string(host);
@@ -101,6 +102,11 @@ void Network::lose(int host, int of_1000) {
   must(in_host + "add rule netdev losses in" + rule);
   must(kNft + " add chain netdev losses " + port_name(host) + hook + port_name(host) + " priority 0 ; }");
   must(kNft + " add rule netdev losses " + port_name(host) + rule);
+}
+
+void Network::narrow(int host, int kbit_s) {
+  must(kTc + " qdisc add dev " + port_name(host) + " root tbf rate " + std::to_string(kbit_s) +
+       "kbit burst 16kb latency 50ms");
 }
 
 void Network::cut(int host) {

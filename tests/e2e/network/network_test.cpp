@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 
 #include "base/time.h"
 #include "codec/recording.h"
@@ -85,6 +86,35 @@ TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {
   EXPECT_EQ(at_one.lost, 0);
   EXPECT_EQ(at_five.frames + at_five.lost, kFrames);
   EXPECT_GE(at_five.frames, kFrames * 99 / 100);
+}
+
+// Proves that a client goes down by what it loses, and that one beside it notices nothing.
+TEST_F(NetworkTest, AClientOnAThinCableTakesTheQualityThatFits) {
+  Network network(3);
+  network.narrow(2, 4'000);
+  const std::string interface = Network::kInterface;
+  Process server(Network::on(
+      1, {program("relievo-server"), "serve", "--source", "sim:plane,rate=10,noise=3", "--stream", "wide",
+          "--texture", "png", "--web", "none", "--interface", interface}));  // some 30 Mbit/s
+  ASSERT_TRUE(server.wait_for_text("stream wide")) << server.err();
+  const auto stats = [&](int host, const std::string& quality) {
+    return std::make_unique<Process>(Network::on(
+        host, {program("relievo"), "stats", "wide", "--quality", quality, "--interface", interface}));
+  };
+  const auto beside = stats(3, "full");
+  ASSERT_TRUE(beside->wait_for_text("full"));
+  const auto thin = stats(2, "auto");
+  EXPECT_TRUE(eventually([&] {
+    return thin->out().find("reduced ") != std::string::npos ||
+           thin->out().find("texture ") != std::string::npos;
+  })) << thin->out()
+      << thin->err();
+  beside->signal(SIGINT);
+  EXPECT_EQ(beside->wait(), 0);
+  std::istringstream lines(beside->out());
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
+  std::printf("%s", thin->out().c_str());
 }
 
 // A receiver forgets a sender that it has not heard of for 10 s, and has to find it anew.

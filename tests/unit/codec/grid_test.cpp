@@ -298,6 +298,38 @@ TEST(Grid, WhatLiesOnNoGridGoesAsAMesh) {
   EXPECT_EQ(codec_of(test::grid_frame(scene)), GeometryCodec::kGrid);
 }
 
+TEST(Grid, TheOrderOfTrianglesChangesNothingAndWrongOnesAreFoundAnywhere) {
+  const test::GridScene scene{.quality = true};
+  Frame3D frame = test::grid_frame(scene);
+  const GridCalibration calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
+  std::vector<Triangle>& triangles = frame.surface.triangles;
+  const std::vector<Triangle> in_rows = triangles;
+  StripeGrid one, other;
+  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, one).ok());
+  std::ranges::reverse(triangles);  // no cell follows its left neighbour
+  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, other).ok());
+  EXPECT_EQ(one.cells, other.cells);
+  EXPECT_EQ(one.triangles, in_rows.size());
+  EXPECT_EQ(other.triangles, in_rows.size());
+  const auto vertices = static_cast<std::uint32_t>(frame.surface.positions.size());
+  test::Random random(6);
+  for (int round = 0; round < 200; ++round) {
+    triangles = in_rows;
+    const auto at = static_cast<std::size_t>(random.below(static_cast<std::uint32_t>(in_rows.size())));
+    switch (round % 3) {
+      case 0:
+        triangles[at][random.below(3)] = vertices + random.below(2);
+        break;
+      case 1:
+        triangles[at][random.below(3)] = (triangles[at][0] + vertices / 2) % vertices;  // in another cell
+        break;
+      default:
+        triangles.insert(triangles.begin() + static_cast<std::ptrdiff_t>(at), in_rows[at]);
+    }
+    EXPECT_FALSE(to_grid(frame.surface, calibration, 4, true, other).ok()) << round << ' ' << at;
+  }
+}
+
 TEST(Grid, SlicesAreTheSameInParallel) {
   const test::GridScene scene{.quality = true};
   const Frame3D frame = test::grid_frame(scene);

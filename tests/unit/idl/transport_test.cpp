@@ -122,6 +122,13 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   status.latency_ms = 12.5;
   status.bit_rate = 3.5e6;
   status.rate_level = 4;
+  status.rungs = {{.rung = Rung::kReduced,
+                   .readers = 3,
+                   .frames = 5'000'000'000,
+                   .drops = 2,
+                   .encode_ms = 1.5,
+                   .bit_rate = 2e6},
+                  {.rung = Rung::kTexture, .frames = 7}};
   status.step = {.mixed = 7, .regrouped = 5'000'000'000, .phase = 1.25, .drift_fields_s = -0.06};
   status.filters.unsupported = 3;
   status.filters.small_component = 5'000'000'000;
@@ -138,6 +145,7 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   EXPECT_EQ(to_yaml(got.pattern), to_yaml(info.pattern));
   EXPECT_EQ(inbox.now().statuses[0].state, StreamState::kStalled);
   EXPECT_EQ(inbox.now().statuses[0].message, "no camera");
+  EXPECT_EQ(inbox.now().statuses[0].rungs, status.rungs);
   EXPECT_EQ(inbox.now().statuses[0].drops_encode, 7u);
   EXPECT_EQ(inbox.now().statuses[0].latency_ms, 12.5);
   EXPECT_EQ(inbox.now().statuses[0].bit_rate, 3.5e6);

@@ -55,7 +55,8 @@ TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
   ASSERT_TRUE(rigs.status) << rigs.status.error().message;
   EXPECT_EQ(rigs.config.streams.size(), 2U);
 
-  for (const std::string table : {"", "[recording]\n", "[gateway]\n", "[camera]\n", "[[stream]]\n"}) {
+  for (const std::string table :
+       {"", "[recording]\n", "[projector]\n", "[gateway]\n", "[camera]\n", "[[stream]]\n"}) {
     const Read wrong = read(table + "nonsense = 1\n");
     ASSERT_FALSE(wrong.status);
     std::istringstream known(wrong.status.error().message);
@@ -66,6 +67,23 @@ TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
       EXPECT_TRUE(named.contains(word) || all.find("[" + word + "]") != std::string::npos) << word;
     EXPECT_GT(count, 0);
   }
+}
+
+TEST(Config, TheLadderIsAListOfLowerQualities) {
+  EXPECT_EQ(read("").config.ladder, (std::vector{Rung::kReduced, Rung::kTexture}));
+  EXPECT_EQ(read("ladder = []\n").config.ladder, std::vector<Rung>{});
+  EXPECT_EQ(read("ladder = [\"texture\"]\n").config.ladder, std::vector{Rung::kTexture});
+  EXPECT_EQ(read("ladder = [\"texture\", \"reduced\", \"texture\"]\n").config.ladder,
+            (std::vector{Rung::kReduced, Rung::kTexture}));
+  for (const char* wrong :
+       {"[\"full\"]", "[\"none\"]", "[\"reduced,texture\"]", "[\"\"]", "\"reduced\"", "[1]"}) {
+    const Read r = read(std::string("loop = true\nladder = ") + wrong + "\n");
+    ASSERT_FALSE(r.status) << wrong;
+    EXPECT_TRUE(r.status.error().message.starts_with(r.file + ":2: ladder")) << r.status.error().message;
+  }
+  EXPECT_TRUE(parse_ladder("none").value().empty());
+  EXPECT_FALSE(parse_ladder(""));
+  EXPECT_FALSE(parse_ladder("reduced,full"));
 }
 
 TEST(Config, EverySetting) {

@@ -75,10 +75,12 @@ TEST_F(OpenApi, EveryAddressAnswersAsDescribed) {
     if (live) gateway->announce(make_info());
     for (const auto& [path, item] : document["paths"].items()) {
       std::string target = path;
-      if (const auto brace = target.find('{'); brace != std::string::npos) {
-        const std::string name = target.substr(brace + 1, target.size() - brace - 2);
-        EXPECT_EQ(resolved(item["get"]["parameters"][0])["name"], name);
-        target.replace(brace, std::string::npos, "face");
+      std::size_t parameter = 0;
+      for (auto brace = target.find('{'); brace != std::string::npos; brace = target.find('{')) {
+        const auto end = target.find('}', brace);
+        EXPECT_EQ(resolved(item["get"]["parameters"][parameter++])["name"],
+                  target.substr(brace + 1, end - brace - 1));
+        target.replace(brace, end + 1 - brace, "face");
       }
       const auto response = request(port, "GET", target);
       const auto& responses = item["get"]["responses"];

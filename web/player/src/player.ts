@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // <relievo-player>: a stream or a recording in any page, with the viewer's own parts (relievo-player.d.ts is its API).
-import { kDefaultDisplay, kModes, type Mode } from '../../viewer/src/display';
+import { kDefaultDisplay, kModes, kThemes, type Mode, type Theme } from '../../viewer/src/display';
 import { make } from '../../viewer/src/dom';
 import { listenToKeys } from '../../viewer/src/keys';
 import { LiveSource } from '../../viewer/src/liveSource';
@@ -40,7 +40,7 @@ interface Parts {
 }
 
 export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
-  static readonly observedAttributes = ['src', 'mode', ...kFlags];
+  static readonly observedAttributes = ['src', 'mode', 'theme', ...kFlags];
   private readonly box = make('div', { className: 'box' });
   private readonly messageLine = make('p', { className: 'message', hidden: true });
   private readonly timelineBox = make('div', { id: 'timeline', hidden: true });
@@ -85,6 +85,12 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   }
   set src(src: string) {
     this.setAttribute('src', src);
+  }
+  get theme(): Theme {
+    return kThemes.find((theme) => theme === this.getAttribute('theme')) ?? 'dark';
+  }
+  set theme(theme: Theme) {
+    this.setAttribute('theme', theme);
   }
   get mode(): Mode {
     return kModes.find((mode) => mode === this.getAttribute('mode')) ?? 'textured';

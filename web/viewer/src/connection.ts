@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One WebSocket to one stream, kept up: clock exchange, silence as loss, retries with backoff.
-import { parseFramePrefix, parseServerMessage } from './protocol';
+import { parseFramePrefix, parseServerMessage, wantedQuality } from './protocol';
 import type { SourceEvents } from './source';
 import { backoffS } from './state';
 
@@ -75,6 +75,8 @@ export class Connection {
       this.attempt = 0;
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
+      const want = this.server === document.baseURI ? wantedQuality(location.search) : null;
+      if (want !== null) this.send({ type: 'quality', want });
       this.events.open();
       this.tick();
     };

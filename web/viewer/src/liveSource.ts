@@ -2,6 +2,7 @@
 // A live stream as a source of frames. What comes is kept for a while, so that a person can stop it, go back, and
 // return to what is live. Kept frames are played as those of a recording are.
 import { Connection } from './connection';
+import type { FrameStore } from './frameStore';
 import { History } from './history';
 import type { Loop } from './playback';
 import type { FramePrefix } from './protocol';
@@ -49,6 +50,9 @@ export class LiveSource implements FrameSource, Playback {
     return this.player === null;
   }
   get kept(): Kept {
+    return this.history;
+  }
+  get store(): FrameStore {
     return this.history;
   }
   get following(): boolean {

@@ -99,6 +99,7 @@ class Viewer {
     if (document.fullscreenEnabled) this.panels.action('fullscreen', () => this.toggleFullscreen());
     fillHelp(this.panels.panel('help', text.help.title));
     this.listen();
+    void this.makeImmersive();
     this.change({});
     this.openAddressed(new URLSearchParams(location.search));
     window.setInterval(() => this.refresh(), kRefreshMs);
@@ -199,6 +200,18 @@ class Viewer {
     });
     this.streamsPanel.open = open;
     this.refresh();
+  }
+
+  // Browsers have WebXR in secure contexts alone.
+  private async makeImmersive(): Promise<void> {
+    const { view } = this;
+    const { xr } = navigator;
+    if (view === null || xr === undefined) return;
+    const { Immersive } = await import('./immersive');
+    new Immersive(xr, view, (why) => {
+      this.note = why;
+      this.refresh();
+    });
   }
 
   private makeStatistics(): void {
@@ -457,6 +470,7 @@ class Viewer {
       this.listFailed = false;
       this.session.everConnected = true;
       this.streams = list.streams;
+      for (const { name, recorder } of list.streams) this.record.listed(name, recorder);
       this.hint = list.hint;
       const first = list.streams[0];
       const missing = this.session.info === null && !list.streams.some((s) => s.name === this.stream);

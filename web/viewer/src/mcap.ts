@@ -6,9 +6,11 @@ import { crc32 } from './crc32';
 /** A file, or anything like it. `read` gives fewer bytes only at the end. */
 export interface Bytes {
   size: number;
-  /** Reading a little everywhere costs as much as reading it all. */
+  /** read() here brings much around it along; for a little in many places there is readLittle(). */
   isRemote?: boolean;
   read(at: number, length: number): Promise<Uint8Array>;
+  /** Only this, where it is not there already. */
+  readLittle?(at: number, length: number): Promise<Uint8Array>;
 }
 
 export const bytesOf = (blob: Blob): Bytes => ({
@@ -57,9 +59,11 @@ export async function readMessage(file: Bytes, { at }: McapMessage): Promise<Uin
   return data;
 }
 
-/** The first bytes of a message's data. */
-export const readMessageHead = (file: Bytes, { at }: McapMessage, length: number): Promise<Uint8Array> =>
-  file.read(at + kRecordHead + kMessageHead, length);
+/** The first bytes of a message's data; `little`: and nothing around them. */
+export function readMessageHead(file: Bytes, { at }: McapMessage, length: number, little = false): Promise<Uint8Array> {
+  const from = at + kRecordHead + kMessageHead;
+  return little && file.readLittle !== undefined ? file.readLittle(from, length) : file.read(from, length);
+}
 
 const viewOf = (bytes: Uint8Array): DataView => new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
 const u64 = (view: DataView, at: number): number => Number(view.getBigUint64(at, true));

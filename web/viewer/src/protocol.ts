@@ -91,12 +91,38 @@ export function parseFramePrefix(message: ArrayBuffer): FramePrefix {
   };
 }
 
+const kQualities = ['auto', 'full', 'reduced', 'texture'];
+
+/** The quality that a page's address asks for (`?quality=auto`); null: it says none, or none that there is. */
+export function wantedQuality(search: string): string | null {
+  const wanted = new URLSearchParams(search).get('quality');
+  return wanted !== null && kQualities.includes(wanted) ? wanted : null;
+}
+
 export interface ListedStream {
   name: string;
   source: string;
   state: string;
   /** Where the file is that it is played from, relative to the page; not said by older servers. */
   recording?: string | null;
+  /**
+   * What its recording on request is doing, whoever started it; null: there is no folder. Not said by older
+   * servers.
+   */
+  recorder?: ServerRecording | null;
+  /** Whether the page /rig can show what its camera sees. */
+  camera?: boolean;
+}
+
+/** What GET and POST /api/recording/STREAM answer. */
+export interface ServerRecording {
+  state: 'off' | 'recording' | 'failed';
+  file: string;
+  frames: number;
+  bytes: number;
+  started_ns: number;
+  pre_roll_s: number;
+  message: string;
 }
 
 export interface StreamList {

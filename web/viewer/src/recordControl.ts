@@ -4,7 +4,7 @@
 import { element, setText } from './dom';
 import { download } from './download';
 import { clockText } from './playback';
-import type { StreamInfo } from './protocol';
+import type { ServerRecording, StreamInfo } from './protocol';
 import type { LiveSource } from './liveSource';
 import { text } from './strings';
 
@@ -12,17 +12,6 @@ const say = text.record;
 const kEveryMs = 1000; // between questions to a server that records
 const kSaidMs = 10_000; // how long it is said where a recording went
 const kMostBytes = 1e9; // kept here, in memory
-
-/** What GET and POST /api/recording/STREAM answer. */
-interface ServerRecording {
-  state: 'off' | 'recording' | 'failed';
-  file: string;
-  frames: number;
-  bytes: number;
-  started_ns: number;
-  pre_roll_s: number;
-  message: string;
-}
 
 interface Taken {
   messages: ArrayBuffer[];
@@ -59,6 +48,15 @@ export class RecordControl {
     this.of = of;
     this.server = null;
     this.serverHasNone = false;
+    this.show();
+  }
+
+  /** What the list of streams says of this one's: others start and stop it too. */
+  listed(stream: string, told: ServerRecording | null | undefined): void {
+    if (this.of?.stream !== stream || this.asking || this.taken !== null || told === undefined) return;
+    this.serverHasNone = told === null;
+    // What this page follows itself it knows better.
+    if (told !== null && told.state === 'recording' && this.server?.state !== 'recording') this.take(told);
     this.show();
   }
 

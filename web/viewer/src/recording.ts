@@ -10,6 +10,8 @@ import { videoTextureIsKey } from './videoTexture';
 const kFrameTopic = 'relievo/frame';
 const kInfoTopic = 'relievo/info';
 const kTogether = 64; // heads read at a time
+const kFarHeadMs = 8; // between those of a remote file
+const kFarSayMs = 500; // between marks drawn meanwhile
 
 export class Recording implements FrameStore {
   readonly times: Float64Array;
@@ -50,14 +52,37 @@ export class Recording implements FrameStore {
     return (this.heads[index] ??= readFrameHead(await readMessageHead(this.file, this.frames[index]!, kFrameHeadBytes)));
   }
 
-  /** All heads, for marks on the time line; of a remote file only those that are needed anyway. `progress` after some of them; stops where it returns false. */
+  /**
+   * All heads, for marks on the time line; of a remote file one after the other, so that what plays goes
+   * before. `progress` after some of them; stops where it returns false.
+   */
   async readHeads(progress: () => boolean): Promise<void> {
-    if (this.file.isRemote === true) return;
+    if (this.file.isRemote === true) return this.readFarHeads(progress);
     for (let i = 0; i < this.count; i += kTogether) {
       const some = Array.from({ length: Math.min(kTogether, this.count - i) }, (_, j) => this.head(i + j));
       await Promise.allSettled(some); // what is damaged has no mark
       if (!progress()) return;
     }
+  }
+
+  private async readFarHeads(progress: () => boolean): Promise<void> {
+    let saidAt = performance.now();
+    for (let i = 0; i < this.count; ++i) {
+      if (this.heads[i] !== undefined) continue;
+      await new Promise((resolve) => setTimeout(resolve, kFarHeadMs));
+      const some = await readMessageHead(this.file, this.frames[i]!, kFrameHeadBytes, true).catch(() => null);
+      if (some !== null) {
+        try {
+          this.heads[i] ??= readFrameHead(some);
+        } catch {
+          // what is damaged has no mark
+        }
+      }
+      if (performance.now() - saidAt < kFarSayMs) continue;
+      saidAt = performance.now();
+      if (!progress()) return;
+    }
+    progress();
   }
 
   async read(index: number): Promise<StoredFrame> {

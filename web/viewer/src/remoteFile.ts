@@ -49,6 +49,16 @@ export class RemoteFile implements Bytes {
     return out;
   }
 
+  /** Of the blocks that are kept, or fetched by itself and not kept. */
+  async readLittle(at: number, length: number): Promise<Uint8Array> {
+    const end = Math.min(this.size, at + length);
+    if (end <= at) return new Uint8Array();
+    const [first, last] = [Math.floor(at / kBlock), Math.floor((end - 1) / kBlock)];
+    const kept = first === last ? this.blocks.get(first) : undefined;
+    if (kept === undefined) return this.ask(at, end);
+    return (await kept).slice(at - first * kBlock, end - first * kBlock);
+  }
+
   private block(index: number): Promise<Uint8Array> {
     let block = this.blocks.get(index);
     this.blocks.delete(index);

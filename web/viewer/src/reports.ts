@@ -45,7 +45,9 @@ export function report(viewer: Reporting): void {
     extent: () => viewer.view?.shown?.extent ?? null,
     surface: () => {
       const frame = viewer.view?.shown ?? null;
-      return frame === null ? null : { number: frame.number, hash: crc32(new Uint8Array(frame.positions.buffer)) };
+      if (frame === null) return null;
+      const { buffer, byteOffset, byteLength } = frame.positions;
+      return { number: frame.number, hash: crc32(new Uint8Array(buffer, byteOffset, byteLength)) };
     },
     link: () => viewer.link(),
     pose: () => viewer.view?.navigator.pose ?? null,

@@ -44,7 +44,7 @@ export class StorePlayer implements Playback {
 
   /** Begins with the first frame; `credits`: how many frames the page can take now. */
   constructor(
-    private readonly store: FrameStore,
+    readonly store: FrameStore,
     private readonly handed: PlayerEvents,
     private credits = 1,
   ) {

@@ -23,6 +23,7 @@ interface Row {
   picture: HTMLCanvasElement;
   about: HTMLElement;
   show: HTMLButtonElement;
+  rig: HTMLAnchorElement; // the page that shows what its camera sees
   beside: HTMLButtonElement | null; // recordings of the folder are shown alone
   pictureAt: number; // when it was asked for
 }
@@ -74,6 +75,7 @@ export class StreamsPanel {
       row.show.setAttribute('aria-pressed', String(isFirst));
       row.beside!.setAttribute('aria-pressed', String(besides.includes(stream.name)));
       row.beside!.disabled = isFirst;
+      row.rig.hidden = stream.camera !== true;
       this.draw(row, stream.name, stream.recording ?? null);
     }
   }
@@ -118,7 +120,8 @@ function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | n
   picture.setAttribute('aria-label', say.picture(name));
   const about = make('small', { className: 'quiet' });
   const show = button(say.show, say.showTitle(name), choose);
-  const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]));
+  const rig = make('a', { href: `rig?stream=${encodeURIComponent(name)}`, title: say.rigTitle, hidden: true }, say.rig);
+  const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]), rig);
   const item = make('li', {}, picture, make('div', {}, make('b', { title: name }, name), about, buttons));
-  return { item, picture, about, show, beside, pictureAt: -Infinity };
+  return { item, picture, about, show, rig, beside, pictureAt: -Infinity };
 }

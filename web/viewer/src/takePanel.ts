@@ -89,6 +89,7 @@ export class TakePanel {
   private shown(): NonNullable<View['shown']> {
     const frame = this.view.shown;
     if (frame === null) throw new Error(say.nothing);
+    frame.kept = true; // it is written while others are shown
     return frame;
   }
 

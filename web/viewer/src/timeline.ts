@@ -2,12 +2,14 @@
 // The time line of a source that has one: playing, scrubbing, speed, a range to repeat, marks of key frames and gaps.
 import { button, make, setText } from './dom';
 import { clockText, frameAt, kSpeeds } from './playback';
+import type { Preview } from './preview';
 import type { Playback } from './source';
 import { text } from './strings';
 
 const say = text.timeline;
 const kRefreshMs = 60;
 const kLongGap = 5; // frames lost in a row, which a person sees
+const kInset = 8; // pixels of the track on both sides of its times, half the slider's thumb
 const kMarksMs = 250; // between drawings of the marks, which move while a stream is live
 
 export class Timeline {
@@ -23,6 +25,8 @@ export class Timeline {
   private dirty = false;
   private readonly timer: number;
   private marksAt = 0; // when they were drawn
+  private preview: Preview | null = null; // loaded when it is first wanted
+  private pointedX: number | null = null; // of the cursor, on the page
 
   /** `shown` is told whether there is anything to go through. */
   constructor(
@@ -37,6 +41,8 @@ export class Timeline {
     const track = make('div', { className: 'track' }, this.track, this.slider);
     const steps = [button('‹', say.back, () => this.playback?.step(-1)), button('›', say.ahead, () => this.playback?.step(1))];
     for (const b of steps) b.setAttribute('aria-label', b.title);
+    track.onpointermove = (event) => this.point(track, event.clientX);
+    track.onpointerleave = () => this.unpoint();
     this.live.id = 'follow';
     this.time.className = 'time';
     this.box.append(this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
@@ -54,7 +60,36 @@ export class Timeline {
     if (playback !== null) playback.changed = () => (this.dirty = true);
     this.dirty = true;
     this.marksAt = 0;
+    this.unpoint();
     this.refresh();
+  }
+
+  // A picture of the frame under the cursor.
+  private point(track: HTMLElement, x: number): void {
+    const wasOut = this.pointedX === null;
+    this.pointedX = x;
+    if (this.preview !== null) return this.showPreview(track);
+    if (!wasOut) return;
+    const loaded = import('./preview').then(({ Preview }) => {
+      this.preview ??= new Preview(track);
+      this.showPreview(track);
+    });
+    loaded.catch(() => (this.pointedX = null)); // the server has gone: tried again with the next move
+  }
+
+  private unpoint(): void {
+    this.pointedX = null;
+    this.preview?.hide();
+  }
+
+  private showPreview(track: HTMLElement): void {
+    const p = this.playback;
+    if (p === null || this.pointedX === null || this.box.hidden) return;
+    const { left, width } = track.getBoundingClientRect();
+    const share = Math.min(1, Math.max(0, (this.pointedX - left - kInset) / Math.max(1, width - 2 * kInset)));
+    const atMs = this.begin + share * (this.end - this.begin);
+    this.preview!.of(p.store);
+    this.preview!.show(atMs, this.timeText(p, atMs), this.pointedX - left, width);
   }
 
   /** True where the key is one of the time line's. */

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "codec/reduce.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "codec/stripe_grid.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// Vertices and triangles by their place.
+struct Places {
+  std::size_t stride = 0;
+  std::vector<std::uint32_t> vertex;    // kNone: there is none
+  std::vector<std::uint8_t> triangles;  // of the cell below and right: bits as in grid_cell
+
+  std::size_t at(std::size_t line, std::size_t boundary) const { return line * stride + boundary; }
+};
+
+bool find_vertices(const Surface& surface, Places& out) {
+  std::size_t boundaries = 0, lines = 0;
+  for (const GridPoint& p : surface.grid) {
+    boundaries = std::max<std::size_t>(boundaries, p.boundary + 1U);
+    lines = std::max<std::size_t>(lines, p.line + 1U);
+  }
+  out.stride = boundaries + 1;
+  out.vertex.assign((lines + 2) * out.stride, kNone);
+  out.triangles.assign(out.vertex.size(), 0);
+  for (std::size_t i = 0; i < surface.grid.size(); ++i) {
+    std::uint32_t& place = out.vertex[out.at(surface.grid[i].line, surface.grid[i].boundary)];
+    if (place != kNone) return false;  // of a dense surface, say
+    place = static_cast<std::uint32_t>(i);
+  }
+  return true;
+}
+
+bool find_triangles(const Surface& surface, Places& out) {
+  for (const Triangle& triangle : surface.triangles) {
+    std::size_t top = std::numeric_limits<std::size_t>::max(), left = top;
+    for (const std::uint32_t v : triangle) {
+      if (v >= surface.grid.size()) return false;
+      top = std::min<std::size_t>(top, surface.grid[v].line);
+      left = std::min<std::size_t>(left, surface.grid[v].boundary);
+    }
+    unsigned corners = 0;
+    for (const std::uint32_t v : triangle) {
+      const std::size_t down = surface.grid[v].line - top;
+      const std::size_t right = surface.grid[v].boundary - left;
+      if (down > 1 || right > 1) return false;
+      corners |= 1U << (down == 0 ? (right == 0 ? 0 : 3) : (right == 0 ? 1 : 2));
+    }
+    const unsigned missing = 0xfU & ~corners;
+    if (missing == 0 || (missing & (missing - 1)) != 0) return false;
+    out.triangles[out.at(top, left)] |= static_cast<std::uint8_t>(missing);
+  }
+  return true;
+}
+
+/// What a cell of two lines has, of the upper and the lower one that it covers. A cell without one of its
+/// outer corners is one triangle of three.
+std::uint8_t joined(std::uint8_t upper, std::uint8_t lower) {
+  const auto whole = [](std::uint8_t cell) {
+    return cell == grid_cell::kStraight || cell == grid_cell::kTurned;
+  };
+  constexpr std::uint8_t kUpperCorners = 1U << 0 | 1U << 3, kLowerCorners = 1U << 1 | 1U << 2;
+  if (whole(upper) && whole(lower)) return grid_cell::kStraight;
+  if (whole(lower) && (upper == 1U << 0 || upper == 1U << 3)) return upper & kUpperCorners;
+  if (whole(upper) && (lower == 1U << 1 || lower == 1U << 2)) return lower & kLowerCorners;
+  return 0;
+}
+
+template <typename T>
+void keep(const std::vector<T>& from, const std::vector<std::uint32_t>& kept, std::vector<T>& to) {
+  to.clear();
+  if (from.empty()) return;
+  to.reserve(kept.size());
+  for (const std::uint32_t v : kept) to.push_back(from[v]);
+}
+
+}  // namespace
+
+bool halve_lines(const Surface& surface, Surface& out) {
+  out = {};
+  Places places;
+  if (surface.grid.size() != surface.positions.size() || !find_vertices(surface, places) ||
+      !find_triangles(surface, places))
+    return false;
+  std::vector<std::uint32_t> kept, now(surface.grid.size(), kNone);
+  for (std::uint32_t v = 0; v < surface.grid.size(); ++v) {
+    if (surface.grid[v].line % 2 != 0) continue;
+    now[v] = static_cast<std::uint32_t>(kept.size());
+    kept.push_back(v);
+  }
+  keep(surface.positions, kept, out.positions);
+  keep(surface.normals, kept, out.normals);
+  keep(surface.texture_coordinates, kept, out.texture_coordinates);
+  keep(surface.grid, kept, out.grid);
+  keep(surface.sigmas_m, kept, out.sigmas_m);
+  keep(surface.interpolated, kept, out.interpolated);
+  for (GridPoint& p : out.grid) p.line /= 2;
+
+  const std::size_t two_lines = 2 * places.stride;
+  for (std::size_t upper = 0; upper + two_lines + 1 < places.vertex.size();
+       upper += (upper + 1) % places.stride == 0 ? places.stride + 1 : 1) {
+    const std::size_t lower = upper + places.stride;
+    const std::uint8_t cell = joined(places.triangles[upper], places.triangles[lower]);
+    if (cell == 0) continue;
+    const std::uint32_t corners[4] = {places.vertex[upper], places.vertex[upper + two_lines],
+                                      places.vertex[upper + two_lines + 1], places.vertex[upper + 1]};
+    const auto add = [&](int a, int b, int c) {
+      out.triangles.push_back({now[corners[a]], now[corners[b]], now[corners[c]]});
+    };
+    if (cell != grid_cell::kStraight) {
+      if (cell == 1U << 0) add(1, 2, 3);
+      if (cell == 1U << 1) add(0, 2, 3);
+      if (cell == 1U << 2) add(0, 1, 3);
+      if (cell == 1U << 3) add(0, 1, 2);
+      continue;
+    }
+    const auto column = [&](int c) { return surface.grid[corners[c]].column_px; };
+    if (std::abs(column(2) - column(0)) <= std::abs(column(3) - column(1))) {
+      add(0, 1, 2);
+      add(2, 3, 0);
+    } else {
+      add(1, 2, 3);
+      add(3, 0, 1);
+    }
+  }
+  return true;
+}
+
+Image8 halve(const Image8& picture) {
+  const int across = picture.width() % 2 == 0 ? 2 : 1;
+  const int down = picture.height() % 2 == 0 ? 2 : 1;
+  const int channels = picture.channels();
+  Image8 out(picture.width() / across, picture.height() / down, channels);
+  const int count = across * down;
+  for (int y = 0; y < out.height(); ++y) {
+    std::uint8_t* to = out.row(y);
+    for (int x = 0; x < out.width(); ++x) {
+      for (int c = 0; c < channels; ++c) {
+        int sum = count / 2;
+        for (int j = 0; j < down; ++j)
+          for (int i = 0; i < across; ++i) sum += picture.row(y * down + j)[(x * across + i) * channels + c];
+        *to++ = static_cast<std::uint8_t>(sum / count);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace relievo

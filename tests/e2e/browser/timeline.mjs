@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cursor over the time line, and the picture that it shows.
+import { eventually } from './chromium.mjs';
+
+/**
+ * Points at the frame of this index, and waits for the picture of it, or of the nearest one before that is
+ * kept apart.
+ */
+export async function pointAt(page, index) {
+  const place = await page.evaluate((i) => {
+    const { times, first } = window.relievo.diagnostics().playback;
+    const { left, top, width, height } = document.querySelector('#timeline .track').getBoundingClientRect();
+    const inset = 8;
+    const share = (times[i - first] + 1e-3 - times[0]) / (times[times.length - 1] - times[0]);
+    return { x: left + inset + share * (width - 2 * inset) + 0.6, y: top + height / 2 };
+  }, index);
+  await page.mouse.move(place.x - 30, place.y);
+  await page.mouse.move(place.x, place.y);
+  await eventually(`no picture of frame ${index}`, () =>
+    page.evaluate((i) => document.querySelector('.preview canvas')?.dataset.index === String(i), index),
+  );
+  return page.evaluate(() => {
+    const canvas = document.querySelector('.preview canvas');
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    let [sum, squares, hash] = [0, 0, 2166136261];
+    for (let i = 0; i < data.length; i += 4) {
+      sum += data[i + 1];
+      squares += data[i + 1] ** 2;
+      hash = Math.imul(hash ^ data[i + 1], 16777619) >>> 0;
+    }
+    const n = data.length / 4;
+    return {
+      frame: Number(canvas.dataset.frame),
+      width: canvas.clientWidth,
+      height: canvas.clientHeight,
+      deviation: Math.sqrt(squares / n - (sum / n) ** 2),
+      hash,
+      time: document.querySelector('.preview span').textContent,
+    };
+  });
+}

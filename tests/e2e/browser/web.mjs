@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// `relievo web` of a recording, in the test's DDS domain.
+import assert from 'node:assert/strict';
+import { spawn } from 'node:child_process';
+
+/** `options` beside those for the network; stop() ends it. */
+export async function startWeb(relievoPath, recorded, options = []) {
+  const domain = process.env.RELIEVO_TEST_DOMAIN;
+  assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
+  const web = spawn(relievoPath, ['web', recorded, '--listen', '127.0.0.1:0', ...options, '--domain', domain], {
+    stdio: ['ignore', 'pipe', 'inherit'],
+  });
+  const ended = new Promise((resolve) => web.once('exit', resolve));
+  const said = await new Promise((resolve, reject) => {
+    web.stdout.once('data', (data) => resolve(String(data)));
+    web.once('exit', (code) => reject(new Error(`relievo web ended with ${code}`)));
+  });
+  const stop = async () => {
+    web.kill('SIGTERM');
+    await ended;
+  };
+  return { address: said.trim().replace('viewer ', ''), stop };
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the server says of one frame of a rig's camera: GET /api/rig/STREAM (docs/WEB.md).
+
+export const kPictures = ['camera', 'complement', 'exposure', 'coverage', 'order', 'difference', 'boundaries'] as const;
+export type PictureName = (typeof kPictures)[number];
+
+export interface Margin {
+  colour: string; // "100": red
+  pieces: number;
+  median: number | null;
+  low: number | null;
+  wrong: number | null;
+}
+
+export interface Look {
+  state: 'measured';
+  stream: string;
+  frame: number;
+  exposure: {
+    histogram: Record<'red' | 'green' | 'blue', number[]>;
+    clipped: number;
+    clipped_level: number;
+    dark: number;
+    dark_level: number;
+    bright: number;
+  };
+  margins: Margin[];
+  margin_needed: number;
+  noise: number;
+  coverage: { lit: number; share: number };
+  boundaries: { seen: number; matched: number; points: number; neighbours: number; order_errors: number };
+  step: { mixed: number; regrouped: number; phase: number | null; drift_fields_s: number | null };
+  advice: string[];
+  pictures: PictureName[];
+}
+
+/** The server said no, and why. */
+export class Refused extends Error {}
+
+const address = (path: string): URL => new URL(path, document.baseURI);
+
+/** Null: no frame was looked at yet. The picture can be had when a look names it. */
+export async function lookAt(stream: string, picture: PictureName): Promise<Look | null> {
+  const response = await ask(`api/rig/${encodeURIComponent(stream)}?pictures=${picture}`);
+  const look = (await response.json()) as Look | { state: 'waiting' };
+  return look.state === 'measured' ? look : null;
+}
+
+export async function pictureOf(stream: string, picture: PictureName): Promise<ImageBitmap> {
+  const response = await ask(`api/rig/${encodeURIComponent(stream)}/${picture}.jpg`);
+  return createImageBitmap(await response.blob());
+}
+
+export async function streamNames(): Promise<string[]> {
+  const list = (await (await ask('api/streams')).json()) as { streams: { name: string }[] };
+  return list.streams.map(({ name }) => name);
+}
+
+export async function ask(path: string, init: RequestInit = {}): Promise<Response> {
+  const response = await fetch(address(path), { cache: 'no-store', signal: AbortSignal.timeout(5000), ...init });
+  if (!response.ok) throw new Refused((await response.text()).trim() || `HTTP ${response.status}`);
+  return response;
+}

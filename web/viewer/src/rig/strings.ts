@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the page /rig says, in one place.
+import type { PictureName } from './look';
+
+const pictures: Record<PictureName, readonly [string, string]> = {
+  camera: ['Camera', 'The exposure under the slide, as the camera gives it'],
+  complement: ['Complement', 'The exposure after it'],
+  exposure: ['Exposure', 'Red: clipped. Blue: dark in both exposures'],
+  coverage: ['Coverage', 'Green: stripes are decoded. Red: their light arrives, and they are not'],
+  order: ['Order', 'Magenta: neighbouring boundaries that do not fit together'],
+  difference: ['Difference', 'The difference of both exposures: what stripes are read from'],
+  boundaries: ['Boundaries', 'Decoded boundaries, in the colours projected on both sides'],
+};
+
+export const text = {
+  pictures,
+  state: {
+    connecting: 'Connecting',
+    waiting: 'Waiting for a frame of the camera',
+    live: (frame: number) => `Frame ${frame}`,
+    lost: 'The server does not answer: trying again',
+    noStream: 'The server has no streams yet',
+    refused: (why: string) => why,
+  },
+  advice: { title: 'What to do', none: 'Nothing to mend in this frame.' },
+  exposure: {
+    title: 'Exposure',
+    histogram: (clipped: string, dark: string) =>
+      `Histogram of red, green and blue over the levels 0 to 255. Clipped: ${clipped}. Dark: ${dark}.`,
+    clipped: (level: number) => `clipped (${level} or more)`,
+    dark: (level: number) => `dark (below ${level})`,
+    bright: 'level of the brightest hundredth',
+  },
+  margins: {
+    title: 'Colour margins',
+    about: (needed: number, noise: number) =>
+      `How far a colour is from being taken for another, of 255: 95 of 100 stripes have at least this. ${
+        needed
+      } is needed; the noise is ${noise.toFixed(1)}.`,
+    columns: ['Colour', 'Least', '', 'Wrong'],
+    none: '–',
+  },
+  colours: {
+    '100': 'Red',
+    '010': 'Green',
+    '001': 'Blue',
+    '110': 'Yellow',
+    '101': 'Magenta',
+    '011': 'Cyan',
+  } as Readonly<Record<string, string>>,
+  stripes: {
+    title: 'Stripes',
+    coverage: 'decoded, of where their light arrives',
+    lit: 'of the picture is lit by them',
+    seen: 'boundaries seen',
+    points: 'points of the surface',
+    order: 'order errors, of neighbours',
+  },
+  step: {
+    title: 'Projector and camera',
+    mixed: 'frames lost under two slides',
+    phase: 'phase, of an exposure',
+    drift: 'drift, fields a second',
+    unknown: 'not known',
+  },
+  projector: {
+    title: 'Projector',
+    states: { none: '', off: 'Off', on: 'On', failed: 'Failed' },
+    on: (output: string, show: string) => `${output}: ${show}`,
+    show: 'Show',
+    shows: { pattern: 'The pattern', white: 'White, to aim', slide1: 'A slide, to focus', black: 'Black' },
+    start: 'Project',
+    stop: 'Stop',
+    failed: (why: string) => `Not done: ${why}`,
+  },
+} as const;
