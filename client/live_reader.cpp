@@ -51,8 +51,8 @@ class DdsLiveReader final : public LiveReader {
     callbacks.status = [this](const ServerStatus& status) { offer(status); };
     callbacks.lost = [this](const std::string&, std::uint64_t count) { seen_.lost += count; };
     callbacks.frame = [this](const std::string&, const FrameMessage& message) { take(message); };
-    auto subscriber = Subscriber::create(options_.domain, options_.stream, std::move(callbacks),
-                                         options_.quality.value_or(Rung::kFull));
+    auto subscriber =
+        Subscriber::create(options_.domain, options_.stream, std::move(callbacks), options_.quality);
     if (!subscriber) return subscriber.error();
     held_ = *std::move(subscriber);
     subscriber_ = held_.get();
@@ -142,7 +142,7 @@ class DdsLiveReader final : public LiveReader {
     report_.moves += moved;
     report_.lost += seen_.lost;
     if (!decoded) {
-      ++report_.skipped;
+      if (report_.frames > 0) ++report_.skipped;  // before, it was not yet there
       return;
     }
     ++report_.frames;

@@ -25,8 +25,10 @@ namespace relievo {
 namespace {
 
 constexpr std::uint32_t kTakeAtOnce = 16;
-constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;  // for the first key frame of a lower rung
-constexpr std::size_t kMaxStreams = 256;                      // what a hostile peer can make us remember
+constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;    // for the first key frame of a lower rung
+constexpr std::int64_t kStatusTime_ns = kNanosecondsPerSecond;  // for the status of a stream that has one
+constexpr int kSilence = 3;               // of those, until a way here counts as blocked
+constexpr std::size_t kMaxStreams = 256;  // what a hostile peer can make us remember
 
 // What is remembered of a stream. It is there while it writes to any topic: DDS marks a topic's instance as
 // not alive when its writer leaves, dies or is silent for its lease, and as alive again only with the topic's
@@ -48,7 +50,7 @@ struct Known {
 class DdsSubscriber final : public Subscriber {
  public:
   static Result<std::unique_ptr<Subscriber>> open(const DomainOptions& options, const std::string& stream,
-                                                  Callbacks callbacks, Rung rung) {
+                                                  Callbacks callbacks, std::optional<Rung> rung) {
     if (stream.empty() && rung != Rung::kFull)
       return Error{"a rung of the ladder is one stream's: name the stream"};
     if (!stream.empty() && !valid_stream_name(stream)) {
@@ -83,7 +85,8 @@ class DdsSubscriber final : public Subscriber {
   }
 
  private:
-  Status start(std::shared_ptr<Domain> domain, const std::string& stream, Callbacks callbacks, Rung rung) {
+  Status start(std::shared_ptr<Domain> domain, const std::string& stream, Callbacks callbacks,
+               std::optional<Rung> rung) {
     domain_ = std::move(domain);
     stream_ = stream;
     callbacks_ = std::move(callbacks);
@@ -112,11 +115,10 @@ class DdsSubscriber final : public Subscriber {
       dds_waitset_attach(waitset_.get(), conditions_[i].get(), 0);
     }
     if (wants_frames()) {
-      wanted_rung_ = rung;
-      auto frames = FrameLink::open(participant, stream, rung);
-      if (!frames) return frames.error();
-      frames_ = *std::move(frames);
-      dds_waitset_attach(waitset_.get(), frames_.condition.get(), 0);
+      wanted_rung_ = rung.value_or(Rung::kFull);
+      if (rung) {
+        if (auto s = open_frames(); !s) return s;
+      }
       if (auto s = keep(create_group(participant, Role::kWatcher, true, stream), request_group_); !s)
         return s;
       if (auto s =
@@ -134,12 +136,15 @@ class DdsSubscriber final : public Subscriber {
   void run() {
     for (;;) {
       dds_attach_t triggered[4];
-      const auto count = dds_waitset_wait(waitset_.get(), triggered, 4, next_ ? kMakeTime_ns : DDS_INFINITY);
+      const bool in_time = next_ || waits_with_frames();
+      const auto count =
+          dds_waitset_wait(waitset_.get(), triggered, 4, in_time ? kMakeTime_ns : DDS_INFINITY);
       bool stopping = false;
       if (count < 0 || dds_read_guardcondition(stop_.get(), &stopping) < 0 || stopping) return;
       ended_.clear();
       take_change();
       for (const Topic topic : kTopics) take(topic);
+      if (waits_with_frames()) begin_with_frames();
       if (next_) take_next();
       if (next_) break_before_make();
       // Only now, so that a stream's last frames come before its end.
@@ -147,11 +152,29 @@ class DdsSubscriber final : public Subscriber {
     }
   }
 
+  bool waits_with_frames() const { return wants_frames() && frames_.reader.get() == 0; }
+
+  Status open_frames() {
+    auto frames = FrameLink::open(domain_->participant(), stream_, wanted_rung_);
+    if (!frames) return frames.error();
+    frames_ = *std::move(frames);
+    dds_waitset_attach(waitset_.get(), frames_.condition.get(), 0);
+    return {};
+  }
+
+  // Once it is known what there is to choose from: behind frames that fill the way here it might never be.
+  void begin_with_frames() {
+    const bool without_status = described_ns_ > 0 && steady_now_ns() - described_ns_ > kStatusTime_ns;
+    if (!has_status_ && !without_status) return;
+    if (const Status opened = open_frames(); !opened) log_warning("no frames: " + opened.error().message);
+  }
+
   // A rung that is to be read is read beside the one before until that can be let go.
   void take_change() {
     bool changed = false;
     if (dds_take_guardcondition(change_.get(), &changed) < 0 || !changed) return;
     const Rung wanted = wanted_rung_;
+    if (waits_with_frames()) return;  // it will begin with that
     if (next_ && next_->rung == wanted) return;
     next_.reset();
     if (wanted == frames_.rung) return;
@@ -170,11 +193,19 @@ class DdsSubscriber final : public Subscriber {
     if (next_->rung < frames_.rung || steady_now_ns() - next_since_ns_ < kMakeTime_ns) return;
     dds_subscription_matched_status_t matched{};
     dds_get_subscription_matched_status(next_->reader.get(), &matched);
-    if (matched.current_count == 0) return;  // there is no such rung
+    if (matched.current_count == 0 && !hidden(next_->rung)) return;  // there is no such rung
     frames_ = *std::move(next_);
     next_.reset();
     known_[stream_].alive[static_cast<std::size_t>(Topic::kFrame)] = false;  // until its first sample
     request_key_frame(stream_);
+  }
+
+  // Whether the server has the rung, but nothing comes through, not even where its writer is to be found.
+  bool hidden(Rung rung) const {
+    const bool offered =
+        std::any_of(rungs_.begin(), rungs_.end(), [&](const RungStatus& r) { return r.rung == rung; });
+    const std::int64_t since_ns = std::max(next_since_ns_, last_frame_ns_);
+    return offered && steady_now_ns() - since_ns > kSilence * kMakeTime_ns;
   }
 
   // Up to its first key frame, from which on it is what is read.
@@ -231,6 +262,7 @@ class DdsSubscriber final : public Subscriber {
         if (!wanted(info->stream)) return {};
         Known* known = remember(info->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
+        if (described_ns_ == 0) described_ns_ = steady_now_ns();
         raw(topic, info->stream, cdr, sample);
         known->info = std::move(*info);
         known->told = true;
@@ -243,6 +275,7 @@ class DdsSubscriber final : public Subscriber {
         if (!wanted(frame->stream)) return {};
         Known* known = remember(frame->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
+        last_frame_ns_ = steady_now_ns();
         tell_there(*known);
         count_lost(*known, *frame, sample.publication_handle);
         raw(topic, frame->stream, cdr, sample);
@@ -264,6 +297,8 @@ class DdsSubscriber final : public Subscriber {
         Known* known = remember(status->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
         tell_there(*known);
+        has_status_ = true;
+        rungs_ = status->rungs;
         raw(topic, status->stream, cdr, sample);
         if (callbacks_.status) callbacks_.status(*status);
         return {};
@@ -367,6 +402,10 @@ class DdsSubscriber final : public Subscriber {
   FrameLink frames_;
   std::optional<FrameLink> next_;  // that it is to be
   std::int64_t next_since_ns_ = 0;
+  std::int64_t last_frame_ns_ = 0;
+  std::int64_t described_ns_ = 0;  // 0: not yet
+  bool has_status_ = false;
+  std::vector<RungStatus> rungs_;  // that the last one told of
   std::map<std::string, Known> known_;
   std::map<std::pair<Topic, std::uint64_t>, std::string> stream_of_;  // by a topic's instance
   std::set<std::string> ended_;
@@ -376,7 +415,7 @@ class DdsSubscriber final : public Subscriber {
 }  // namespace
 
 Result<std::unique_ptr<Subscriber>> Subscriber::create(const DomainOptions& domain, const std::string& stream,
-                                                       Callbacks callbacks, Rung rung) {
+                                                       Callbacks callbacks, std::optional<Rung> rung) {
   return DdsSubscriber::open(domain, stream, std::move(callbacks), rung);
 }
 

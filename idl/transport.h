@@ -106,9 +106,12 @@ class Subscriber {
     std::function<void(const std::string& stream, std::uint64_t count)> lost;  // gap in the frame sequence
   };
   /// `rung`: the one of the ladder whose frames come; another than kFull needs a name. Description and
-  /// status are the stream's own.
+  /// status are the stream's own. Nothing: the rung that set_rung() was called with when the stream's first
+  /// status has come, or else kFull; so that who joins by a narrow way hears what there is before frames
+  /// fill it. (A stream that has no status is waited for a second.)
   static Result<std::unique_ptr<Subscriber>> create(const DomainOptions& domain, const std::string& stream,
-                                                    Callbacks callbacks, Rung rung = Rung::kFull);
+                                                    Callbacks callbacks,
+                                                    std::optional<Rung> rung = Rung::kFull);
   virtual ~Subscriber() = default;
 
   /// Frames are of this rung soon: those of the one before come until its first key frame is here (of a

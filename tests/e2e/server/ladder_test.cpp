@@ -92,9 +92,11 @@ TEST_F(LadderTest, FullReducedAndTextureTogether) {
   WebServer server(command());
   ASSERT_NE(server.port(), 0);
   Watcher full(Rung::kFull), reduced(Rung::kReduced), texture(Rung::kTexture);
+  std::map<std::uint64_t, Watcher::Seen> a, b;
   const auto common = [&] {
     std::vector<std::uint64_t> numbers;
-    const auto a = full.seen(), b = reduced.seen();
+    a = full.seen();
+    b = reduced.seen();
     for (const auto& [number, seen] : b)
       if (a.contains(number) && !seen.points.empty()) numbers.push_back(number);
     return numbers;
@@ -104,7 +106,6 @@ TEST_F(LadderTest, FullReducedAndTextureTogether) {
   EXPECT_EQ(full.report().lost, 0U);
   EXPECT_EQ(full.report().skipped, 0U);
   EXPECT_EQ(reduced.report().skipped, 0U);
-  const auto a = full.seen(), b = reduced.seen();
   for (const std::uint64_t number : common()) {
     const auto& whole = a.at(number);
     const auto& half = b.at(number);

@@ -71,7 +71,8 @@ class LadderTest : public ::testing::Test {
     ASSERT_TRUE(rung) << rung.error().message;
     rung_ = *std::move(rung);
   }
-  std::unique_ptr<Subscriber> read(Inbox& inbox, const std::string& stream, Rung rung = Rung::kFull) {
+  std::unique_ptr<Subscriber> read(Inbox& inbox, const std::string& stream,
+                                   std::optional<Rung> rung = Rung::kFull) {
     auto made = Subscriber::create(kDomain, stream, inbox.callbacks(), rung);
     EXPECT_TRUE(made);
     return made ? *std::move(made) : nullptr;
@@ -158,6 +159,38 @@ TEST_F(LadderTest, WhereThereIsNoSuchRungTheOneBeforeGoesOn) {
   reader->set_rung(Rung::kFull);  // and changes its mind
   reader->set_rung(Rung::kReduced);
   ASSERT_TRUE(publish_until([&] { return inbox.count(Rung::kReduced) >= 1; }));
+}
+
+// Frames of the full rung before that would fill a narrow way, and what there is to choose from be late.
+TEST_F(LadderTest, WhoLeavesItOpenHearsFirstWhatThereIs) {
+  ServerStatus status;
+  status.stream = "ladder";
+  status.rungs = {{.rung = Rung::kReduced}};
+  Inbox inbox;
+  Subscriber* made = nullptr;
+  std::mutex made_first;
+  auto callbacks = inbox.callbacks();
+  callbacks.status = [&](const ServerStatus& s) {
+    const std::lock_guard lock(made_first);
+    if (!s.rungs.empty()) made->set_rung(Rung::kReduced);
+  };
+  std::unique_ptr<Subscriber> reader;
+  {
+    const std::lock_guard lock(made_first);
+    auto subscriber = Subscriber::create(kDomain, "ladder", callbacks, std::nullopt);
+    ASSERT_TRUE(subscriber);
+    reader = *std::move(subscriber);
+    made = reader.get();
+  }
+  ASSERT_TRUE(publisher_->publish(status));
+  ASSERT_TRUE(publish_until([&] { return inbox.count(Rung::kReduced) >= 3; }));
+  EXPECT_EQ(inbox.count(Rung::kFull), 0U);
+}
+
+TEST_F(LadderTest, WhoLeavesItOpenGetsAStreamThatHasNoStatus) {
+  Inbox inbox;
+  const auto reader = read(inbox, "ladder", std::nullopt);
+  EXPECT_TRUE(publish_until([&] { return inbox.count(Rung::kFull) >= 3; }));
 }
 
 TEST_F(LadderTest, TheEndOfTheServerIsNoticedOnALowerRungToo) {
