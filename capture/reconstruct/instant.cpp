@@ -16,7 +16,9 @@ constexpr float kWorst_px = 0.3F;     // standard deviation of a place that tell
 constexpr float kStill_px = 0.15F;    // less motion than this needs no neighbour that moves alike
 constexpr float kAlike_px = 0.3F;     // between a boundary's motion and a neighbour's,
 constexpr float kAlikeShare = 0.15F;  // and of the motion more
+constexpr float kOffFields_px = 3.F;  // between it and what the fields of the frame tell
 constexpr float kFastest_px = 16.F;   // from one frame to the next
+constexpr float kFields = 2.F;        // of a frame
 constexpr float kHalfWay = 0.5F;      // of the motion between the fields
 constexpr float kMotion_px = 0.4F;    // standard deviation of that
 
@@ -51,7 +53,8 @@ void InstantFilter::fill(const SequenceResult& result, const EdgeImage& edges,
 }
 
 /// False where the frame before tells nothing.
-bool InstantFilter::adjust_by_before(int line, int boundary, float share, float& column_px, float& sigma_px) {
+bool InstantFilter::adjust_by_before(int line, int boundary, const Step& step, float& column_px,
+                                     float& sigma_px) {
   const Seen now = row(now_, line)[boundary];
   const Seen before = row(before_, line)[boundary];
   if (!(now.sigma_px < kWorst_px) || !(before.sigma_px < kWorst_px)) return false;
@@ -59,7 +62,9 @@ bool InstantFilter::adjust_by_before(int line, int boundary, float share, float&
   const float size = std::fabs(moved);
   if (!(size < kFastest_px)) return false;
   if (size > kStill_px) {
-    // A code that was wrong, or another surface, moves alone.
+    // A boundary that lay on another surface came by another way than what is there now.
+    if (std::fabs(moved - step.expected_px) > kOffFields_px) return false;
+    // A code that was wrong moves alone.
     int alike = 0;
     for (const auto& [l, b] :
          {std::pair{line - 1, boundary}, {line + 1, boundary}, {line, boundary - 1}, {line, boundary + 1}}) {
@@ -70,9 +75,9 @@ bool InstantFilter::adjust_by_before(int line, int boundary, float share, float&
     }
     if (alike < 2) return false;
   }
-  column_px -= share * moved;
-  const float kept = (1 - share) * now.sigma_px;
-  const float added = share * before.sigma_px;
+  column_px -= step.share * moved;
+  const float kept = (1 - step.share) * now.sigma_px;
+  const float added = step.share * before.sigma_px;
   sigma_px = std::sqrt(kept * kept + added * added);
   return true;
 }
@@ -84,8 +89,9 @@ void InstantFilter::adjust(const FrameInstant& frame, const SequenceResult& resu
   const bool by_before = have_before_ && frames > 0.5 && frames < kFrames + 0.5;
   const auto share = static_cast<float>(by_before ? kPhase / frames : 0);
   const auto adjust_one = [&](int line, int boundary, float& column_px, float& sigma_px) {
-    if (by_before && adjust_by_before(line, boundary, share, column_px, sigma_px)) return;
     const float moved = frame.motion.at(line, column_px);
+    const Step step{share, kFields * static_cast<float>(frames) * moved};
+    if (by_before && adjust_by_before(line, boundary, step, column_px, sigma_px)) return;
     if (moved == 0) return;
     column_px -= kHalfWay * moved;
     sigma_px = std::hypot(sigma_px, kHalfWay * kMotion_px);

@@ -41,7 +41,12 @@ class InstantFilter {
   Seen* row(std::vector<Seen>& grid, int line) const;
   void fill(const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
-  bool adjust_by_before(int line, int boundary, float share, float& column_px, float& sigma_px);
+  /// From the frame before to the time stamp of this one.
+  struct Step {
+    float share;        // of the motion to here, to be taken back
+    float expected_px;  // that motion, by what moves between the frame's fields
+  };
+  bool adjust_by_before(int line, int boundary, const Step& step, float& column_px, float& sigma_px);
 
   int boundaries_, lines_;
   double frame_ns_;
