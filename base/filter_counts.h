@@ -11,7 +11,7 @@ namespace relievo {
 struct FilterCounts {
   std::uint64_t unsupported = 0, completed = 0, traced = 0, rejected = 0, moved = 0, no_point = 0,
                 duplicate = 0, filled = 0, interpolated = 0, alone = 0, step = 0, edge_on = 0,
-                small_component = 0, recovered = 0;
+                small_component = 0, recovered = 0, fronts = 0;
 
   FilterCounts& operator+=(const FilterCounts& other);
   bool operator==(const FilterCounts&) const = default;
@@ -24,7 +24,7 @@ struct Filter {
   std::string_view meaning;
   std::uint64_t FilterCounts::*count;
 };
-inline constexpr std::array<Filter, 14> kFilters{{
+inline constexpr std::array<Filter, 15> kFilters{{
     {"unsupported", "decoded boundaries given up, since no neighbouring line agreed",
      &FilterCounts::unsupported},
     {"completed", "boundaries decoded by the lines above and below", &FilterCounts::completed},
@@ -43,6 +43,8 @@ inline constexpr std::array<Filter, 14> kFilters{{
      &FilterCounts::small_component},
     {"recovered", "boundaries found by their surface and luma, or by the frame before",
      &FilterCounts::recovered},
+    {"fronts", "last boundaries of a surface that had been taken for some of what is behind it",
+     &FilterCounts::fronts},
 }};
 
 inline FilterCounts& FilterCounts::operator+=(const FilterCounts& other) {

@@ -9,6 +9,7 @@
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/front_edge.h"
 #include "capture/reconstruct/grow.h"
 #include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
@@ -45,6 +46,7 @@ struct SlideDecoder::State {
         table(p),
         differencer(rig.colour_matrix),
         sequence(p),
+        front_edges(rig),
         refiner(rig.colour_matrix),
         continuity(p.boundaries(),
                    rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
@@ -66,6 +68,7 @@ struct SlideDecoder::State {
   SequenceDecoder sequence;
   WeakSignal weak_signal;
   Tracer tracer;
+  FrontEdges front_edges;
   Refiner refiner;
   ConsistencyCheck consistency;
   Recovery recovery;
@@ -242,6 +245,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const std::size_t traced =
         s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
     report.filters.traced = traced;
+    report.filters.fronts = s.front_edges.correct(s.edges, s.sequence.shown_colours(s.order),
+                                                  s.sequence.shown_colours(other(s.order)), pool, s.result);
     std::swap(s.before_px, s.result.seen_px);
     s.before_motion = s.newer.difference.motion;
     s.before_ns = pair.time_ns;
