@@ -11,6 +11,7 @@ Command codec_suite();
 Command texture_suite();
 Command chain_suite();
 Command peer_suite();
+Command rate_suite();
 Command recording_suite();
 
 }  // namespace relievo::bench

@@ -2,6 +2,7 @@
 #include "codec/frame3d_codec.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "codec/grid_coder.h"
 #include "codec/grid_estimator.h"
 #include "codec/grid_points.h"
+#include "codec/reduce.h"
 #include "codec/surface_check.h"
 #include "codec/texture_codec.h"
 #include "codec/vertex_quality.h"
@@ -121,13 +123,12 @@ int step_bits_within(float bound_px) {
   return bits;
 }
 
-Result<Coded> encode_mesh(const Frame3D& frame, const EncodeOptions& options) {
-  auto geometry = encode_draco(frame.surface, options);
+Result<Coded> encode_mesh(const Surface& surface, const EncodeOptions& options) {
+  auto geometry = encode_draco(surface, options);
   if (!geometry) return geometry.error();
   Coded coded;
-  if (options.quality && !frame.surface.texture_coordinates.empty() &&
-      geometry->vertices >= geometry->sent.size())
-    coded.quality = encode_vertex_quality(frame.surface, geometry->sent, options.texture_coordinate_bits);
+  if (options.quality && !surface.texture_coordinates.empty() && geometry->vertices >= geometry->sent.size())
+    coded.quality = encode_vertex_quality(surface, geometry->sent, options.texture_coordinate_bits);
   coded.header.geometry = GeometryCodec::kDracoMesh;
   coded.header.volume = geometry->volume;
   coded.header.vertices = geometry->vertices;
@@ -142,13 +143,15 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
   if (auto status = check_frame(frame, options); !status) return status.error();
   if (options.geometry != GeometryCodec::kDracoMesh)
     return Error{"a grid needs its calibration: encode it with a FrameEncoder"};
-  const auto coded = encode_mesh(frame, options);
+  const auto coded = encode_mesh(frame.surface, options);
   if (!coded) return coded.error();
   return with_texture(frame, options, make_texture_encoder(options.texture).get(), true, *coded);
 }
 
 struct FrameEncoder::State {
-  GridCalibration calibration;
+  GridCalibration calibration;  // of the lines that go
+  int line_step_px = 1;         // of the surfaces' lines
+  Surface halved;               // of a mesh
   GridEncoder encoder;
   StripeGrid grid;
   GridEstimator estimator;
@@ -157,16 +160,17 @@ struct FrameEncoder::State {
   bool has_key = false;  // a grid to build on
   std::unique_ptr<TextureEncoder> texture;
   TextureCodec texture_codec = TextureCodec::kNone;
+  int step_bits = 4;   // of this frame's grid
   int since_key = -1;  // frames; -1: there was none
   std::atomic<bool> key_asked{false};
 
   /// The surface as a grid, which `grid` already is.
-  Coded encode_grid(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
+  Coded encode_grid(const Surface& surface, const EncodeOptions& options, bool want_key) {
     Coded coded;
-    coded.geometry_is_key = want_key || !has_key || key.grid.step_bits != grid.step_bits;
-    coded.geometry = encoder.encode(grid, calibration, coded.geometry_is_key ? nullptr : &key, tolerance,
-                                    step_mm(frame.surface, calibration, grid.step_bits),
-                                    {.slice_lines = options.slice_lines});
+    coded.geometry_is_key = want_key || !has_key;
+    coded.geometry =
+        encoder.encode(grid, calibration, coded.geometry_is_key ? nullptr : &key, tolerance,
+                       step_mm(surface, calibration, grid.step_bits), {.slice_lines = options.slice_lines});
     coded.geometry.resize(std::max(coded.geometry.size(), least_grid_bytes(grid)));
     coded.header.geometry = GeometryCodec::kGrid;
     coded.header.vertices = grid.vertices;
@@ -184,13 +188,13 @@ struct FrameEncoder::State {
   }
 
   /// The same in Draco's clouds.
-  Result<Coded> encode_in_draco(const Frame3D& frame) {
+  Result<Coded> encode_in_draco(const Surface& surface) {
     Coded coded;
     coded.header.geometry = GeometryCodec::kDracoGrid;
     has_key = false;
     if (grid.vertices == 0) return coded;
     auto bytes =
-        encode_draco_grid(grid, calibration, tolerance, step_mm(frame.surface, calibration, grid.step_bits));
+        encode_draco_grid(grid, calibration, tolerance, step_mm(surface, calibration, grid.step_bits));
     if (!bytes) return bytes.error();
     coded.geometry = *std::move(bytes);
     coded.header.vertices = grid.vertices;
@@ -198,22 +202,39 @@ struct FrameEncoder::State {
     return coded;
   }
 
-  Result<Coded> encode_geometry(const Frame3D& frame, const EncodeOptions& options, bool want_key) {
-    const int step_bits = options.bound_px > 0 ? step_bits_within(options.bound_px) : options.step_bits;
-    const bool is_grid = options.geometry != GeometryCodec::kDracoMesh && !frame.surface.positions.empty() &&
-                         to_grid(frame.surface, calibration, step_bits, options.quality, grid);
-    if (is_grid) {
-      tolerance.clear();
-      if (options.estimate) estimator.estimate(frame.surface, grid, tolerance);
-      if (options.bound_px > 0) tolerance.assign(grid.columns.size(), 1);
-      if (options.geometry == GeometryCodec::kDracoGrid) return encode_in_draco(frame);
-      return encode_grid(frame, options, want_key);
-    }
+  /// Which lines go, and in which steps: a grid of others than before cannot build on it.
+  void choose(const EncodeOptions& options) {
+    const int step_px = line_step_px * (options.halve_lines ? 2 : 1);
+    if (calibration.line_step_px != step_px) has_key = false;
+    calibration.line_step_px = step_px;
+    step_bits = options.bound_px > 0 ? step_bits_within(options.bound_px) : options.step_bits;
+    if (key.grid.step_bits != step_bits) has_key = false;
+  }
+
+  /// All its lines, as they lie in `grid` then; estimated where that is asked for.
+  bool fill_grid(const Surface& surface, const EncodeOptions& options) {
+    GridCalibration whole = calibration;
+    whole.line_step_px = line_step_px;
+    if (options.geometry == GeometryCodec::kDracoMesh || surface.positions.empty() ||
+        !to_grid(surface, whole, step_bits, options.quality, grid))
+      return false;
+    tolerance.clear();
+    if (options.estimate) estimator.estimate(surface, grid, tolerance);
+    if (options.halve_lines) halve_lines(grid, std::array{&tolerance});
+    if (options.bound_px > 0) tolerance.assign(grid.columns.size(), 1);
+    return true;
+  }
+
+  Result<Coded> encode_geometry(const Surface& surface, const EncodeOptions& options, bool want_key) {
+    if (fill_grid(surface, options))
+      return options.geometry == GeometryCodec::kDracoGrid ? encode_in_draco(surface)
+                                                           : encode_grid(surface, options, want_key);
     has_key = false;
     estimator.forget();
     EncodeOptions mesh = options;
     mesh.geometry = GeometryCodec::kDracoMesh;
-    return encode_mesh(frame, mesh);
+    const bool halves = options.halve_lines && halve_lines(surface, halved);
+    return encode_mesh(halves ? halved : surface, mesh);
   }
 };
 
@@ -221,6 +242,7 @@ FrameEncoder::FrameEncoder(const Rig& rig, const Pattern& pattern, int line_stri
     : state_(std::make_unique<State>()) {
   state_->calibration = grid_calibration(rig, pattern);
   state_->calibration.line_step_px *= line_stride;
+  state_->line_step_px = state_->calibration.line_step_px;
 }
 FrameEncoder::FrameEncoder(FrameEncoder&&) noexcept = default;
 FrameEncoder& FrameEncoder::operator=(FrameEncoder&&) noexcept = default;
@@ -239,8 +261,13 @@ Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& op
   const bool other_texture = s.texture_codec != options.texture;
   if (other_texture) s.texture = make_texture_encoder(options.texture);
   s.texture_codec = options.texture;
-  const bool want_key = asked || other_texture || s.since_key < 0 || s.since_key + 1 >= options.key_interval;
-  const auto coded = s.encode_geometry(frame, options, want_key);
+  const bool had_key = s.has_key;
+  s.choose(options);
+  // With other lines or steps the texture begins anew too, so that whoever joins finds a whole key frame.
+  const bool other_grid = had_key && !s.has_key;
+  const bool want_key =
+      asked || other_texture || other_grid || s.since_key < 0 || s.since_key + 1 >= options.key_interval;
+  const auto coded = s.encode_geometry(frame.surface, options, want_key);
   if (!coded) return coded.error();
   auto bytes = with_texture(frame, options, s.texture.get(), want_key, *coded);
   if (!bytes) {

@@ -41,7 +41,9 @@ struct EncodeOptions {
   // Grids: how far off a column may be, 0.006 to 8 pixels; chooses the step. 0: step_bits does.
   float bound_px = 0;
   int slice_lines = 270;  // 8..16384; grid: lines that are coded together, and lost together
-  int key_interval = 1;   // 1..1000; grid and H.264: every so many frames decodes alone, those between do not
+  // Of a surface on the grid of stripes and lines every second line goes alone (codec/reduce.h).
+  bool halve_lines = false;
+  int key_interval = 1;  // 1..1000; grid and H.264: every so many frames decodes alone, those between do not
 };
 
 /// What a frame says of itself; read without decoding it.

@@ -61,15 +61,73 @@ std::uint32_t BitReader::get_unary(std::uint32_t most) {
   return value;
 }
 
+namespace {
+
+/// What a level takes of all others' share, in bits a symbol of the table: linear about the frequencies that
+/// were counted.
+const std::array<float, kLargestLevel + 1>& share_costs() {
+  static const auto costs = [] {
+    std::array<float, kLargestLevel + 1> out{};
+    for (int level = 1; level <= kLargestLevel; ++level)
+      out[static_cast<std::size_t>(level)] =
+          static_cast<float>(std::exp2(0.5 * (level - 1)) / kScale / std::log(2.0));
+    return out;
+  }();
+  return costs;
+}
+
+}  // namespace
+
 Levels levels_of(std::span<const std::uint32_t> counts) {
+  constexpr float kNever = 1e30F;
   Levels levels{};
   std::uint64_t total = 0;
-  for (const std::uint32_t c : counts) total += c;
+  std::size_t used = 0;
   for (std::size_t s = 0; s < counts.size(); ++s) {
-    if (counts[s] == 0) continue;
-    const double frequency = static_cast<double>(counts[s]) * kScale / static_cast<double>(total);
-    const int level = 1 + static_cast<int>(std::lround(2 * std::log2(std::max(frequency, 1.0))));
-    levels[s] = static_cast<std::uint8_t>(std::clamp(level, 1, kLargestLevel));
+    total += counts[s];
+    if (counts[s] > 0) used = s + 1;
+  }
+  if (total == 0) return levels;
+  // The way through the levels on which they and the symbols together take the fewest bits: as
+  // write_levels() has it a level up takes two, a level down too, and none takes one.
+  const auto& shares = share_costs();
+  std::array<std::array<std::uint8_t, kLargestLevel + 1>, kMostSymbols> from{};
+  std::array<float, kLargestLevel + 1> best{}, next{};
+  for (std::size_t s = 0; s < used; ++s) {
+    if (s > 0) {
+      // From below or the same, then from above.
+      float least = kNever;
+      std::uint8_t at = 0;
+      for (std::uint8_t l = 0; l <= kLargestLevel; ++l, least += 2) {
+        if (best[l] < least) {
+          least = best[l];
+          at = l;
+        }
+        next[l] = least + 1;
+        from[s][l] = at;
+      }
+      least = kNever;
+      for (std::uint8_t l = kLargestLevel + 1; l-- > 0; least += 2) {
+        if (least < next[l]) {
+          next[l] = least;
+          from[s][l] = at;
+        }
+        if (best[l] < least) {
+          least = best[l];
+          at = l;
+        }
+      }
+      best = next;
+    }
+    const auto count = static_cast<float>(counts[s]);
+    for (std::uint8_t l = 1; l <= kLargestLevel; ++l)
+      best[l] += static_cast<float>(total) * shares[l] - 0.5F * count * static_cast<float>(l - 1);
+    if (counts[s] > 0) best[0] = kNever;
+  }
+  auto level = static_cast<std::uint8_t>(std::min_element(best.begin(), best.end()) - best.begin());
+  for (std::size_t s = used; s-- > 0;) {
+    levels[s] = level;
+    level = from[s][level];
   }
   return levels;
 }

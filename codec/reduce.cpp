@@ -2,13 +2,12 @@
 #include "codec/reduce.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <vector>
-
-#include "codec/stripe_grid.h"
+#include <type_traits>
 
 namespace relievo {
 namespace {
@@ -76,6 +75,36 @@ std::uint8_t joined(std::uint8_t upper, std::uint8_t lower) {
   return 0;
 }
 
+/// Pixels of `across` in a row, each the sum of `down`, to one.
+template <int kChannels>
+void join_pairs(const std::uint16_t* sums, int width, int half, int shift, std::uint8_t* to) {
+  for (int x = 0; x < width; ++x, sums += 2 * kChannels, to += kChannels)
+    for (int c = 0; c < kChannels; ++c)
+      to[c] = static_cast<std::uint8_t>((sums[c] + sums[c + kChannels] + half) >> shift);
+}
+void join(const std::uint16_t* sums, int channels, int across, int down, int width, std::uint8_t* to) {
+  const int shift = (across == 2 ? 1 : 0) + (down == 2 ? 1 : 0);
+  const int half = (1 << shift) / 2;
+  if (across == 1) {
+    for (int i = 0; i < width * channels; ++i) to[i] = static_cast<std::uint8_t>((sums[i] + half) >> shift);
+  } else if (channels == 1) {
+    join_pairs<1>(sums, width, half, shift, to);
+  } else {
+    join_pairs<3>(sums, width, half, shift, to);
+  }
+}
+
+/// Nothing in it, but its memory.
+void clear(Surface& surface) {
+  surface.positions.clear();
+  surface.normals.clear();
+  surface.texture_coordinates.clear();
+  surface.triangles.clear();
+  surface.grid.clear();
+  surface.sigmas_m.clear();
+  surface.interpolated.clear();
+}
+
 template <typename T>
 void keep(const std::vector<T>& from, const std::vector<std::uint32_t>& kept, std::vector<T>& to) {
   to.clear();
@@ -87,7 +116,7 @@ void keep(const std::vector<T>& from, const std::vector<std::uint32_t>& kept, st
 }  // namespace
 
 bool halve_lines(const Surface& surface, Surface& out) {
-  out = {};
+  clear(out);
   Places places;
   if (surface.grid.size() != surface.positions.size() || !find_vertices(surface, places) ||
       !find_triangles(surface, places))
@@ -136,24 +165,57 @@ bool halve_lines(const Surface& surface, Surface& out) {
   return true;
 }
 
-Image8 halve(const Image8& picture) {
+void halve_lines(StripeGrid& grid, std::span<std::vector<std::uint8_t>* const> planes) {
+  static const auto kJoined = [] {
+    std::array<std::uint8_t, 256> all{};
+    for (unsigned i = 0; i < all.size(); ++i)
+      all[i] = joined(static_cast<std::uint8_t>(i >> 4), static_cast<std::uint8_t>(i & 15U));
+    return all;
+  }();
+  const auto stride = static_cast<std::size_t>(grid.stride());
+  const int lines = (grid.lines + 1) / 2;
+  const std::size_t size = grid.at(lines, 0);
+  const auto halve_plane = [&](auto& plane) {
+    if (plane.empty()) return;
+    for (std::size_t l = 1; l < static_cast<std::size_t>(lines); ++l)
+      std::copy_n(plane.data() + 2 * l * stride, stride, plane.data() + l * stride);
+    plane.resize(size);
+    std::fill_n(plane.data() + size - StripeGrid::kMargin, StripeGrid::kMargin,
+                std::is_same_v<decltype(plane), std::vector<std::int32_t>&> ? StripeGrid::kAbsent : 0);
+  };
+  for (int l = 0; 2 * l + 1 < grid.lines; ++l) {
+    std::uint8_t* to = grid.cells.data() + static_cast<std::size_t>(l) * stride;
+    const std::uint8_t* upper = grid.cells.data() + static_cast<std::size_t>(2 * l) * stride;
+    for (std::size_t i = 0; i < stride; ++i) to[i] = kJoined[upper[i] << 4U | (upper[i + stride] & 15U)];
+  }
+  grid.cells.resize(size);
+  std::fill(grid.cells.data() + grid.at(lines - 1, 0), grid.cells.data() + size, std::uint8_t{0});
+  halve_plane(grid.columns);
+  halve_plane(grid.sigmas);
+  halve_plane(grid.interpolated);
+  for (std::vector<std::uint8_t>* plane : planes) halve_plane(*plane);
+  grid.lines = lines;
+  grid.vertices = static_cast<std::uint32_t>(
+      std::ranges::count_if(grid.columns, [](std::int32_t c) { return c != StripeGrid::kAbsent; }));
+  grid.triangles = 0;
+  for (const std::uint8_t cell : grid.cells) grid.triangles += static_cast<unsigned>(std::popcount(cell));
+}
+
+void halve(const Image8& picture, Image8& out) {
   const int across = picture.width() % 2 == 0 ? 2 : 1;
   const int down = picture.height() % 2 == 0 ? 2 : 1;
-  const int channels = picture.channels();
-  Image8 out(picture.width() / across, picture.height() / down, channels);
-  const int count = across * down;
-  for (int y = 0; y < out.height(); ++y) {
-    std::uint8_t* to = out.row(y);
-    for (int x = 0; x < out.width(); ++x) {
-      for (int c = 0; c < channels; ++c) {
-        int sum = count / 2;
-        for (int j = 0; j < down; ++j)
-          for (int i = 0; i < across; ++i) sum += picture.row(y * down + j)[(x * across + i) * channels + c];
-        *to++ = static_cast<std::uint8_t>(sum / count);
-      }
-    }
+  const int width = picture.width() / across, height = picture.height() / down;
+  if (out.width() != width || out.height() != height || out.channels() != picture.channels())
+    out = Image8(width, height, picture.channels());
+  // Two steps, so that the first is one of vectors: half of the work, and of the memory that is read.
+  std::vector<std::uint16_t> sums(static_cast<std::size_t>(picture.width() * picture.channels()));
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* upper = picture.row(y * down);
+    const std::uint8_t* lower = picture.row(y * down + down - 1);
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      sums[i] = static_cast<std::uint16_t>(upper[i] + (down == 2 ? lower[i] : 0));
+    join(sums.data(), picture.channels(), across, down == 2 ? 2 : 1, width, out.row(y));
   }
-  return out;
 }
 
 }  // namespace relievo

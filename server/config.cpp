@@ -147,6 +147,14 @@ class Reader {
       return refuse(*node, key, "must be a number of pictures a second from 0.1 to 1000");
     out = *value;
   }
+  void number(std::string_view key, const std::string& range, double least, double most, double& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value<double>();  // a whole number too
+    if (!value || !(*value >= least && *value <= most))
+      return refuse(*node, key, "must be a number of " + range);
+    out = *value;
+  }
   void bound(std::string_view key, std::optional<double>& out) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
@@ -296,9 +304,13 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.texture("texture", config.texture);
-  reader.integer("texture_quality", 1, 100, config.texture_quality);
+  if (const auto quality = reader.integer("texture_quality", 1, 100))
+    config.texture_quality = static_cast<int>(*quality);
   if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))
-    config.bit_rate = static_cast<double>(*bits);
+    config.rate.bit_rate = static_cast<double>(*bits);
+  reader.number("deadline", "milliseconds from 0.5 to 1000", kLeastDeadline_ms, kMostDeadline_ms,
+                config.rate.deadline_ms);
+  reader.number("psnr", "decibels from 20 to 60", kLeastTexture_db, kMostTexture_db, config.rate.texture_db);
   reader.geometry("geometry", config.geometry);
   reader.integer("step_bits", 0, 8, config.step_bits);
   reader.bound("bound", config.bound_px);
@@ -343,12 +355,14 @@ void read_gateway(Reader& reader, WebOptions& gateway) {
 
 EncodeOptions encode_options(const StreamConfig& config) {
   constexpr int kVideoInterval = 30;  // a second: what a late joiner waits at most
+  constexpr int kUsualQuality = 80, kFinestQuality = 95;
   EncodeOptions options;
   set_geometry_profile(config.geometry, options);
   options.step_bits = config.step_bits;
   options.draco_speed = config.draco_speed;
   options.texture = config.texture;
-  options.texture_quality = config.texture_quality;
+  options.texture_quality =
+      config.texture_quality.value_or(config.rate.texture_db > 0 ? kFinestQuality : kUsualQuality);
   const int usual = config.texture == TextureCodec::kH264 ? kVideoInterval : 1;
   options.key_interval = config.key_interval.value_or(std::max(usual, options.key_interval));
   if (options.bound_px > 0 && config.bound_px) options.bound_px = static_cast<float>(*config.bound_px);
@@ -418,6 +432,8 @@ Status check_stream(const StreamConfig& stream) {
   if (const std::string wrong = stream_name()(name_of(stream)); !wrong.empty()) return Error{wrong};
   if (const Status usable = check_texture_codec(stream.texture); !usable) return usable;
   if (const auto source = with_scheme(stream.source, stream.scheme); !source) return source.error();
+  if (stream.rate.texture_db > 0 && stream.texture == TextureCodec::kPng)
+    return Error{"psnr is kept of textures that lose something: leave it out with png"};
   return check_rig(stream.source, stream.camera);
 }
 

@@ -16,6 +16,7 @@
 #include "cli/checks.h"
 #include "cli/recording_flags.h"
 #include "codec/frame3d_codec.h"
+#include "server/rate_control.h"
 
 namespace relievo {
 
@@ -23,6 +24,8 @@ inline constexpr double kLeastBound_px = 0.01, kMostBound_px = 8;  // of ServeCo
 inline constexpr int kMostRefreshes = 4;                           // of ProjectorConfig::refreshes
 /// Of --bitrate; below it the coarsest pictures are not worth showing.
 inline constexpr std::int64_t kLeastBitRate = 100'000, kMostBitRate = 1'000'000'000;
+inline constexpr double kLeastDeadline_ms = 0.5, kMostDeadline_ms = 1000;  // of --deadline
+inline constexpr double kLeastTexture_db = 20, kMostTexture_db = 60;       // of --psnr
 
 /// One stream that is served, and from what.
 struct StreamConfig {
@@ -38,8 +41,9 @@ struct StreamConfig {
   Decoder decoder = ReconstructOptions{}.decoder;
   SurfaceBuilderOptions surface;
   TextureCodec texture = TextureCodec::kJpeg;
-  int texture_quality = 80;
-  double bit_rate = 0;            // bits a second at most; 0: as the qualities make it
+  std::optional<int>
+      texture_quality;  // the finest; not said: 80, or 95 where `rate` says how good it is to be
+  RateTargets rate;
   std::string geometry = "grid";  // a name of codec/geometry_profile.h
   int step_bits = 6;
   // Not said: every frame a key frame, but of metric, visual and H.264 every 30th.

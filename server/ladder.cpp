@@ -36,6 +36,7 @@ struct Ladder::Step {
   PipelineStats stats;
   std::atomic<std::uint64_t> drops{0};
   // Of the ladder's thread:
+  Frame3D frame;  // what is encoded; its memory stays
   std::uint64_t sequence = 0;
   bool was_read = false;
   bool said = false;  // that it could not be published
@@ -67,7 +68,7 @@ bool Ladder::wanted() {
 void Ladder::take(Frame3D frame, std::int64_t capture_time_ns) {
   if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
   const std::uint64_t before = queue_.drops();
-  queue_.push_drop_oldest({std::move(frame), capture_time_ns});
+  queue_.push_drop_oldest(Item(std::move(frame), capture_time_ns, &give_back_));
   if (queue_.drops() == before) return;
   for (const auto& step : steps_)
     if (step->output.readers() > 0) ++step->drops;
@@ -86,30 +87,30 @@ void Ladder::run() {
     const std::int64_t now_ns = steady_now_ns();
     const bool key = now_ns - key_ns >= kKeyInterval_ns && key_wanted_.exchange(false);
     if (key) key_ns = now_ns;
-    Image8 half = halve(item->frame.texture);
+    halve(item->frame.texture, half_);
     for (const auto& step : steps_) {
       const bool is_read = step->output.readers() > 0;
       if (key || (is_read && !step->was_read)) step->encoder.request_key_frame();
       step->was_read = is_read;
-      if (is_read) encode(*step, *item, half);
+      if (is_read) encode(*step, *item);
     }
   }
 }
 
-void Ladder::encode(Step& step, Item& item, Image8& half) {
+void Ladder::encode(Step& step, Item& item) {
   const std::int64_t begin_ns = steady_now_ns();
-  Frame3D frame;
+  Frame3D& frame = step.frame;
   frame.number = item.frame.number;
   frame.time_ns = item.frame.time_ns;
   // A surface that lies on no grid goes whole, with the smaller texture.
   const bool whole = step.output.rung == Rung::kReduced && !halve_lines(item.frame.surface, frame.surface);
   if (whole) std::swap(frame.surface, item.frame.surface);
-  frame.texture = std::move(half);
+  frame.texture = std::move(half_);
   EncodeOptions options = step.options;
   options.volume = volume_.fit(frame.surface.positions);
   if (const int bits = volume_.bits(depth_resolution_); bits > 0) options.position_bits = bits;
   auto bytes = step.encoder.encode(frame, options);
-  half = std::move(frame.texture);
+  half_ = std::move(frame.texture);
   if (whole) std::swap(frame.surface, item.frame.surface);
   const auto fail = [&](const Error& error) {
     if (!std::exchange(step.said, true))

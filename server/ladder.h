@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/bounded_queue.h"
@@ -48,26 +49,41 @@ class Ladder final : public LowerRungs {
   bool wanted() override;
   /// A frame that comes before the one before is done takes its place, which is counted.
   void take(Frame3D frame, std::int64_t capture_time_ns) override;
+  void give_back_to(std::function<void(Frame3D&&)> give_back) override { give_back_ = std::move(give_back); }
   void end() override;
   std::vector<RungStatus> status() const override;
 
  private:
   struct Step;
+  /// Given back where it ends: encoded, dropped by the queue, or left in it.
   struct Item {
+    Item(Frame3D frame_, std::int64_t time_ns, const std::function<void(Frame3D&&)>* give_back_)
+        : frame(std::move(frame_)), capture_time_ns(time_ns), give_back(give_back_) {}
+    Item(Item&& other) noexcept
+        : frame(std::move(other.frame)),
+          capture_time_ns(other.capture_time_ns),
+          give_back(std::exchange(other.give_back, nullptr)) {}
+    Item& operator=(Item&&) = delete;
+    ~Item() {
+      if (give_back != nullptr && *give_back) (*give_back)(std::move(frame));
+    }
     Frame3D frame;
     std::int64_t capture_time_ns;
+    const std::function<void(Frame3D&&)>* give_back;  // null: nobody
   };
   void run();
-  void encode(Step& step, Item& item, Image8& half);
+  void encode(Step& step, Item& item);
 
   const Rig rig_;
   const Pattern pattern_;
   const EncodeOptions encode_;
   const double depth_resolution_;
   std::vector<std::unique_ptr<Step>> steps_;
-  WorkingVolume volume_;  // of surfaces that are no grid; of the ladder's thread
+  Image8 half_;           // of the ladder's thread, as what follows
+  WorkingVolume volume_;  // of surfaces that are no grid
   std::atomic<bool> key_wanted_{false};
   std::atomic<bool> ending_{false};
+  std::function<void(Frame3D&&)> give_back_;
   BoundedQueue<Item> queue_{1};
   std::thread thread_;
 };

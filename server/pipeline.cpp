@@ -12,9 +12,9 @@
 #include "base/bounded_queue.h"
 #include "base/log.h"
 #include "base/time.h"
-#include "server/rate_control.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
+#include "server/texture_look.h"
 #include "server/working_volume.h"
 
 namespace relievo {
@@ -28,7 +28,8 @@ constexpr std::int64_t kMaxLate_ns =
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
 constexpr double kSilentFrames = 10;  // times a frame's without one: the source has stalled
 constexpr std::int64_t kSilentAtLeast_ns = kNanosecondsPerSecond;
-constexpr std::uint64_t kFramesForASurface = 30;  // far more than any schedule needs
+constexpr std::int64_t kLookInterval_ns = kNanosecondsPerSecond;  // between pictures whose error is measured
+constexpr std::uint64_t kFramesForASurface = 30;                  // far more than any schedule needs
 constexpr std::uint64_t kMixedForASurface =
     300;  // frames under two slides each: ten seconds of a drifting rig
 
@@ -40,6 +41,14 @@ struct Captured {
 struct Reconstructed {
   Frame3D frame;
   std::int64_t capture_time_ns;
+};
+struct Encoded {
+  FrameMessage message;
+  std::int64_t begin_ns;  // of its encoding
+  double place;           // RateControl::place()
+};
+struct Taken {
+  double ms, place;
 };
 
 class ThreadedPipeline final : public Pipeline {
@@ -54,6 +63,8 @@ class ThreadedPipeline final : public Pipeline {
         volume_(options.encode.volume) {}
 
   Status run() override {
+    if (options_.rungs != nullptr)
+      options_.rungs->give_back_to([this](Frame3D&& used) { reconstructor_.recycle(std::move(used)); });
     std::thread reconstruct([this] { reconstruct_stage(); });
     std::thread encode([this] { encode_stage(); });
     std::thread publish([this] { publish_stage(); });
@@ -255,15 +266,21 @@ class ThreadedPipeline final : public Pipeline {
 
   void encode_stage() {
     std::int64_t key_ns = steady_now_ns() - kKeyInterval_ns;  // of the last key frame
+    std::int64_t look_ns = steady_now_ns();                   // when the texture's error is measured next
     std::optional<RateControl> rate;
-    if (options_.bit_rate > 0) rate.emplace(options_.bit_rate, source_.info().rig.frame_rate);
+    if (options_.rate.any()) rate.emplace(options_.rate, source_.info().rig.frame_rate, options_.encode);
     while (auto item = to_encode_.pop()) {
       const std::int64_t begin = steady_now_ns();
       if (begin - key_ns >= kKeyInterval_ns && key_wanted_.exchange(false)) encoder_.request_key_frame();
       EncodeOptions encode = options_.encode;
       encode.volume = volume_.fit(item->frame.surface.positions);
       if (const int bits = volume_.bits(options_.depth_resolution); bits > 0) encode.position_bits = bits;
-      if (rate) rate->apply(encode);
+      double place = 0;
+      if (rate) {
+        for (const Taken& taken : take_times()) rate->took(taken.ms, taken.place);
+        rate->apply(encode);
+        place = rate->place();
+      }
       auto bytes = encoder_.encode(item->frame, encode);
       if (!bytes) {
         fail(bytes.error());
@@ -278,15 +295,20 @@ class ThreadedPipeline final : public Pipeline {
       stats_.encoded(milliseconds(steady_now_ns() - begin));
       FrameMessage message;
       message.number = item->frame.number;
+      message.capture_time_ns = item->capture_time_ns;
+      message.data = std::make_shared<const Bytes>(*std::move(bytes));
+      const auto data = message.data;
+      const std::uint64_t dropped = to_publish_.drops();
+      push(to_publish_, Encoded{std::move(message), begin, place});
+      if (to_publish_.drops() > dropped) encoder_.request_key_frame();  // later frames may build on that one
+      if (options_.rate.texture_db > 0 && is_key && begin >= look_ns) {
+        look_ns = begin + kLookInterval_ns;
+        if (const auto db = texture_db(*data, item->frame.texture)) rate->looked(*db, place);
+      }
       if (options_.rungs != nullptr && options_.rungs->wanted())
         options_.rungs->take(std::move(item->frame), item->capture_time_ns);
       else
         reconstructor_.recycle(std::move(item->frame));
-      message.capture_time_ns = item->capture_time_ns;
-      message.data = std::make_shared<const Bytes>(*std::move(bytes));
-      const std::uint64_t dropped = to_publish_.drops();
-      push(to_publish_, std::move(message));
-      if (to_publish_.drops() > dropped) encoder_.request_key_frame();  // later frames may build on that one
     }
   }
 
@@ -295,11 +317,13 @@ class ThreadedPipeline final : public Pipeline {
     std::int64_t status_due_ns = steady_now_ns();
     while (!to_publish_.finished()) {
       const std::int64_t wait_ns = std::max<std::int64_t>(0, status_due_ns - steady_now_ns());
-      if (auto message = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns))) {
-        message->sequence = sequence++;
-        message->publish_time_ns = utc_now_ns();
-        stats_.published(message->capture_time_ns, message->publish_time_ns, message->data->size());
-        to_sinks(*message);
+      if (auto encoded = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns))) {
+        FrameMessage& message = encoded->message;
+        message.sequence = sequence++;
+        message.publish_time_ns = utc_now_ns();
+        stats_.published(message.capture_time_ns, message.publish_time_ns, message.data->size());
+        to_sinks(message);
+        add_time({milliseconds(steady_now_ns() - encoded->begin_ns), encoded->place});
       }
       if (steady_now_ns() < status_due_ns) continue;
       status_due_ns = steady_now_ns() + kStatusInterval_ns;
@@ -312,6 +336,17 @@ class ThreadedPipeline final : public Pipeline {
     for (FrameSink* sink : sinks_) {
       if (const Status sent = sink->consume(message); !sent) fail(sent.error());
     }
+  }
+
+  /// Of a frame that is published, for the rate control.
+  void add_time(const Taken& taken) {
+    if (options_.rate.deadline_ms <= 0) return;
+    std::lock_guard lock(mutex_);
+    times_.push_back(taken);
+  }
+  std::vector<Taken> take_times() {
+    std::lock_guard lock(mutex_);
+    return std::exchange(times_, {});
   }
 
   /// The first failure ends the run; the stages go on emptying their queues.
@@ -347,7 +382,7 @@ class ThreadedPipeline final : public Pipeline {
   std::atomic<bool> key_wanted_{false};
   BoundedQueue<Captured> to_reconstruct_{kQueueFrames};
   BoundedQueue<Reconstructed> to_encode_{kQueueFrames};
-  BoundedQueue<FrameMessage> to_publish_{kQueueFrames};
+  BoundedQueue<Encoded> to_publish_{kQueueFrames};
   PipelineStats stats_;
 
   mutable std::mutex mutex_;  // of what follows
@@ -357,6 +392,7 @@ class ThreadedPipeline final : public Pipeline {
   std::string message_;
   StepStatus step_;
   std::string step_message_;              // of projector and camera
+  std::vector<Taken> times_;              // of frames published since the last one was encoded
   std::optional<std::int64_t> asked_ns_;  // the source for a frame that has not come yet
   std::optional<Error> failure_;
 };

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "capture/source/field_source.h"
 #include "codec/frame3d_codec.h"
 #include "server/frame_tap.h"
+#include "server/rate_control.h"
 
 namespace relievo {
 
@@ -36,6 +38,9 @@ class LowerRungs {
   /// Whether take() is to be called. This and take() are called on the encoding thread and return at once.
   virtual bool wanted() = 0;
   virtual void take(Frame3D frame, std::int64_t capture_time_ns) = 0;
+  /// Called with each frame that was taken when it is done with, on any thread, until end() has returned; so
+  /// that the next ones are made in its memory. Before the first take().
+  virtual void give_back_to(std::function<void(Frame3D&&)> give_back) = 0;
   /// No more comes. Returns when all that was begun is done; what was not is not.
   virtual void end() = 0;
   /// What the rungs made of it have done. Any thread.
@@ -51,7 +56,7 @@ struct PipelineOptions {
   EncodeOptions encode;  // volume.size_m 0: fitted to the first frame, grown when a frame leaves it
   // Step of coded positions, of the distance to the nearest part of the scene; overrides position_bits.
   double depth_resolution = 1e-4;
-  double bit_rate = 0;          // bits a second that frames may take; 0: as `encode` says
+  RateTargets rate;             // what is kept by coarser frames; none: all are as `encode` says
   FrameTap* tap = nullptr;      // must outlive the pipeline; null: nobody looks at single frames
   LowerRungs* rungs = nullptr;  // must outlive the pipeline; null: there is the full quality only
 };

@@ -28,7 +28,7 @@ struct Flags {
   std::shared_ptr<WebOptions> gateway;
   std::optional<int> refreshes;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
-  std::optional<double> bound_px;
+  std::optional<double> bound_px, deadline_ms, texture_db;
   std::optional<std::uint64_t> frames;
   bool loop = false, fast = false, dense = false;
   CameraOptions camera;
@@ -45,8 +45,11 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
   if (flags.texture) config.texture = texture_codec_named(*flags.texture).value_or(config.texture);
-  set(flags.texture_quality, config.texture_quality);
-  if (flags.bit_rate) config.bit_rate = parse_bit_rate(*flags.bit_rate).value();  // the option is checked
+  if (flags.texture_quality) config.texture_quality = flags.texture_quality;
+  set(flags.deadline_ms, config.rate.deadline_ms);
+  set(flags.texture_db, config.rate.texture_db);
+  if (flags.bit_rate)
+    config.rate.bit_rate = parse_bit_rate(*flags.bit_rate).value();  // the option is checked
   set(flags.geometry, config.geometry);
   set(flags.step_bits, config.step_bits);
   set(flags.key_interval, config.key_interval);
@@ -186,11 +189,21 @@ Command serve_command() {
             ->check(CLI::Range(1, 100))
             ->type_name("N");
         app.add_option("--bitrate", f->bit_rate,
-                       "Keep the stream below so many bits a second, such as 4M: texture quality and steps "
-                       "of grid become "
-                       "coarser than asked for where it needs that, and fine again")
+                       "Keep the stream at so many bits a second at most, such as 4M: texture quality, steps "
+                       "of grid, standard deviations and lines become coarser than asked for where it needs "
+                       "that, and fine again")
             ->type_name("BITS")
             ->check(bit_rate());
+        app.add_option("--deadline", f->deadline_ms,
+                       "Keep the time from a frame's surface to its being published below so many "
+                       "milliseconds, in the same way")
+            ->type_name("MS")
+            ->check(CLI::Range(kLeastDeadline_ms, kMostDeadline_ms));
+        app.add_option("--psnr", f->texture_db,
+                       "Keep the texture this good, decibels: no finer than that needs, as fine as "
+                       "--texture-quality (then 95 unless given). --bitrate and --deadline go before it")
+            ->type_name("DB")
+            ->check(CLI::Range(kLeastTexture_db, kMostTexture_db));
         app.add_option(
                "--geometry", f->geometry,
                "How the surface is sent: grid (default: as measured, for relievo's own receivers), "
@@ -241,7 +254,7 @@ Command serve_command() {
             "  relievo-server serve --source sim:walk,drop=50 --record walk.mcap\n"
             "  relievo-server serve --record-dir takes --pre-roll 10s\n"
             "  relievo-server serve --config /etc/relievo/server.toml\n"
-            "  relievo-server serve --source sim:walk --texture h264 --bitrate 4M\n"
+            "  relievo-server serve --source sim:walk --texture h264 --bitrate 4M --deadline 12\n"
             "  relievo-server serve --source v4l2:/dev/video0 --rig rig.yaml --control gain=20\n\n" +
             std::string(scheme_help()));
         return [f](StopSignal& stop) { return run(*f, stop); };

@@ -122,7 +122,7 @@ PipelineOptions pipeline_options(const StreamConfig& config, const std::string& 
   options.reconstruct.decoder = config.decoder;
   options.reconstruct.surface = config.surface;
   options.encode = encode_options(config);
-  options.bit_rate = config.bit_rate;
+  options.rate = config.rate;
   return options;
 }
 

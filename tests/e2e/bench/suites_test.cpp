@@ -135,6 +135,26 @@ TEST(Bench, Recording) {
   for (const char* from : {"cached", "from disk"}) expect_spread(row(report, from)["seek_ms"], 7, from);
 }
 
+TEST(Bench, Rate) {
+  // The levels of one scene are all different sizes of it: coarser, smaller, worse.
+  const Json report =
+      report_of({"rate", "--source", "sim:object,width=320,height=240,stripes=40", "--geometry", "grid",
+                 "--texture", "jpeg", "--frames", "3", "--rounds", "2"});
+  ASSERT_TRUE(report.is_object());
+  ASSERT_GT(report["rows"].size(), 5U);
+  double bytes = 1e9, psnr = 100;
+  for (const Json& level : report["rows"]) {
+    expect_spread(level["encode_ms"], 4, level["name"]);
+    EXPECT_GT(level["time"], 0.0);
+    EXPECT_LT(level["mean_bytes"], bytes) << level["name"];
+    EXPECT_LT(level["texture_db"], psnr) << level["name"];
+    bytes = level["mean_bytes"];
+    psnr = level["texture_db"];
+  }
+  EXPECT_EQ(report["rows"][0]["size"], 1.0);
+  EXPECT_EQ(bench({"rate", "--texture", "gif"}).status, 2);
+}
+
 TEST(Bench, Texture) {
   const Json report = report_of({"texture", "--source", kSource, "--frames", "3", "--rounds", "2"});
   ASSERT_TRUE(report.is_object());

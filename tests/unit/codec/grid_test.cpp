@@ -278,6 +278,49 @@ TEST(Grid, AKeyFrameComesWhenAskedFor) {
   EXPECT_LT(still.size() * 3, key.size()) << "of a surface that stands still nothing is left to say";
 }
 
+TEST(Grid, EverySecondLineIsAKeyFrameAndItsOwnSurface) {
+  for (const bool estimate : {false, true}) {
+    const test::GridScene scene{.stripes = 40};
+    FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+    FrameDecoder decoder;
+    EncodeOptions options{.geometry = GeometryCodec::kGrid, .estimate = estimate, .key_interval = 100};
+    std::vector<std::size_t> vertices;
+    std::vector<bool> keys;
+    for (const auto& [halves, step_bits] :
+         {std::pair(false, 6), {false, 6}, {true, 6}, {true, 6}, {true, 4}, {true, 4}, {false, 4}}) {
+      options.halve_lines = halves;
+      options.step_bits = step_bits;
+      const auto bytes = encoder.encode(test::grid_frame(scene), options);
+      ASSERT_TRUE(bytes) << bytes.error().message;
+      keys.push_back(is_key_frame(*bytes));
+      const auto decoded = decoder.decode(*bytes);
+      ASSERT_TRUE(decoded) << decoded.error().message;
+      const Surface& s = decoded->surface;
+      vertices.push_back(s.positions.size());
+      EXPECT_GT(s.triangles.size(), s.positions.size());
+      for (std::size_t i = 0; i < s.positions.size(); ++i) {
+        const float row = s.texture_coordinates[i][1] * static_cast<float>(scene.height) - 0.5F;
+        ASSERT_NEAR(row, static_cast<float>(s.grid[i].line * (halves ? 4 : 2)), 0.01F);
+      }
+    }
+    EXPECT_EQ(keys, (std::vector{true, false, true, false, true, false, true}));
+    EXPECT_NEAR(static_cast<double>(vertices[2]), static_cast<double>(vertices[0]) / 2,
+                0.02 * static_cast<double>(vertices[0]));
+    EXPECT_EQ(vertices[6], vertices[0]);
+  }
+}
+
+TEST(Grid, AMeshHasEverySecondLineToo) {
+  const test::GridScene scene;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  EncodeOptions options;
+  const auto whole = encoder.encode(test::grid_frame(scene), options);
+  options.halve_lines = true;
+  const auto half = encoder.encode(test::grid_frame(scene), options);
+  ASSERT_TRUE(whole && half);
+  EXPECT_NEAR(read_frame_header(*half)->vertices, read_frame_header(*whole)->vertices / 2.0, 300);
+}
+
 TEST(Grid, WhatLiesOnNoGridGoesAsAMesh) {
   const test::GridScene scene;
   FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));

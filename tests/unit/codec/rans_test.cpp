@@ -2,7 +2,10 @@
 // Entropy coding: whatever goes in comes out, for likely, unlikely and lone symbols; damage is noticed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <vector>
 
 #include "codec/rans.h"
 #include "tests/support/make_surface.h"
@@ -81,6 +84,57 @@ TEST(Rans, SymbolsComeBackFromAnyTables) {
         cut.row(decoders, tables.data() + start, end - start, got.data());
       }
       EXPECT_FALSE(cut.finished());
+    }
+  }
+}
+
+/// Bits of `counts` symbols coded with `levels`, and of the levels.
+double bits_of(const std::vector<std::uint32_t>& counts, const Levels& levels) {
+  BitWriter table;
+  write_levels(levels, table);
+  double bits = 8 * static_cast<double>(table.finish().size());
+  const auto frequencies = frequencies_of(levels);
+  for (std::size_t s = 0; s < counts.size(); ++s)
+    if (counts[s] > 0) bits += counts[s] * std::log2(kScale / static_cast<double>(frequencies[s]));
+  return bits;
+}
+
+TEST(Rans, LevelsCostLessWithTheirSymbolsThanNeighboursOfThem) {
+  test::Random random(9);
+  for (int round = 0; round < 40; ++round) {
+    // Falling counts with gaps at their end, as residuals have.
+    std::vector<std::uint32_t> counts(kMostSymbols);
+    const double first = std::exp2(2 + random.below(11)), fall = 0.4 + 0.55 * random.unit();
+    for (std::size_t s = 0; s < counts.size(); ++s) {
+      const double mean = first * std::pow(fall, static_cast<double>(s));
+      counts[s] = static_cast<std::uint32_t>(mean * (0.7 + 0.6 * random.unit()) + random.unit() * 0.9);
+    }
+    if (round == 0) counts.assign(counts.size(), 0);
+    if (round == 1) counts.assign(counts.size(), 0), counts[50] = 7;
+    const Levels levels = levels_of(counts);
+    std::uint32_t total = 0;
+    for (std::size_t s = 0; s < counts.size(); ++s) {
+      total += counts[s];
+      ASSERT_TRUE(counts[s] == 0 || levels[s] > 0) << s;
+    }
+    if (total == 0) {
+      EXPECT_EQ(levels, Levels{});
+      continue;
+    }
+    // Those that fit the counts best, without a look at what they take themselves.
+    Levels fitting{};
+    for (std::size_t s = 0; s < counts.size(); ++s)
+      if (counts[s] > 0)
+        fitting[s] = static_cast<std::uint8_t>(std::clamp(
+            1 + std::lround(2 * std::log2(std::max(1.0, counts[s] * static_cast<double>(kScale) / total))),
+            1L, static_cast<long>(kLargestLevel)));
+    const double bits = bits_of(counts, levels);
+    EXPECT_LE(bits, 1.001 * bits_of(counts, fitting) + 8) << "and a byte of rounding";
+    for (std::size_t s = 0; s < counts.size(); ++s) {
+      Levels other = levels;
+      if (other[s] == 0 || other[s] == kLargestLevel) continue;
+      ++other[s];
+      EXPECT_LE(bits, 1.005 * bits_of(counts, other) + 8) << s;
     }
   }
 }

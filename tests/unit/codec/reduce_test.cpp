@@ -4,11 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "codec/frame3d_codec.h"
+#include "codec/stripe_grid.h"
 #include "tests/support/make_grid.h"
 
 namespace relievo::test {
@@ -117,14 +120,74 @@ TEST(Halve, IsTheMeanOfFourAndLeavesOddSides) {
   Image8 picture(4, 2, 1);
   const std::uint8_t values[] = {0, 2, 255, 255, 4, 6, 255, 254};
   std::copy(std::begin(values), std::end(values), picture.data());
-  const Image8 half = halve(picture);
+  Image8 half;
+  halve(picture, half);
   ASSERT_EQ(half.width(), 2);
   ASSERT_EQ(half.height(), 1);
   EXPECT_EQ(half.data()[0], 3);
   EXPECT_EQ(half.data()[1], 255);
-  const Image8 odd = halve(Image8(5, 6, 3));
-  EXPECT_EQ(odd.width(), 5);
-  EXPECT_EQ(odd.height(), 3);
+  halve(Image8(5, 6, 3), half);
+  EXPECT_EQ(half.width(), 5);
+  EXPECT_EQ(half.height(), 3);
+}
+
+TEST(Halve, AnyPictureIsTheMeanOfItsPixels) {
+  Random random(7);
+  Image8 half;
+  for (const auto& [width, height, channels] :
+       {std::tuple(64, 20, 3), {66, 7, 3}, {37, 8, 3}, {64, 10, 1}, {31, 12, 1}, {2, 2, 3}}) {
+    Image8 picture(width, height, channels);
+    for (std::size_t i = 0; i < picture.size(); ++i)
+      picture.data()[i] = static_cast<std::uint8_t>(random.below(256));
+    halve(picture, half);
+    const int across = 2 - width % 2, down = 2 - height % 2;
+    ASSERT_EQ(half.width(), width / across);
+    ASSERT_EQ(half.height(), height / down);
+    for (int y = 0; y < half.height(); ++y)
+      for (int i = 0; i < half.width() * channels; ++i) {
+        int sum = across * down / 2;
+        for (int dy = 0; dy < down; ++dy)
+          for (int dx = 0; dx < across; ++dx)
+            sum += picture.row(y * down + dy)[(i / channels * across + dx) * channels + i % channels];
+        ASSERT_EQ(half.row(y)[i], sum / (across * down)) << width << " " << height << " " << y << " " << i;
+      }
+  }
+}
+
+TEST(HalveLines, OfAGridIsAsOfItsSurface) {
+  for (const int height : {480, 482}) {
+    const GridScene scene{.height = height, .quality = true};
+    const Frame3D frame = grid_frame(scene);
+    GridCalibration whole = grid_calibration(grid_rig(scene), grid_pattern(scene)), every_second = whole;
+    whole.line_step_px = 2;
+    every_second.line_step_px = 4;
+    Surface half;
+    ASSERT_TRUE(halve_lines(frame.surface, half));
+    StripeGrid expected, grid;
+    ASSERT_TRUE(to_grid(half, every_second, 6, true, expected));
+    ASSERT_TRUE(to_grid(frame.surface, whole, 6, true, grid));
+    std::vector<std::uint8_t> plane(grid.columns.size()), none;
+    for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = static_cast<std::uint8_t>(grid.columns[i]);
+    halve_lines(grid, std::array{&plane, &none});
+    EXPECT_EQ(grid.lines, expected.lines);
+    EXPECT_EQ(grid.columns, expected.columns);
+    EXPECT_EQ(grid.sigmas, expected.sigmas);
+    EXPECT_EQ(grid.interpolated, expected.interpolated);
+    EXPECT_EQ(grid.vertices, expected.vertices);
+    EXPECT_EQ(grid.triangles, expected.triangles);
+    ASSERT_EQ(grid.cells.size(), expected.cells.size());
+    for (std::size_t i = 0; i < grid.cells.size(); ++i) {
+      const auto both = [](std::uint8_t cell) {
+        return cell == grid_cell::kTurned ? grid_cell::kStraight : cell;
+      };
+      ASSERT_EQ(both(grid.cells[i]), both(expected.cells[i])) << i;
+    }
+    ASSERT_EQ(plane.size(), grid.columns.size());
+    for (int line = 0; line < grid.lines; ++line)
+      for (int b = 0; b < grid.boundaries; ++b)
+        ASSERT_EQ(plane[grid.at(line, b)], static_cast<std::uint8_t>(grid.columns[grid.at(line, b)]));
+    EXPECT_TRUE(none.empty());
+  }
 }
 
 }  // namespace

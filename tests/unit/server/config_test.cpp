@@ -102,6 +102,8 @@ decoder = "paper"
 texture = "webp"
 texture_quality = 91
 bitrate = 4_000_000
+deadline = 12.5
+psnr = 38
 draco_speed = 4
 geometry = "draco-mesh"
 step_bits = 5
@@ -124,7 +126,9 @@ fill_holes = 3
   EXPECT_EQ(r.config.decoder, Decoder::kPaper);
   EXPECT_EQ(r.config.texture, TextureCodec::kWebp);
   EXPECT_EQ(r.config.texture_quality, 91);
-  EXPECT_EQ(r.config.bit_rate, 4e6);
+  EXPECT_EQ(r.config.rate.bit_rate, 4e6);
+  EXPECT_EQ(r.config.rate.deadline_ms, 12.5);
+  EXPECT_EQ(r.config.rate.texture_db, 38);
   EXPECT_EQ(r.config.draco_speed, 4);
   EXPECT_EQ(r.config.geometry, "draco-mesh");
   EXPECT_EQ(r.config.step_bits, 5);
@@ -348,6 +352,10 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"bound_over", "bound = 9", "bound must be a number of pixels from 0.01 to 8"},
         Wrong{"keys_none", "key_interval = 0", "key_interval must be a whole number from 1 to 1000"},
         Wrong{"unknown", "quality = 80", "quality is no setting; there are: source scheme"},
+        Wrong{"deadline_none", "deadline = 0", "deadline must be a number of milliseconds from 0.5 to 1000"},
+        Wrong{"deadline_text", "deadline = \"12ms\"", "deadline must be a number of milliseconds"},
+        Wrong{"deadline_not", "deadline = nan", "deadline must be a number of milliseconds"},
+        Wrong{"psnr_fine", "psnr = 61", "psnr must be a number of decibels from 20 to 60"},
         Wrong{"bitrate_low", "bitrate = 4", "bitrate must be a whole number from 100000"},
         Wrong{"texture_unknown", "texture = \"gif\"", "texture must be jpeg, webp, png or h264"},
         Wrong{"part_of_a_name", "quality = 80", "quality is no setting"},

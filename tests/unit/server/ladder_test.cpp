@@ -5,6 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <vector>
+
 #include "base/time.h"
 #include "codec/texture_codec.h"
 #include "tests/support/make_grid.h"
@@ -147,12 +153,89 @@ TEST_F(LadderTest, EndsAtOnceWithFramesWaiting) {
   EXPECT_LE(reduced_.frames().size(), 2U);
 }
 
+TEST_F(LadderTest, EveryFrameComesBackInItsMemory) {
+  reduced_readers_ = 1;
+  std::mutex mutex;
+  std::vector<const std::uint8_t*> taken, back;
+  ladder_.give_back_to([&](Frame3D&& frame) {
+    std::lock_guard lock(mutex);
+    back.push_back(frame.texture.data());
+    EXPECT_GT(frame.surface.positions.size(), 1000U);
+  });
+  Gate entered, go_on;
+  hold(entered, go_on);
+  for (std::uint64_t n = 1; n <= 5; ++n) {
+    Frame3D frame = frame_with_picture(n);
+    if (n == 5) frame.surface.grid.clear();  // goes whole
+    taken.push_back(frame.texture.data());
+    ladder_.take(std::move(frame), 1);
+    if (n == 1) {
+      ASSERT_TRUE(entered.wait());
+    }
+  }
+  {
+    std::lock_guard lock(mutex);
+    EXPECT_EQ(back.size(), 3U) << "those that were dropped";
+  }
+  go_on.open();
+  ASSERT_TRUE(eventually([&] { return reduced_.frames().size() == 2; }));
+  ladder_.end();
+  std::sort(taken.begin(), taken.end());
+  std::sort(back.begin(), back.end());
+  EXPECT_EQ(taken, back);
+}
+
 TEST(RungOptions, AreNeverFinerThanTheStreams) {
   const EncodeOptions coarse{.texture_quality = 30, .step_bits = 2, .bound_px = 2};
   const EncodeOptions options = rung_options(coarse, Rung::kReduced);
   EXPECT_EQ(options.texture_quality, 30);
   EXPECT_EQ(options.step_bits, 2);
   EXPECT_EQ(options.bound_px, 2);
+}
+
+/// Keeps each frame for one more, and counts in how many pieces of memory they lay.
+class CountingRungs final : public LowerRungs {
+ public:
+  bool wanted() override { return true; }
+  void take(Frame3D frame, std::int64_t) override {
+    ++frames;
+    memory.insert(frame.texture.data());
+    if (kept_) give_back_(std::move(*kept_));
+    kept_ = std::move(frame);
+  }
+  void give_back_to(std::function<void(Frame3D&&)> give_back) override { give_back_ = std::move(give_back); }
+  void end() override {
+    if (kept_) give_back_(std::move(*kept_));
+    kept_.reset();
+  }
+  std::vector<RungStatus> status() const override { return {}; }
+
+  int frames = 0;
+  std::set<const std::uint8_t*> memory;
+
+ private:
+  std::function<void(Frame3D&&)> give_back_;
+  std::optional<Frame3D> kept_;
+};
+
+TEST(PipelineRungs, FramesAreMadeInTheMemoryOfThoseThatRungsHaveDone) {
+  const StripedScene scene = striped_scene();
+  const Frames frames(scene);
+  ScriptedSource source(scene, count_to(frames, 60));
+  CollectingSink full;
+  CountingRungs rungs;
+  PipelineOptions options;
+  options.stream = "test";
+  options.paced = false;
+  options.lossless = true;
+  options.encode.geometry = GeometryCodec::kGrid;
+  options.rungs = &rungs;
+  auto pipeline = Pipeline::create(source, {&full}, options);
+  ASSERT_TRUE(pipeline);
+  ASSERT_TRUE((*pipeline)->run());
+  EXPECT_EQ(rungs.frames, 59);
+  // At most: one being made, three in the queue, one encoded, one kept; and as many spare.
+  EXPECT_LE(rungs.memory.size(), 10U);
 }
 
 TEST(PipelineTap, TheStreamGoesOnBesideARungThatStandsStill) {
