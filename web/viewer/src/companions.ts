@@ -2,8 +2,9 @@
 // Streams that are shown beside the first one, in the same scene. Each has a decoder and a rate of its own.
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
-import type { ListedStream } from './protocol';
+import type { ListedStream, Quality } from './protocol';
 import { Session } from './session';
+import type { SourceEvents } from './source';
 import type { Beside, View } from './view';
 
 interface Companion {
@@ -13,6 +14,7 @@ interface Companion {
 
 export class Companions {
   private readonly shown = new Map<string, Companion>();
+  private quality: Quality | null = null;
 
   constructor(
     private readonly view: View,
@@ -44,7 +46,7 @@ export class Companions {
     });
     this.shown.set(name, { session, beside: this.view.addBeside(name) });
     if (typeof listed?.recording === 'string') void this.openRecording(name, session, listed.recording);
-    else session.watch((events) => new LiveSource(name, events));
+    else session.watch((events) => this.live(name, events));
     this.wish();
     this.changed();
   }
@@ -69,16 +71,30 @@ export class Companions {
     }
   }
 
+  /** How much detail is to come of all of them. */
+  want(quality: Quality): void {
+    this.quality = quality;
+    for (const { session } of this.shown.values()) {
+      if (session.source instanceof LiveSource) session.source.want(quality);
+    }
+  }
+
   /** What the decoders should bring along. */
   wish(): void {
     for (const { session } of this.shown.values()) session.decoder.want = this.view.wants;
+  }
+
+  private live(name: string, events: SourceEvents): LiveSource {
+    const source = new LiveSource(name, events);
+    if (this.quality !== null) source.want(this.quality);
+    return source;
   }
 
   // A file plays on and on beside the others.
   private async openRecording(name: string, session: Session, address: string): Promise<void> {
     const opened = await openRemote(new URL(address, document.baseURI)).catch(() => null);
     if (this.shown.get(name)?.session !== session) return;
-    session.watch(opened === null ? (events) => new LiveSource(name, events) : opened.source);
+    session.watch(opened === null ? (events) => this.live(name, events) : opened.source);
     const playback = opened === null ? null : session.source!.playback;
     playback?.setLoop({ from: 0, to: playback.times[playback.times.length - 1]! });
   }

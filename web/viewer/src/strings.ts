@@ -2,7 +2,7 @@
 // What the page says, in one place.
 import type { Background, Mode, Theme, Way } from './display';
 import type { Placement } from './placement';
-import type { StreamStatus } from './protocol';
+import type { Quality, StreamStatus } from './protocol';
 
 const modes: Record<Mode, string> = {
   textured: 'Textured',
@@ -23,6 +23,8 @@ const ways: Record<Way, readonly [string, string]> = {
 const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
 const themes: Record<Theme, string> = { auto: 'As the system', dark: 'Dark', light: 'Light' };
+
+const qualities: Record<Quality, string> = { auto: 'As it can follow', full: 'Full', reduced: 'Reduced', texture: 'Picture alone' };
 
 export const text = {
   modes,
@@ -69,6 +71,17 @@ export const text = {
     fov: 'Field of view',
     fovOfRig: "as the rig's camera",
   },
+  quality: {
+    label: 'Quality',
+    names: qualities,
+    only: 'This stream comes in full only.',
+    missing: (wanted: string) => `This stream has no “${wanted}”.`,
+    notChosen: (now: string) => `${now} comes: nothing else was asked for.`,
+    asChosen: (now: string) => `${now} comes, as chosen.`,
+    soon: (now: string, wanted: string) => `${now} comes until “${wanted}” begins.`,
+    autoFull: 'Full comes: this page can follow.',
+    autoLess: (now: string) => `${now} comes: this page or its network could not follow more.`,
+  },
   measure: {
     title: 'Measure',
     tools: { point: 'Point', distance: 'Distance', angle: 'Angle', section: 'Section' },
@@ -107,6 +120,7 @@ export const text = {
     names: {
       rate: 'drawn',
       bits: 'received',
+      detail: 'quality',
       codecs: 'codecs',
       vertices: 'vertices, triangles',
       geometry: 'geometry',
