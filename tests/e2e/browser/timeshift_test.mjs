@@ -159,7 +159,7 @@ const onFeeder = {
   async 'what plays faster than it comes arrives at live by itself'(page) {
     await page.keyboard.press(' ');
     await press(page, ',');
-    await page.selectOption('#timeline select', '8');
+    await page.selectOption('#timeline select[title^="Speed"]', '8');
     await page.evaluate(() => document.querySelector('#view').focus());
     await page.keyboard.press(' ');
     await inState(page, 'live');

@@ -4,7 +4,7 @@ import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
 import type { ListedStream, Quality } from './protocol';
 import { Session } from './session';
-import type { SourceEvents } from './source';
+import type { Playback, SourceEvents } from './source';
 import type { Beside, View } from './view';
 
 interface Companion {
@@ -15,6 +15,7 @@ interface Companion {
 export class Companions {
   private readonly shown = new Map<string, Companion>();
   private quality: Quality | null = null;
+  private wishedQuality = false;
 
   constructor(
     private readonly view: View,
@@ -30,7 +31,8 @@ export class Companions {
     const { places } = this.view;
     return [...this.shown].map(([name, { session, beside }]) => {
       const { shown, errors, frame } = session.meter.report();
-      return { name, shown, errors, frame, right: places[name], extent: beside.extent };
+      const { index = null, following = null } = session.source?.playback ?? {};
+      return { name, shown, errors, frame, right: places[name], extent: beside.extent, index, following };
     });
   }
 
@@ -49,6 +51,11 @@ export class Companions {
     else session.watch((events) => this.live(name, events));
     this.wish();
     this.changed();
+  }
+
+  /** What a time line of it drives. */
+  playback(name: string): Playback | null {
+    return this.shown.get(name)?.session.source?.playback ?? null;
   }
 
   remove(name: string): void {
@@ -79,9 +86,11 @@ export class Companions {
     }
   }
 
-  /** What the decoders should bring along. */
-  wish(): void {
-    for (const { session } of this.shown.values()) session.decoder.want = this.view.wants;
+  /** What the decoders should bring along; `quality`: that of the vertices too, whatever the view needs. */
+  wish(quality = this.wishedQuality): void {
+    this.wishedQuality = quality;
+    const { wants } = this.view;
+    for (const { session } of this.shown.values()) session.decoder.want = { ...wants, quality: wants.quality || quality };
   }
 
   private live(name: string, events: SourceEvents): LiveSource {

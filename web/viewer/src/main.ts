@@ -42,7 +42,15 @@ class Viewer {
   private readonly measure: MeasurePanel | null;
   private readonly companions: Companions | null;
   private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
-  private readonly timeline = new Timeline(element('timeline'), (shown) => document.body.classList.toggle('with-timeline', shown));
+  private readonly timeline = new Timeline(
+    element('timeline'),
+    (shown) => document.body.classList.toggle('with-timeline', shown),
+    (name) => {
+      this.timed = name;
+      this.refresh();
+    },
+  );
+  private timed: string | null = null; // a stream beside the first that the time line is of
   private readonly record: RecordControl;
   private readonly session: Session;
   readonly view: View | null;
@@ -252,8 +260,9 @@ class Viewer {
   private wish(): void {
     if (this.view === null) return;
     const { wants } = this.view;
-    this.session.decoder.want = { ...wants, quality: wants.quality || this.measure?.isOpen === true };
-    this.companions?.wish();
+    const measuring = this.measure?.isOpen === true;
+    this.session.decoder.want = { ...wants, quality: wants.quality || measuring };
+    this.companions?.wish(measuring);
   }
 
   private listen(): void {
@@ -267,8 +276,10 @@ class Viewer {
       command: (key) => this.command(key),
     });
     this.ui.canvas.addEventListener('dblclick', (event) => {
-      const picked = this.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
-      if (picked !== null) navigator?.setPivot(picked.point);
+      const hit = this.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
+      if (hit === null) return;
+      const [x, y, z] = hit.point;
+      navigator?.setPivot([x + hit.right, y, z]);
     });
   }
 
@@ -347,7 +358,7 @@ class Viewer {
       this.record.watch({ stream: name, source, info: () => this.session.info });
       return source;
     });
-    this.timeline.show(this.session.source!.playback);
+    this.showTimeline();
     void this.preferRecording();
     this.refresh();
   }
@@ -366,7 +377,7 @@ class Viewer {
       this.record.watch(null);
       this.session.watch((events) => opened.source(events, this.shared?.moment));
       this.note = opened.note ?? '';
-      this.timeline.show(this.session.source?.playback ?? null);
+      this.showTimeline();
     } catch (error) {
       this.session.meter.failed(error instanceof Error ? error.message : String(error)); // the stream goes on
     }
@@ -412,9 +423,17 @@ class Viewer {
     } catch (error) {
       this.fileProblem = { name, why: error instanceof Error ? error.message : String(error) };
     }
-    this.timeline.show(this.session.source?.playback ?? null);
     this.refresh();
     return shown;
+  }
+
+  // Of the first stream, or of the one beside it that a person has chosen.
+  private showTimeline(): void {
+    const names = this.companions?.names ?? [];
+    if (!names.includes(this.timed ?? '')) this.timed = null;
+    const first = this.session.source?.playback ?? null;
+    this.timeline.show(this.timed === null ? first : (this.companions?.playback(this.timed) ?? null));
+    this.timeline.offer(names.length === 0 ? [] : [this.stream ?? this.file ?? '', ...names], this.timed);
   }
 
   // On the screen's beat.
@@ -489,6 +508,7 @@ class Viewer {
     this.streamsPanel?.show(this.streams, this.stream, this.companions?.names ?? []);
     this.ui.showStreams(this.streams, this.stream, this.file ?? info?.source ?? '', this.note);
     this.qualityControl.show(this.offered);
+    this.showTimeline();
     this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }
 

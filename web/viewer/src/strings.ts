@@ -103,6 +103,9 @@ export const text = {
     sectionCsvTitle: 'Save the last section, point by point',
     clear: 'Clear',
     remove: 'Remove this measurement',
+    otherStream:
+      'That place is of another stream. Lengths between streams are true only where they are placed in one frame, of one camera; a section is of one.',
+    cursorOf: (stream: string, read: string) => `${stream} · ${read}`,
     cursor: (depth: string, x: string, y: string) => `depth ${depth} · right ${x} · up ${y}`,
   },
   picture: "The camera's picture, as it lies on the surface",
@@ -209,6 +212,7 @@ export const text = {
   },
   shifted: { playing: 'Behind live', paused: 'Paused' },
   timeline: {
+    stream: 'Stream that the time line is of',
     live: 'Live',
     goLive: 'Back to live (L)',
     isLive: 'Live: what comes is shown',
