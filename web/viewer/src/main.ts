@@ -91,6 +91,7 @@ class Viewer {
     this.shared = readShared(location.hash, loadDisplay());
     this.display = this.shared.display;
     this.view = this.makeView();
+    document.documentElement.classList.toggle('software', this.view?.inSoftware === true);
     this.session = new Session({
       changed: () => this.refresh(),
       described: (info, seen) => this.view?.restart(info.camera, seen),
@@ -160,6 +161,7 @@ class Viewer {
       besides: this.companions?.report(),
       measurements: this.measure?.measurements,
       quality: this.offered,
+      keptBytes: this.session.source?.kept?.bytes,
       problem: this.problem,
       ...this.session.meter.report(),
     };
@@ -502,7 +504,7 @@ class Viewer {
     });
     if (this.fileProblem !== null) {
       const { name, why } = this.fileProblem;
-      this.presentation = { ...this.presentation, title: text.file.failed(name), text: `${why}.`, hint: '', dim: seen };
+      this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: seen };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
     this.streamsPanel?.show(this.streams, this.stream, this.companions?.names ?? []);
@@ -539,6 +541,8 @@ class Viewer {
     this.refresh();
   }
 }
+
+const sentence = (words: string): string => `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
 
 report(new Viewer());
 // Only in secure contexts; without it the page needs its server, as before.

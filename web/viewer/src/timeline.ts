@@ -47,7 +47,7 @@ export class Timeline {
     const track = make('div', { className: 'track' }, this.track, this.slider);
     const steps = [button('‹', say.back, () => this.playback?.step(-1)), button('›', say.ahead, () => this.playback?.step(1))];
     for (const b of steps) b.setAttribute('aria-label', b.title);
-    track.onpointermove = (event) => this.point(track, event.clientX);
+    track.onpointermove = track.onpointerenter = (event) => this.point(track, event.clientX);
     track.onpointerleave = () => this.unpoint();
     this.live.id = 'follow';
     this.time.className = 'time';
@@ -175,7 +175,7 @@ export class Timeline {
     const position = p.position;
     if (!this.slider.matches(':active')) this.slider.value = String(position);
     const frame = frameAt(p.times, position);
-    const time = this.timeText(p, position);
+    const time = this.timeText(p, p.following === true ? this.end : position);
     this.slider.setAttribute('aria-valuetext', say.at(time, frame + 1, p.times.length));
     setText(this.time, time);
     const label = p.playing ? say.pause : say.play;
@@ -198,7 +198,7 @@ export class Timeline {
   private timeText(p: Playback, position: number): string {
     if (this.absolute) return absoluteText(p.startMs + position);
     if (p.following === null) return `${clockText(position)} / ${clockText(this.end)}`;
-    return say.behind(clockText(p.following ? 0 : this.end - position));
+    return say.behind(clockText(Math.max(0, this.end - position)));
   }
 
   private drawMarks(p: Playback): void {

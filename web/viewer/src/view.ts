@@ -43,6 +43,8 @@ export interface ViewEvents {
 export class View {
   readonly navigator: Navigator;
   readonly overlay: Overlay;
+  /** The processor draws, the rest of the page too. */
+  readonly inSoftware = drawnInSoftware();
   private readonly sizes = new ResizeObserver(() => this.resize());
   private ended = false;
   private readonly renderer: THREE.WebGLRenderer;
@@ -74,7 +76,7 @@ export class View {
     keys: EventTarget = window,
   ) {
     // Four samples a pixel cost a processor that draws more than all the rest.
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.inSoftware, alpha: true });
     this.renderer.setClearAlpha(0);
     this.overlay = new Overlay(overlay);
     const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
