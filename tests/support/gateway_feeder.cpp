@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A gateway with a synthetic moving surface, for the browser test: what it serves is encoded by the real
 // codec. Prints "listening PORT" and obeys lines on stdin: start NAME, also NAME (a second stream of the
-// same frames), stop, frame NUMBER (that one, then stop), corrupt (one frame), status STATE TEXT, gone,
-// texture NAME (of a codec; h264 with a key frame every 8th). Ends when stdin does, so that no test leaves
-// it behind.
+// same frames), apart N (its frames are N ahead of the first one's), stop, frame NUMBER (that one, then
+// stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
+// 8th). Ends when stdin does, so that no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -100,8 +100,9 @@ StreamInfo make_info(const std::string& name) {
 /// What stdin asked for; the feeding loop looks once a frame.
 struct Orders {
   std::mutex mutex;
-  std::string stream;  // feeding this one; empty: none
-  std::string also;    // and this one; empty: none
+  std::string stream;       // feeding this one; empty: none
+  std::string also;         // and this one; empty: none
+  std::uint64_t apart = 0;  // how many frames it is ahead
   bool announce = false, withdraw = false, feeding = false, corrupt = false, quit = false;
   std::string state, text;
   std::optional<std::uint64_t> only;  // this frame, then none
@@ -122,6 +123,8 @@ void read_orders(Orders& orders) {
     } else if (verb == "also") {
       words >> orders.also;
       orders.announce = true;
+    } else if (verb == "apart") {
+      words >> orders.apart;
     } else if (verb == "stop") {
       orders.feeding = false;
     } else if (verb == "frame") {
@@ -167,6 +170,7 @@ int feed(std::uint16_t port, double rate) {
   options.volume = {{-1, -1, 0}, 2};
   options.key_interval = 8;
   FrameEncoder encoder(make_info("").rig, make_info("").pattern);
+  FrameEncoder also_encoder(make_info("").rig, make_info("").pattern);
   std::uint64_t sequence = 0;
   auto next = std::chrono::steady_clock::now();
   for (;;) {
@@ -192,18 +196,27 @@ int feed(std::uint16_t port, double rate) {
     message.sequence = sequence++;
     message.number = std::exchange(orders.only, {}).value_or(message.sequence);
     options.texture = orders.texture;
-    const auto bytes =
-        encoder.encode(make_frame(message.number, static_cast<float>(message.number + 1) * 0.05f), options);
-    if (!bytes.ok()) {
-      std::fprintf(stderr, "%s\n", bytes.error().message.c_str());
-      return 1;
-    }
-    Bytes data = *bytes;
-    if (std::exchange(orders.corrupt, false)) data.resize(data.size() / 2);
-    message.data = std::make_shared<const Bytes>(std::move(data));
-    message.publish_time_ns = utc_now_ns();
+    const auto fill = [&](FrameEncoder& with) {
+      const auto bytes =
+          with.encode(make_frame(message.number, static_cast<float>(message.number + 1) * 0.05f), options);
+      if (!bytes.ok()) {
+        std::fprintf(stderr, "%s\n", bytes.error().message.c_str());
+        return false;
+      }
+      Bytes data = *bytes;
+      if (std::exchange(orders.corrupt, false)) data.resize(data.size() / 2);
+      message.data = std::make_shared<const Bytes>(std::move(data));
+      message.publish_time_ns = utc_now_ns();
+      return true;
+    };
+    if (!fill(encoder)) return 1;
     gateway.publish(orders.stream, message);
-    if (!orders.also.empty()) gateway.publish(orders.also, message);
+    if (orders.also.empty()) continue;
+    if (orders.apart != 0) {
+      message.number += orders.apart;
+      if (!fill(also_encoder)) return 1;
+    }
+    gateway.publish(orders.also, message);
   }
 }
 

@@ -132,7 +132,7 @@ const checks = {
     await seek(page, 9);
     await onFrame(page, numbers[9]);
     await page.keyboard.press(']');
-    await page.selectOption('#timeline select', '4');
+    await page.selectOption('#timeline select[title^="Speed"]', '4');
     await page.evaluate(() => document.querySelector('#view').focus());
     await page.keyboard.press(' ');
     const { shown } = await look(page);

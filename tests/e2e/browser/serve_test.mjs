@@ -4,8 +4,10 @@
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { createInterface } from 'node:readline';
+import { gzipSync } from 'node:zlib';
 import { kPatienceMs, launchChromium } from './chromium.mjs';
 
+const kFirstPictureBytes = 300_000; // gzipped
 const [serverPath, screenshot] = process.argv.slice(2);
 
 const domain = process.env.RELIEVO_TEST_DOMAIN;
@@ -30,12 +32,20 @@ try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
   page.setDefaultTimeout(kPatienceMs);
   page.on('pageerror', (error) => complaints.push(error.message));
+  const bodies = [];
+  const sizeOf = async (response) => ({ url: response.url(), bytes: gzipSync(await response.body().catch(() => '')).length });
+  page.on('response', (response) => bodies.push(sizeOf(response)));
   const begin = Date.now();
   await page.goto(address);
   const look = () => page.evaluate(() => ({ ...window.relievo.diagnostics(), pixels: window.relievo.readPixels() }));
   const shownPast = (count) => page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
   await shownPast(1);
   console.log(`first picture ${Date.now() - begin} ms after the page was asked for`);
+  const loaded = await Promise.all(bodies);
+  const bytes = loaded.reduce((sum, body) => sum + body.bytes, 0);
+  console.log(`${bytes} bytes gzipped until then`);
+  assert.ok(bytes > 50_000 && bytes < kFirstPictureBytes, `${bytes} bytes`);
+  assert.deepEqual(loaded.filter(({ url }) => /draco/i.test(url)), [], 'Draco is loaded where nothing needs it');
 
   const first = await look();
   await shownPast(first.shown + 5);
@@ -65,6 +75,52 @@ try {
   const { streams } = await (await page.request.get(new URL('/api/streams', address).href)).json();
   assert.deepEqual(streams[0].clients_of, { full: 0, reduced: 1, texture: 0 });
   console.log(`${second.vertices} vertices in full, ${reduced.vertices} reduced`);
+
+  // The menu: by keys alone, told in words, and kept by address and link.
+  await page.goto(address);
+  await shownPast(1);
+  const told = (pattern) => page.waitForFunction((p) => new RegExp(p).test(document.querySelector('#quality-why').textContent), pattern);
+  const now = (rung) => page.waitForFunction((r) => window.relievo.diagnostics().quality.now === r, rung);
+  await page.keyboard.press('b');
+  await told('^Full comes: nothing else was asked for');
+  const offered = () => page.evaluate(() => [...document.querySelectorAll('#quality option')].map((o) => o.value));
+  await page.waitForFunction(() => document.querySelectorAll('#quality option').length === 4);
+  assert.deepEqual(await offered(), ['auto', 'full', 'reduced', 'texture']);
+  assert.equal(await page.getByLabel('Quality').getAttribute('aria-describedby'), 'quality-why');
+  await page.focus('#quality');
+  await page.keyboard.press('ArrowDown');
+  await now('reduced');
+  await told('^Reduced comes, as chosen');
+  assert.match(page.url(), /\?stream=face&quality=reduced$/);
+  assert.match(await page.evaluate(() => window.relievo.link()), /\?stream=face&quality=reduced#/);
+  await page.selectOption('#quality', 'texture');
+  await now('texture');
+  await page.waitForFunction(() => document.body.classList.contains('picture-alone'));
+  const drawn = await page.evaluate(() => {
+    const { width, height } = document.querySelector('#picture');
+    return document.querySelector('#picture').getContext('2d').getImageData(0, 0, width, height).data.some((v) => v > 60 && v < 250);
+  });
+  assert.ok(drawn, 'the picture is not shown');
+  await page.keyboard.press('Escape');
+  await page.keyboard.press('i');
+  await page.waitForFunction(() => /qualityPicture alone comes, as chosen/.test(document.querySelector('#panel-statistics').textContent));
+  await page.keyboard.press('b');
+  await page.selectOption('#quality', 'auto');
+  await now('full');
+  await told('^Full comes: this page can follow');
+  await page.waitForFunction(() => !document.body.classList.contains('picture-alone') && window.relievo.diagnostics().vertices > 10_000);
+  await page.evaluate(() => {
+    const busy = () => {
+      for (const end = performance.now() + 250; performance.now() < end; );
+      window.busy = setTimeout(busy, 5);
+    };
+    busy();
+  });
+  await page.waitForFunction(() => window.relievo.diagnostics().quality.now !== 'full');
+  await told('comes: this page or its network could not follow more');
+  await page.evaluate(() => clearTimeout(window.busy));
+  assert.equal((await look()).errors, 0, (await look()).lastError);
+  console.log('the menu chooses the quality, and says which one comes and why');
 
   server.kill('SIGINT');
   assert.deepEqual(await exited, { code: 0, signal: null });

@@ -1,16 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: the list shows each stream with its picture, and a second stream stands beside the first
-// where the page says it does, by a button and by the address, until it is taken away or another one is chosen.
+// where the page says it does, is picked, measured and gone back in like the first, by a button and by the address, until it is taken away or another one is chosen.
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, inState, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, inState, isRim, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
 const browser = await launchChromium();
 const complaints = [];
 const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
 const kFrame = 62;
+const kApart = 31; // frames between the two streams
+
+/** A place of a stream's surface in its own camera's frame, how far right that stands, and where it is on the page. */
+async function placeOf(page, name, u, v) {
+  const [{ frame, right }] = name === 'ball' ? [{ frame: kFrame, right: 0 }] : (await look(page)).besides;
+  const point = pointOf(u, v, frame);
+  const { x, y } = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
+  return { point, right, at: [x, y] };
+}
+const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
 
 const besides = (page, count) =>
   page.waitForFunction((n) => window.relievo.diagnostics().besides.filter((b) => b.shown > 0).length === n, count);
@@ -84,12 +94,114 @@ const checks = {
     assert.ok(alone.covered > 0.5 && alone.covered < 0.9, `covers ${alone.covered}`); // 4:3 in 8:5
   },
 
+  async 'what is under the cursor is read of whichever stream it is'(page) {
+    feeder.say(`apart ${kApart}`); // another shape from here on
+    feeder.say(`frame ${kFrame}`);
+    await page.waitForFunction(([n, m]) => {
+      const now = window.relievo.diagnostics();
+      return now.frame === n && now.besides[0].frame === m;
+    }, [kFrame, kFrame + kApart]);
+    await still(page);
+    for (const [u, v] of [[0.1, 0.15], [0.5, 0.5], [0.85, 0.8]]) {
+      for (const name of ['ball', 'other']) {
+        const { at, point } = await placeOf(page, name, u, v);
+        const picked = await page.evaluate(([x, y]) => window.relievo.pick(x, y), at);
+        assert.equal(picked.stream, name);
+        for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${name}: ${'xyz'[i]} at ${u}, ${v}`);
+        await page.mouse.move(...at);
+        const said = new RegExp(`^${name} · depth ([\\d.]+)`);
+        await page.waitForFunction((source) => new RegExp(source).test(document.querySelector('#cursor').textContent), said.source);
+        near(Number(said.exec(await page.textContent('#cursor'))[1]), point[2] * 1000, 2, `${name}: depth at ${u}, ${v}`);
+      }
+    }
+    const depths = await Promise.all(['ball', 'other'].map(async (name) => (await placeOf(page, name, 0.5, 0.5)).point[2]));
+    assert.ok(Math.abs(depths[0] - depths[1]) > 0.005, `the two shapes are alike: ${depths}`);
+  },
+
+  async 'lengths are measured on each, not between rigs that nobody has placed'(page) {
+    const clickOn = async (...place) => page.mouse.click(...(await placeOf(page, ...place)).at);
+    await page.keyboard.press('m');
+    await page.click('#panel-measure .segments button:text-is("Distance")');
+    for (const name of ['other', 'ball']) {
+      const [a, b] = [(await placeOf(page, name, 0.15, 0.2)).point, (await placeOf(page, name, 0.5, 0.55)).point];
+      const { length } = (await look(page)).measurements;
+      await clickOn(name, 0.15, 0.2);
+      await clickOn(name, 0.5, 0.55);
+      await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, length);
+      const m = (await look(page)).measurements.at(-1);
+      near(m.value, Math.hypot(...a.map((c, i) => c - b[i])), 0.003, `distance on ${name}`);
+      assert.deepEqual(m.spots.map((s) => s.stream), [name, name]);
+    }
+    await clickOn('ball', 0.15, 0.2);
+    await clickOn('other', 0.15, 0.2);
+    await page.waitForFunction(() => /of another stream/.test(document.querySelector('#panel-measure').textContent));
+    assert.equal((await look(page)).measurements.length, 2);
+    await clickOn('ball', 0.15, 0.8); // the first place still counts
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 3);
+    await page.click('#panel-measure .segments button:text-is("Section")');
+    await clickOn('other', 0.15, 0.5);
+    await clickOn('other', 0.85, 0.5);
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 4);
+    const { profile } = (await look(page)).measurements[3];
+    assert.ok(profile.length > 100, `${profile.length} pieces`);
+    for (const [{ point: [x, y, z] }] of profile) {
+      const [u, v] = [x, y].map((c, i) => (c * kPicture.focal) / ([kPicture.width, kPicture.height][i] * z) + 0.5);
+      if (isRim(u, v, kFrame + kApart)) continue;
+      near(z, pointOf(u, v, kFrame + kApart)[2], 0.003, `depth of the section at ${u}, ${v}`);
+    }
+    await page.click('#panel-measure button:text-is("Clear")');
+    await page.keyboard.press('Escape');
+  },
+
+  async 'a double-click turns around a place of the other one'(page) {
+    const { at, point, right } = await placeOf(page, 'other', 0.5, 0.5);
+    await page.mouse.dblclick(...at);
+    await still(page);
+    await page.keyboard.press('ArrowLeft');
+    await still(page);
+    const { width, height } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
+    const now = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
+    near(now.x, width / 2, 3, 'the pivot, to the right');
+    near(now.y, height / 2, 3, 'the pivot, down');
+    await page.keyboard.press('r');
+    await still(page);
+  },
+
+  async 'the time line is of the one that is chosen'(page) {
+    feeder.say('apart 0');
+    feeder.say('start ball');
+    const other = async () => (await look(page)).besides[0];
+    await shownPast(page, (await look(page)).shown + 6);
+    const choice = page.getByLabel('Stream that the time line is of');
+    assert.deepEqual(await choice.locator('option').allTextContents(), ['ball', 'other']);
+    await choice.selectOption('other');
+    await page.click('#timeline button[title^="Pause"]');
+    await page.waitForFunction(() => window.relievo.diagnostics().besides[0].following === false);
+    const { shown } = await look(page);
+    await shownPast(page, shown + 5);
+    assert.equal((await look(page)).playback.following, true, 'the first one was stopped too');
+    const { index, frame } = await other();
+    await page.click('#timeline button[title^="A frame back"]');
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].index < n, index);
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame < n, frame);
+    await page.click('#follow');
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame > n + 5, frame);
+    assert.equal((await other()).following, true);
+    await choice.selectOption('ball');
+    await page.click('#timeline button[title^="Pause"]');
+    await inState(page, 'shifted');
+    assert.equal((await other()).following, true);
+    await page.click('#follow');
+    await inState(page, 'live');
+  },
+
   async 'in one frame, and taken away'(page) {
     await page.keyboard.press('n');
     await page.selectOption('#panel-streams select', 'together');
     await page.waitForFunction(() => window.relievo.diagnostics().besides[0].right === 0);
     await page.click(`${rowOf('other')} button:text-is("Beside")`);
     await page.waitForFunction(() => window.relievo.diagnostics().besides.length === 0);
+    await page.waitForFunction(() => document.querySelector('#timeline .stream').hidden);
     assert.match(page.url(), /\?stream=ball$/);
     await page.keyboard.press('Escape');
   },

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: a live stream is stopped, gone back in and stepped through to the right surfaces, plays
 // on behind live, and returns to live without a fault; also where frames build on others, and after the server is gone.
-// Run as: in_own_domain node timeshift_test.mjs GATEWAY_FEEDER RELIEVO_SERVER, in web/viewer. Exit 77: no Chromium here.
+// Run as: in_own_domain node timeshift_test.mjs GATEWAY_FEEDER RELIEVO_SERVER [h264], in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
 import { depthOf, Feeder, inState, kPicture, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
 import { Server } from './server.mjs';
 import { pointAt } from './timeline.mjs';
 
-const [feederPath, serverPath] = process.argv.slice(2);
+const [feederPath, serverPath, video] = process.argv.slice(2);
+const kScene = ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6'];
 const feeder = await Feeder.start(feederPath);
 const browser = await launchChromium();
 const complaints = [];
@@ -43,18 +44,19 @@ const errors = async (page) => {
   const now = await look(page);
   assert.equal(now.errors, 0, now.lastError);
 };
-/** Goes to each of these frames one after the other, then in another order, and compares the surfaces. */
-async function compare(page, indices) {
+const surfaceHash = async (page) => (await surface(page)).hash;
+/** Goes to each of these frames one after the other, then in another order, and compares what `read` tells of them. */
+async function compare(page, indices, read = surfaceHash) {
   const hashes = new Map();
   for (const index of indices) {
     await seek(page, index);
-    hashes.set(index, (await surface(page)).hash);
+    hashes.set(index, await read(page));
   }
   for (const index of [...indices].sort((a, b) => ((a * 7) % 11) - ((b * 7) % 11))) {
     await seek(page, index);
-    assert.equal((await surface(page)).hash, hashes.get(index), `frame ${index}`);
+    assert.equal(await read(page), hashes.get(index), `frame ${index}`);
   }
-  assert.ok(new Set(hashes.values()).size > indices.length / 2, 'the surfaces are all alike');
+  assert.ok(new Set(hashes.values()).size > indices.length / 2, 'they are all alike');
 }
 
 const onFeeder = {
@@ -156,10 +158,21 @@ const onFeeder = {
     await errors(page);
   },
 
+  async 'the picture under the cursor says how far behind live it is'(page) {
+    const { x, y, width, height } = await page.locator('#timeline .track').boundingBox();
+    await page.mouse.move(x + 0.1 * width, y + height / 2);
+    await page.mouse.move(x + 0.2 * width, y + height / 2);
+    await page.waitForFunction(() => /−\d+:\d\d/.test(document.querySelector('.preview')?.textContent ?? ''));
+    const [minutes, seconds] = /−(\d+):([\d.]+)/.exec(await page.textContent('.preview')).slice(1).map(Number);
+    assert.ok(60 * minutes + seconds > 0.5, `${minutes}:${seconds} behind live`);
+    assert.equal((await playback(page)).following, true);
+    await page.mouse.move(300, 150);
+  },
+
   async 'what plays faster than it comes arrives at live by itself'(page) {
     await page.keyboard.press(' ');
     await press(page, ',');
-    await page.selectOption('#timeline select', '8');
+    await page.selectOption('#timeline select[title^="Speed"]', '8');
     await page.evaluate(() => document.querySelector('#view').focus());
     await page.keyboard.press(' ');
     await inState(page, 'live');
@@ -223,14 +236,44 @@ const onServer = {
   },
 };
 
+const onVideo = {
+  async 'pictures of H.264 are those they were, in any order'(page) {
+    await shownPast(page, 2);
+    await page.waitForFunction(() => window.relievo.diagnostics().playback.keys.filter((k) => k).length > 2);
+    await page.keyboard.press('c');
+    await page.keyboard.press(' ');
+    await inState(page, 'shifted');
+    await settled(page);
+    const { first, index, keys } = await playback(page);
+    assert.ok(keys.some((k) => k === false), 'every frame is a key frame');
+    assert.equal((await look(page)).parts.texture > 0 && (await page.isHidden('#notice')), true, 'there is no picture');
+    const from = Math.max(first, index - 9);
+    const picture = (of) => of.evaluate(() => window.relievo.readPixels().hash);
+    await compare(page, Array.from({ length: Math.min(10, index - first) }, (_, i) => from + i), picture);
+    const seen = await pointAt(page, from + 2); // that of the key frame before it
+    assert.ok(seen.deviation > 5, `its picture is flat: ${seen.deviation}`);
+    await page.mouse.move(300, 150);
+    await page.keyboard.press('l');
+    await inState(page, 'live');
+    const { shown } = await look(page);
+    await shownPast(page, shown + 8);
+    await errors(page);
+  },
+};
+
 let failed = 2;
 let server = null;
 try {
   feeder.say('start ball');
   failed = await runChecks(onFeeder, await open());
-  server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5']);
+  server = await Server.start(serverPath, [...kScene, '--key-interval', '5']);
   const ofServer = pagesOf(browser, server.address, complaints);
   failed += await runChecks(onServer, await ofServer.open());
+  if (video === 'h264') {
+    await server.kill();
+    server = await Server.start(serverPath, [...kScene, '--key-interval', '5', '--texture', 'h264']);
+    failed += await runChecks(onVideo, await pagesOf(browser, server.address, complaints).open());
+  }
 } finally {
   await browser.close();
   await feeder.kill();

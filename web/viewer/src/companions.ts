@@ -2,8 +2,9 @@
 // Streams that are shown beside the first one, in the same scene. Each has a decoder and a rate of its own.
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
-import type { ListedStream } from './protocol';
+import type { ListedStream, Quality } from './protocol';
 import { Session } from './session';
+import type { Playback, SourceEvents } from './source';
 import type { Beside, View } from './view';
 
 interface Companion {
@@ -13,6 +14,8 @@ interface Companion {
 
 export class Companions {
   private readonly shown = new Map<string, Companion>();
+  private quality: Quality | null = null;
+  private wishedQuality = false;
 
   constructor(
     private readonly view: View,
@@ -28,7 +31,8 @@ export class Companions {
     const { places } = this.view;
     return [...this.shown].map(([name, { session, beside }]) => {
       const { shown, errors, frame } = session.meter.report();
-      return { name, shown, errors, frame, right: places[name], extent: beside.extent };
+      const { index = null, following = null } = session.source?.playback ?? {};
+      return { name, shown, errors, frame, right: places[name], extent: beside.extent, index, following };
     });
   }
 
@@ -44,9 +48,14 @@ export class Companions {
     });
     this.shown.set(name, { session, beside: this.view.addBeside(name) });
     if (typeof listed?.recording === 'string') void this.openRecording(name, session, listed.recording);
-    else session.watch((events) => new LiveSource(name, events));
+    else session.watch((events) => this.live(name, events));
     this.wish();
     this.changed();
+  }
+
+  /** What a time line of it drives. */
+  playback(name: string): Playback | null {
+    return this.shown.get(name)?.session.source?.playback ?? null;
   }
 
   remove(name: string): void {
@@ -69,16 +78,32 @@ export class Companions {
     }
   }
 
-  /** What the decoders should bring along. */
-  wish(): void {
-    for (const { session } of this.shown.values()) session.decoder.want = this.view.wants;
+  /** How much detail is to come of all of them. */
+  want(quality: Quality): void {
+    this.quality = quality;
+    for (const { session } of this.shown.values()) {
+      if (session.source instanceof LiveSource) session.source.want(quality);
+    }
+  }
+
+  /** What the decoders should bring along; `quality`: that of the vertices too, whatever the view needs. */
+  wish(quality = this.wishedQuality): void {
+    this.wishedQuality = quality;
+    const { wants } = this.view;
+    for (const { session } of this.shown.values()) session.decoder.want = { ...wants, quality: wants.quality || quality };
+  }
+
+  private live(name: string, events: SourceEvents): LiveSource {
+    const source = new LiveSource(name, events);
+    if (this.quality !== null) source.want(this.quality);
+    return source;
   }
 
   // A file plays on and on beside the others.
   private async openRecording(name: string, session: Session, address: string): Promise<void> {
     const opened = await openRemote(new URL(address, document.baseURI)).catch(() => null);
     if (this.shown.get(name)?.session !== session) return;
-    session.watch(opened === null ? (events) => new LiveSource(name, events) : opened.source);
+    session.watch(opened === null ? (events) => this.live(name, events) : opened.source);
     const playback = opened === null ? null : session.source!.playback;
     playback?.setLoop({ from: 0, to: playback.times[playback.times.length - 1]! });
   }

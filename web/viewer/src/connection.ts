@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One WebSocket to one stream, kept up: clock exchange, silence as loss, retries with backoff.
-import { parseFramePrefix, parseServerMessage, wantedQuality } from './protocol';
+import { parseFramePrefix, parseServerMessage, type Quality } from './protocol';
 import type { SourceEvents } from './source';
 import { backoffS } from './state';
 
@@ -25,6 +25,7 @@ export class Connection {
   private lastClock = -Infinity;
   private stopped = false;
   private readonly timer: number;
+  private wanted: Quality | null = null;
 
   /** `server`: the address of its page. */
   constructor(
@@ -51,6 +52,12 @@ export class Connection {
     this.send({ type: 'credit', n });
   }
 
+  /** How much detail is wanted from now on, and after each loss of the connection. */
+  want(quality: Quality): void {
+    this.wanted = quality;
+    this.send({ type: 'quality', want: quality });
+  }
+
   retryNow(): void {
     if (this.retryAt !== null) this.connect();
   }
@@ -75,8 +82,7 @@ export class Connection {
       this.attempt = 0;
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
-      const want = this.server === document.baseURI ? wantedQuality(location.search) : null;
-      if (want !== null) this.send({ type: 'quality', want });
+      if (this.wanted !== null) this.send({ type: 'quality', want: this.wanted });
       this.events.open();
       this.tick();
     };

@@ -55,7 +55,8 @@ export class Decoder {
     this.ready = false;
     worker.onmessage = (event: MessageEvent<DecodeReply>) => {
       const reply = event.data;
-      if (reply.type === 'ready') this.ready = true;
+      if (reply.type === 'ready') this.onReady();
+      if (reply.type === 'loading') this.ready = false;
       if (reply.type === 'unusable') this.events.unusable(reply.message);
       if (reply.type === 'frame' && this.pending.delete(reply.id)) this.events.decoded(reply);
       if (reply.type === 'failed' && this.pending.delete(reply.id)) this.events.failed(reply.id, reply.message);
@@ -65,6 +66,13 @@ export class Decoder {
       if (!this.ready) this.events.unusable(event.message || 'the decoder cannot be loaded');
     };
     return worker;
+  }
+
+  // What waited for the network did not hang.
+  private onReady(): void {
+    this.ready = true;
+    const now = performance.now();
+    for (const id of this.pending.keys()) this.pending.set(id, now);
   }
 
   private watch(): void {

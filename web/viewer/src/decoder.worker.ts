@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decodes frames off the main thread, one after the other.
 import wasmUrl from 'draco3d/draco_decoder.wasm?url';
-import { DracoDecoder, type Geometry } from './draco';
-import { kGeometryDracoGrid, kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
+import type { DracoDecoder, Geometry } from './draco';
+import { kGeometryDraco, kGeometryDracoGrid, kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
 import { GridFrames } from './grid';
 import gridWasmUrl from './grid.wasm?url';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
@@ -19,11 +19,12 @@ const kStills: Record<number, string> = { [kTextureJpeg]: 'image/jpeg', [kTextur
 const grids = new GridFrames();
 const videos = new VideoTextures();
 let kernelAsked = false;
-const decoder = load();
-let queue: Promise<void> = decoder.then(
-  () => post({ type: 'ready' }),
-  (error: unknown) => post({ type: 'unusable', message: String(error) }),
-);
+const kOfDraco = [kGeometryDraco, kGeometryDracoGrid];
+const kDracoTries = 3;
+const kDracoAgainMs = 1000;
+const draco = { loaded: null as DracoDecoder | null, failure: '', failures: 0, failedAt: -Infinity };
+let queue: Promise<void> = Promise.resolve();
+post({ type: 'ready' });
 
 self.onmessage = (event: MessageEvent<DecodeRequest>) => {
   const request = event.data;
@@ -42,16 +43,31 @@ self.onmessage = (event: MessageEvent<DecodeRequest>) => {
   });
 };
 
-async function load(): Promise<DracoDecoder> {
-  const response = await fetch(wasmUrl);
-  if (!response.ok) throw new Error(`the geometry decoder cannot be loaded (HTTP ${response.status})`);
-  return DracoDecoder.create(await response.arrayBuffer());
+/** Where a stream needs it: most do not. Tried again, a few times, where it does not come. */
+async function theDraco(): Promise<DracoDecoder> {
+  if (draco.loaded !== null) return draco.loaded;
+  if (performance.now() - draco.failedAt < kDracoAgainMs) throw new Error(draco.failure);
+  post({ type: 'loading' });
+  try {
+    const [{ DracoDecoder }, response] = await Promise.all([import('./draco'), fetch(wasmUrl)]);
+    if (!response.ok) throw new Error(`HTTP ${response.status}`);
+    draco.loaded = await DracoDecoder.create(await response.arrayBuffer());
+    return draco.loaded;
+  } catch (error) {
+    draco.failure = `the Draco decoder cannot be loaded: ${error instanceof Error ? error.message : String(error)}`;
+    draco.failedAt = performance.now();
+    if (++draco.failures === kDracoTries) post({ type: 'unusable', message: draco.failure });
+    throw new Error(draco.failure);
+  } finally {
+    post({ type: 'ready' });
+  }
 }
 
 async function decode(request: DecodeRequest): Promise<DecodedFrame> {
-  const draco = await decoder;
-  const start = performance.now();
   const frame = parseFrame(new Uint8Array(request.bytes, request.offset));
+  const needsDraco = frame.header.vertices > 0 && kOfDraco.includes(frame.geometryCodec);
+  const draco = needsDraco ? await theDraco() : null;
+  const start = performance.now();
   const picture = decodeTexture(frame); // the browser decodes it meanwhile, on a thread of its own
   picture.catch(() => undefined); // awaited below, unless the geometry fails first
   const geometry = decodeGeometry(draco, frame, request.want.quality);
@@ -86,12 +102,22 @@ function askForKernel(): void {
     .catch(() => undefined);
 }
 
+const kNoSurface = (): Geometry & { quality: null } => ({
+  positions: new Float32Array(0),
+  coordinates: null,
+  normals: null,
+  triangles: new Uint32Array(0),
+  quality: null,
+});
+
 /** Of a grid the quality is there with the positions; of Draco it is decoded where it is wanted. */
-function decodeGeometry(draco: DracoDecoder, frame: Frame, wantQuality: boolean): Geometry & { quality: VertexQuality | null } {
+function decodeGeometry(draco: DracoDecoder | null, frame: Frame, wantQuality: boolean): Geometry & { quality: VertexQuality | null } {
   if (frame.geometryCodec === kGeometryGrid) {
     askForKernel();
     return { normals: null, ...grids.decode(frame) };
   }
+  if (frame.header.vertices === 0 && kOfDraco.includes(frame.geometryCodec)) return kNoSurface();
+  if (draco === null) throw new Error(`geometry codec ${frame.geometryCodec} is not known here`);
   if (frame.geometryCodec === kGeometryDracoGrid) return { normals: null, ...grids.decodeInDraco(frame, draco) };
   const geometry = draco.decode(frame);
   const told = wantQuality && frame.quality.length > 0 && geometry.coordinates !== null;

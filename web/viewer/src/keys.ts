@@ -29,7 +29,9 @@ export function listenToKeys(actions: KeyActions, of: EventTarget = window): voi
   of.addEventListener('keydown', (e) => {
     const event = e as KeyboardEvent;
     const modified = event.ctrlKey || event.metaKey || event.altKey;
-    if (modified || isTyping(event.target) || belongsToControl(event)) return;
+    if (modified) return;
+    // Closes panels from within them too.
+    if (event.key !== 'Escape' && (isTyping(event.target) || belongsToControl(event))) return;
     if (act(event, actions)) event.preventDefault();
   });
 }

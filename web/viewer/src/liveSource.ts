@@ -5,7 +5,7 @@ import { Connection } from './connection';
 import type { FrameStore } from './frameStore';
 import { History } from './history';
 import type { Loop } from './playback';
-import type { FramePrefix } from './protocol';
+import type { FramePrefix, Quality } from './protocol';
 import type { FrameSource, Kept, Playback, SourceEvents } from './source';
 import { StorePlayer } from './storePlayer';
 
@@ -126,6 +126,11 @@ export class LiveSource implements FrameSource, Playback {
     this.withPage = Math.max(0, this.withPage - n);
     this.player?.credit(n);
     this.topUp();
+  }
+
+  /** How much detail is to come. */
+  want(quality: Quality): void {
+    this.connection.want(quality);
   }
 
   retryNow(): void {

@@ -14,10 +14,11 @@ import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Picture } from './picture';
 import type { DecodedFrame } from './messages';
-import type { ListedStream, StreamList } from './protocol';
+import { offeredRungs, wantedQuality, type ListedStream, type Quality, type StreamList } from './protocol';
+import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { report } from './reports';
-import { momentOf, readShared, shareLink, type Shared, type Shown } from './share';
+import { address, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
@@ -37,15 +38,26 @@ class Viewer {
   private readonly legend = new Legend();
   private readonly picture = new Picture();
   private readonly displayPanel: DisplayPanel;
+  private readonly qualityControl: QualityControl;
   private readonly measure: MeasurePanel | null;
   private readonly companions: Companions | null;
   private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
-  private readonly timeline = new Timeline(element('timeline'), (shown) => document.body.classList.toggle('with-timeline', shown));
+  private readonly timeline = new Timeline(
+    element('timeline'),
+    (shown) => document.body.classList.toggle('with-timeline', shown),
+    (name) => {
+      this.timed = name;
+      this.refresh();
+    },
+  );
+  private timed: string | null = null; // a stream beside the first that the time line is of
   private readonly record: RecordControl;
   private readonly session: Session;
   readonly view: View | null;
   private display: Display;
+  private quality: Quality | null = wantedQuality(location.search); // of live streams; null: nobody has chosen
   private shared: Shared | null; // by the link that was opened, until something else is chosen
+  private pictureAlone = false; // what comes is no surface
   private posed = false; // the link's view is shown
 
   private problem: string | null = null;
@@ -79,6 +91,7 @@ class Viewer {
     this.shared = readShared(location.hash, loadDisplay());
     this.display = this.shared.display;
     this.view = this.makeView();
+    document.documentElement.classList.toggle('software', this.view?.inSoftware === true);
     this.session = new Session({
       changed: () => this.refresh(),
       described: (info, seen) => this.view?.restart(info.camera, seen),
@@ -91,7 +104,10 @@ class Viewer {
     this.record = new RecordControl(this.panels.action('record', () => undefined));
     this.companions = this.view === null ? null : new Companions(this.view, () => this.refresh());
     this.makeStreams();
-    this.displayPanel = new DisplayPanel(this.panels.panel('display', text.display.title), (part) => this.change(part));
+    const displayBody = this.panels.panel('display', text.display.title);
+    this.displayPanel = new DisplayPanel(displayBody, (part) => this.change(part));
+    this.qualityControl = new QualityControl(displayBody, (quality) => this.chooseQuality(quality));
+    if (this.quality !== null) this.companions?.want(this.quality);
     this.measure = this.makeMeasure();
     this.makeStatistics();
     this.makeTake();
@@ -106,9 +122,9 @@ class Viewer {
     this.refresh();
   }
 
-  private openAddressed(address: URLSearchParams): void {
-    const [asked, ...besides] = (address.get('stream') ?? '').split(',').filter((n) => n !== '');
-    const recording = address.get('recording');
+  private openAddressed(wanted: URLSearchParams): void {
+    const [asked, ...besides] = (wanted.get('stream') ?? '').split(',').filter((n) => n !== '');
+    const recording = wanted.get('recording');
     if (asked !== undefined) {
       this.chosenByPerson = true;
       this.watch(asked);
@@ -124,7 +140,7 @@ class Viewer {
     this.display = { ...this.display, ...part };
     if (this.view !== null) this.view.display = this.display;
     this.wish();
-    this.picture.on = this.display.split;
+    this.showPicture();
     storeDisplay(this.display);
     this.showDisplay();
   }
@@ -144,6 +160,8 @@ class Viewer {
       gridStep: this.view?.gridStep,
       besides: this.companions?.report(),
       measurements: this.measure?.measurements,
+      quality: this.offered,
+      keptBytes: this.session.source?.kept?.bytes,
       problem: this.problem,
       ...this.session.meter.report(),
     };
@@ -221,6 +239,7 @@ class Viewer {
       this.session.meter,
       () => this.session.status,
       () => this.session.source?.kept ?? null,
+      () => (this.offered === null ? null : whyText(this.offered)),
     );
   }
 
@@ -243,8 +262,9 @@ class Viewer {
   private wish(): void {
     if (this.view === null) return;
     const { wants } = this.view;
-    this.session.decoder.want = { ...wants, quality: wants.quality || this.measure?.isOpen === true };
-    this.companions?.wish();
+    const measuring = this.measure?.isOpen === true;
+    this.session.decoder.want = { ...wants, quality: wants.quality || measuring };
+    this.companions?.wish(measuring);
   }
 
   private listen(): void {
@@ -258,8 +278,10 @@ class Viewer {
       command: (key) => this.command(key),
     });
     this.ui.canvas.addEventListener('dblclick', (event) => {
-      const picked = this.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
-      if (picked !== null) navigator?.setPivot(picked.point);
+      const hit = this.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
+      if (hit === null) return;
+      const [x, y, z] = hit.point;
+      navigator?.setPivot([x + hit.right, y, z]);
     });
   }
 
@@ -299,13 +321,28 @@ class Viewer {
   /** What of the server is shown, as an address says it. */
   private get addressed(): Shown | null {
     if (this.stream === null) return this.serverFile === null ? null : { kind: 'recording', name: this.serverFile };
-    return { kind: 'stream', name: [this.stream, ...(this.companions?.names ?? [])].join(',') };
+    return { kind: 'stream', name: [this.stream, ...(this.companions?.names ?? [])].join(','), quality: this.quality };
+  }
+
+  /** For this page's live streams, those that follow too. */
+  private chooseQuality(quality: Quality): void {
+    this.quality = quality;
+    if (this.session.source instanceof LiveSource) this.session.source.want(quality);
+    this.companions?.want(quality);
+    this.writeAddress();
+    this.refresh();
+  }
+
+  /** Null: what is shown is no live stream. */
+  private get offered(): Offered | null {
+    if (!(this.session.source instanceof LiveSource)) return null;
+    const { rung: now, status } = this.session;
+    return { want: this.quality, now, of: offeredRungs(status) };
   }
 
   private writeAddress(): void {
     if (this.addressed === null) return;
-    const url = new URL(location.href);
-    url.search = `?${this.addressed.kind}=${this.addressed.name}`; // names hold no character that would have to be escaped
+    const url = address(location.href, this.addressed);
     if (this.shared === null) url.hash = ''; // was of something else
     history.replaceState(null, '', url);
   }
@@ -319,10 +356,11 @@ class Viewer {
     if (this.view !== null) this.view.name = name;
     this.session.watch((events) => {
       const source = new LiveSource(name, events);
+      if (this.quality !== null) source.want(this.quality);
       this.record.watch({ stream: name, source, info: () => this.session.info });
       return source;
     });
-    this.timeline.show(this.session.source!.playback);
+    this.showTimeline();
     void this.preferRecording();
     this.refresh();
   }
@@ -341,7 +379,7 @@ class Viewer {
       this.record.watch(null);
       this.session.watch((events) => opened.source(events, this.shared?.moment));
       this.note = opened.note ?? '';
-      this.timeline.show(this.session.source?.playback ?? null);
+      this.showTimeline();
     } catch (error) {
       this.session.meter.failed(error instanceof Error ? error.message : String(error)); // the stream goes on
     }
@@ -387,9 +425,17 @@ class Viewer {
     } catch (error) {
       this.fileProblem = { name, why: error instanceof Error ? error.message : String(error) };
     }
-    this.timeline.show(this.session.source?.playback ?? null);
     this.refresh();
     return shown;
+  }
+
+  // Of the first stream, or of the one beside it that a person has chosen.
+  private showTimeline(): void {
+    const names = this.companions?.names ?? [];
+    if (!names.includes(this.timed ?? '')) this.timed = null;
+    const first = this.session.source?.playback ?? null;
+    this.timeline.show(this.timed === null ? first : (this.companions?.playback(this.timed) ?? null));
+    this.timeline.offer(names.length === 0 ? [] : [this.stream ?? this.file ?? '', ...names], this.timed);
   }
 
   // On the screen's beat.
@@ -410,10 +456,18 @@ class Viewer {
     this.posed = true;
     if (pose !== null && !this.view.navigator.isRigView) this.view.navigator.pose = pose;
     this.view.invalidate();
-    this.picture.show(frame.texture);
+    this.pictureAlone = this.session.rung === 'texture' && frame.positions.length === 0 && frame.texture !== null;
+    this.picture.show(frame.texture); // the one before is closed
+    this.showPicture();
     this.wish();
     this.measure?.readCursor();
     this.showDisplay();
+  }
+
+  // Beside the surface where a person wants it, all over the page where the stream comes as a picture alone.
+  private showPicture(): void {
+    this.picture.on = this.display.split || this.pictureAlone;
+    document.body.classList.toggle('picture-alone', this.pictureAlone);
   }
 
   private showDisplay(): void {
@@ -450,11 +504,13 @@ class Viewer {
     });
     if (this.fileProblem !== null) {
       const { name, why } = this.fileProblem;
-      this.presentation = { ...this.presentation, title: text.file.failed(name), text: `${why}.`, hint: '', dim: seen };
+      this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: seen };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
     this.streamsPanel?.show(this.streams, this.stream, this.companions?.names ?? []);
     this.ui.showStreams(this.streams, this.stream, this.file ?? info?.source ?? '', this.note);
+    this.qualityControl.show(this.offered);
+    this.showTimeline();
     this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }
 
@@ -485,6 +541,8 @@ class Viewer {
     this.refresh();
   }
 }
+
+const sentence = (words: string): string => `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
 
 report(new Viewer());
 // Only in secure contexts; without it the page needs its server, as before.

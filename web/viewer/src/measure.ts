@@ -12,6 +12,7 @@ export const kSpots: Record<Tool, number> = { point: 1, distance: 2, angle: 3, s
 export interface Spot {
   point: Vec3;
   sigma: number | null; // of its depth, metres; null: not known
+  stream: string; // whose camera's frame it is in
 }
 
 export interface Measurement {
@@ -140,14 +141,14 @@ export function valueText({ tool, value, sigma }: Measurement): string {
 
 const number = (value: number | null | undefined): string => (value === null || value === undefined ? '' : value.toPrecision(9));
 
-/** A line a measurement; metres and radians. */
+/** A line a measurement; metres and radians, each place in the frame of its own stream's camera. */
 export function measurementsCsv(measurements: readonly Measurement[]): string {
-  const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`].join(',');
+  const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`, `stream${i}`].join(',');
   const lines = [`tool,value,unit,sigma,${[1, 2, 3].map(spot).join(',')}`];
   for (const m of measurements) {
     const spots = [0, 1, 2].flatMap((i) => {
       const s = m.spots[i];
-      return s === undefined ? ['', '', '', ''] : [...s.point.map(number), number(s.sigma)];
+      return s === undefined ? ['', '', '', '', ''] : [...s.point.map(number), number(s.sigma), s.stream];
     });
     lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), ...spots].join(','));
   }

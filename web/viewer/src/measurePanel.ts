@@ -15,7 +15,7 @@ import {
   type Tool,
 } from './measure';
 import type { Mark } from './overlay';
-import { coordinatesAt, sigmaAt } from './pick';
+import { coordinatesAt, sigmaAt, type Vec3 } from './pick';
 import { plot } from './plot';
 import { text } from './strings';
 import type { View } from './view';
@@ -55,6 +55,7 @@ export class MeasurePanel {
     const clear = button(say.clear, say.clear, () => this.clear());
     body.append(group, this.hint, this.list, this.plot, make('div', { className: 'buttons' }, copied, csv, section, clear));
     this.listen(view.canvas);
+    view.overlay.marks = () => this.marks();
     this.refresh();
   }
 
@@ -69,14 +70,14 @@ export class MeasurePanel {
 
   /** After each drawing of a new surface, and when the cursor moves. */
   readCursor(): void {
-    const picked = this.cursor === null ? null : this.view.pick(this.cursor);
-    const shown = this.view.shown;
-    this.readout.hidden = picked === null || shown === null;
-    this.pointed(picked === null || shown === null ? null : coordinatesAt(shown, picked));
-    if (picked === null || shown === null) return;
-    const [x, y, z] = picked.point;
+    const hit = this.cursor === null ? null : this.view.pick(this.cursor);
+    this.readout.hidden = hit === null;
+    this.pointed(hit !== null && hit.stream === this.view.name ? coordinatesAt(hit.surface, hit) : null);
+    if (hit === null) return;
+    const [x, y, z] = hit.point;
     const mm = (v: number): string => (v * 1000).toFixed(1);
-    setText(this.readout, say.cursor(lengthText(z, sigmaAt(shown, picked)), mm(x), mm(-y)));
+    const read = say.cursor(lengthText(z, sigmaAt(hit.surface, hit)), mm(x), mm(-y));
+    setText(this.readout, this.view.isAlone ? read : say.cursorOf(hit.stream, read));
   }
 
   private choose(tool: Tool | null): void {
@@ -125,13 +126,17 @@ export class MeasurePanel {
   }
 
   private add(at: { x: number; y: number }): void {
-    const surface = this.view.shown;
-    const picked = this.view.pick(at);
-    if (this.tool === null || surface === null) return;
-    if (picked === null) return setText(this.hint, say.nothingThere);
-    this.spots.push({ point: picked.point, sigma: sigmaAt(surface, picked) });
+    const hit = this.view.pick(at);
+    if (this.tool === null) return;
+    if (hit === null) return setText(this.hint, say.nothingThere);
+    const { surface, stream, right } = hit;
+    const other = this.spots.some((spot) => spot.stream !== stream);
+    // Nothing says where one rig stands to another; and a section is of one surface.
+    if (other && (!this.view.isTogether || this.tool === 'section')) return setText(this.hint, say.otherStream);
+    this.spots.push({ point: hit.point, sigma: sigmaAt(surface, hit), stream });
     if (this.spots.length === kSpots[this.tool]) {
-      const eye = this.view.navigator.ray(at)?.origin ?? [0, 0, 0];
+      const [x, y, z] = this.view.navigator.ray(at)?.origin ?? [right, 0, 0];
+      const eye: Vec3 = [x - right, y, z];
       this.measurements.push(measure(this.tool, this.spots, surface, eye));
       this.spots = [];
     }
@@ -151,17 +156,19 @@ export class MeasurePanel {
         return make('li', {}, make('span', { className: 'quiet' }, say.tools[m.tool]), make('b', {}, valueText(m)), remove);
       }),
     );
-    this.view.overlay.marks = this.marks();
     this.drawPlot();
     this.view.invalidate();
   }
 
   private marks(): Mark[] {
-    const marks = this.measurements.map((m): Mark => {
-      const path = m.tool === 'section' ? m.profile.flatMap(([a, b]) => [a.point, b.point]) : [];
-      return { points: path.length > 0 ? path : m.spots.map((s) => s.point), text: valueText(m) };
-    });
-    return this.spots.length === 0 ? marks : [...marks, { points: this.spots.map((s) => s.point), text: '' }];
+    const mark = (spots: readonly Spot[], profile: Measurement['profile'], text: string): Mark[] => {
+      const rights = spots.map(({ stream }) => this.view.rightOf(stream));
+      if (rights.length === 0 || rights.includes(null)) return []; // of a stream that is not to be seen
+      const placed = ([x, y, z]: Vec3, right: number): Vec3 => [x + right, y, z];
+      const path = profile.flatMap(([a, b]) => [placed(a.point, rights[0]!), placed(b.point, rights[0]!)]);
+      return [{ points: path.length > 0 ? path : spots.map(({ point }, i) => placed(point, rights[i]!)), text }];
+    };
+    return [...this.measurements.flatMap((m) => mark(m.spots, m.profile, valueText(m))), ...mark(this.spots, [], '')];
   }
 
   private drawPlot(): void {

@@ -32,6 +32,7 @@ export interface DecodedFrame {
 
 export type DecodeReply =
   | { type: 'ready' }
+  | { type: 'loading' } // a part of the decoder; 'ready' follows
   | { type: 'unusable'; message: string } // the decoder cannot be loaded at all
   | { type: 'failed'; id: number; message: string }
   | DecodedFrame;

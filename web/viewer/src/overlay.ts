@@ -4,7 +4,7 @@ import type { Label } from './ground';
 import type { Vec3 } from './pick';
 
 export interface Mark {
-  points: Vec3[]; // rig camera's frame; joined by lines
+  points: Vec3[]; // of the scene; joined by lines
   text: string; // at the middle of the points
   closed?: boolean;
 }
@@ -15,7 +15,8 @@ const kFont = '11px system-ui, sans-serif';
 
 export class Overlay {
   private readonly context: CanvasRenderingContext2D;
-  marks: readonly Mark[] = [];
+  /** Asked for at each drawing: what they are on may have moved. */
+  marks: () => readonly Mark[] = () => [];
 
   constructor(private readonly canvas: HTMLCanvasElement) {
     this.context = canvas.getContext('2d')!;
@@ -42,7 +43,7 @@ export class Overlay {
       const place = project(at);
       if (place !== null) this.text(text, place.x, place.y + 9, style.getPropertyValue(colour), halo);
     }
-    for (const mark of this.marks) this.mark(mark, project, accent, halo);
+    for (const mark of this.marks()) this.mark(mark, project, accent, halo);
   }
 
   private mark({ points, text }: Mark, project: Project, accent: string, halo: string): void {

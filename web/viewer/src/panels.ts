@@ -71,6 +71,7 @@ export class Panels {
     const panel = this.panels.get(name)!;
     this.opened = open ? name : null;
     document.body.classList.toggle('with-panel', open);
+    if (!open && panel.box.contains(document.activeElement)) panel.button.focus(); // keys go on from where they began
     panel.box.hidden = !open;
     panel.button.setAttribute('aria-expanded', String(open));
     panel.changed?.(open);

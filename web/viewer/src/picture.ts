@@ -14,6 +14,7 @@ export class Picture {
   private wanted = false;
 
   set on(on: boolean) {
+    if (on === this.wanted) return;
     this.wanted = on;
     this.draw();
   }

@@ -46,16 +46,26 @@ export interface StreamStatus {
   drops_publish: number;
   reconstruct_ms?: number;
   encode_ms?: number;
+  /** Lower qualities that it is offered in; not said by older servers. */
+  rungs?: readonly { readonly quality: string }[];
 }
+
+/** How much detail a stream is sent with. */
+export const kRungs = ['full', 'reduced', 'texture'] as const;
+export type Rung = (typeof kRungs)[number];
+/** What a page may ask for; auto: as much as it can follow. */
+export const kQualities = ['auto', ...kRungs] as const;
+export type Quality = (typeof kQualities)[number];
 
 export type ServerMessage =
   | ({ type: 'info' } & StreamInfo)
   | ({ type: 'status' } & StreamStatus)
   | { type: 'waiting'; hint: string }
   | { type: 'gone' }
+  | { type: 'quality'; now: Rung; of: Rung[] }
   | { type: 'time'; t0: number; server_ms: number };
 
-const kTypes = ['info', 'status', 'waiting', 'gone', 'time'];
+const kTypes = ['info', 'status', 'waiting', 'gone', 'time', 'quality'];
 
 /** Null for a type of a later version. Throws on what is no message at all. */
 export function parseServerMessage(text: string): ServerMessage | null {
@@ -63,6 +73,7 @@ export function parseServerMessage(text: string): ServerMessage | null {
   if (typeof message !== 'object' || message === null || typeof message.type !== 'string') {
     throw new Error('the server sent a message without a type');
   }
+  if (message.type === 'quality') return parseQuality(message);
   return kTypes.includes(message.type) ? (message as ServerMessage) : null;
 }
 
@@ -91,12 +102,23 @@ export function parseFramePrefix(message: ArrayBuffer): FramePrefix {
   };
 }
 
-const kQualities = ['auto', 'full', 'reduced', 'texture'];
-
 /** The quality that a page's address asks for (`?quality=auto`); null: it says none, or none that there is. */
-export function wantedQuality(search: string): string | null {
+export function wantedQuality(search: string): Quality | null {
   const wanted = new URLSearchParams(search).get('quality');
-  return wanted !== null && kQualities.includes(wanted) ? wanted : null;
+  return kQualities.find((quality) => quality === wanted) ?? null;
+}
+
+const isRung = (name: unknown): name is Rung => kRungs.some((rung) => rung === name);
+
+// Of a later version: one that is not known here is as none.
+function parseQuality({ now, of }: { type?: unknown; now?: unknown; of?: unknown }): ServerMessage | null {
+  if (!isRung(now) || !Array.isArray(of)) return null;
+  return { type: 'quality', now, of: of.filter(isRung) };
+}
+
+/** What a stream is offered in, by the latest that was said of it. */
+export function offeredRungs(status: StreamStatus | null): Rung[] {
+  return kRungs.filter((rung) => rung === 'full' || (status?.rungs ?? []).some(({ quality }) => quality === rung));
 }
 
 export interface ListedStream {

@@ -4,7 +4,7 @@ import { utcNow } from './connection';
 import { Decoder } from './decoder';
 import type { DecodedFrame } from './messages';
 import { Meter } from './meter';
-import type { FramePrefix, ServerMessage, StreamInfo, StreamStatus } from './protocol';
+import type { FramePrefix, Rung, ServerMessage, StreamInfo, StreamStatus } from './protocol';
 import type { FrameSource, SourceEvents } from './source';
 
 export interface SessionEvents {
@@ -29,6 +29,7 @@ export class Session {
   source: FrameSource | null = null;
   info: StreamInfo | null = null; // while the stream is announced
   status: StreamStatus | null = null;
+  rung: Rung = 'full'; // how much detail comes now
   seen = false; // a frame was shown
   lastFrameAt = 0;
   everConnected = false;
@@ -60,6 +61,7 @@ export class Session {
     this.forget();
     this.info = this.status = null;
     this.seen = false;
+    this.rung = 'full';
     this.meter.restart();
     this.source = null;
     if (open === null) return;
@@ -102,6 +104,8 @@ export class Session {
       this.events.described(message, this.seen);
     } else if (message.type === 'status') {
       this.status = message;
+    } else if (message.type === 'quality') {
+      this.rung = message.now;
     } else if (message.type === 'waiting' || message.type === 'gone') {
       this.info = this.status = null;
       if (message.type === 'waiting') this.events.hint(message.hint);

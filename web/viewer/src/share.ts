@@ -3,12 +3,22 @@
 import { parseDisplay, writeDisplay, type Display } from './display';
 import type { Pose } from './navigator';
 import type { Vec3 } from './pick';
+import type { Quality } from './protocol';
 import type { Moment, Playback } from './source';
 
 /** What a link is of: streams of the server, the first and those beside it, or a recording in its folder. */
 export interface Shown {
   readonly kind: 'stream' | 'recording';
   readonly name: string;
+  readonly quality?: Quality | null; // that was chosen for a stream
+}
+
+/** Over an address; what else it asked for is gone. */
+export function address(page: string, { kind, name, quality }: Shown): URL {
+  const url = new URL(page);
+  url.search = `?${kind}=${name}`; // names hold no character that would have to be escaped
+  if (quality != null) url.search += `&quality=${quality}`;
+  return url;
 }
 
 export interface Shared {
@@ -33,9 +43,8 @@ export function shareLink(
   pose: Pose | null,
   moment: Moment | 'live' | null,
 ): string {
-  const url = new URL(page);
-  url.search = '';
-  if (shown !== null) url.searchParams.set(shown.kind, shown.name);
+  const url = shown === null ? new URL(page) : address(page, shown);
+  if (shown === null) url.search = '';
   const state = writeDisplay(display, null);
   state.delete('theme'); // is the reader's own
   if (pose !== null) {

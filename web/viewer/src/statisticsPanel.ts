@@ -21,10 +21,11 @@ export class StatisticsPanel {
     private readonly meter: Meter,
     private readonly status: () => StreamStatus | null,
     private readonly kept: () => Kept | null,
+    private readonly detail: () => string | null,
   ) {
     this.plot.setAttribute('role', 'img');
     this.plot.setAttribute('aria-label', say.plot);
-    this.section(say.stream, ['rate', 'bits', 'codecs', 'vertices']);
+    this.section(say.stream, ['rate', 'bits', 'detail', 'codecs', 'vertices']);
     this.section(say.sizes, [...kParts]);
     this.section(say.latency, ['total', ...kStages]);
     body.append(this.plot);
@@ -66,6 +67,7 @@ export class StatisticsPanel {
       value === null || value === undefined ? null : `${value.toFixed(1)} ms`;
     this.set('rate', `${figures.rate.toFixed(1)} /s`);
     this.set('bits', `${(figures.bits / 1e6).toFixed(2)} Mbit/s`);
+    this.set('detail', this.detail());
     this.set('codecs', journal.codecs === '' ? null : `${journal.codecs}${journal.isKey ? '' : say.delta}`);
     this.set('vertices', `${figures.vertices}, ${figures.triangles}`);
     const total = journal.parts === null ? 0 : kParts.reduce((sum, part) => sum + journal.parts![part], 0);

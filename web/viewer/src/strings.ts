@@ -2,7 +2,7 @@
 // What the page says, in one place.
 import type { Background, Mode, Theme, Way } from './display';
 import type { Placement } from './placement';
-import type { StreamStatus } from './protocol';
+import type { Quality, StreamStatus } from './protocol';
 
 const modes: Record<Mode, string> = {
   textured: 'Textured',
@@ -23,6 +23,8 @@ const ways: Record<Way, readonly [string, string]> = {
 const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
 const themes: Record<Theme, string> = { auto: 'As the system', dark: 'Dark', light: 'Light' };
+
+const qualities: Record<Quality, string> = { auto: 'As it can follow', full: 'Full', reduced: 'Reduced', texture: 'Picture alone' };
 
 export const text = {
   modes,
@@ -69,6 +71,17 @@ export const text = {
     fov: 'Field of view',
     fovOfRig: "as the rig's camera",
   },
+  quality: {
+    label: 'Quality',
+    names: qualities,
+    only: 'This stream comes in full only.',
+    missing: (wanted: string) => `This stream has no “${wanted}”.`,
+    notChosen: (now: string) => `${now} comes: nothing else was asked for.`,
+    asChosen: (now: string) => `${now} comes, as chosen.`,
+    soon: (now: string, wanted: string) => `${now} comes until “${wanted}” begins.`,
+    autoFull: 'Full comes: this page can follow.',
+    autoLess: (now: string) => `${now} comes: this page or its network could not follow more.`,
+  },
   measure: {
     title: 'Measure',
     tools: { point: 'Point', distance: 'Distance', angle: 'Angle', section: 'Section' },
@@ -90,6 +103,9 @@ export const text = {
     sectionCsvTitle: 'Save the last section, point by point',
     clear: 'Clear',
     remove: 'Remove this measurement',
+    otherStream:
+      'That place is of another stream. Lengths between streams are true only where they are placed in one frame, of one camera; a section is of one.',
+    cursorOf: (stream: string, read: string) => `${stream} · ${read}`,
     cursor: (depth: string, x: string, y: string) => `depth ${depth} · right ${x} · up ${y}`,
   },
   picture: "The camera's picture, as it lies on the surface",
@@ -107,6 +123,7 @@ export const text = {
     names: {
       rate: 'drawn',
       bits: 'received',
+      detail: 'quality',
       codecs: 'codecs',
       vertices: 'vertices, triangles',
       geometry: 'geometry',
@@ -195,6 +212,7 @@ export const text = {
   },
   shifted: { playing: 'Behind live', paused: 'Paused' },
   timeline: {
+    stream: 'Stream that the time line is of',
     live: 'Live',
     goLive: 'Back to live (L)',
     isLive: 'Live: what comes is shown',

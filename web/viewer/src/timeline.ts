@@ -20,6 +20,8 @@ export class Timeline {
   private readonly live = button(say.live, '', () => this.playback?.follow());
   private readonly speed = make('select', { title: say.speed });
   private readonly range = button(say.range, say.rangeTitle, () => this.cycleLoop());
+  private readonly streams = make('select', { title: say.stream, hidden: true, className: 'stream' });
+  private offered = '';
   private playback: Playback | null = null;
   private absolute = false;
   private dirty = false;
@@ -32,20 +34,24 @@ export class Timeline {
   constructor(
     private readonly box: HTMLElement,
     private readonly shown: (shown: boolean) => void = () => undefined,
+    /** `chosen` gets the name of one that was offered beside the first; null: the first. */
+    chosen: (name: string | null) => void = () => undefined,
   ) {
     this.slider.setAttribute('aria-label', say.slider);
     this.speed.setAttribute('aria-label', say.speed);
     for (const speed of kSpeeds) this.speed.append(make('option', { value: String(speed) }, `${speed}×`));
+    this.streams.setAttribute('aria-label', say.stream);
+    this.streams.onchange = () => chosen(this.streams.selectedIndex === 0 ? null : this.streams.value);
     this.slider.oninput = () => this.playback?.seek(Number(this.slider.value));
     this.speed.onchange = () => this.playback?.setSpeed(Number(this.speed.value));
     const track = make('div', { className: 'track' }, this.track, this.slider);
     const steps = [button('‹', say.back, () => this.playback?.step(-1)), button('›', say.ahead, () => this.playback?.step(1))];
     for (const b of steps) b.setAttribute('aria-label', b.title);
-    track.onpointermove = (event) => this.point(track, event.clientX);
+    track.onpointermove = track.onpointerenter = (event) => this.point(track, event.clientX);
     track.onpointerleave = () => this.unpoint();
     this.live.id = 'follow';
     this.time.className = 'time';
-    this.box.append(this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
+    this.box.append(this.streams, this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
     new ResizeObserver(() => (this.dirty = true)).observe(this.track);
     this.timer = window.setInterval(() => this.refresh(), kRefreshMs);
   }
@@ -55,7 +61,20 @@ export class Timeline {
     window.clearInterval(this.timer);
   }
 
+  /** The streams that it can be of, the first one first; none: there is no choice. `chosen` null: the first. */
+  offer(names: readonly string[], chosen: string | null): void {
+    this.streams.hidden = names.length < 2;
+    if (names.join() !== this.offered) {
+      this.offered = names.join();
+      this.streams.replaceChildren(...names.map((name) => make('option', { value: name }, name)));
+    }
+    const at = Math.max(0, names.indexOf(chosen ?? ''));
+    if (this.streams.selectedIndex !== at) this.streams.selectedIndex = at;
+  }
+
+  /** Also again and again: nothing happens where it is the one shown. */
   show(playback: Playback | null): void {
+    if (playback === this.playback) return;
     this.playback = playback;
     if (playback !== null) playback.changed = () => (this.dirty = true);
     this.dirty = true;
@@ -156,7 +175,7 @@ export class Timeline {
     const position = p.position;
     if (!this.slider.matches(':active')) this.slider.value = String(position);
     const frame = frameAt(p.times, position);
-    const time = this.timeText(p, position);
+    const time = this.timeText(p, p.following === true ? this.end : position);
     this.slider.setAttribute('aria-valuetext', say.at(time, frame + 1, p.times.length));
     setText(this.time, time);
     const label = p.playing ? say.pause : say.play;
@@ -179,7 +198,7 @@ export class Timeline {
   private timeText(p: Playback, position: number): string {
     if (this.absolute) return absoluteText(p.startMs + position);
     if (p.following === null) return `${clockText(position)} / ${clockText(this.end)}`;
-    return say.behind(clockText(p.following ? 0 : this.end - position));
+    return say.behind(clockText(Math.max(0, this.end - position)));
   }
 
   private drawMarks(p: Playback): void {

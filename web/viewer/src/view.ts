@@ -25,6 +25,13 @@ export interface Beside {
   extent: Extent | null; // of its first frame
 }
 
+/** A place of one of the surfaces, in the frame of its own camera. */
+export interface Hit extends Picked {
+  readonly stream: string;
+  readonly surface: DecodedFrame;
+  readonly right: number; // metres from that frame to the scene's
+}
+
 export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
   beforeDraw(): void;
@@ -36,6 +43,8 @@ export interface ViewEvents {
 export class View {
   readonly navigator: Navigator;
   readonly overlay: Overlay;
+  /** The processor draws, the rest of the page too. */
+  readonly inSoftware = drawnInSoftware();
   private readonly sizes = new ResizeObserver(() => this.resize());
   private ended = false;
   private readonly renderer: THREE.WebGLRenderer;
@@ -67,7 +76,7 @@ export class View {
     keys: EventTarget = window,
   ) {
     // Four samples a pixel cost a processor that draws more than all the rest.
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !drawnInSoftware(), alpha: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.inSoftware, alpha: true });
     this.renderer.setClearAlpha(0);
     this.overlay = new Overlay(overlay);
     const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
@@ -163,6 +172,9 @@ export class View {
   private get meshes(): SurfaceMesh[] {
     return [this.surface, ...this.besides.map(({ mesh }) => mesh)];
   }
+  private get names(): string[] {
+    return [this.name, ...this.besides.map(({ name }) => name)];
+  }
   private get extents(): (Extent | null)[] {
     return [this.extent, ...this.besides.map(({ extent }) => extent)];
   }
@@ -183,11 +195,36 @@ export class View {
     this.navigator.setExtent(all);
   }
 
-  /** What of the surface is at this place of the page (pixels of it, from the canvas' upper left corner). */
-  pick(at: { x: number; y: number }): Picked | null {
-    const frame = this.surface.shown;
+  /** What is at this place of the page (pixels of it, from the canvas' upper left corner): the first of all surfaces. */
+  pick(at: { x: number; y: number }): Hit | null {
     const ray = this.navigator.ray(at);
-    return frame === null || ray === null ? null : pick(frame, ray.origin, ray.direction);
+    if (ray === null) return null;
+    let first: Hit | null = null;
+    for (const [i, { shown: surface }] of this.meshes.entries()) {
+      const stream = this.names[i]!;
+      const right = this.rightOf(stream);
+      if (surface === null || right === null) continue;
+      const [x, y, z] = ray.origin;
+      const picked = pick(surface, [x - right, y, z], ray.direction);
+      if (picked !== null && (first === null || picked.along < first.along)) first = { ...picked, stream, surface, right };
+    }
+    return first;
+  }
+
+  /** How far a stream's surface stands to the right of its camera's frame, metres; null: it is not to be seen. */
+  rightOf(stream: string): number | null {
+    const i = this.names.indexOf(stream);
+    return i < 0 || (i > 0 && this.isRigView) ? null : (this.offsets[i] ?? 0);
+  }
+
+  /** Whether there is none beside the first. */
+  get isAlone(): boolean {
+    return this.besides.length === 0;
+  }
+
+  /** Whether all surfaces stand in one camera's frame, so that lengths between them are true. */
+  get isTogether(): boolean {
+    return this.placement_ === 'together';
   }
 
   /** For good: gives back what it holds of the card. */
@@ -300,7 +337,7 @@ export class View {
   private get labels(): readonly Label[] {
     const ground = this.showsGround ? this.ground.labels : [];
     if (this.besides.length === 0 || this.navigator.isRigView) return ground;
-    const names = [this.name, ...this.besides.map(({ name }) => name)];
+    const { names } = this;
     const above = this.extents.flatMap((extent, i): Label[] => {
       if (extent === null) return [];
       const { min, max } = extent;

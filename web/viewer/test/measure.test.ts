@@ -4,7 +4,7 @@ import { describe, expect, it } from 'vitest';
 import { lengthText, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
 import type { Surface, Vec3 } from '../src/pick';
 
-const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma });
+const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma, stream: 'face' });
 const eye: Vec3 = [0, 0, 0];
 
 /** A roof: z = 2 + |x| / 2 for x, y in -1..1. */
