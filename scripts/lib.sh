@@ -140,6 +140,10 @@ jobs_for_machine() {
   echo $((cores < by_memory ? cores : by_memory))
 }
 
+# Tests at a time: many wait for networks, time-outs and each other, and so two a core; those that cannot bear each other
+# say so by RESOURCE_LOCK.
+tests_for_machine() { echo $((2 * $(jobs_for_machine))); }
+
 # build PRESET [TARGET...]: configures where needed and builds.
 build() {
   local preset=$1 dir=$root/build/$1 args=() log

@@ -252,7 +252,7 @@ const checks = {
     await page.screenshot({ path: join(shots, 'lost.png') });
     feeder = await Feeder.restart(feederPath, port);
     feeder.say('start ball');
-    await page.click('#retry').catch(() => undefined); // it may have tried by itself meanwhile
+    page.click('#retry').catch(() => undefined); // not waited for: it may have tried by itself meanwhile
     await inState(page, 'live');
     await more(page, 2);
   },

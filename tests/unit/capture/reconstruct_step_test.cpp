@@ -15,6 +15,7 @@ namespace relievo {
 namespace {
 
 const std::string kSmall = ",width=320,height=240,stripes=45";
+const std::string kSmaller = ",width=192,height=144,stripes=30";  // where nothing is measured in millimetres
 
 struct Kept {
   std::vector<StepReport> reports;
@@ -46,8 +47,7 @@ TEST(StepKeeper, FindsThePhase) {
   for (const std::string more : {"", ",scan=progressive", ",field_order=bottom", ",scheme=white-field",
                                  ",noise=5,ambient=0.5", ",albedo=0.3"}) {
     for (const double phase : {0.0, 0.15, 0.4, 0.75, 1.0, 1.3, 1.9, 3.1}) {
-      const Kept kept =
-          keep("object,frames=3,phase=" + std::to_string(phase) + more + ",width=192,height=144,stripes=30");
+      const Kept kept = keep("object,frames=3,phase=" + std::to_string(phase) + more + kSmaller);
       ASSERT_EQ(kept.reports.size(), 3U);
       EXPECT_FALSE(kept.reports[0].phase);  // a phase takes two frames
       for (std::size_t i = 1; i < 3; ++i) {
@@ -80,7 +80,7 @@ TEST(StepKeeper, MotionIsNoMixture) {
 TEST(StepKeeper, LostFramesThatNoTimeStampTellsOfCostNoOthers) {
   for (const std::string scene : {"walk", "object", "face"}) {
     for (const std::string more : {"", ",scheme=white-field", ",scan=progressive"}) {
-      const Kept kept = keep(scene + ",frames=20,drop=5" + more + kSmall, false);
+      const Kept kept = keep(scene + ",frames=20,drop=5" + more + kSmaller, false);
       for (std::size_t i = 0; i < kept.given.size(); ++i) {
         EXPECT_TRUE(kept.given[i]) << scene << more << " " << i;
         EXPECT_FALSE(kept.reports[i].regrouped) << scene << more << " " << i;
@@ -91,14 +91,14 @@ TEST(StepKeeper, LostFramesThatNoTimeStampTellsOfCostNoOthers) {
 
 TEST(StepKeeper, OtherSchemesAreTakenAsTheyAre) {
   for (const std::string scheme : {"white-frame", "one-slide"}) {
-    const Kept kept = keep("object,frames=4,phase=0.4,scheme=" + scheme + kSmall);
+    const Kept kept = keep("object,frames=4,phase=0.4,scheme=" + scheme + kSmaller);
     for (const bool given : kept.given) EXPECT_TRUE(given);
   }
 }
 
 TEST(StepDrift, IsTheSimulatedOne) {
   for (const double drift : {1.5, -0.8}) {
-    const Kept kept = keep("plane,frames=40,phase=6,drift=" + std::to_string(drift) + kSmall);
+    const Kept kept = keep("plane,frames=40,phase=6,drift=" + std::to_string(drift) + kSmaller);
     StepDrift measured;
     int mixed = 0;
     int truly_mixed = 0;

@@ -65,7 +65,9 @@ TEST_F(GatewayTls, WhoSpeaksPlainIsSentToHttps) {
 }
 
 TEST_F(GatewayTls, OldVersionsAndNoiseAreRefusedAndCounted) {
-  start({.port = 0, .web = {.tls_cert = cert, .tls_key = key}, .request_time = 500ms});
+  start({.port = 0,
+         .web = {.tls_cert = cert, .tls_key = key},
+         .request_time = 2s});  // enough for who is no noise
   TcpClient noise(port);
   noise.send("\x16\x03\x01 this is no client's hello and never will be one");
   while (noise.receive()) {
