@@ -12,12 +12,13 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMargin = 2;
 
 // Measured on simulated scenes: of what these let through, nine out of ten are right.
-constexpr float kAlong_px = 0.6F;        // off what the line above or below predicts
-constexpr float kRegular = 1.4F;         // times a distance of boundaries, the one next to it
-constexpr float kLeastRoom_px = 1.F;     // to the boundaries beside it
-constexpr float kWidest_px = 40.F;       // of a stripe
-constexpr float kPredicted_px = 0.2F;    // standard deviation of a prediction
-constexpr float kWorst_px = 0.4F;        // standard deviation of a boundary where the scene holds still,
+constexpr float kAlong_px = 0.6F;      // off what the line above or below predicts
+constexpr float kRegular = 1.4F;       // times a distance of boundaries, the one next to it
+constexpr float kLeastRoom_px = 1.F;   // to the boundaries beside it
+constexpr float kWidest_px = 40.F;     // of a stripe
+constexpr float kPredicted_px = 0.2F;  // standard deviation of a prediction
+constexpr float kOwnShare = 0.5F;  // of the weight of its own place, which what it was doubted for draws off
+constexpr float kWorst_px = 0.3F;  // standard deviation of a boundary where the scene holds still,
 constexpr float kWorstMoving_px = 0.2F;  // and where it moves
 // Where the scene holds still, what is against a boundary is as good as what is for it, unless contrast
 // spoils both; and a step's own edge goes on from a true boundary over many lines.
@@ -107,7 +108,7 @@ bool Readmission::take_back(const Candidate& candidate, SequenceResult& result, 
                        regular(right, here[2].column_px - here[1].column_px);
   if (along.count == 0 && !between) return false;
   if (along.count > 0) {
-    const float own_weight = 1 / (edge.sigma_px * edge.sigma_px);
+    const float own_weight = kOwnShare / (edge.sigma_px * edge.sigma_px);
     const float one_weight = 1 / (kPredicted_px * kPredicted_px);
     const float weights = own_weight + one_weight * static_cast<float>(along.count);
     edge.column_px = (own_weight * own + one_weight * along.sum_px) / weights;

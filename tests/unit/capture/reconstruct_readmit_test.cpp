@@ -133,12 +133,12 @@ TEST(Readmission, ABoundaryThatIsThereAlreadyIsNotTakenBackTwice) {
 TEST(Readmission, NeitherIsOneThatIsTooUncertain) {
   Frame f;
   f.doubt(7, 0);
-  f.edge(7, 0).sigma_px = 0.4F;
+  f.edge(7, 0).sigma_px = 0.3F;
   f.doubt(12, 0);
-  f.edge(12, 0).sigma_px = 0.4F;
+  f.edge(12, 0).sigma_px = 0.3F;
   f.result.still[Frame::at(12, 0)] = 0;
   f.doubt(15, 0);
-  f.edge(15, 0).sigma_px = 0.6F;
+  f.edge(15, 0).sigma_px = 0.4F;
   EXPECT_EQ(f.readmit(), 1U);
   EXPECT_TRUE(f.decoded(7, 0));
   EXPECT_GE(f.edge(7, 0).sigma_px, 0.1F);
