@@ -17,8 +17,9 @@ declare global {
       pose(): object | null;
       link(): string;
       extent(): object | null;
-      /** The surface shown, told apart from others by a hash of its numbers. */
-      surface(): { number: number; hash: number } | null;
+      /** The surface shown, told apart from others by a hash of its numbers, or by its mean depth in metres where other
+       * decoders, which round elsewhere, are to tell the same. */
+      surface(): { number: number; depth: number; hash: number } | null;
     };
   }
 }
@@ -47,7 +48,10 @@ export function report(viewer: Reporting): void {
       const frame = viewer.view?.shown ?? null;
       if (frame === null) return null;
       const { buffer, byteOffset, byteLength } = frame.positions;
-      return { number: frame.number, hash: crc32(new Uint8Array(buffer, byteOffset, byteLength)) };
+      let depth = 0;
+      for (let i = 2; i < frame.positions.length; i += 3) depth += frame.positions[i]!;
+      depth /= Math.max(1, frame.positions.length / 3);
+      return { number: frame.number, depth, hash: crc32(new Uint8Array(buffer, byteOffset, byteLength)) };
     },
     link: () => viewer.link(),
     pose: () => viewer.view?.navigator.pose ?? null,
