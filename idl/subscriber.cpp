@@ -27,7 +27,7 @@ namespace {
 constexpr std::uint32_t kTakeAtOnce = 16;
 constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;    // for the first key frame of a lower rung
 constexpr std::int64_t kStatusTime_ns = kNanosecondsPerSecond;  // for the status of a stream that has one
-constexpr int kSilence = 3;               // of those, until a way here counts as blocked
+constexpr int kSilence = 3;               // times kMakeTime_ns, until a way here counts as blocked
 constexpr std::size_t kMaxStreams = 256;  // what a hostile peer can make us remember
 
 // What is remembered of a stream. It is there while it writes to any topic: DDS marks a topic's instance as

@@ -140,8 +140,8 @@ jobs_for_machine() {
   echo $((cores < by_memory ? cores : by_memory))
 }
 
-# Tests at a time: many wait for networks, time-outs and each other, and so two a core; those that cannot bear each other
-# say so by RESOURCE_LOCK.
+# Tests at a time: many wait for networks, time-outs and each other, and so two a core; those that need it to themselves
+# say so by RUN_SERIAL.
 tests_for_machine() { echo $((2 * $(jobs_for_machine))); }
 
 # build PRESET [TARGET...]: configures where needed and builds.
