@@ -13,35 +13,35 @@ namespace {
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMargin = 2;
 
-// The step between a boundary's two colours.
-constexpr std::size_t kSteps = 9;     // to each side of the prediction it is looked at,
-constexpr std::size_t kFurthest = 5;  // and looked for,
-constexpr float kStep_px = 0.5F;      // so far apart
-constexpr float kArm_px = 1.5F;       // each side's colour is read this far from it
-constexpr float kNearly = 0.85F;      // of the greatest rise
-constexpr float kLeastStep = 0.25F;   // of the light there
+constexpr int kCell_px = 4;      // in which motion is told,
+constexpr int kCellsAround = 3;  // and around an edge that moves
 
-// The colours themselves.
-constexpr int kReach_px = 14;         // light around in which each primary is somewhere at its brightest
-constexpr float kFull = 0.5F;         // of the brightest primary, what each is taken to reach
-constexpr float kDark = 12.F;         // grey levels; less is no light
-constexpr float kOff = 0.4F;          // of its brightest: in between on and off
-constexpr float kClear = 0.25F;       // to either side of that it is clear
-constexpr float kLeastAgree = 0.55F;  // of each side's colour, -1..1
-constexpr float kDisagrees = 0.2F;    // less: a side is of another colour
-constexpr float kMostSide_px = 4.5F;  // colours are read up to here
+// Next to a boundary of the line, by the pitch of the lines around or of the line itself.
+constexpr int kPitchLines = 2;
+constexpr float kLeastPitch = 0.7F;  // of the frame's: a surface that turns away is too steep to go on
+constexpr float kMostPitch = 1.4F;
+constexpr float kPitch_px = 0.8F;      // standard deviation,
+constexpr float kLinePitch_px = 1.8F;  // and by the line's own
+constexpr float kMostMoved_px = 1.2F;  // farther from where it is expected it is another surface's
 
-constexpr float kLeastRoom_px = 3.F;  // to the next boundary
-constexpr float kOpen_px = 12.F;      // where there is none
-constexpr int kCell_px = 4;           // in which motion is told,
-constexpr int kCellsAround = 3;       // and around an edge that moves
+// What the frame before and what stands still say.
+constexpr float kStands_px = 0.1F;  // less from one frame to the next, and it stands still,
+constexpr float kSure_px = 0.2F;    // what is less sure of its place is not remembered
+constexpr float kStood_px = 0.3F;   // or, where the field shows it, comes back
+constexpr float kOthers_px = 0.5F;  // another boundary was so near: it still is
+constexpr float kOthersStand_px = 0.3F;
+constexpr float kElsewhere = 2.F;   // pitches: it was on what has moved away
+constexpr float kSameLook = 0.12F;  // Backdrop::difference of what is back
+constexpr float kAlike = 0.2F;      // the same, where the step is seen, too
+constexpr float kSameEdge_px = 0.3F;
+constexpr float kRoom_px = 2.F;       // no other edge so near to what comes back
+constexpr float kRestored_px = 0.1F;  // its standard deviation
+constexpr int kLooksEvery = 4;        // frames
 
 // Standard deviations, measured on simulated scenes.
-constexpr float kFound_px = 0.4F;     // of where the field shows the step
 constexpr float kBetween_px = 0.12F;  // between the lines above and below,
 constexpr float kLeanShare = 0.2F;    // and of their difference more
 constexpr float kOneSide_px = 1.F;    // from one line
-constexpr float kApartShare = 0.3F;   // of the distance between the two
 
 // What tells where a boundary is.
 constexpr unsigned kAbove = 1, kBelow = 2, kLeft = 4, kRight = 8;
@@ -50,56 +50,46 @@ bool known(float x) {
   return x == x;
 }
 
+/// The nearest edge, if there is one within kRoom_px.
+std::optional<std::uint32_t> edge_near(const EdgeImage& edges, int line, float column_px) {
+  std::optional<std::uint32_t> out;
+  float nearest = kRoom_px;
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const float apart = std::fabs(edges.edges[e].column_px - column_px);
+    if (apart > nearest) continue;
+    nearest = apart;
+    out = e;
+  }
+  return out;
+}
+
 }  // namespace
 
-struct Growth::Light {
-  static constexpr int kColumns = 2 * kReach_px + 1;
-  std::array<std::array<float, kColumns>, 3> primary;
-  std::array<float, 3> full;
-  int first;
+/// On a line, of a place.
+struct Growth::Neighbours {
+  float left_px, right_px;  // infinite where there is none
+  int left, right;          // boundaries
 
-  float at(std::size_t c, float column_px) const {
-    const float off = column_px - static_cast<float>(first);
-    const int i = static_cast<int>(off);
-    const float share = off - static_cast<float>(i);
-    const auto k = static_cast<std::size_t>(i);
-    return primary[c][k] + share * (primary[c][k + 1] - primary[c][k]);
+  /// Whether boundaries so near to the place are in the pattern's order with one there.
+  bool in_order(int boundary, float column_px) const {
+    return !(column_px - left_px < StepFinder::kOpen_px && left > boundary) &&
+           !(right_px - column_px < StepFinder::kOpen_px && right < boundary);
   }
-
-  /// Of columns [from, to] with a colour, -1..1.
-  float agreement(Primary colour, float from, float to) const {
-    const int begin = static_cast<int>(from + 0.5F);
-    const int last = std::max(begin, static_cast<int>(to + 0.5F));
-    float sum = 0;
-    for (int x = begin; x <= last; ++x) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float share = primary[c][static_cast<std::size_t>(x - first)] / full[c];
-        const float on = std::clamp((share - kOff) / kClear, -1.F, 1.F);
-        sum += (colour >> c & 1) != 0 ? on : -on;
-      }
-    }
-    return sum / static_cast<float>(3 * (last - begin + 1));
-  }
-
-  /// Of the side that agrees less with a boundary's colours.
-  float agreement(const std::array<Primary, 2>& colours, float column_px, float free_left_px,
-                  float free_right_px) const {
-    const float l = std::min(0.55F * free_left_px, kMostSide_px);
-    const float r = std::min(0.55F * free_right_px, kMostSide_px);
-    return std::min(agreement(colours[0], column_px - l, column_px - 0.5F * l),
-                    agreement(colours[1], column_px + 0.5F * r, column_px + r));
+  StepPrediction prediction(float column_px, float sigma_px) const {
+    return {column_px, sigma_px, std::min(column_px - left_px, StepFinder::kOpen_px),
+            std::min(right_px - column_px, StepFinder::kOpen_px)};
   }
 };
 
 Growth::Growth(const std::array<double, 9>& colour_matrix, int boundaries, int lines)
-    : boundaries_(boundaries),
+    : steps_(colour_matrix),
+      backdrop_(boundaries, lines),
+      boundaries_(boundaries),
       lines_(lines),
       stride_(static_cast<std::size_t>(boundaries) + 2 * kMargin),
       now_(stride_ * static_cast<std::size_t>(lines + 2 * kMargin), kNone),
-      before_(now_) {
-  std::transform(colour_matrix.begin(), colour_matrix.end(), colour_.begin(),
-                 [](double m) { return static_cast<float>(m); });
-}
+      before_(now_) {}
 
 float* Growth::row(std::vector<float>& grid, int line) const {
   return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
@@ -133,6 +123,65 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   }
   for (const RecoveredBoundary& r : recovered) row(now_, r.line)[r.boundary] = r.column_px;
   mostly_still_ = 2 * still > decoded;
+  measure_pitch();
+}
+
+void Growth::measure_pitch() {
+  constexpr int kEvery = 8;  // lines
+  float sum = 0;
+  std::size_t count = 0;
+  for (int line = 0; line < lines_; line += kEvery) {
+    const float* here = row(now_, line);
+    for (int b = 0; b + 1 < boundaries_; ++b) {
+      const float apart = here[b + 1] - here[b];
+      if (!(apart > 0)) continue;
+      sum += apart;
+      ++count;
+    }
+  }
+  pitch_px_ = count == 0 ? 0 : sum / static_cast<float>(count);
+}
+
+void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
+                           const SequenceResult& result) {
+  const float* before = row(before_, line);
+  const bool turn = line % kLooksEvery == frame_ / 2 % kLooksEvery;
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int b = result.boundary[e];
+    if (b < 0) continue;
+    const float column = edges.edges[e].column_px;
+    if (edges.edges[e].sigma_px > kSure_px) continue;
+    if (result.still[e] == 0 && !(std::fabs(before[b] - column) < kStands_px)) continue;
+    if (turn || !backdrop_.knows(view.slide, line, b, column)) backdrop_.remember(view, line, b, column);
+  }
+}
+
+/// What moved away uncovers what stood behind it: an edge of the difference where both fields show it, a step
+/// of the field where that alone does.
+std::size_t Growth::restore_line(const SlideFieldView& view, int line, const EdgeImage& edges,
+                                 SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
+  float* here = row(now_, line);
+  std::size_t restored = 0;
+  for (int b = 0; b < boundaries_; ++b) {
+    if (known(here[b])) continue;
+    const float column = backdrop_.column_px(line, b);
+    if (!known(column) || !moves(line, column)) continue;
+    if (!(backdrop_.difference(view, line, b, column).value_or(1) < kSameLook)) continue;
+    const std::optional<std::uint32_t> near = edge_near(edges, line, column);
+    if (near && std::fabs(edges.edges[*near].column_px - column) < kSameEdge_px) {
+      if (result.boundary[*near] >= 0) here[result.boundary[*near]] = kNone;
+      result.boundary[*near] = static_cast<std::int16_t>(b);
+      here[b] = edges.edges[*near].column_px;
+    } else if (near && result.boundary[*near] >= 0) {
+      continue;
+    } else {
+      here[b] = column;
+      recovered.push_back({line, b, column, kRestored_px, 0});
+    }
+    ++restored;
+  }
+  return restored;
 }
 
 /// Whether an edge near a place was elsewhere two frames ago.
@@ -141,118 +190,135 @@ bool Growth::moves(int line, float column_px) const {
   return cell >= 0 && cell < cells_ && moving_[static_cast<std::size_t>(line * cells_ + cell)] != 0;
 }
 
-std::optional<Growth::Prediction> Growth::predict(int line, int boundary) {
+Growth::Neighbours Growth::neighbours(int line, float column_px) {
   const float* here = row(now_, line);
-  std::array<float, 2> places{};
-  std::size_t count = 0;
-  unsigned sources = 0;
+  Neighbours out{-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(), -1,
+                 boundaries_};
+  for (int b = 0; b < boundaries_; ++b) {
+    const float px = here[b];
+    if (px < column_px && px > out.left_px) {
+      out.left_px = px;
+      out.left = b;
+    } else if (px >= column_px && px < out.right_px) {
+      out.right_px = px;
+      out.right = b;
+    }
+  }
+  return out;
+}
+
+/// From boundary + `side` to the boundary, by the nearest lines that have both; NaN where none has.
+float Growth::pitch_beside(int line, int boundary, int side) {
+  for (int lines = 1; lines <= kPitchLines; ++lines) {
+    float sum = 0;
+    int count = 0;
+    for (const int direction : {-lines, lines}) {
+      const float* there = row(now_, line + direction);
+      const float apart = there[boundary] - there[boundary + side];
+      if (!known(apart)) continue;
+      sum += apart;
+      ++count;
+    }
+    if (count > 0) return sum / static_cast<float>(count);
+  }
+  return kNone;
+}
+
+/// As far from the next one on the line as on the lines around, or as that one is from its next.
+std::optional<Growth::Prediction> Growth::predict_beside(int line, int boundary) {
+  const float* here = row(now_, line);
+  for (const int side : {-1, 1}) {
+    const float from = here[boundary + side];
+    if (!known(from)) continue;
+    float sigma = kPitch_px;
+    float pitch = pitch_beside(line, boundary, side);
+    if (!known(pitch)) {
+      pitch = from - here[boundary + 2 * side];
+      sigma = kLinePitch_px;
+    }
+    const float apart = static_cast<float>(-side) * pitch;
+    if (!(apart > kLeastPitch * pitch_px_ && apart < kMostPitch * pitch_px_)) continue;
+    const float column = from + pitch;
+    if (!moves(line, column)) continue;
+    const Neighbours near = neighbours(line, column);
+    if (!near.in_order(boundary, column)) continue;
+    if (side < 0 ? near.left != boundary - 1 : near.right != boundary + 1) continue;
+    return Prediction{near.prediction(column, sigma), true};
+  }
+  return std::nullopt;
+}
+
+/// Where the boundary is on the nearest of two lines above, and below.
+Growth::Around Growth::around(int line, int boundary) {
+  Around out;
   for (const int direction : {-1, 1}) {
     for (const int lines : {direction, 2 * direction}) {
       const float px = row(now_, line + lines)[boundary];
       if (!known(px)) continue;
-      places[count++] = px;
-      sources |= direction < 0 ? kAbove : kBelow;
+      out.column_px[out.count++] = px;
+      out.sources |= direction < 0 ? kAbove : kBelow;
       break;
     }
   }
-  if (count == 0) return std::nullopt;
+  return out;
+}
+
+/// Between the lines above and below, or, where the scene holds still but for what moves there, from one of
+/// them.
+std::optional<Growth::Prediction> Growth::predict_between(int line, int boundary, const Around& places) {
+  const float* here = row(now_, line);
+  unsigned sources = places.sources;
   if (known(here[boundary - 1])) sources |= kLeft;
   if (known(here[boundary + 1])) sources |= kRight;
-  const bool both = count == 2;
+  const bool both = places.count == 2;
   const bool beside = (sources & (kLeft | kRight)) != 0;
   if (!both && (!beside || !mostly_still_)) return std::nullopt;
   // What the frame before had there and this one does not may be covered by now.
   if (!both && known(row(before_, line)[boundary])) return std::nullopt;
   std::uint8_t& tried = tried_[static_cast<std::size_t>(line * boundaries_ + boundary)];
   if (std::exchange(tried, static_cast<std::uint8_t>(sources)) == sources) return std::nullopt;
-  const float column = both ? 0.5F * (places[0] + places[1]) : places[0];
-  float left = -std::numeric_limits<float>::infinity();
-  float right = std::numeric_limits<float>::infinity();
-  int left_index = -1;
-  int right_index = boundaries_;
-  for (int b = 0; b < boundaries_; ++b) {
-    const float px = here[b];
-    if (px < column && px > left) {
-      left = px;
-      left_index = b;
-    } else if (px >= column && px < right) {
-      right = px;
-      right_index = b;
-    }
-  }
-  if ((column - left < kOpen_px && left_index > boundary) ||
-      (right - column < kOpen_px && right_index < boundary))
-    return std::nullopt;
+  const float column = both ? 0.5F * (places.column_px[0] + places.column_px[1]) : places.column_px[0];
+  const Neighbours near = neighbours(line, column);
+  if (!near.in_order(boundary, column)) return std::nullopt;
   // Where the scene holds still, what is against a boundary is as good as what is for it.
   if (!both && !moves(line, column)) return std::nullopt;
-  const float sigma = both ? kBetween_px + kLeanShare * std::fabs(places[1] - places[0]) : kOneSide_px;
-  return Prediction{column, sigma, std::min(column - left, kOpen_px), std::min(right - column, kOpen_px)};
+  const float sigma =
+      both ? kBetween_px + kLeanShare * std::fabs(places.column_px[1] - places.column_px[0]) : kOneSide_px;
+  return Prediction{near.prediction(column, sigma), false};
 }
 
-void Growth::read(const std::uint8_t* pixels, int centre, Light& out) const {
-  out.first = centre - kReach_px;
-  out.full = {};
-  const std::uint8_t* p = pixels + 3 * out.first;
-  for (std::size_t i = 0; i < Light::kColumns; ++i, p += 3) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float value = std::max(0.F, colour_[3 * c] * static_cast<float>(p[0]) +
-                                            colour_[3 * c + 1] * static_cast<float>(p[1]) +
-                                            colour_[3 * c + 2] * static_cast<float>(p[2]));
-      out.primary[c][i] = value;
-      out.full[c] = std::max(out.full[c], value);
-    }
+/// Whether what stands still, and what the frame before saw, allow a boundary there. A place that only looks
+/// as if the boundary before it went on is the more likely to be of another surface, the more is known of
+/// that.
+bool Growth::fits_before(const SlideFieldView& view, int line, int boundary, const FoundStep& found,
+                         bool beside) {
+  const float column = found.column_px;
+  if (std::fabs(found.moved_px) > kMostMoved_px) return false;
+  const float* before = row(before_, line);
+  const float since = std::fabs(before[boundary] - column);
+  const bool stood = since < kStood_px || since > kElsewhere * pitch_px_;
+  if (backdrop_.stands(line, boundary, column)) {
+    const auto difference = backdrop_.difference(view, line, boundary, column);
+    return difference ? *difference < kAlike : stood;
   }
-  const float brightest = std::max({out.full[0], out.full[1], out.full[2], 2 * kDark});
-  for (float& full : out.full) full = std::max(full, kFull * brightest);
+  if (beside && !stood) {
+    const float* here = row(now_, line);
+    for (const int next : {boundary - 1, boundary + 1})
+      if (next >= 0 && next < boundaries_ && backdrop_.stands(line, next, here[next])) return false;
+  }
+  for (int b = 0; b < boundaries_; ++b) {
+    if (b == boundary) continue;
+    if (std::fabs(before[b] - column) < kOthers_px) return false;
+    if (std::fabs(backdrop_.column_px(line, b) - column) < kOthersStand_px) return false;
+  }
+  return true;
 }
 
-std::optional<Growth::Found> Growth::find(const SlideFieldView& view, int line, int boundary,
-                                          const Prediction& p) const {
-  const int centre = static_cast<int>(p.column_px + 0.5F);
-  if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) return std::nullopt;
-  Light light;
-  read(view.field.row(line), centre, light);
-  const auto [left, right] = view.colours[static_cast<std::size_t>(boundary)];
-  std::array<float, 3> direction{};
-  float flips = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    direction[c] = static_cast<float>((right >> c & 1) - (left >> c & 1));
-    flips += std::fabs(direction[c]);
-  }
-  std::array<float, 2 * kSteps + 1> steps;
-  std::size_t best = kSteps - kFurthest;
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    const float at = p.column_px + kStep_px * (static_cast<float>(i) - kSteps);
-    float rise = 0;
-    for (std::size_t c = 0; c < 3; ++c)
-      rise += direction[c] * (light.at(c, at + kArm_px) - light.at(c, at - kArm_px));
-    steps[i] = rise / flips;
-    if (steps[i] > steps[best] && i <= kSteps + kFurthest) best = i;
-  }
-  // The middle of what rises nearly as much: a sharp step does so as far as the arms reach.
-  const float nearly = kNearly * steps[best];
-  std::size_t first = best;
-  std::size_t last = best;
-  while (first > 0 && steps[first - 1] >= nearly) --first;
-  while (last + 1 < steps.size() && steps[last + 1] >= nearly) ++last;
-  if (first == 0 || last + 1 == steps.size()) return std::nullopt;  // another's, farther away
-  const float before = (steps[first] - nearly) / (steps[first] - steps[first - 1]);
-  const float behind = (steps[last] - nearly) / (steps[last] - steps[last + 1]);
-  const float middle = 0.5F * (static_cast<float>(first) - before + static_cast<float>(last) + behind);
-  const float moved = kStep_px * (middle - kSteps);
-  const float column = p.column_px + moved;
-  const float free_left = p.left_px + moved;
-  const float free_right = p.right_px - moved;
-  if (free_left < kLeastRoom_px || free_right < kLeastRoom_px) return std::nullopt;
-  float level = kDark;
-  for (std::size_t c = 0; c < 3; ++c)
-    for (const float at : {-2.F, -1.F, 0.F, 1.F, 2.F}) level = std::max(level, light.at(c, column + at));
-  if (steps[best] < kLeastStep * level) return std::nullopt;
-  if (light.agreement({left, right}, column, free_left, free_right) < kLeastAgree) return std::nullopt;
-  const float own = 1 / (kFound_px * kFound_px);
-  const float predicted = 1 / (p.sigma_px * p.sigma_px);
-  return Found{(own * column + predicted * p.column_px) / (own + predicted),
-               std::hypot(1 / std::sqrt(own + predicted), kApartShare * moved)};
+std::optional<FoundStep> Growth::look(const SlideFieldView& view, int line, int boundary,
+                                      const std::optional<Prediction>& p) {
+  if (!p) return std::nullopt;
+  const auto found = steps_.find(view, line, boundary, *p);
+  return found && fits_before(view, line, boundary, *found, p->beside) ? found : std::nullopt;
 }
 
 std::size_t Growth::grow_line(const SlideFieldView& view, int line,
@@ -261,9 +327,10 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
   std::size_t added = 0;
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
-    const auto p = predict(line, b);
-    if (!p) continue;
-    const auto found = find(view, line, b, *p);
+    const Around places = around(line, b);
+    std::optional<FoundStep> found;
+    if (places.count < 2) found = look(view, line, b, predict_beside(line, b));
+    if (!found && places.count > 0) found = look(view, line, b, predict_between(line, b, places));
     if (!found) continue;
     here[b] = found->column_px;
     recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
@@ -281,15 +348,12 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
     const int b = result.boundary[e];
     if (b < 0) continue;
     const float column = here[b];
-    const int centre = static_cast<int>(column + 0.5F);
-    if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) continue;
     if (view.motion->at(line, column) == 0) continue;
-    Light light;
-    read(view.field.row(line), centre, light);
-    const auto room = [](float px) { return known(px) ? std::clamp(px, kLeastRoom_px, kOpen_px) : kOpen_px; };
-    const float left = room(column - here[b - 1]);
-    const float right = room(here[b + 1] - column);
-    if (light.agreement(view.colours[static_cast<std::size_t>(b)], column, left, right) >= kDisagrees)
+    const auto room = [](float px) {
+      return known(px) ? std::clamp(px, StepFinder::kLeastRoom_px, StepFinder::kOpen_px)
+                       : StepFinder::kOpen_px;
+    };
+    if (!steps_.shows_another(view, line, b, column, room(column - here[b - 1]), room(here[b + 1] - column)))
       continue;
     result.boundary[e] = -1;
     here[b] = kNone;
@@ -300,12 +364,15 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Seq
                          std::vector<RecoveredBoundary>& recovered) {
   fill(view.field.width, result, edges, recovered);
   const int lines = std::min(lines_, view.field.height);
+  std::size_t added = 0;
+  for (int line = 0; line < lines; ++line) remember_line(view, line, edges, result);
+  for (int line = 0; line < lines; ++line) added += restore_line(view, line, edges, result, recovered);
   for (int line = 0; line < lines; ++line)
     if (view.motion != nullptr && view.motion->line_moves(line)) drop_line(view, line, edges, result);
-  std::size_t added = 0;
   for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
   for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);
   std::swap(now_, before_);
+  ++frame_;
   return added;
 }
 

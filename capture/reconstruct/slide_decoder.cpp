@@ -279,7 +279,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
       const std::size_t grown =
-          s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion},
+          s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion,
+                         s.order == SlideOrder::kNewerIsFirst ? 0 : 1},
                         s.edges, s.result, s.recovered);
       report.filters.recovered += grown;
       report.matched += grown;

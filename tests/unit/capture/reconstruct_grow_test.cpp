@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+// Proves: boundaries that two slides cannot tell are found in the slide's field alone, from the lines around,
+// from the line itself and from what stood there before; and are not where the field, the order, or what is
+// known of another surface speaks against them.
 #include "capture/reconstruct/grow.h"
 
 #include <gtest/gtest.h>
@@ -85,10 +88,19 @@ TEST(Growth, TheFieldSaysWhereItIsMoreThanOneLineDoes) {
   f.move(7);
   f.lose(7, kBoundaries - 1);
   for (int line = 8; line < kLines; ++line) f.lose(line, kBoundaries - 1);
-  for (int line = 0; line < 7; ++line) f.edges.edges[Frame::at(line, kBoundaries - 1)].column_px += 1.5F;
+  for (int line = 0; line < 7; ++line) f.edges.edges[Frame::at(line, kBoundaries - 1)].column_px += 1;
   ASSERT_GE(f.grow(), 1U);
   EXPECT_NEAR(f.recovered.front().column_px, Frame::place(kBoundaries - 1), 0.4F);
   EXPECT_GT(f.recovered.front().sigma_px, 0.4F) << "the two disagree";
+}
+
+TEST(Growth, FarFromWhereItIsExpectedItIsAnothers) {
+  Frame f;
+  f.move(7);
+  f.lose(7, kBoundaries - 1);
+  for (int line = 8; line < kLines; ++line) f.lose(line, kBoundaries - 1);
+  for (int line = 0; line < 7; ++line) f.edges.edges[Frame::at(line, kBoundaries - 1)].column_px += 2.5F;
+  EXPECT_EQ(f.grow(), 0U);
 }
 
 TEST(Growth, WhereTheFieldShowsOtherColoursThereIsNone) {
@@ -114,19 +126,92 @@ TEST(Growth, ASurfacesEndGoesOnWhereItMovesOnly) {
   }
 }
 
-TEST(Growth, WhatTheFrameBeforeHadThereMayBeCoveredByNow) {
-  Growth growth(kIdentity, kBoundaries, kLines);
-  const auto grown = [&](int lost_from) {
-    Frame f;
-    for (int line = lost_from; line < kLines; ++line) {
-      f.move(line);
-      f.lose(line, kBoundaries - 1);
+/// Two frames, in the second of which the last boundary is lost on the lines from 12 on, where something
+/// moves.
+class AfterAnother : public ::testing::Test {
+ protected:
+  AfterAnother() {
+    for (int line = 12; line < kLines; ++line) {
+      second_.move(line);
+      second_.lose(line, kLost);
     }
-    return growth.grow({f.picture.view(), f.colours}, f.edges, f.result, f.recovered);
-  };
-  EXPECT_EQ(grown(kLines), 0U) << "all are there";
-  EXPECT_EQ(grown(12), 0U);
-  EXPECT_EQ(grown(12), 8U) << "they were not there before";
+  }
+  std::size_t grow() {
+    for (int k = 0; k < 2; ++k)  // under both slides
+      growth_.grow({first_.picture.view(), first_.colours, nullptr, k}, first_.edges, first_.result,
+                   first_.recovered);
+    return growth_.grow({second_.picture.view(), second_.colours}, second_.edges, second_.result,
+                        second_.recovered);
+  }
+  void paint_second(int from, int to, Primary colour) {
+    for (int line = 12; line < kLines; ++line)
+      for (int x = from; x < to; ++x) second_.paint(line, x, colour);
+  }
+
+  static constexpr int kLost = kBoundaries - 1;
+  static constexpr int kColumn = 102;  // of the pixel left of it
+  Frame first_, second_;
+  Growth growth_{kIdentity, kBoundaries, kLines};
+};
+
+TEST_F(AfterAnother, WhatLooksAsBeforeIsBackWhereItWas) {
+  EXPECT_EQ(grow(), 8U);
+  for (const RecoveredBoundary& r : second_.recovered) {
+    EXPECT_EQ(r.boundary, kLost);
+    EXPECT_EQ(r.column_px, Frame::place(kLost));
+    EXPECT_LT(r.sigma_px, 0.2F);
+  }
+}
+
+TEST_F(AfterAnother, WhatLooksOtherwiseIsCovered) {
+  paint_second(kColumn + 1, kColumn + 6, 5);
+  EXPECT_EQ(grow(), 0U);
+}
+
+TEST_F(AfterAnother, AnEdgeAtItsPlaceIsItsOwn) {
+  for (int line = 12; line < kLines; ++line) second_.result.boundary[Frame::at(line, kLost)] = 2;
+  for (int line = 12; line < kLines; ++line) second_.lose(line, 2);
+  for (int line = 12; line < kLines; ++line)
+    for (int x = 50; x < 66; ++x) second_.paint(line, x, 7);  // and what was there is not
+  EXPECT_EQ(grow(), 8U);
+  for (int line = 12; line < kLines; ++line)
+    EXPECT_EQ(second_.result.boundary[Frame::at(line, kLost)], kLost);
+  EXPECT_TRUE(second_.recovered.empty());
+}
+
+TEST_F(AfterAnother, WhatWasOfUnknownPlaceIsNotRemembered) {
+  for (Edge& e : first_.edges.edges) e.sigma_px = 0.5F;
+  for (int line = 12; line < kLines; ++line)
+    for (int b = 0; b < kBoundaries - 1; ++b) second_.lose(line, b);
+  EXPECT_EQ(grow(), 0U);
+}
+
+TEST_F(AfterAnother, WhereAnotherBoundaryStoodItStillDoes) {
+  for (int line = 0; line < kLines; ++line) {  // the wall has that of two stripes earlier there
+    first_.lose(line, kLost - 2);
+    first_.result.boundary[Frame::at(line, kLost)] = kLost - 2;
+  }
+  EXPECT_EQ(grow(), 0U);
+}
+
+TEST(Growth, BesideAnOutlineTheLineGoesOn) {
+  Frame f;
+  for (int line = 0; line < kLines; ++line) f.move(line), f.lose(line, 6), f.lose(line, 7);
+  EXPECT_EQ(f.grow(), static_cast<std::size_t>(2 * kLines));
+  for (const RecoveredBoundary& r : f.recovered)
+    EXPECT_NEAR(r.column_px, Frame::place(r.boundary), 0.1F) << r.boundary;
+}
+
+TEST(Growth, AtASurfacesEndWhatIsNextToABoundaryIsEnough) {
+  for (const bool narrow : {false, true}) {
+    Frame f;
+    for (int line = 0; line < kLines; ++line) {
+      f.move(line);
+      f.lose(line, 7);
+      for (int x = 103 + (narrow ? 0 : 2); x < 112; ++x) f.paint(line, x, 0);  // boundary 7 is at 102.5
+    }
+    EXPECT_EQ(f.grow(), narrow ? 0U : static_cast<std::size_t>(kLines));
+  }
 }
 
 TEST(Growth, ABoundaryThatWouldBreakTheOrderIsNone) {
@@ -143,12 +228,12 @@ TEST(Growth, ABoundaryThatWouldBreakTheOrderIsNone) {
   for (const RecoveredBoundary& r : f.recovered) EXPECT_FALSE(r.line == 7 && r.boundary == 3);
 }
 
-TEST(Growth, WhereAllMovesOnlyWhatLinesEncloseIsFound) {
+TEST(Growth, WhereAllMovesWhatLinesEncloseIsFoundAndLinesGoOn) {
   Frame f;
   for (int line = 0; line < kLines; ++line) f.move(line);
   f.lose(7, 3);
   for (int line = 12; line < kLines; ++line) f.lose(line, kBoundaries - 1);
-  ASSERT_EQ(f.grow(), 1U);
+  ASSERT_EQ(f.grow(), 9U);
   EXPECT_EQ(f.recovered.front().boundary, 3);
 }
 

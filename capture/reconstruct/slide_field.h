@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "base/image.h"
+#include "base/pattern.h"
+#include "capture/reconstruct/field_motion.h"
+
+namespace relievo {
+
+/// A frame's field under the slide itself, a row a line, the colours on both sides of each boundary of that
+/// slide, the motion between the frame's fields, and which of the two slides it is.
+struct SlideFieldView {
+  View8 field;
+  const std::vector<std::array<Primary, 2>>& colours;
+  const FieldMotion* motion = nullptr;
+  int slide = 0;
+};
+
+}  // namespace relievo
