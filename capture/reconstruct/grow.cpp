@@ -229,6 +229,7 @@ std::optional<Growth::Found> Growth::find(const SlideFieldView& view, int line, 
     steps[i] = rise / flips;
     if (steps[i] > steps[best] && i <= kSteps + kFurthest) best = i;
   }
+  if (steps[best] <= 0) return std::nullopt;  // what follows is of a rise
   // The middle of what rises nearly as much: a sharp step does so as far as the arms reach.
   const float nearly = kNearly * steps[best];
   std::size_t first = best;
