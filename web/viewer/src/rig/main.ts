@@ -35,6 +35,7 @@ class RigPage {
   );
   private readonly cards = [new AdviceCard(), new ExposureCard(), new MarginsCard(), new StripesCard(), new StepCard()];
   private stream = new URLSearchParams(location.search).get('stream');
+  private away: string | null = null; // that was calibrated and is not back yet
   private picture: PictureName = kPictures.find((name) => name === location.hash.slice(1)) ?? 'camera';
 
   constructor() {
@@ -122,6 +123,7 @@ class RigPage {
     setText(element('caption'), on ? text.calibration.caption : text.pictures[this.picture][1]);
     if (!on) element('seen').hidden = true;
     this.streams.disabled = on;
+    if (!on) this.away = this.stream;
     this.streams.dataset['listed'] = ''; // the stream was away
   }
 
@@ -129,16 +131,21 @@ class RigPage {
   private async findStream(): Promise<boolean> {
     if (this.streams.dataset['listed'] === '1') return true;
     const names = await streamNames();
+    const away = this.away !== null && !names.includes(this.away);
+    if (away) names.push(this.away!); // it comes back after its calibration
     this.streams.replaceChildren(...names.map((name) => make('option', { value: name }, name)));
     if (names.length === 0) {
       this.say(text.state.noStream, 'waiting');
       return false;
     }
     if (this.stream === null || !names.includes(this.stream)) this.stream = names[0]!;
+    if (!away) this.away = null;
     this.streams.value = this.stream;
-    this.streams.dataset['listed'] = '1';
+    this.streams.dataset['listed'] = away ? '' : '1';
     this.remember();
-    return true;
+    if (this.stream !== this.away) return true;
+    this.say(text.state.waiting, 'waiting');
+    return false;
   }
 
   private draw(bitmap: ImageBitmap, picture: PictureName | 'calibration'): void {
