@@ -12,6 +12,7 @@
 #include "capture/calibrate/rig_part.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
+#include "server/calibration_report.h"
 #include "server/camera_flags.h"
 
 namespace relievo {
@@ -65,29 +66,8 @@ bool is_palette(Primary colour) {
 }
 
 void print_json(const ColourCalibration& c, const std::string& out) {
-  nlohmann::json colours = nlohmann::json::array();
-  for (const ColourReport& r : c.colours) {
-    nlohmann::json colour = {{"colour", primary_name(r.colour)},
-                             {"captured", r.captured},
-                             {"estimated", r.estimated},
-                             {"residual", r.residual}};
-    if (is_palette(r.colour)) {
-      colour["weakest_difference"] = r.weakest_difference;
-      colour["margin"] = r.weakest_difference - kDetectionThreshold;
-      colour["weakest_in_sigmas"] = r.weakest_in_sigmas;
-      colour["weakest_channel"] = kChannels[r.weakest_channel];
-    }
-    colours.push_back(colour);
-  }
-  const nlohmann::json json = {
-      {"colour_matrix", c.matrix},
-      {"residual", c.residual},
-      {"noise", c.noise},
-      {"threshold", kDetectionThreshold},
-      {"target",
-       {{"box", {c.target.x, c.target.y, c.target.width, c.target.height}}, {"pixels", c.target_pixels}}},
-      {"colours", colours},
-      {"rig", out}};
+  auto json = nlohmann::json::parse(colour_report(c));
+  json["rig"] = out;
   std::printf("%s\n", json.dump(2).c_str());
 }
 

@@ -18,6 +18,7 @@
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
 #include "server/calibrate_views.h"
+#include "server/calibration_report.h"
 #include "server/camera_flags.h"
 
 namespace relievo {
@@ -44,45 +45,9 @@ struct Options {
   bool json = false;
 };
 
-nlohmann::json lens_json(const PinholeModel& lens, const double* sigma) {
-  return {{"focal_px", {lens.fx(), lens.fy()}},
-          {"focal_sigma_px", {sigma[0], sigma[1]}},
-          {"centre_px", {lens.cx(), lens.cy()}},
-          {"centre_sigma_px", {sigma[2], sigma[3]}},
-          {"distortion", lens.distortion}};
-}
-
 void print_json(const Geometry& g, const std::optional<RigDifference>& d, const std::string& out) {
-  nlohmann::json views = nlohmann::json::array();
-  for (const ViewReport& r : g.reports) {
-    nlohmann::json view = {
-        {"name", r.name}, {"used", r.used}, {"corners", r.corners}, {"corners_left_out", r.corners_left_out}};
-    if (r.used) {
-      view["camera_rms_px"] = r.camera_rms;
-      view["projector_rms_px"] = r.projector_rms;
-      view["stereo_rms_px"] = r.stereo_rms;
-      view["plane_rms_mm"] = 1000 * r.plane_rms_m;
-    } else {
-      view["why"] = r.why;
-    }
-    views.push_back(view);
-  }
-  nlohmann::json json = {{"stereo_rms_px", g.stereo_rms},
-                         {"stereo_rms_all_corners_px", g.stereo_rms_all},
-                         {"distance_m", g.distance_m},
-                         {"camera_rms_px", g.camera_rms},
-                         {"projector_rms_px", g.projector_rms},
-                         {"plane_rms_mm", 1000 * g.plane_rms_m},
-                         {"square_error_mm", 1000 * g.square_error_m},
-                         {"views_used", g.views},
-                         {"corners_used", g.corners},
-                         {"camera", lens_json(g.camera, g.sigma_px.data())},
-                         {"projector", lens_json(g.projector, g.sigma_px.data() + 4)},
-                         {"baseline_mm", 1000 * std::hypot(g.projector_from_camera_translation[0],
-                                                           g.projector_from_camera_translation[1],
-                                                           g.projector_from_camera_translation[2])},
-                         {"views", views},
-                         {"rig", out}};
+  auto json = nlohmann::json::parse(geometry_report(g));
+  json["rig"] = out;
   if (d) {
     json["compare"] = {{"camera_focal_percent", 100 * d->camera_focal},
                        {"projector_focal_percent", 100 * d->projector_focal},

@@ -287,6 +287,7 @@ void read_recording(Reader& reader, ServeConfig& config) {
 void read_projector(Reader& reader, ProjectorConfig& projector) {
   reader.text("output", projector.output);
   reader.integer("refreshes", 1, kMostRefreshes, projector.refreshes);
+  reader.size("size", projector.width, projector.height);
 }
 
 /// All but its name.

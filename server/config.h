@@ -57,8 +57,9 @@ struct StreamConfig {
 
 /// The projector that pages may drive (/rig); docs/RIG.md.
 struct ProjectorConfig {
-  std::string output;  // as `project --output`; "auto": as `project` chooses; empty: pages drive none
-  int refreshes = 1;   // that each picture stays
+  std::string output;         // as `project --output`; "auto": as `project` chooses; empty: pages drive none
+  int refreshes = 1;          // that each picture stays
+  int width = 0, height = 0;  // its picture, pixels; needed where no rig.yaml says it yet
 
   bool operator==(const ProjectorConfig&) const = default;
 };

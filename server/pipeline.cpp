@@ -33,6 +33,9 @@ constexpr std::uint64_t kFramesForASurface = 30;                  // far more th
 constexpr std::uint64_t kMixedForASurface =
     300;  // frames under two slides each: ten seconds of a drifting rig
 
+constexpr const char* kGuessed =
+    "The rig is not calibrated: its shapes are guesses until it is, on the page /rig.";
+
 struct Captured {
   CapturedFrame frame;
   std::int64_t capture_time_ns;
@@ -102,7 +105,7 @@ class ThreadedPipeline final : public Pipeline {
     if (options_.rungs != nullptr) s.rungs = options_.rungs->status();
     std::lock_guard lock(mutex_);
     s.state = state_;
-    s.message = message_.empty() ? step_message_ : message_;
+    s.message = !message_.empty() ? message_ : options_.calibrated ? step_message_ : kGuessed;
     s.step = step_;
     if (state_ == StreamState::kRunning && asked_ns_ && steady_now_ns() - *asked_ns_ > silence_ns()) {
       s.state = StreamState::kStalled;
@@ -223,7 +226,7 @@ class ThreadedPipeline final : public Pipeline {
       if (reconstructor_.report().step.mixed) {
         stats_.lost_in_capture(1);
         // A projector that drifts comes round; a source that can be played again is given up in the end.
-        if (!any_surface && !source_.info().live &&
+        if (!any_surface && options_.calibrated && !source_.info().live &&
             steps.status().mixed == std::max(kMixedForASurface, 2 * pass.value_or(0)))
           fail(Error{source_.info().name + " gave no surface in " + std::to_string(steps.status().mixed) +
                      " frames: " + steps.advice()});
@@ -235,7 +238,8 @@ class ThreadedPipeline final : public Pipeline {
       previous = item->ordinal;
       if (!*result) {
         // A take that is looped would go on so for ever.
-        if (!any_surface && ++without_surface == std::max(kFramesForASurface, 2 * pass.value_or(0)))
+        if (!any_surface && options_.calibrated &&
+            ++without_surface == std::max(kFramesForASurface, 2 * pass.value_or(0)))
           fail(Error{source_.info().name + " gave no surface in " + std::to_string(without_surface) +
                      " frames: a surface needs two frames under different slides"});
         continue;

@@ -56,7 +56,9 @@ struct PipelineOptions {
   EncodeOptions encode;  // volume.size_m 0: fitted to the first frame, grown when a frame leaves it
   // Step of coded positions, of the distance to the nearest part of the scene; overrides position_bits.
   double depth_resolution = 1e-4;
-  RateTargets rate;             // what is kept by coarser frames; none: all are as `encode` says
+  RateTargets rate;  // what is kept by coarser frames; none: all are as `encode` says
+  // False: the rig is a guess, so that surfaces may be missing for long; the status says so.
+  bool calibrated = true;
   FrameTap* tap = nullptr;      // must outlive the pipeline; null: nobody looks at single frames
   LowerRungs* rungs = nullptr;  // must outlive the pipeline; null: there is the full quality only
 };

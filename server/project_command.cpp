@@ -8,8 +8,11 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/log.h"
+#include "capture/calibrate/sheet_colours.h"
+#include "capture/calibrate/stripe_stack.h"
 #include "capture/pattern/schedule.h"
 #include "capture/pattern/slides.h"
 #include "capture/projector/show_slides.h"
@@ -36,7 +39,7 @@ struct Options {
   std::string field_order = "top";
   int refreshes = 1;
   std::optional<std::uint64_t> pictures;
-  std::string still;
+  std::string still, cycle;
   bool json = false;
 };
 
@@ -79,6 +82,14 @@ std::optional<Image8> still_picture(const std::string& name, const Pattern& patt
     }
   }
   return std::nullopt;
+}
+
+/// What a calibration needs; empty for the pattern's own slides.
+Result<std::vector<Image8>> cycle_of(const std::string& name, const Pattern& pattern,
+                                     const DisplayMode& mode) {
+  if (name == "colours") return draw_sheet_colours(mode.width, mode.height);
+  if (name == "stripes") return draw_stripe_slides(pattern, mode.width, mode.height, Scan::kProgressive);
+  return std::vector<Image8>();
 }
 
 Status report(const ShowReport& shown, const Options& options, const DisplayOutput& output) {
@@ -129,6 +140,8 @@ Status project(const Options& options, StopSignal& stop) {
     if (!picture) return Error{"there is no picture " + options.still + ": give white, black, slide1, ..."};
     return show_still(**display, *std::move(picture), stopped);
   }
+  const auto cycle = cycle_of(options.cycle, *pattern, output.mode);
+  if (!cycle) return cycle.error();
   Progress progress("project", "pictures", options.pictures.value_or(0));
   bool warned = false;
   show.refreshes_each = options.refreshes;
@@ -141,7 +154,8 @@ Status project(const Options& options, StopSignal& stop) {
                 " does not wait for its refresh: slides are paced by the clock and may tear; switch vertical "
                 "sync on in the graphics driver and the compositor off");
   };
-  const auto shown = show_slides(**display, *pattern, show);
+  const auto shown =
+      cycle->empty() ? show_slides(**display, *pattern, show) : show_cycle(**display, *cycle, show);
   progress.finish();
   if (!shown) return shown.error();
   display->reset();  // the desktop is back before anything is said
@@ -178,6 +192,11 @@ Command project_command() {
             ->needs(interlaced);
         app.add_option("--pictures", o->pictures, "End after so many (default: never)")
             ->check(whole_number(1));
+        app.add_option("--cycle", o->cycle,
+                       "Show what a calibration needs in turn: colours (black, red, green and blue, each "
+                       "before its complement) or stripes (along columns and along rows)")
+            ->check(CLI::IsMember({"colours", "stripes"}))
+            ->type_name("NAME");
         app.add_option("--still", o->still,
                        "Show one picture all the time, to aim and focus: white, black, slide1, "
                        "slide1_complement, ...")

@@ -44,9 +44,14 @@ class Folder {
   std::filesystem::path path_;  // empty: it could not be made
 };
 
-/// What `project --still` knows, and "pattern".
+/// What a calibration needs: `project --cycle`.
+bool is_cycle(const std::string& shows) {
+  return shows == "colours" || shows == "stripes";
+}
+
+/// What `project` knows.
 bool known_picture(const std::string& shows, int slides) {
-  if (shows == "pattern" || shows == "white" || shows == "black") return true;
+  if (shows == "pattern" || shows == "white" || shows == "black" || is_cycle(shows)) return true;
   for (int slide = 1; slide <= slides; ++slide) {
     const std::string name = "slide" + std::to_string(slide);
     if (shows == name || shows == name + "_complement") return true;
@@ -169,7 +174,10 @@ std::string ProjectorDriver::run(const Order& order, int& exit_code) {
                                  "--rig",          rig.string(),  "--pattern",
                                  pattern.string(), "--refreshes", std::to_string(config_.refreshes)};
   if (config_.output != "auto") words.insert(words.end(), {"--output", config_.output});
-  if (order.shows != "pattern") words.insert(words.end(), {"--still", order.shows});
+  if (is_cycle(order.shows))
+    words.insert(words.end(), {"--cycle", order.shows});
+  else if (order.shows != "pattern")
+    words.insert(words.end(), {"--still", order.shows});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);

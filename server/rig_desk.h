@@ -28,6 +28,8 @@ class RigDesk final : public RigControl {
   Status project(const std::string& stream, const std::string& shows) override;
   Status stop_projecting() override { return projector_.stop(); }
 
+  ProjectorDriver& driver() { return projector_; }
+
  private:
   mutable std::mutex mutex_;
   std::map<std::string, RigProbe*> probes_;

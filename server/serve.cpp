@@ -12,6 +12,7 @@
 #include "cli/listen_address.h"
 #include "cli/service_manager.h"
 #include "idl/cdr.h"
+#include "server/calibration_desk.h"
 #include "server/recording_desk.h"
 #include "server/rig_desk.h"
 #include "server/stream_set.h"
@@ -22,7 +23,8 @@ namespace relievo {
 namespace {
 
 Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFrameWishes& wishes,
-                                               RecordingDesk* desk, RigDesk& rigs) {
+                                               RecordingDesk* desk, RigDesk& rigs,
+                                               CalibrationDesk& calibrations) {
   if (config.web == "none") return std::unique_ptr<Gateway>();
   const auto address = parse_listen_address(config.web);
   if (!address) return address.error();
@@ -37,7 +39,8 @@ Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFra
                                                        return write_frame_cdr(name, frame);
                                                      }},
                          .recordings = desk,
-                         .rigs = &rigs});
+                         .rigs = &rigs,
+                         .calibrations = &calibrations});
 }
 
 void print_addresses(const ServeConfig& config, const std::vector<std::string>& streams,
@@ -94,8 +97,9 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
   if (!config.record_folder.empty()) desk.emplace(config.record_folder);
   RecordingDesk* const desk_or_none = desk ? &*desk : nullptr;
   RigDesk rigs(config.projector);
+  CalibrationDesk calibrations(rigs.driver(), config.projector);
   // The gateway first: a port in use should fail before anything is opened or announced.
-  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs);
+  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs, calibrations);
   if (!gateway) return gateway.error();
   StreamSet streams({.config = config,
                      .wishes = wishes,
@@ -106,10 +110,12 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
                     !config.streams.empty());
   stop.on_stop([&] {
     tell_stopping();
+    calibrations.give_up();
     streams.stop();
   });
   wishes.answer_with([&](const std::string& name) { streams.request_key_frame(name); });
   streams.apply(config.all_streams());
+  calibrations.open(streams);
   const std::vector<std::string> opened = streams.opened();
   if (!opened.empty() || !config.streams.empty()) {
     print_addresses(config, opened, gateway->get());
@@ -122,6 +128,7 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
     }
   }
   const Status done = streams.wait();
+  calibrations.close();
   stop.clear_on_reload();
   stop.clear_on_stop();
   wishes.answer_with({});

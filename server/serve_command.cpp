@@ -6,6 +6,7 @@
 
 #include "cli/checks.h"
 #include "cli/quantities.h"
+#include "cli/size_option.h"
 #include "cli/web_flags.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
@@ -27,6 +28,7 @@ struct Flags {
   std::shared_ptr<RecordingTexts> recording;
   std::shared_ptr<WebOptions> gateway;
   std::optional<int> refreshes;
+  Size projector_size;
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<double> bound_px, deadline_ms, texture_db;
   std::optional<std::uint64_t> frames;
@@ -95,6 +97,10 @@ Result<ServeConfig> read(const Flags& flags) {
   set(flags.pre_roll, config.pre_roll);
   set(flags.projector, config.projector.output);
   set(flags.refreshes, config.projector.refreshes);
+  if (flags.projector_size.width > 0) {
+    config.projector.width = flags.projector_size.width;
+    config.projector.height = flags.projector_size.height;
+  }
   config.recording = merged(*flags.recording, std::move(config.recording));
   config.gateway = merged(*flags.gateway, std::move(config.gateway));
   set_stream(flags, config);
@@ -163,6 +169,9 @@ Command serve_command() {
             ->type_name("NAME");
         app.add_option("--refreshes", f->refreshes, "With --projector: refreshes that each picture stays")
             ->check(CLI::Range(1, kMostRefreshes));
+        add_size_option(app, "--projector-size", f->projector_size,
+                        "With --projector: its mode, for a rig that the page /rig is to calibrate from "
+                        "nothing; afterwards rig.yaml says it");
         app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
         app.add_option("--decoder", f->decoder,
                        "ordered (default: more exact) or paper (as published: three times as fast)")

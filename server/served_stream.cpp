@@ -14,8 +14,8 @@
 #include "idl/recorder.h"
 #include "idl/stream_recorder.h"
 #include "server/ladder.h"
-#include "server/options.h"
 #include "server/pipeline.h"
+#include "server/stream_source.h"
 
 namespace relievo {
 namespace {
@@ -171,16 +171,14 @@ class RunningStream final : public ServedStream {
 };
 
 Status RunningStream::open() {
-  const auto name = with_scheme(config_.source, config_.scheme);
-  if (!name) return name.error();
-  auto source = open_source(
-      *name, {.loop = config_.loop || config_.source.starts_with("sim:"), .camera = config_.camera});
-  if (!source) return source.error();
-  source_ = *std::move(source);
-  if (const Status announced = announce(*name); !announced) return announced;
+  auto opened = open_stream_source(config_, around_.config.projector);
+  if (!opened) return opened.error();
+  source_ = std::move(opened->source);
+  if (const Status announced = announce(opened->uri); !announced) return announced;
   std::vector<FrameSink*> sinks;
   for (const auto& sink : sinks_) sinks.push_back(sink.get());
   PipelineOptions options = pipeline_options(config_, name_);
+  options.calibrated = opened->calibrated;
   if (around_.rigs != nullptr) {
     const SourceInfo& info = source_->info();
     probe_ = std::make_unique<RigProbe>(name_, info.rig, info.pattern);

@@ -89,6 +89,41 @@ std::vector<std::string> StreamSet::opened() const {
   return names;
 }
 
+std::optional<StreamConfig> StreamSet::config_of(const std::string& stream) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = entries_.find(stream);
+  return found == entries_.end() ? std::nullopt : std::optional(found->second->config);
+}
+
+Status StreamSet::pause(const std::string& stream) {
+  std::unique_lock lock(mutex_);
+  const auto find = [&]() -> Entry* {
+    const auto found = entries_.find(stream);
+    return found == entries_.end() || found->second->stopping ? nullptr : found->second.get();
+  };
+  Entry* entry = find();
+  if (entry == nullptr || entry->ended) return Error{"the stream '" + stream + "' has ended"};
+  entry->paused = true;
+  entry->retries = true;  // what it finds when it goes on ends no server
+  if (entry->stream != nullptr) entry->stream->stop();
+  changed_.notify_all();
+  // Looked for anew each time: another configuration may end it meanwhile.
+  changed_.wait(lock, [&] {
+    entry = find();
+    return entry == nullptr || entry->waiting || entry->ended;
+  });
+  if (entry == nullptr || entry->ended) return Error{"the stream '" + stream + "' has ended meanwhile"};
+  return {};
+}
+
+void StreamSet::resume(const std::string& stream) {
+  const std::lock_guard lock(mutex_);
+  const auto found = entries_.find(stream);
+  if (found == entries_.end()) return;
+  found->second->paused = false;
+  changed_.notify_all();
+}
+
 void StreamSet::end(Entry& entry) {
   entry.stopping = true;
   if (entry.stream != nullptr) entry.stream->stop();
@@ -98,9 +133,13 @@ void StreamSet::end(Entry& entry) {
 void StreamSet::run(Entry& entry) {
   std::string said;
   Status result;
-  for (;;) {
+  while (wait_while_paused(entry)) {
     result = run_once(entry);
-    if (result || !entry.retries) break;
+    {
+      const std::lock_guard lock(mutex_);
+      if (entry.paused && !entry.stopping) continue;
+      if (result || !entry.retries) break;
+    }
     const std::string name = name_of(entry.config);
     const std::string& why = result.error().message;
     if (said != why)
@@ -111,11 +150,11 @@ void StreamSet::run(Entry& entry) {
     if (!wait_to_retry(entry)) break;
     result = {};
   }
+  const std::lock_guard lock(mutex_);
   if (entry.retries) {
     around_.board.forget(name_of(entry.config));
     result = {};
   }
-  const std::lock_guard lock(mutex_);
   entry.result = result;
   entry.tried = entry.ended = true;
   changed_.notify_all();
@@ -132,7 +171,7 @@ Status StreamSet::run_once(Entry& entry) {
     entry.opened = entry.opened || opened;
     entry.tried = true;
     changed_.notify_all();
-    if (entry.stopping) return {};
+    if (entry.stopping || entry.paused) return {};
   }
   if (!opened) return opened.error();
   const Status done = (*opened)->run();
@@ -144,7 +183,20 @@ Status StreamSet::run_once(Entry& entry) {
 /// False where it is to end.
 bool StreamSet::wait_to_retry(Entry& entry) {
   std::unique_lock lock(mutex_);
-  return !changed_.wait_for(lock, kRetry, [&] { return entry.stopping; });
+  return !changed_.wait_for(lock, kRetry, [&] { return entry.stopping || entry.paused; }) || !entry.stopping;
+}
+
+/// Returns when the stream is to run. False where it is to end.
+bool StreamSet::wait_while_paused(Entry& entry) {
+  std::unique_lock lock(mutex_);
+  while (entry.paused && !entry.stopping) {
+    entry.waiting = true;
+    changed_.notify_all();
+    around_.board.say(name_of(entry.config), "paused while its rig is calibrated", true);
+    changed_.wait_for(lock, kRetry, [&] { return entry.stopping || !entry.paused; });
+  }
+  entry.waiting = false;
+  return !entry.stopping;
 }
 
 }  // namespace relievo

@@ -12,13 +12,14 @@
 #include <vector>
 
 #include "base/result.h"
+#include "server/calibration_session.h"
 #include "server/config.h"
 #include "server/served_stream.h"
 
 namespace relievo {
 
 /// Every function may be called from any thread; apply() by one at a time.
-class StreamSet {
+class StreamSet final : public StreamPauses {
  public:
   /// `retries`: a stream that could not be opened, or failed, is tried again a few seconds later, and never
   /// ends with an error. Those of a second apply() always are.
@@ -26,7 +27,7 @@ class StreamSet {
   StreamSet(const StreamSet&) = delete;
   StreamSet& operator=(const StreamSet&) = delete;
   /// Stops and waits.
-  ~StreamSet();
+  ~StreamSet() override;
 
   /// From now on these run: those that do already, as they are configured, go on untouched; others end, or
   /// begin. Returns when those have ended.
@@ -36,6 +37,11 @@ class StreamSet {
   /// All end soon. Any number of times.
   void stop();
   void request_key_frame(const std::string& stream);
+
+  std::optional<StreamConfig> config_of(const std::string& stream) const override;
+  Status pause(const std::string& stream) override;
+  void resume(const std::string& stream) override;
+
   /// Waits until each was opened or could not be. The names of those that were, though some may have ended
   /// since.
   std::vector<std::string> opened() const;
@@ -48,7 +54,9 @@ class StreamSet {
     std::thread thread;
     ServedStream* stream = nullptr;  // while it runs
     bool stopping = false;
-    bool tried = false;  // to open it
+    bool paused = false;   // to be, or is
+    bool waiting = false;  // it is: nothing of it is open
+    bool tried = false;    // to open it
     bool opened = false;
     bool ended = false;
     Status result;
@@ -57,6 +65,7 @@ class StreamSet {
   void run(Entry& entry);
   Status run_once(Entry& entry);
   bool wait_to_retry(Entry& entry);
+  bool wait_while_paused(Entry& entry);
   void end(Entry& entry);
 
   const Surroundings around_;

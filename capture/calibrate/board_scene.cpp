@@ -113,7 +113,8 @@ Image8 render_colour_capture(const Rig& rig, Primary colour, double distance_m,
       const double albedo = sheet ? kWhite : kWall;
       for (int c = 0; c < 3; ++c) {
         const double value = (lit ? light[c] : 0) + options.ambient * 0.25;
-        out.row(y)[3 * x + c] = exposed(kBoardExposure * albedo * value, options.noise, random);
+        out.row(y)[3 * x + c] =
+            exposed(kBoardExposure * options.exposure * albedo * value, options.noise, random);
       }
     }
   }

@@ -67,6 +67,7 @@ BoardSceneOptions look_of(const sim::SimOptions& options, std::uint64_t index) {
   return {.noise = options.noise,
           .ambient = options.ambient,
           .chroma = options.chroma,
+          .exposure = options.exposure,
           .samples = kSamples,
           .seed = options.seed + 2 * static_cast<std::uint32_t>(index)};
 }

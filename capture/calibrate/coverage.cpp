@@ -15,6 +15,7 @@ constexpr const char* kCells[] = {"top left", "top",         "top right", "left"
                                   "right",    "bottom left", "bottom",    "bottom right"};
 constexpr const char* kSides[] = {"left", "right", "upper", "lower"};
 constexpr double kLeastTilt_deg = 12;
+constexpr double kSmall = 0.25;    // of the picture's width: a board that fills less says little
 constexpr double kRepeats = 0.02;  // of the picture's width, that corners lie apart on average
 
 /// How much farther away the board's right and lower sides are: slopes of depth over x and y.
@@ -101,6 +102,26 @@ std::string Coverage::missing() const {
   std::string out;
   if (!cells.empty()) out = "the board in the " + listed(cells) + " of the picture";
   if (!sides.empty()) out += (out.empty() ? "its " : "; its ") + listed(sides) + " side farther away";
+  return out;
+}
+
+double Coverage::last_width() const {
+  if (added_.empty() || added_.back().empty()) return 1;
+  const auto [left, right] = std::minmax_element(
+      added_.back().begin(), added_.back().end(),
+      [](const CornerSight& a, const CornerSight& b) { return a.camera_px[0] < b.camera_px[0]; });
+  return (right->camera_px[0] - left->camera_px[0]) / camera_.width;
+}
+
+std::string Coverage::next() const {
+  const auto cell = std::find(cells_.begin(), cells_.end(), false);
+  const auto side = std::find(tilts_.begin(), tilts_.end(), false);
+  std::string out;
+  if (cell != cells_.end()) out = "in the " + std::string(kCells[cell - cells_.begin()]) + " of the picture";
+  if (last_width() < kSmall) out += out.empty() ? "nearer" : ", nearer";
+  if (side != tilts_.end())
+    out += std::string(out.empty() ? "" : ", ") + "so that its " + kSides[side - tilts_.begin()] +
+           " side is farther away by some 25 degrees";
   return out;
 }
 

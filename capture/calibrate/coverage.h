@@ -28,6 +28,10 @@ class Coverage {
   /// nothing is.
   std::string missing() const;
 
+  /// Where the board would help most, one place and one tilt: "in the top left of the picture, nearer, so
+  /// that its upper side is farther away by some 25 degrees"; empty where nothing is missing.
+  std::string next() const;
+
   /// RGB, camera left, projector right: where corners were seen, the last view's boldly; parts of the
   /// camera's picture without any are red; below, the four tilts, those still missing in red.
   Image8 draw() const;
@@ -36,6 +40,9 @@ class Coverage {
   PinholeModel camera_, projector_;
   std::array<bool, 9> cells_{};  // of the picture, row by row, that had a corner
   std::array<bool, 4> tilts_{};  // left, right, upper, lower side farther away
+  /// How much of the picture's width the last view's corners span.
+  double last_width() const;
+
   std::vector<std::vector<CornerSight>> added_;
 };
 

@@ -145,7 +145,8 @@ Image8 SeenBoard::under(const GraySlide& slide, const BoardSceneOptions& options
       }
       sum += light * sample.albedo;
     }
-    picture.data()[i] = exposed(kBoardExposure * sum / static_cast<double>(each_), options.noise, random);
+    picture.data()[i] =
+        exposed(kBoardExposure * options.exposure * sum / static_cast<double>(each_), options.noise, random);
   }
   return picture;
 }
@@ -177,7 +178,7 @@ Image8 SeenBoard::under(const StripeSlide& slide, const BoardSceneOptions& optio
             sample.albedo * (slide.complement ? Eigen::Vector3f(Eigen::Vector3f::Ones() - light) : light);
       }
       const Eigen::Vector3f value = seen * projected + Eigen::Vector3f::Constant(ambient * albedo);
-      const auto scale = static_cast<float>(kBoardExposure / static_cast<double>(each_));
+      const auto scale = static_cast<float>(kBoardExposure * options.exposure / static_cast<double>(each_));
       for (int c = 0; c < 3; ++c) row[3 * x + static_cast<std::size_t>(c)] = scale * value[c];
     }
     if (options.chroma > 0) blur_chroma(row, options.chroma);

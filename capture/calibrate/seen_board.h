@@ -18,6 +18,7 @@ struct BoardSceneOptions {
   double noise = 1.2;     // sigma, of 255
   double ambient = 0.04;  // light that is not the projector's, of its white
   double chroma = 0;      // sigma of the chroma blur along a line, camera pixels; of colour pictures
+  double exposure = 1;    // times the one that suits a white board
   int samples = 2;        // a pixel is the mean of samples * samples rays
   std::uint32_t seed = 1;
 };

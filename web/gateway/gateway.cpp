@@ -142,6 +142,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .options = web_,
                                    .recordings = options_.recordings,
                                    .rigs = options_.rigs,
+                                   .calibrations = options_.calibrations,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});

@@ -15,6 +15,7 @@
 #include "base/rung.h"
 #include "base/stream.h"
 #include "base/web_options.h"
+#include "web/gateway/calibration_control.h"
 #include "web/gateway/recording_control.h"
 #include "web/gateway/rig_control.h"
 
@@ -39,6 +40,7 @@ struct GatewayOptions {
   std::optional<SampleFormat> samples{};           // none: no /foxglove
   RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   RigControl* rigs = nullptr;                      // likewise; null: no camera is here
+  CalibrationControl* calibrations = nullptr;      // likewise
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "web/gateway/assets.h"
+#include "web/gateway/calibration_api.h"
 #include "web/gateway/foxglove_feed.h"
 #include "web/gateway/recording_api.h"
 #include "web/gateway/recording_route.h"
@@ -257,6 +258,15 @@ constexpr Route kRoutes[] = {
      [](auto, auto&, const RouteContext& context) { return projector_state(context.rigs); },
      [](auto, const HttpRequest& request, const RouteContext& context) {
        return order_projector(request, context.rigs);
+     }},
+    {"/api/calibration/{picture}", true,
+     [](std::string_view name, auto&, const RouteContext& context) {
+       return calibration_picture(name, context.calibrations);
+     }},
+    {"/api/calibration", true,
+     [](auto, auto&, const RouteContext& context) { return calibration_state(context.calibrations); },
+     [](auto, const HttpRequest& request, const RouteContext& context) {
+       return order_calibration(request, context.calibrations);
      }},
     {"/ws/{stream}", true,
      [](std::string_view name, const HttpRequest& request, const RouteContext& context) {

@@ -12,6 +12,7 @@
 
 #include "base/web_options.h"
 #include "web/gateway/access.h"
+#include "web/gateway/calibration_control.h"
 #include "web/gateway/hub.h"
 #include "web/gateway/protocol.h"
 #include "web/gateway/recording_control.h"
@@ -71,9 +72,10 @@ struct RouteContext {
   const GatewayCounts& counts;
   const Tokens& tokens;
   const WebOptions& options;
-  RecordingControl* recordings = nullptr;  // none: nothing is recorded here
-  RigControl* rigs = nullptr;              // none: no camera is here
-  bool foxglove = false;                   // there is an encoder for it
+  RecordingControl* recordings = nullptr;      // none: nothing is recorded here
+  RigControl* rigs = nullptr;                  // none: no camera is here
+  CalibrationControl* calibrations = nullptr;  // likewise
+  bool foxglove = false;                       // there is an encoder for it
   std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only
 };

@@ -8,6 +8,7 @@ import { openRemote } from '../../viewer/src/openFile';
 import { Session } from '../../viewer/src/session';
 import { present } from '../../viewer/src/state';
 import { text } from '../../viewer/src/strings';
+import themeCss from '../../viewer/src/theme.css?inline';
 import timelineCss from '../../viewer/src/timeline.css?inline';
 import { Timeline } from '../../viewer/src/timeline';
 import { View } from '../../viewer/src/view';
@@ -39,6 +40,13 @@ interface Parts {
   timer: number;
 }
 
+/** A page's colours, as an element's own: dark unless its theme says otherwise. */
+const ofHost = (css: string): string =>
+  css
+    .replace(/:root:not\(\[data-theme=["']?dark["']?\]\)/g, ":host([theme='auto'])")
+    .replace(/:root\[data-theme=["']?light["']?\]/g, ":host([theme='light'])")
+    .replaceAll(':root', ':host');
+
 export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   static readonly observedAttributes = ['src', 'mode', 'theme', ...kFlags];
   private readonly box = make('div', { className: 'box' });
@@ -55,7 +63,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     super();
     const root = this.attachShadow({ mode: 'open' });
     // Not <style>, which a page's policy may forbid.
-    root.adoptedStyleSheets = [playerCss, timelineCss].map((css) => {
+    root.adoptedStyleSheets = [ofHost(themeCss), playerCss, timelineCss].map((css) => {
       const sheet = new CSSStyleSheet();
       sheet.replaceSync(css);
       return sheet;

@@ -2,6 +2,7 @@
 // A live stream as a source of frames. What comes is kept for a while, so that a person can stop it, go back, and
 // return to what is live. Kept frames are played as those of a recording are.
 import { Connection } from './connection';
+import { Credit } from './credit';
 import type { FrameStore } from './frameStore';
 import { History } from './history';
 import type { Loop } from './playback';
@@ -9,14 +10,13 @@ import type { FramePrefix, Quality } from './protocol';
 import type { FrameSource, Kept, Playback, SourceEvents } from './source';
 import { StorePlayer } from './storePlayer';
 
-const kCredit = 2; // frames under way: one being decoded while the next travels; more would only be older when they are shown
-
 export class LiveSource implements FrameSource, Playback {
   readonly playback: Playback = this;
   private readonly history = new History();
   private readonly connection: Connection;
   private player: StorePlayer | null = null; // of what was; null: what comes is shown
   private returning = false; // the player catches up
+  private readonly underWay = new Credit();
   private withServer = 0; // frames that the server may send
   private withPage = 0; // frames that the page has not shown yet
   changed: () => void = () => undefined;
@@ -121,11 +121,16 @@ export class LiveSource implements FrameSource, Playback {
     this.player.seek(Infinity);
   }
 
-  /** The page has shown this many frames, whoever sent them. */
-  credit(n = 1): void {
+  /** The page has shown this many frames, or skipped them, whoever sent them. */
+  credit(n = 1, shown = true): void {
     this.withPage = Math.max(0, this.withPage - n);
     this.player?.credit(n);
-    this.topUp();
+    const slow = this.underWay.frames === 1;
+    if (!shown) this.underWay.skipped();
+    else if (this.live) this.underWay.shown(performance.now(), this.withPage);
+    // Asked for before the drawing that has just begun, it would wait for that to end.
+    if (slow) window.setTimeout(() => this.topUp());
+    else this.topUp();
   }
 
   /** How much detail is to come. */
@@ -185,6 +190,7 @@ export class LiveSource implements FrameSource, Playback {
 
   private onFrame(prefix: FramePrefix, message: ArrayBuffer): void {
     --this.withServer;
+    this.underWay.came(performance.now());
     const kept = this.history.add(prefix, message);
     if (kept !== null) this.tap?.(kept);
     if (this.live) {
@@ -198,8 +204,9 @@ export class LiveSource implements FrameSource, Playback {
   }
 
   private topUp(): void {
-    const more = kCredit - this.withServer - (this.live ? this.withPage : 0);
+    const more = this.underWay.frames - this.withServer - (this.live ? this.withPage : 0);
     if (more <= 0 || !this.connected) return;
+    if (this.withServer === 0) this.underWay.asked(performance.now());
     this.withServer += more;
     this.connection.credit(more);
   }

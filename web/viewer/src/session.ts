@@ -131,7 +131,7 @@ export class Session {
     }
     if (this.discard()) {
       ++this.meter.skipped;
-      this.source?.credit();
+      this.source?.credit(1, false);
     }
     this.meter.decoded(known.prefix, utcNow());
     this.waiting = { frame, prefix: known.prefix };
@@ -140,7 +140,7 @@ export class Session {
 
   private onFailed(id: number, message: string): void {
     this.meter.failed(message);
-    if (this.underway.get(id)?.forLater === false) this.source?.credit();
+    if (this.underway.get(id)?.forLater === false) this.source?.credit(1, false);
     this.underway.delete(id);
   }
 

@@ -24,8 +24,8 @@ export interface FrameSource {
   readonly live: boolean;
   /** What is kept of a live stream; null: a recording. */
   readonly kept: Kept | null;
-  /** This many frames more may come. */
-  credit(n?: number): void;
+  /** This many frames more may come: so many were shown, or not even that. */
+  credit(n?: number, shown?: boolean): void;
   retryNow(): void;
   stop(): void;
 }

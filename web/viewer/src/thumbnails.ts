@@ -3,6 +3,7 @@
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
 import { Session } from './session';
+import type { SourceEvents } from './source';
 
 export const kThumbnail = { width: 88, height: 66 }; // pixels of the page
 const kPatienceMs = 5000; // with a stream that sends nothing
@@ -46,7 +47,7 @@ export class Thumbnails {
     const { name, recording } = job;
     const opened = recording === null ? null : await openRemote(new URL(recording, document.baseURI)).catch(() => null);
     if (this.jobs[0] !== job) return;
-    session.watch(opened === null ? (events) => new LiveSource(name, events) : opened.source);
+    session.watch(opened === null ? (events) => pictureAlone(name, events) : opened.source);
   }
 
   private take(): void {
@@ -69,6 +70,13 @@ export class Thumbnails {
     this.session?.end();
     this.session = null;
   }
+}
+
+/** In the lowest quality that the stream has. */
+function pictureAlone(name: string, events: SourceEvents): LiveSource {
+  const source = new LiveSource(name, events);
+  source.want('texture');
+  return source;
 }
 
 /** Filling it, the middle of the picture. */

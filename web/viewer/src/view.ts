@@ -265,9 +265,9 @@ export class View {
     if (this.scheduled || this.ended || this.renderer.xr.isPresenting) return;
     this.scheduled = true;
     requestAnimationFrame((now) => {
-      this.scheduled = false;
+      if (!this.ended) this.events.beforeDraw();
+      this.scheduled = false; // what changed until here is drawn now, not once more
       if (this.ended) return;
-      this.events.beforeDraw();
       this.navigator.update(now);
       this.setScale(this.resolution.scale);
       this.render();

@@ -5,6 +5,8 @@
 import { loadDisplay } from '../display';
 import { button, element, make, setText } from '../dom';
 
+import { calibrationPicture, type Calibration } from './calibration';
+import { CalibrationCard } from './calibrationCard';
 import { AdviceCard, ExposureCard, MarginsCard, StepCard, StripesCard } from './cards';
 
 import { kPictures, lookAt, pictureOf, Refused, streamNames, type PictureName } from './look';
@@ -14,12 +16,26 @@ import { text } from './strings';
 const kEveryMs = 200;
 const kAgainMs = 1500; // after a failure
 
+/** Shows the picture, and ends it. */
+function draw(canvas: HTMLCanvasElement, bitmap: ImageBitmap): void {
+  if (canvas.width !== bitmap.width) canvas.width = bitmap.width;
+  if (canvas.height !== bitmap.height) canvas.height = bitmap.height;
+  canvas.getContext('2d')!.drawImage(bitmap, 0, 0);
+  bitmap.close();
+}
+
 class RigPage {
   private readonly streams = element<HTMLSelectElement>('stream');
   private readonly canvas = element<HTMLCanvasElement>('picture');
+  private readonly coverage = element<HTMLCanvasElement>('coverage');
   private readonly buttons = new Map<PictureName, HTMLButtonElement>();
+  private readonly calibration = new CalibrationCard(
+    () => this.stream,
+    () => this.calibrationChanged(),
+  );
   private readonly cards = [new AdviceCard(), new ExposureCard(), new MarginsCard(), new StripesCard(), new StepCard()];
   private stream = new URLSearchParams(location.search).get('stream');
+  private away: string | null = null; // that was calibrated and is not back yet
   private picture: PictureName = kPictures.find((name) => name === location.hash.slice(1)) ?? 'camera';
 
   constructor() {
@@ -35,7 +51,12 @@ class RigPage {
       this.stream = this.streams.value;
       this.remember();
     };
-    element('cards').append(...this.cards.map(({ root }) => root), new ProjectorCard(() => this.stream).root);
+    element('cards').append(
+      this.calibration.root,
+      ...this.cards.map(({ root }) => root),
+      new ProjectorCard(() => this.stream).root,
+    );
+    setText(element('coverage-caption'), text.calibration.coverage);
     this.choose(this.picture);
     this.say(text.state.connecting, 'waiting');
     void this.run();
@@ -67,6 +88,8 @@ class RigPage {
   /** Milliseconds until the next. */
   private async once(): Promise<number> {
     try {
+      const { underWay } = this.calibration;
+      if (underWay !== null) return await this.watchCalibration(underWay);
       if (!(await this.findStream())) return kAgainMs;
       const [stream, picture] = [this.stream!, this.picture];
       const look = await lookAt(stream, picture);
@@ -85,29 +108,49 @@ class RigPage {
     }
   }
 
+  private async watchCalibration(of: Calibration): Promise<number> {
+    this.say(text.calibration.state(of.stream), 'live');
+    if (of.state === 'pausing') return kEveryMs;
+    this.draw(await calibrationPicture('camera'), 'calibration');
+    if (of.coverage) draw(this.coverage, await calibrationPicture('coverage'));
+    element('seen').hidden = !of.coverage;
+    return kEveryMs;
+  }
+
+  private calibrationChanged(): void {
+    const on = this.calibration.underWay !== null;
+    document.body.classList.toggle('calibrating', on);
+    setText(element('caption'), on ? text.calibration.caption : text.pictures[this.picture][1]);
+    if (!on) element('seen').hidden = true;
+    this.streams.disabled = on;
+    if (!on) this.away = this.stream;
+    this.streams.dataset['listed'] = ''; // the stream was away
+  }
+
   /** Lists the streams at first and after a failure. */
   private async findStream(): Promise<boolean> {
     if (this.streams.dataset['listed'] === '1') return true;
     const names = await streamNames();
+    const away = this.away !== null && !names.includes(this.away);
+    if (away) names.push(this.away!); // it comes back after its calibration
     this.streams.replaceChildren(...names.map((name) => make('option', { value: name }, name)));
     if (names.length === 0) {
       this.say(text.state.noStream, 'waiting');
       return false;
     }
     if (this.stream === null || !names.includes(this.stream)) this.stream = names[0]!;
+    if (!away) this.away = null;
     this.streams.value = this.stream;
-    this.streams.dataset['listed'] = '1';
+    this.streams.dataset['listed'] = away ? '' : '1';
     this.remember();
-    return true;
+    if (this.stream !== this.away) return true;
+    this.say(text.state.waiting, 'waiting');
+    return false;
   }
 
-  private draw(bitmap: ImageBitmap, picture: PictureName): void {
-    const { canvas } = this;
-    if (canvas.width !== bitmap.width) canvas.width = bitmap.width;
-    if (canvas.height !== bitmap.height) canvas.height = bitmap.height;
-    canvas.getContext('2d')!.drawImage(bitmap, 0, 0);
-    canvas.dataset['shows'] = picture;
-    bitmap.close();
+  private draw(bitmap: ImageBitmap, picture: PictureName | 'calibration'): void {
+    draw(this.canvas, bitmap);
+    this.canvas.dataset['shows'] = picture;
   }
 
   private say(what: string, state: 'live' | 'waiting' | 'bad'): void {

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/keep_rig.h"
+
+#include <ctime>
+
+#include "base/time.h"
+#include "base/whole_file.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "rig.before-20260131T120000.yaml", or with a number where that is there already.
+fs::path name_of_old(const fs::path& file, std::int64_t utc_ns) {
+  const std::time_t seconds = utc_ns / kNanosecondsPerSecond;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char stamp[32];
+  std::strftime(stamp, sizeof stamp, "%Y%m%dT%H%M%S", &utc);
+  const std::string begin = file.stem().string() + ".before-" + stamp;
+  fs::path out = fs::path(file).replace_filename(begin + file.extension().string());
+  std::error_code ignored;
+  for (int n = 2; fs::exists(out, ignored); ++n)
+    out.replace_filename(begin + "-" + std::to_string(n) + file.extension().string());
+  return out;
+}
+
+}  // namespace
+
+Result<std::string> keep_rig(const fs::path& file, std::string_view text, const Pattern& pattern,
+                             std::int64_t utc_ns) {
+  std::error_code failed;
+  fs::path old;
+  if (fs::exists(file, failed)) {
+    old = name_of_old(file, utc_ns);
+    fs::copy_file(file, old, failed);
+    if (failed) {
+      std::error_code ignored;
+      fs::remove(old, ignored);
+      return Error{"the rig so far cannot be kept as " + old.string() + ": " + failed.message()};
+    }
+  }
+  const fs::path beside = fs::path(file).replace_filename("pattern.yaml");
+  if (!fs::exists(beside, failed)) {
+    if (const Status written = write_whole_file(beside, to_yaml(pattern)); !written) return written.error();
+  }
+  if (const Status written = write_whole_file(file, text); !written) return written.error();
+  return old.filename().string();
+}
+
+}  // namespace relievo

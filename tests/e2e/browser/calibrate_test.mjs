@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium against `relievo-server serve` that owns a camera (simulated) and a projector
+// (an X server without a screen): a rig is calibrated on the page /rig from nothing, and reconstructs as its
+// truth does; the rig file before stays; what is not good is said, and why; the stream goes on however a
+// calibration ends. Run as: in_own_domain node calibrate_test.mjs RELIEVO_SERVER [SCREENSHOTS], in web/viewer.
+// Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { Screen } from './screen.mjs';
+import { Server } from './server.mjs';
+
+const [serverPath, screenshots] = process.argv.slice(2);
+const kScene = 'width=320,height=240,scan=progressive,stripes=40,distortion=1';
+const kSource = `sim:object,${kScene},rate=10`;
+const kBoard = 'chessboard:7x5:40mm';
+
+const browser = await launchChromium();
+const complaints = [];
+const kExpected = /status of (404|409|503)/; // the stream is away; an order is refused, as it should be
+async function open(address, options = {}) {
+  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+  const page = await context.newPage();
+  page.setDefaultTimeout(kPatienceMs);
+  page.on('pageerror', (error) => complaints.push(error.message));
+  page.on('console', (message) => {
+    if (message.type() === 'error' && !kExpected.test(message.text())) complaints.push(message.text());
+  });
+  await page.goto(`${address}/rig`);
+  return page;
+}
+
+const state = async (server) => (await fetch(`${server.address}/api/calibration`)).json();
+const streams = async (server) => (await (await fetch(`${server.address}/api/streams`)).json()).streams;
+const order = (server, body, headers = {}) =>
+  fetch(`${server.address}/api/calibration`, {
+    method: 'POST',
+    headers: { 'content-type': 'application/json', ...headers },
+    body: JSON.stringify(body),
+  });
+const press = (page, action) => page.click(`#calibration [data-action=${action}]:enabled`);
+const reaches = (page, phase) =>
+  page.waitForFunction((wanted) => document.querySelector('#calibration').dataset.state === wanted, phase);
+const goesOn = (server) =>
+  eventually('the stream does not go on', async () => (await streams(server))[0]?.frames > 0);
+const shot = async (page, name) => {
+  if (screenshots) await page.screenshot({ path: join(screenshots, `calibrate-${name}.png`) });
+};
+
+async function choose(page, kind) {
+  await page.waitForSelector('#calibration:not([hidden])');
+  await page.selectOption('#calibration select', kind);
+  if (kind === 'geometry') await page.fill('#calibration-board', kBoard);
+  await page.click('#calibration button:has-text("Start")');
+  await reaches(page, 'watching');
+}
+
+async function withRig(options, use, environment) {
+  const folder = mkdtempSync(join(tmpdir(), 'relievo-calibrate-'));
+  const rig = join(folder, 'rig.yaml');
+  const server = await Server.start(serverPath, ['--stream', 'rig', '--rig', rig, ...options], environment);
+  try {
+    await use(server, folder, rig);
+  } finally {
+    await server.kill();
+    rmSync(folder, { recursive: true, force: true });
+  }
+}
+
+/** What `evaluate` says of a take of the simulated rig, reconstructed with this rig.yaml instead of the truth. */
+function evaluated(folder, rig) {
+  const take = join(folder, 'take');
+  execFileSync(serverPath, ['simulate', '--scene', `object,${kScene}`, '--frames', '3', '--out', take], { stdio: 'ignore' });
+  const truth = JSON.parse(execFileSync(serverPath, ['evaluate', take, '--json'], { stdio: ['ignore', 'pipe', 'ignore'] }));
+  copyFileSync(rig, join(take, 'rig.yaml'));
+  const own = JSON.parse(execFileSync(serverPath, ['evaluate', take, '--json'], { stdio: ['ignore', 'pipe', 'ignore'] }));
+  return { truth, own };
+}
+
+const checks = {
+  async 'a rig is calibrated from nothing, and reconstructs'() {
+    const screen = await Screen.start(1024, 768); // as the simulated rig's projector
+    try {
+      await withRig(
+        ['--source', kSource, '--projector', 'auto'],
+        async (server, folder, rig) => {
+          const page = await open(server.address);
+          await eventually('it is not said that the rig is not calibrated', async () =>
+            /not calibrated/.test((await streams(server))[0]?.status?.message ?? ''),
+          );
+          await choose(page, 'colour');
+          assert.match(await page.textContent('#calibration-next'), /white sheet/);
+          assert.equal(await page.isVisible('#pictures'), false, 'what the stream shows is paused');
+          await eventually('the projector shows no colours', () => screen.seen().coloured > 0.9 || screen.seen().white > 0.9);
+          await shot(page, 'colour');
+          await press(page, 'take');
+          await reaches(page, 'solved');
+          assert.match(await page.textContent('#calibration-result'), /good/);
+          assert.ok(Number(await page.textContent('#calibration-result [data-figure=residual]')) < 5);
+          assert.equal(existsSync(rig), false, 'written before it was to be kept');
+          await shot(page, 'colour-result');
+          await press(page, 'keep');
+          await reaches(page, 'off');
+          await goesOn(server);
+          assert.match(readFileSync(rig, 'utf8'), /colour_matrix/);
+
+          await choose(page, 'geometry');
+          assert.equal(await page.isDisabled('#calibration [data-action=calculate]'), true);
+          await press(page, 'take');
+          await page.waitForSelector('#calibration-views [data-used=true]');
+          assert.match(await page.textContent('#calibration-views li'), /35 corners/);
+          await page.waitForFunction(() => /hold the board/.test(document.querySelector('#calibration-next').textContent));
+          await eventually('the projector shows no stripes', () => screen.seen().coloured > 0.9);
+          await shot(page, 'geometry');
+          await page.check('#calibration input[type=checkbox]');
+          await page.waitForFunction(() => document.querySelectorAll('#calibration-views [data-used=true]').length >= 8);
+          await press(page, 'calculate');
+          await reaches(page, 'solved');
+          assert.ok(parseFloat(await page.textContent('#calibration-result [data-figure=stereo]')) < 0.3);
+          assert.ok(Math.abs(parseFloat(await page.textContent('#calibration-result [data-figure=baseline]')) - 200) < 4);
+          await shot(page, 'geometry-result');
+          await press(page, 'keep');
+          await reaches(page, 'off');
+          assert.match(await page.textContent('#calibration-message'), /Written to rig\.yaml; the one before is rig\.before-/);
+          await goesOn(server);
+          await eventually('the stream does not know its new rig', async () => {
+            const [{ status }] = await streams(server);
+            return status?.message === '';
+          });
+          await eventually('the projector stays on', () => screen.seen().coloured < 0.1);
+          await page.waitForFunction(() => document.body.dataset.state === 'live' && document.querySelector('#picture').dataset.shows === 'camera');
+          const { truth, own } = evaluated(folder, rig);
+          console.log(`  completeness ${own.completeness} (truth's rig: ${truth.completeness}), median ${own.median_um_per_m ?? ''}`);
+          assert.ok(own.completeness > truth.completeness - 0.02, JSON.stringify(own));
+          await page.context().close();
+        },
+        screen.environment,
+      );
+    } finally {
+      await screen.close();
+    }
+  },
+
+  async 'the rig before stays, and what a step does not touch'() {
+    await withRig(['--source', kSource], async (server, folder, rig) => {
+      const page = await open(server.address);
+      for (const [round, action] of ['keep', 'more', 'keep'].entries()) {
+        if (round !== 2) await choose(page, 'colour');
+        await press(page, 'take');
+        await reaches(page, 'solved');
+        await press(page, action);
+        await reaches(page, action === 'keep' ? 'off' : 'watching');
+      }
+      const old = readdirSync(folder).filter((name) => name.startsWith('rig.before-'));
+      assert.equal(old.length, 1);
+      assert.match(readFileSync(join(folder, old[0]), 'utf8'), /colour_matrix/);
+      assert.ok(existsSync(rig) && existsSync(join(folder, 'pattern.yaml')));
+      await page.context().close();
+    });
+  },
+
+  async 'what is not good is said, and what to do'() {
+    await withRig(['--source', `${kSource},exposure=4`], async (server, folder) => {
+      const page = await open(server.address);
+      await choose(page, 'colour');
+      await press(page, 'take');
+      await page.waitForSelector('#calibration-views [data-used=false]');
+      assert.match(await page.textContent('#calibration-views li'), /exposure/);
+      await shot(page, 'not-used');
+      assert.equal((await order(server, { action: 'start', stream: 'rig', kind: 'colour' })).status, 409, 'a second one');
+      await press(page, 'cancel');
+      await reaches(page, 'off');
+      assert.match(await page.textContent('#calibration-message'), /as it was/);
+      await goesOn(server);
+
+      await page.selectOption('#calibration select', 'geometry');
+      await page.fill('#calibration-board', 'a plank');
+      await page.click('#calibration button:has-text("Start")');
+      await page.waitForSelector('#calibration-message.bad');
+      assert.match(await page.textContent('#calibration-message'), /chessboard/);
+      assert.equal((await state(server)).state, 'off');
+      assert.deepEqual(readdirSync(folder), []);
+      await page.context().close();
+    });
+  },
+
+  async 'who leaves the page leaves the stream'() {
+    await withRig(['--source', kSource], async (server, folder) => {
+      const page = await open(server.address);
+      await choose(page, 'geometry');
+      assert.equal((await order(server, { action: 'calculate' })).status, 409, 'without a view');
+      assert.deepEqual(await streams(server), []);
+      await page.context().close();
+      await goesOn(server);
+      const left = await state(server);
+      assert.match(left.message, /no page watched/);
+      assert.equal(left.failed, true);
+      assert.deepEqual(readdirSync(folder), []);
+    });
+  },
+
+  async 'it is refused to those who may not, and where it cannot be'() {
+    const start = { action: 'start', stream: 'rig', kind: 'colour' };
+    await withRig(['--source', kSource], async (server) => {
+      assert.equal((await order(server, start, { 'content-type': 'text/plain' })).status, 415);
+      assert.equal((await order(server, start, { origin: 'http://elsewhere.example' })).status, 403);
+      assert.equal((await order(server, { action: 'start', stream: 'rig' })).status, 400);
+      assert.equal((await order(server, { action: 'take' })).status, 409);
+      assert.equal((await order(server, { ...start, stream: 'other' })).status, 409);
+      assert.equal((await fetch(`${server.address}/api/calibration/sound.jpg`)).status, 400);
+      assert.equal((await fetch(`${server.address}/api/calibration/camera.jpg`)).status, 503);
+    });
+    const server = await Server.start(serverPath, ['--source', kSource, '--stream', 'rig']);
+    try {
+      const refused = await order(server, start);
+      assert.equal(refused.status, 409);
+      assert.match(await refused.text(), /--rig FILE/);
+    } finally {
+      await server.kill();
+    }
+  },
+
+  async 'a projector that is switched off ends it, and the stream goes on'() {
+    const screen = await Screen.start(1024, 768);
+    try {
+      await withRig(
+        ['--source', kSource, '--projector', 'auto'],
+        async (server) => {
+          const page = await open(server.address);
+          await choose(page, 'colour');
+          await fetch(`${server.address}/api/projector`, {
+            method: 'POST',
+            headers: { 'content-type': 'application/json' },
+            body: JSON.stringify({ action: 'stop' }),
+          });
+          await reaches(page, 'off');
+          assert.match(await page.textContent('#calibration-message'), /projector was switched off/);
+          await goesOn(server);
+          await page.context().close();
+        },
+        screen.environment,
+      );
+    } finally {
+      await screen.close();
+    }
+  },
+
+  async 'it is for phones and both themes'() {
+    await withRig(['--source', kSource], async (server) => {
+      for (const colorScheme of ['dark', 'light']) {
+        const page = await open(server.address, { viewport: { width: 390, height: 844 }, colorScheme });
+        await choose(page, 'geometry');
+        await press(page, 'take');
+        await page.waitForSelector('#calibration-views li');
+        const wide = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+        assert.ok(wide <= 0, `${wide} px beside the screen`);
+        const { bottom } = await page.locator('#calibration [data-action=take]').evaluate((b) => b.getBoundingClientRect());
+        assert.ok(bottom <= 844, 'the button is below the screen');
+        await shot(page, `phone-${colorScheme}`);
+        await press(page, 'cancel');
+        await reaches(page, 'off');
+        await goesOn(server);
+        await page.context().close();
+      }
+    });
+  },
+};
+
+try {
+  for (const [name, check] of Object.entries(checks)) {
+    console.log(name);
+    await check();
+    assert.deepEqual(complaints, [], name);
+  }
+} finally {
+  await browser.close();
+}

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: a rig.yaml that is written anew is whole or as it was, and the one before stays beside it.
+#include "server/keep_rig.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "base/whole_file.h"
+#include "tests/support/temp_folder.h"
+#include "tests/unit/server/fakes.h"
+
+namespace relievo {
+namespace {
+
+using namespace test;
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kNow_ns = 1'769'860'800'000'000'000;  // 2026-01-31 12:00:00
+
+std::string text_of(const fs::path& file) {
+  std::ostringstream out;
+  out << std::ifstream(file).rdbuf();
+  return out.str();
+}
+
+class KeepRig : public testing::Test {
+ protected:
+  const TempFolder folder_;
+  const fs::path file_ = folder_ / "rig.yaml";
+  const Pattern pattern_ = striped_scene().pattern;
+};
+
+TEST_F(KeepRig, TheFirstOneHasItsPatternBesideIt) {
+  const auto old = keep_rig(file_, "first", pattern_, kNow_ns);
+  ASSERT_TRUE(old) << old.error().message;
+  EXPECT_EQ(*old, "");
+  EXPECT_EQ(text_of(file_), "first");
+  EXPECT_EQ(text_of(folder_ / "pattern.yaml"), to_yaml(pattern_));
+}
+
+TEST_F(KeepRig, WhatWasThereStaysEachTime) {
+  ASSERT_TRUE(write_whole_file(folder_ / "pattern.yaml", "own"));
+  ASSERT_TRUE(keep_rig(file_, "first", pattern_, kNow_ns));
+  const auto second = keep_rig(file_, "second", pattern_, kNow_ns);
+  const auto third = keep_rig(file_, "third", pattern_, kNow_ns);
+  ASSERT_TRUE(second && third);
+  EXPECT_EQ(*second, "rig.before-20260131T120000.yaml");
+  EXPECT_EQ(*third, "rig.before-20260131T120000-2.yaml");
+  EXPECT_EQ(text_of(folder_ / *second), "first");
+  EXPECT_EQ(text_of(folder_ / *third), "second");
+  EXPECT_EQ(text_of(file_), "third");
+  EXPECT_EQ(text_of(folder_ / "pattern.yaml"), "own") << "a pattern that is there is another's";
+}
+
+TEST_F(KeepRig, WhereItCannotBeWrittenItSaysSo) {
+  const auto kept = keep_rig(folder_ / "missing" / "rig.yaml", "text", pattern_, kNow_ns);
+  ASSERT_FALSE(kept);
+  EXPECT_FALSE(kept.error().message.empty());
+}
+
+}  // namespace
+}  // namespace relievo
