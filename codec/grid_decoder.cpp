@@ -116,10 +116,9 @@ void GridDecoder::Scratch::read_places(const Input& in, int line, const std::uin
   const std::uint8_t* key = nullptr;
   const int boundaries = in.grid.boundaries;
   if (in.key != nullptr) {
-    const std::int32_t* from = in.key->columns.data() + in.key->at(line, 0);
-    for (int b = 0; b < boundaries; ++b)
-      key_there[static_cast<std::size_t>(b + StripeGrid::kMargin)] = from[b] != StripeGrid::kAbsent;
-    key = key_there.data() + StripeGrid::kMargin;
+    std::uint8_t* there_in_key = key_there.data() + StripeGrid::kMargin;
+    grid_kernels().there(in.key->columns.data() + in.key->at(line, 0), boundaries, there_in_key);
+    key = there_in_key;
   }
   for (int b = 0; b < boundaries; b += 8) {
     const int last = std::min(b + 8, boundaries);

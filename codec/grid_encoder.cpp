@@ -17,8 +17,9 @@ namespace {
 using namespace grid;
 
 /// How often each symbol comes, by its code.
-template <std::size_t Tables>
-using Counts = std::array<std::uint32_t, Tables * rans::kMostSymbols>;
+template <std::size_t Tables, std::size_t Symbols = rans::kMostSymbols>
+using Counts = std::array<std::uint32_t, Tables * Symbols>;
+using ControlCounts = Counts<kControlTables, kControlSymbols>;
 
 void put_varint(Bytes& out, std::size_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
@@ -34,11 +35,12 @@ struct GridEncoder::Slice {
   rans::Rows control, residuals, sigmas;
   rans::BitWriter raw;
   std::uint32_t vertices = 0, triangles = 0;
-  Counts<kControlTables> control_counts;
+  ControlCounts control_counts;
   Counts<kResidualTables> residual_counts;
   Counts<kSigmaTables> sigma_counts;
   std::vector<std::uint8_t> there[2], there_after, key_there, good[2], sizes, contexts, kinds;
-  std::vector<std::uint16_t> line_codes, words;
+  std::vector<std::uint16_t> line_codes;
+  rans::Words words;
   std::vector<std::int32_t> expected, absent;
   Bytes bytes;
 
@@ -57,7 +59,7 @@ struct GridEncoder::Slice {
              const rans::EncoderTables* sigma_tables);
 
  private:
-  void put(int table, int symbol) { control.codes.push_back(rans::code_of(table, symbol)); }
+  void put(int table, int symbol) { control.codes.push_back(rans::code_of(table, symbol, kControlSymbols)); }
   void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
   void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
   void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
@@ -93,9 +95,8 @@ void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
 }
 
 void GridEncoder::Slice::fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const {
-  const std::int32_t* from = grid.columns.data() + grid.at(line, 0);
-  for (int b = 0; b < grid.boundaries; ++b)
-    out[static_cast<std::size_t>(b + StripeGrid::kMargin)] = from[b] != StripeGrid::kAbsent;
+  grid_kernels().there(grid.columns.data() + grid.at(line, 0), grid.boundaries,
+                       out.data() + StripeGrid::kMargin);
 }
 
 void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8_t* above,
@@ -282,11 +283,9 @@ void GridEncoder::Slice::write(const rans::EncoderTables& control_tables,
                                const rans::EncoderTables* sigma_tables) {
   Bytes streams;
   std::array<std::size_t, 3> ends{};
-  rans::encode(control, control_tables, 1, words, streams);
-  ends[0] = streams.size();
-  rans::encode(residuals, residual_tables, rans::kLanes, words, streams);
+  ends[0] = rans::encode({control, control_tables}, {residuals, residual_tables}, words, streams);
   ends[1] = streams.size();
-  if (sigma_tables != nullptr) rans::encode(sigmas, *sigma_tables, rans::kLanes, words, streams);
+  if (sigma_tables != nullptr) rans::encode({sigmas, *sigma_tables}, words, streams);
   ends[2] = streams.size();
   const Bytes rest = raw.finish();
   bytes.clear();
@@ -311,30 +310,29 @@ void add(const std::array<std::uint32_t, N>& from, std::array<std::uint32_t, N>&
   for (std::size_t i = 0; i < N; ++i) to[i] += from[i];
 }
 
-std::span<const std::uint32_t> of_table(std::span<const std::uint32_t> counts, std::size_t table) {
-  return counts.subspan(table * rans::kMostSymbols, rans::kMostSymbols);
-}
-
 template <std::size_t Tables>
 rans::EncoderTables make_tables(const Counts<Tables>& counts, rans::BitWriter& bits) {
   rans::EncoderTables tables(Tables);
+  const std::vector<rans::Levels> levels = rans::levels_of(counts, rans::kMostSymbols);
   for (std::size_t t = 0; t < Tables; ++t) {
-    const rans::Levels levels = rans::levels_of(of_table(counts, t));
-    rans::write_levels(levels, bits);
-    tables.set(t, levels);
+    rans::write_levels(levels[t], bits);
+    tables.set(t, levels[t]);
   }
   return tables;
 }
 
-rans::EncoderTables make_control_tables(const Counts<kControlTables>& counts, rans::BitWriter& bits) {
-  rans::EncoderTables tables(kControlTables);
+rans::EncoderTables make_control_tables(const ControlCounts& counts, rans::BitWriter& bits) {
+  rans::EncoderTables tables(kControlTables, kControlSymbols);
+  const std::span<const std::uint32_t> all(counts);
+  const std::vector<rans::Levels> cells = rans::levels_of(
+      all.subspan(kCellTable * kControlSymbols, kCellTables * kControlSymbols), kControlSymbols);
   for (std::size_t t = 0; t < kControlTables; ++t) {
-    const auto of = of_table(counts, t);
     if (t >= kCellTable && t < kCellTable + kCellTables) {
-      const rans::Levels levels = rans::levels_of(of);
+      const rans::Levels& levels = cells[t - kCellTable];
       rans::write_levels(levels, bits);
       tables.set(t, levels);
     } else {
+      const auto of = all.subspan(t * kControlSymbols, kControlSymbols);
       const rans::BinaryLevel level = rans::binary_level_of(of[0], of[1]);
       rans::write_level(level, bits);
       tables.set(t, level);

@@ -23,6 +23,7 @@ constexpr int kCellBlockTable = kCellTable + kCellTables;  // eight whole cells
 constexpr int kMarkTable = kCellBlockTable + 1;            // interpolated, by the marks above and left
 constexpr int kControlTables = kMarkTable + 4;
 constexpr int kCellSymbols = 6;
+constexpr int kControlSymbols = 8;  // room for each of them
 
 constexpr int kResidualTables = 8;      // by the sizes above; the last where nothing is above
 constexpr std::uint8_t kFirstSize = 1;  // what is taken for the sizes above a slice
