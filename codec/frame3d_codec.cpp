@@ -181,7 +181,7 @@ struct FrameEncoder::State {
       has_key = false;
     } else if (coded.geometry_is_key) {
       has_key = options.key_interval > 1;
-      key.id = grid_id(coded.geometry);
+      if (has_key) key.id = grid_id(coded.geometry);
       std::swap(key.grid, grid);
     }
     return coded;

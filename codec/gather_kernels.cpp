@@ -128,7 +128,8 @@ RELIEVO_AVX2 unsigned mask_of(__m256i lanes) {
     const std::uint32_t key = place_key(first);
     const __m256i expected = _mm256_add_epi32(_mm256_set1_epi32(static_cast<std::int32_t>(key)), lane);
     const unsigned run = mask_of(_mm256_cmpeq_epi32(points.keys, expected));
-    const auto n = static_cast<unsigned>(std::countr_one(run));
+    // By itself, so that the next eight do not wait for these to be counted.
+    const unsigned n = run == 0xffU ? 8U : static_cast<unsigned>(std::countr_one(run));
     const std::size_t at = first.line * stride + first.boundary;
     if (first.line >= lines || first.boundary + n > boundaries) return gather(job, i, count);
     const __m256i before = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(columns + at));

@@ -152,20 +152,22 @@ bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint
         continue;
       }
     }
+    std::uint8_t left = good_here[b - 1];
     for (int i = b; i < last; ++i) {
-      int lack = 0;
-      const int corners = corners_of(above, below, i, lack);
-      good_here[i] = 0;
-      if (corners < 3) continue;
+      const unsigned there_here = corners_there(above, below, i);
+      const int corners = kCornerCounts[there_here];
+      if (corners < 3) {
+        good_here[i] = left = 0;
+        continue;
+      }
       const rans::DecoderTable& table =
-          in.tables
-              .cells[static_cast<std::size_t>((corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i])];
+          in.tables.cells[static_cast<std::size_t>((corners == 4 ? 4 : 0) + 2 * left + good_above[i])];
       if (!table.usable) return false;
       const int symbol = control.one(table);
       if (symbol >= kCellSymbols || (corners == 3 && symbol > 1)) return false;
-      good_here[i] = symbol == 0;
+      good_here[i] = left = symbol == 0;
       triangles += triangles_of(symbol, corners);
-      cells[i] = cell_of(symbol, corners, lack);
+      cells[i] = cell_of(symbol, corners, missing_of(there_here));
     }
   }
   std::swap(good[0], good[1]);

@@ -59,7 +59,7 @@ struct GridEncoder::Slice {
              const rans::EncoderTables* sigma_tables);
 
  private:
-  void put(int table, int symbol) { control.codes.push_back(rans::code_of(table, symbol, kControlSymbols)); }
+  void put(int table, int symbol) { *to_++ = rans::code_of(table, symbol, kControlSymbols); }
   void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
   void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
   void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
@@ -67,6 +67,16 @@ struct GridEncoder::Slice {
   void read_columns(const Input& in, int line);
   void read_alone(const Input& in, int line, const GridRows& rows, int b, std::uint16_t*& to);
   void read_sigmas(const Input& in, int line);
+  /// What `write` puts into the control stream; at most `most` symbols.
+  template <typename Write>
+  void put_at_most(std::size_t most, const Write& write) {
+    const std::size_t start = control.codes.size();
+    control.codes.resize(start + most);
+    to_ = control.codes.data() + start;
+    write();
+    control.codes.resize(static_cast<std::size_t>(to_ - control.codes.data()));
+  }
+  std::uint16_t* to_ = nullptr;  // of put()
   const std::int32_t* row(const StripeGrid& grid, int line) const {
     return line < begin ? absent.data() + StripeGrid::kMargin : grid.columns.data() + grid.at(line, 0);
   }
@@ -115,7 +125,11 @@ void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8
       put(kBlockTable + uniform, all ? 0 : 1);
       if (all) continue;
     }
-    for (int i = b; i < last; ++i) put(place_context(here, above, key, i), here[i]);
+    const std::uint64_t contexts_of = place_contexts(here, above, key, b);
+    static_assert(kPlaceTables * kControlSymbols <= 256);
+    const std::uint64_t codes = contexts_of * kControlSymbols + load8(here + b);  // of tables from 0 on
+    for (int i = 0; i < 8; ++i) to_[i] = static_cast<std::uint8_t>(codes >> 8 * i);
+    to_ += last - b;
   }
 }
 
@@ -140,15 +154,17 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
         continue;
       }
     }
+    std::uint8_t left = good_here[b - 1];
     for (int i = b; i < last; ++i) {
-      int lack = 0;
-      const int corners = corners_of(above, below, i, lack);
-      good_here[i] = 0;
-      if (corners < 3) continue;
+      const int corners = kCornerCounts[corners_there(above, below, i)];
+      if (corners < 3) {
+        good_here[i] = left = 0;
+        continue;
+      }
       const int symbol = cell_symbol(cells[i], corners);
       triangles += triangles_of(symbol, corners);
-      put(kCellTable + (corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i], symbol);
-      good_here[i] = symbol == 0;
+      put(kCellTable + (corners == 4 ? 4 : 0) + 2 * left + good_above[i], symbol);
+      good_here[i] = left = symbol == 0;
     }
   }
   std::swap(good[0], good[1]);
@@ -254,11 +270,15 @@ void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
 void GridEncoder::Slice::read(const Input& in) {
   // there[0] is the line above; the place at [1] the line itself. Nothing is above a slice.
   fill_there(in.grid, begin, there[1]);
-  read_places(in, begin, there[0].data() + StripeGrid::kMargin, there[1].data() + StripeGrid::kMargin);
+  // A line's marks, the places below it and its cells, each with what is said of blocks.
+  const auto most = static_cast<std::size_t>(4 * in.grid.stride());
+  put_at_most(most, [&] {
+    read_places(in, begin, there[0].data() + StripeGrid::kMargin, there[1].data() + StripeGrid::kMargin);
+  });
   for (int line = begin; line < end; ++line) {
     std::swap(there[0], there[1]);
     const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
-    if (!in.grid.interpolated.empty()) read_marks(in, line, here);
+    if (!in.grid.interpolated.empty()) put_at_most(most, [&] { read_marks(in, line, here); });
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
       if (line + 1 < end) {
@@ -267,13 +287,15 @@ void GridEncoder::Slice::read(const Input& in) {
         there[1].swap(there_after);
       }
       const std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
-      read_places(in, line + 1, here, below);
-      read_cells(in, line, here, below);
+      put_at_most(most, [&] {
+        read_places(in, line + 1, here, below);
+        read_cells(in, line, here, below);
+      });
     }
     read_columns(in, line);
     if (!in.grid.sigmas.empty()) read_sigmas(in, line);
   }
-  for (const std::uint16_t code : control.codes) ++control_counts[code];
+  rans::count_codes(control.codes, control_counts);
   rans::count_codes(residuals.codes, residual_counts);
   rans::count_codes(sigmas.codes, sigma_counts);
 }
