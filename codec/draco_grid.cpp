@@ -162,10 +162,10 @@ void list_places(StripeGrid& grid, const std::vector<std::uint8_t>& there, Place
       const std::size_t at = grid.at(line, b);
       std::uint32_t change = there[at] ^ (line > 0 ? there[at - stride] : 0U);
       grid.vertices += there[at];
-      int lack = 0;
-      const int corners = line + 1 < grid.lines && b + 1 < grid.boundaries
-                              ? corners_of(there.data() + at, there.data() + at + stride, 0, lack)
-                              : 0;
+      const unsigned around = line + 1 < grid.lines && b + 1 < grid.boundaries
+                                  ? corners_there(there.data() + at, there.data() + at + stride, 0)
+                                  : 0;
+      const int corners = kCornerCounts[around];
       if (corners >= 3) {
         const int symbol = cell_symbol(grid.cells[at], corners);
         grid.triangles += triangles_of(symbol, corners);
@@ -221,14 +221,14 @@ bool fill_cells(const std::vector<std::uint8_t>& changes, const std::vector<std:
     for (int b = 0; b < grid.boundaries; ++b) {
       const std::size_t at = grid.at(line, b);
       const int symbol = changes[at] >> 1;
-      int lack = 0;
-      const int corners = line + 1 < grid.lines && b + 1 < grid.boundaries
-                              ? corners_of(there.data() + at, there.data() + at + stride, 0, lack)
-                              : 0;
+      const unsigned around = line + 1 < grid.lines && b + 1 < grid.boundaries
+                                  ? corners_there(there.data() + at, there.data() + at + stride, 0)
+                                  : 0;
+      const int corners = kCornerCounts[around];
       if (symbol > (corners == 4 ? kCellSymbols - 1 : corners == 3 ? 1 : 0)) return false;
       if (corners < 3) continue;
       grid.triangles += triangles_of(symbol, corners);
-      grid.cells[at] = cell_of(symbol, corners, lack);
+      grid.cells[at] = cell_of(symbol, corners, missing_of(around));
     }
   }
   return true;

@@ -94,8 +94,9 @@ Result<Bytes> with_texture(const Frame3D& frame, const EncodeOptions& options, T
   if (sends_texture(frame, options)) {
     header.texture_width = static_cast<std::uint32_t>(frame.texture.width());
     header.texture_height = static_cast<std::uint32_t>(frame.texture.height());
-    const auto alone =
-        texture->encode(frame.texture.view(), {.quality = options.texture_quality, .key = key}, section);
+    const auto alone = texture->encode(
+        frame.texture.view(),
+        {.quality = options.texture_quality, .key = key, .encoder = options.texture_encoder}, section);
     if (!alone) return alone.error();
     header.is_key = header.is_key && *alone;
   }
@@ -181,7 +182,7 @@ struct FrameEncoder::State {
       has_key = false;
     } else if (coded.geometry_is_key) {
       has_key = options.key_interval > 1;
-      key.id = grid_id(coded.geometry);
+      if (has_key) key.id = grid_id(coded.geometry);
       std::swap(key.grid, grid);
     }
     return coded;

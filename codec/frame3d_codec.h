@@ -12,6 +12,7 @@
 #include "base/result.h"
 #include "base/rig.h"
 #include "base/stream.h"
+#include "codec/video_encoder_kind.h"
 
 namespace relievo {
 
@@ -34,8 +35,9 @@ struct EncodeOptions {
   Volume volume;                     // size 0: each frame's own bounding box
   TextureCodec texture = TextureCodec::kJpeg;
   int texture_quality = 80;  // 1..100: about the error of a JPEG of that quality
-  bool quality = true;       // sigma and interpolation of each vertex, where the surface has them
-  int step_bits = 4;         // 0..8; grids: columns are whole steps of 2^-step_bits pixels
+  VideoEncoderKind texture_encoder = VideoEncoderKind::kAuto;  // of H.264
+  bool quality = true;  // sigma and interpolation of each vertex, where the surface has them
+  int step_bits = 4;    // 0..8; grids: columns are whole steps of 2^-step_bits pixels
   // Grids: estimates from this frame and those before go instead of what was measured (GridEstimator).
   bool estimate = false;
   // Grids: how far off a column may be, 0.006 to 8 pixels; chooses the step. 0: step_bits does.

@@ -116,10 +116,9 @@ void GridDecoder::Scratch::read_places(const Input& in, int line, const std::uin
   const std::uint8_t* key = nullptr;
   const int boundaries = in.grid.boundaries;
   if (in.key != nullptr) {
-    const std::int32_t* from = in.key->columns.data() + in.key->at(line, 0);
-    for (int b = 0; b < boundaries; ++b)
-      key_there[static_cast<std::size_t>(b + StripeGrid::kMargin)] = from[b] != StripeGrid::kAbsent;
-    key = key_there.data() + StripeGrid::kMargin;
+    std::uint8_t* there_in_key = key_there.data() + StripeGrid::kMargin;
+    grid_kernels().there(in.key->columns.data() + in.key->at(line, 0), boundaries, there_in_key);
+    key = there_in_key;
   }
   for (int b = 0; b < boundaries; b += 8) {
     const int last = std::min(b + 8, boundaries);
@@ -153,20 +152,22 @@ bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint
         continue;
       }
     }
+    std::uint8_t left = good_here[b - 1];
     for (int i = b; i < last; ++i) {
-      int lack = 0;
-      const int corners = corners_of(above, below, i, lack);
-      good_here[i] = 0;
-      if (corners < 3) continue;
+      const unsigned there_here = corners_there(above, below, i);
+      const int corners = kCornerCounts[there_here];
+      if (corners < 3) {
+        good_here[i] = left = 0;
+        continue;
+      }
       const rans::DecoderTable& table =
-          in.tables
-              .cells[static_cast<std::size_t>((corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i])];
+          in.tables.cells[static_cast<std::size_t>((corners == 4 ? 4 : 0) + 2 * left + good_above[i])];
       if (!table.usable) return false;
       const int symbol = control.one(table);
       if (symbol >= kCellSymbols || (corners == 3 && symbol > 1)) return false;
-      good_here[i] = symbol == 0;
+      good_here[i] = left = symbol == 0;
       triangles += triangles_of(symbol, corners);
-      cells[i] = cell_of(symbol, corners, lack);
+      cells[i] = cell_of(symbol, corners, missing_of(there_here));
     }
   }
   std::swap(good[0], good[1]);

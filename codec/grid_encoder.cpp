@@ -17,8 +17,9 @@ namespace {
 using namespace grid;
 
 /// How often each symbol comes, by its code.
-template <std::size_t Tables>
-using Counts = std::array<std::uint32_t, Tables * rans::kMostSymbols>;
+template <std::size_t Tables, std::size_t Symbols = rans::kMostSymbols>
+using Counts = std::array<std::uint32_t, Tables * Symbols>;
+using ControlCounts = Counts<kControlTables, kControlSymbols>;
 
 void put_varint(Bytes& out, std::size_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
@@ -34,11 +35,12 @@ struct GridEncoder::Slice {
   rans::Rows control, residuals, sigmas;
   rans::BitWriter raw;
   std::uint32_t vertices = 0, triangles = 0;
-  Counts<kControlTables> control_counts;
+  ControlCounts control_counts;
   Counts<kResidualTables> residual_counts;
   Counts<kSigmaTables> sigma_counts;
   std::vector<std::uint8_t> there[2], there_after, key_there, good[2], sizes, contexts, kinds;
-  std::vector<std::uint16_t> line_codes, words;
+  std::vector<std::uint16_t> line_codes;
+  rans::Words words;
   std::vector<std::int32_t> expected, absent;
   Bytes bytes;
 
@@ -57,7 +59,7 @@ struct GridEncoder::Slice {
              const rans::EncoderTables* sigma_tables);
 
  private:
-  void put(int table, int symbol) { control.codes.push_back(rans::code_of(table, symbol)); }
+  void put(int table, int symbol) { *to_++ = rans::code_of(table, symbol, kControlSymbols); }
   void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
   void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
   void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
@@ -65,6 +67,16 @@ struct GridEncoder::Slice {
   void read_columns(const Input& in, int line);
   void read_alone(const Input& in, int line, const GridRows& rows, int b, std::uint16_t*& to);
   void read_sigmas(const Input& in, int line);
+  /// What `write` puts into the control stream; at most `most` symbols.
+  template <typename Write>
+  void put_at_most(std::size_t most, const Write& write) {
+    const std::size_t start = control.codes.size();
+    control.codes.resize(start + most);
+    to_ = control.codes.data() + start;
+    write();
+    control.codes.resize(static_cast<std::size_t>(to_ - control.codes.data()));
+  }
+  std::uint16_t* to_ = nullptr;  // of put()
   const std::int32_t* row(const StripeGrid& grid, int line) const {
     return line < begin ? absent.data() + StripeGrid::kMargin : grid.columns.data() + grid.at(line, 0);
   }
@@ -93,9 +105,8 @@ void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
 }
 
 void GridEncoder::Slice::fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const {
-  const std::int32_t* from = grid.columns.data() + grid.at(line, 0);
-  for (int b = 0; b < grid.boundaries; ++b)
-    out[static_cast<std::size_t>(b + StripeGrid::kMargin)] = from[b] != StripeGrid::kAbsent;
+  grid_kernels().there(grid.columns.data() + grid.at(line, 0), grid.boundaries,
+                       out.data() + StripeGrid::kMargin);
 }
 
 void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8_t* above,
@@ -114,7 +125,11 @@ void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8
       put(kBlockTable + uniform, all ? 0 : 1);
       if (all) continue;
     }
-    for (int i = b; i < last; ++i) put(place_context(here, above, key, i), here[i]);
+    const std::uint64_t contexts_of = place_contexts(here, above, key, b);
+    static_assert(kPlaceTables * kControlSymbols <= 256);
+    const std::uint64_t codes = contexts_of * kControlSymbols + load8(here + b);  // of tables from 0 on
+    for (int i = 0; i < 8; ++i) to_[i] = static_cast<std::uint8_t>(codes >> 8 * i);
+    to_ += last - b;
   }
 }
 
@@ -139,15 +154,17 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
         continue;
       }
     }
+    std::uint8_t left = good_here[b - 1];
     for (int i = b; i < last; ++i) {
-      int lack = 0;
-      const int corners = corners_of(above, below, i, lack);
-      good_here[i] = 0;
-      if (corners < 3) continue;
+      const int corners = kCornerCounts[corners_there(above, below, i)];
+      if (corners < 3) {
+        good_here[i] = left = 0;
+        continue;
+      }
       const int symbol = cell_symbol(cells[i], corners);
       triangles += triangles_of(symbol, corners);
-      put(kCellTable + (corners == 4 ? 4 : 0) + 2 * good_here[i - 1] + good_above[i], symbol);
-      good_here[i] = symbol == 0;
+      put(kCellTable + (corners == 4 ? 4 : 0) + 2 * left + good_above[i], symbol);
+      good_here[i] = left = symbol == 0;
     }
   }
   std::swap(good[0], good[1]);
@@ -253,11 +270,15 @@ void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
 void GridEncoder::Slice::read(const Input& in) {
   // there[0] is the line above; the place at [1] the line itself. Nothing is above a slice.
   fill_there(in.grid, begin, there[1]);
-  read_places(in, begin, there[0].data() + StripeGrid::kMargin, there[1].data() + StripeGrid::kMargin);
+  // A line's marks, the places below it and its cells, each with what is said of blocks.
+  const auto most = static_cast<std::size_t>(4 * in.grid.stride());
+  put_at_most(most, [&] {
+    read_places(in, begin, there[0].data() + StripeGrid::kMargin, there[1].data() + StripeGrid::kMargin);
+  });
   for (int line = begin; line < end; ++line) {
     std::swap(there[0], there[1]);
     const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
-    if (!in.grid.interpolated.empty()) read_marks(in, line, here);
+    if (!in.grid.interpolated.empty()) put_at_most(most, [&] { read_marks(in, line, here); });
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
       if (line + 1 < end) {
@@ -266,13 +287,15 @@ void GridEncoder::Slice::read(const Input& in) {
         there[1].swap(there_after);
       }
       const std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
-      read_places(in, line + 1, here, below);
-      read_cells(in, line, here, below);
+      put_at_most(most, [&] {
+        read_places(in, line + 1, here, below);
+        read_cells(in, line, here, below);
+      });
     }
     read_columns(in, line);
     if (!in.grid.sigmas.empty()) read_sigmas(in, line);
   }
-  for (const std::uint16_t code : control.codes) ++control_counts[code];
+  rans::count_codes(control.codes, control_counts);
   rans::count_codes(residuals.codes, residual_counts);
   rans::count_codes(sigmas.codes, sigma_counts);
 }
@@ -282,11 +305,9 @@ void GridEncoder::Slice::write(const rans::EncoderTables& control_tables,
                                const rans::EncoderTables* sigma_tables) {
   Bytes streams;
   std::array<std::size_t, 3> ends{};
-  rans::encode(control, control_tables, 1, words, streams);
-  ends[0] = streams.size();
-  rans::encode(residuals, residual_tables, rans::kLanes, words, streams);
+  ends[0] = rans::encode({control, control_tables}, {residuals, residual_tables}, words, streams);
   ends[1] = streams.size();
-  if (sigma_tables != nullptr) rans::encode(sigmas, *sigma_tables, rans::kLanes, words, streams);
+  if (sigma_tables != nullptr) rans::encode({sigmas, *sigma_tables}, words, streams);
   ends[2] = streams.size();
   const Bytes rest = raw.finish();
   bytes.clear();
@@ -311,30 +332,29 @@ void add(const std::array<std::uint32_t, N>& from, std::array<std::uint32_t, N>&
   for (std::size_t i = 0; i < N; ++i) to[i] += from[i];
 }
 
-std::span<const std::uint32_t> of_table(std::span<const std::uint32_t> counts, std::size_t table) {
-  return counts.subspan(table * rans::kMostSymbols, rans::kMostSymbols);
-}
-
 template <std::size_t Tables>
 rans::EncoderTables make_tables(const Counts<Tables>& counts, rans::BitWriter& bits) {
   rans::EncoderTables tables(Tables);
+  const std::vector<rans::Levels> levels = rans::levels_of(counts, rans::kMostSymbols);
   for (std::size_t t = 0; t < Tables; ++t) {
-    const rans::Levels levels = rans::levels_of(of_table(counts, t));
-    rans::write_levels(levels, bits);
-    tables.set(t, levels);
+    rans::write_levels(levels[t], bits);
+    tables.set(t, levels[t]);
   }
   return tables;
 }
 
-rans::EncoderTables make_control_tables(const Counts<kControlTables>& counts, rans::BitWriter& bits) {
-  rans::EncoderTables tables(kControlTables);
+rans::EncoderTables make_control_tables(const ControlCounts& counts, rans::BitWriter& bits) {
+  rans::EncoderTables tables(kControlTables, kControlSymbols);
+  const std::span<const std::uint32_t> all(counts);
+  const std::vector<rans::Levels> cells = rans::levels_of(
+      all.subspan(kCellTable * kControlSymbols, kCellTables * kControlSymbols), kControlSymbols);
   for (std::size_t t = 0; t < kControlTables; ++t) {
-    const auto of = of_table(counts, t);
     if (t >= kCellTable && t < kCellTable + kCellTables) {
-      const rans::Levels levels = rans::levels_of(of);
+      const rans::Levels& levels = cells[t - kCellTable];
       rans::write_levels(levels, bits);
       tables.set(t, levels);
     } else {
+      const auto of = all.subspan(t * kControlSymbols, kControlSymbols);
       const rans::BinaryLevel level = rans::binary_level_of(of[0], of[1]);
       rans::write_level(level, bits);
       tables.set(t, level);

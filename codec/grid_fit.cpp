@@ -47,6 +47,16 @@ struct Fit {
   }
 };
 
+Fit<3> fit_of(const GridSlopes& sums) {
+  const auto of = [](std::int64_t sum) { return static_cast<double>(sum); };
+  Fit<3> fit;
+  fit.a = {{{of(sums.x0x0), of(sums.x0x1), of(sums.x0x2)},
+            {of(sums.x0x1), of(sums.x1x1), of(sums.x1x2)},
+            {of(sums.x0x2), of(sums.x1x2), of(sums.x2x2)}}};
+  fit.b = {of(sums.x0y), of(sums.x1y), of(sums.x2y)};
+  return fit;
+}
+
 bool near(std::int32_t d, std::int32_t limit) {
   return d <= limit && d >= -limit;
 }
@@ -73,20 +83,17 @@ GridModel fit_model(const StripeGrid& grid, const StripeGrid* key) {
   const int line_step = std::max(1, grid.lines / kSampledLines);
   model.spacing = usual_spacing(grid, line_step);
   const auto row = [&](const StripeGrid& of, int line) { return of.columns.data() + of.at(line, 0); };
-  Fit<3> slopes;
+  GridSlopes sums;
   for (int line = 4; line < grid.lines; line += line_step) {
-    const std::int32_t *here = row(grid, line), *up1 = row(grid, line - 1), *up2 = row(grid, line - 2),
-                       *up3 = row(grid, line - 3), *up4 = row(grid, line - 4);
-    for (int b = 0; b < grid.boundaries; ++b) {
-      const std::int32_t y = here[b] - up1[b];
-      const std::array<std::int32_t, 3> x{up1[b] - up2[b], up2[b] - up3[b], up3[b] - up4[b]};
-      // Absent places are far from all others; between two of them there is nothing to learn.
-      if (here[b] == kAbsent || !near(y, limit) || !near(x[0], limit) || !near(x[1], limit) ||
-          !near(x[2], limit))
-        continue;
-      slopes.add(x, y);
-    }
+    const GridRows rows{.up1 = row(grid, line - 1),
+                        .up2 = row(grid, line - 2),
+                        .up3 = row(grid, line - 3),
+                        .up4 = row(grid, line - 4),
+                        .key = nullptr,
+                        .key_up = nullptr};
+    grid_kernels().slopes(row(grid, line), rows, limit, grid.boundaries, sums);
   }
+  Fit<3> slopes = fit_of(sums);
   const auto w = slopes.weights();
   model.slope1 = w[0];
   model.slope2 = w[1];

@@ -2,12 +2,10 @@
 #include "codec/grid_points.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "base/lens.h"
-#include "base/variants.h"
 
 namespace relievo {
 namespace {
@@ -15,76 +13,18 @@ namespace {
 constexpr int kRayStep = 8;        // columns between ray samples: linear between them is good to 1e-3 px
 constexpr int kSheetSamples = 65;  // over the projector's height and a quarter beyond
 constexpr int kSheetRounds = 4;    // of point -> height -> sheet; each gains about two digits
-constexpr float kFarthest_m = 1e6F;
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 bool is_there(const std::int32_t* columns, std::size_t b) {
   return columns[b] != StripeGrid::kAbsent;
 }
 
-#define RELIEVO_INLINE [[gnu::always_inline]] inline
-
-RELIEVO_INLINE bool meet_body(const SheetRow& row, const Sheets& sheets, int count) {
-  const float* __restrict numerator = sheets.numerator;
-  const float* __restrict a = sheets.a;
-  const float* __restrict b = sheets.b;
-  const float* __restrict c = sheets.c;
-  const std::int32_t* __restrict columns = row.columns;
-  const float* __restrict x = row.ray_x;
-  const float* __restrict y = row.ray_y;
-  float* __restrict slope = row.slope;
-  float* __restrict z = row.z;
-  for (int i = 0; i < count; ++i) {
-    const float denominator = a[i] * x[i] + b[i] * y[i] + c[i];
-    z[i] = numerator[i] / denominator;
-    slope[i] = z[i] * a[i] / denominator;
-  }
-  // By itself, since compilers do not make such comparisons of floats several at a time.
-  std::int32_t bad = 0;
-  for (int i = 0; i < count; ++i) {
-    const bool in_front = (z[i] > 0) & (z[i] < kFarthest_m);
-    bad |= (columns[i] != StripeGrid::kAbsent) & !in_front ? 1 : 0;
-  }
-  return bad == 0;
+/// Kernels do eight places at once.
+std::size_t whole_eights(int boundaries) {
+  return static_cast<std::size_t>(boundaries + 7) / 8 * 8;
 }
-
-RELIEVO_INLINE void straight_rays_body(const std::int32_t* __restrict columns, const StraightRays& rays,
-                                       int count, float* __restrict column, float* __restrict x,
-                                       float* __restrict y) {
-  for (int i = 0; i < count; ++i) {
-    column[i] = static_cast<float>(columns[i]) * rays.step_px;
-    x[i] = column[i] * rays.per_px - rays.first;
-    y[i] = rays.y;
-  }
-}
-
-#define RELIEVO_KERNELS(set, attributes)                                                                   \
-  struct set {                                                                                             \
-    attributes static bool meet(const SheetRow& row, const Sheets& sheets, int count) {                    \
-      return meet_body(row, sheets, count);                                                                \
-    }                                                                                                      \
-    attributes static void straight_rays(const std::int32_t* columns, const StraightRays& rays, int count, \
-                                         float* column, float* x, float* y) {                              \
-      straight_rays_body(columns, rays, count, column, x, y);                                              \
-    }                                                                                                      \
-    static GridPointKernels table(const char* name) { return {name, meet, straight_rays}; }                \
-  }
-
-RELIEVO_KERNELS(Portable, );
-#if defined(__x86_64__)
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
-#endif
 
 }  // namespace
-
-const std::vector<GridPointKernels>& all_grid_point_kernels() {
-#if defined(__x86_64__)
-  static const auto kernels = variants(Portable::table("portable"), Avx2::table("avx2"));
-#else
-  static const auto kernels = variants(Portable::table("portable"));
-#endif
-  return kernels;
-}
 
 GridPoints::GridPoints(const GridCalibration& calibration)
     : calibration_(calibration),
@@ -107,6 +47,8 @@ GridPoints::GridPoints(const GridCalibration& calibration)
       sheet_b_.push_back(static_cast<float>(r[1] - x * r[7]));
       sheet_c_.push_back(static_cast<float>(r[2] - x * r[8]));
     }
+    for (auto* values : {&sheet_numerator_, &sheet_a_, &sheet_b_, &sheet_c_})
+      values->resize(whole_eights(calibration.boundaries()), 1);
     return;
   }
   const double top = (0 - projector.cy()) / projector.fy();
@@ -121,14 +63,13 @@ GridPoints::GridPoints(const GridCalibration& calibration)
 bool GridPoints::find_rays(const std::int32_t* columns, float step_px, int line, std::size_t count) {
   const PinholeModel& camera = calibration_.camera;
   const double row = line * calibration_.line_step_px;
-  const int boundaries = calibration_.boundaries();
+  const auto places = static_cast<int>(line_.column.size());
   StraightRays rays;
   rays.step_px = step_px;
   rays.y = static_cast<float>((row - camera.cy()) / camera.fy());
   rays.per_px = static_cast<float>(1 / camera.fx());
   rays.first = static_cast<float>((camera.cx() + camera.matrix[1] * rays.y) / camera.fx());
-  kernels_.straight_rays(columns, rays, boundaries, line_.column.data(), line_.ray_x.data(),
-                         line_.ray_y.data());
+  kernels_.straight_rays(columns, rays, places, line_.column.data(), line_.ray_x.data(), line_.ray_y.data());
   if (straight_rays_) return true;
   const auto samples = static_cast<std::size_t>(ray_samples_);
   const std::size_t start = static_cast<std::size_t>(line) * samples;
@@ -210,30 +151,31 @@ bool GridPoints::meet_curved_sheets(const std::int32_t* columns) {
 
 bool GridPoints::make_line(const StripeGrid& grid, int line, Surface& out, const std::int32_t* index) {
   const std::int32_t* columns = grid.columns.data() + grid.at(line, 0);
-  const auto boundaries = static_cast<std::size_t>(grid.boundaries);
+  const auto places = static_cast<int>(whole_eights(grid.boundaries));
   const auto first = static_cast<std::size_t>(index[0]);
-  const std::size_t count = static_cast<std::size_t>(index[boundaries]) - first;
+  const std::size_t count = static_cast<std::size_t>(index[grid.boundaries]) - first;
   if (count == 0) return true;
   if (!find_rays(columns, 1.F / static_cast<float>(1 << grid.step_bits), line, count)) return false;
-  const SheetRow row{columns, line_.ray_x.data(), line_.ray_y.data(), line_.slope.data(), line_.z.data()};
+  const bool has_quality = !grid.interpolated.empty() || !grid.sigmas.empty();
+  const SheetRow row{columns, line_.ray_x.data(), line_.ray_y.data(),
+                     has_quality ? line_.slope.data() : nullptr, line_.z.data()};
   const Sheets sheets{sheet_numerator_.data(), sheet_a_.data(), sheet_b_.data(), sheet_c_.data()};
-  const bool met =
-      straight_sheets_ ? kernels_.meet(row, sheets, grid.boundaries) : meet_curved_sheets(columns);
+  const bool met = straight_sheets_ ? kernels_.meet(row, sheets, places) : meet_curved_sheets(columns);
   if (!met) return false;
-  const float per_width = 1.F / static_cast<float>(calibration_.camera.width);
-  const float v = (static_cast<float>(line * calibration_.line_step_px) + 0.5F) /
-                  static_cast<float>(calibration_.camera.height);
-  Vec3f* position = out.positions.data() + first;
-  Vec2f* coordinate = out.texture_coordinates.data() + first;
-  GridPoint* place = out.grid.data() + first;
-  for (std::size_t b = 0; b < boundaries; ++b) {
-    if (!is_there(columns, b)) continue;
-    const float z = line_.z[b];
-    *position++ = {z * line_.ray_x[b], z * line_.ray_y[b], z};
-    *coordinate++ = {(line_.column[b] + 0.5F) * per_width, v};
-    *place++ = {static_cast<std::uint16_t>(b), static_cast<std::uint16_t>(line), line_.column[b], 0, false};
-  }
-  if (!grid.interpolated.empty() || !grid.sigmas.empty()) tell_quality(grid, line, out, first);
+  kernels_.vertices({.columns = columns,
+                     .column_px = line_.column.data(),
+                     .ray_x = line_.ray_x.data(),
+                     .ray_y = line_.ray_y.data(),
+                     .z = line_.z.data(),
+                     .per_width = 1.F / static_cast<float>(calibration_.camera.width),
+                     .v = (static_cast<float>(line * calibration_.line_step_px) + 0.5F) /
+                          static_cast<float>(calibration_.camera.height),
+                     .line = static_cast<std::uint16_t>(line),
+                     .position = out.positions.data() + first,
+                     .coordinate = out.texture_coordinates.data() + first,
+                     .place = out.grid.data() + first},
+                    places);
+  if (has_quality) tell_quality(grid, line, out, first);
   return true;
 }
 
@@ -262,43 +204,10 @@ void GridPoints::tell_quality(const StripeGrid& grid, int line, Surface& out, st
   }
 }
 
-namespace {
-
-/// Triangle without corner c, counter-clockwise; of kStraight and kTurned in this order.
-constexpr std::array<int, 4> kOrder{3, 1, 0, 2};
-
-Triangle* write_cells(const std::uint8_t* cells, const std::int32_t* above, const std::int32_t* below,
-                      int count, Triangle* to) {
-  const auto index = [](std::int32_t i) { return static_cast<std::uint32_t>(i); };
-  for (int b = 0; b < count; ++b) {
-    const std::uint8_t cell = cells[b];
-    if (cell == 0) continue;
-    const std::array<std::uint32_t, 4> q{index(above[b]), index(below[b]), index(below[b + 1]),
-                                         index(above[b + 1])};
-    const bool straight = cell == grid_cell::kStraight;
-    if (straight || cell == grid_cell::kTurned) {
-      // Without branches on the diagonal, which is hard to foresee.
-      const std::uint32_t first = straight ? q[0] : q[1];
-      const std::uint32_t third = straight ? q[2] : q[3];
-      *to++ = {first, straight ? q[1] : q[2], third};
-      *to++ = {third, straight ? q[3] : q[0], first};
-    } else {
-      for (const int lack : kOrder) {
-        if ((cell >> lack & 1) == 0) continue;
-        const auto c = static_cast<std::size_t>(lack);
-        *to++ = {q[(c + 1) & 3U], q[(c + 2) & 3U], q[(c + 3) & 3U]};
-      }
-    }
-  }
-  return to;
-}
-
-}  // namespace
-
 Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
   const auto places = static_cast<std::size_t>(grid.stride());
   for (auto* values : {&line_.column, &line_.ray_x, &line_.ray_y, &line_.slope, &line_.z})
-    values->resize(static_cast<std::size_t>(grid.boundaries));
+    values->resize(whole_eights(grid.boundaries));
   out.positions.resize(grid.vertices);
   out.texture_coordinates.resize(grid.vertices);
   out.grid.resize(grid.vertices);
@@ -315,16 +224,14 @@ Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
     std::swap(index_[0], index_[1]);
     const std::int32_t* columns = grid.columns.data() + grid.at(line, 0);
     std::int32_t* index = index_[1].data();
-    for (int b = 0; b < grid.boundaries; ++b) {
-      index[b] = next;
-      next += columns[b] != StripeGrid::kAbsent;
-    }
+    next = kernels_.number(columns, grid.boundaries, next, index);
     index[grid.boundaries] = next;
     if (!make_line(grid, line, out, index))
       return Error{"grid has a vertex whose ray meets no light sheet of the calibration"};
     if (line > 0)
-      triangle = write_cells(grid.cells.data() + grid.at(line - 1, 0), index_[0].data(), index,
-                             grid.boundaries - 1, triangle);
+      triangle = kernels_.triangles(
+          {.cells = grid.cells.data() + grid.at(line - 1, 0), .above = index_[0].data(), .below = index},
+          grid.boundaries - 1, triangle);
   }
   return {};
 }

@@ -8,36 +8,10 @@
 
 #include "base/frame3d.h"
 #include "base/result.h"
+#include "codec/point_kernels.h"
 #include "codec/stripe_grid.h"
 
 namespace relievo {
-
-/// Light sheets without distortion, one a boundary: z = numerator / (a x + b y + c) on the ray (x, y, 1).
-struct Sheets {
-  const float *numerator, *a, *b, *c;
-};
-/// One line's places: their columns, kAbsent where there is no vertex; rays; z and dz/dx.
-struct SheetRow {
-  const std::int32_t* columns;
-  const float *ray_x, *ray_y;
-  float *slope, *z;
-};
-/// Rays of a line of a lens without distortion: x = column per_px - first.
-struct StraightRays {
-  float step_px, per_px, first, y;
-};
-
-/// As GridKernels: the reference, and others with the same results.
-struct GridPointKernels {
-  const char* name;
-  /// Fills slope and z. False where a vertex is not in front of the camera.
-  bool (*meet)(const SheetRow& row, const Sheets& sheets, int count);
-  /// Fills columns in pixels and rays; of no meaning where there is no vertex.
-  void (*straight_rays)(const std::int32_t* columns, const StraightRays& rays, int count, float* column,
-                        float* x, float* y);
-};
-/// The reference first and the best last.
-const std::vector<GridPointKernels>& all_grid_point_kernels();
 
 /// What can be worked out once for a calibration; lines and boundaries when they are first needed. One
 /// thread.
@@ -53,7 +27,7 @@ class GridPoints {
   Status to_surface(const StripeGrid& grid, Surface& out);
 
  private:
-  struct Line {  // of one line, a value a boundary
+  struct Line {  // of one line, a value a boundary, rounded up to 8
     std::vector<float> column, ray_x, ray_y, slope, z;
   };
   bool find_rays(const std::int32_t* columns, float step_px, int line, std::size_t count);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/grid_predict.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "base/variants.h"
+#include "codec/grid_avx2.h"
 #include "codec/rans.h"
 #include "codec/stripe_grid.h"
 
@@ -131,6 +133,54 @@ RELIEVO_INLINE bool columns_body(const GridColumns& line, std::int32_t most, int
   return any == 0;
 }
 
+RELIEVO_INLINE void there_body(const std::int32_t* columns, int count, std::uint8_t* __restrict out) {
+  for (int b = 0; b < (count + 7) / 8 * 8; ++b) out[b] = columns[b] != StripeGrid::kAbsent;
+}
+
+/// Of so few places that no sum overflows: limits are 2^12 at most.
+constexpr int kPlacesOfASum = 64;
+
+RELIEVO_INLINE void slopes_of(const std::int32_t* here, const GridRows& rows, int begin, int end,
+                              std::int32_t limit, GridSlopes& sums) {
+  std::int32_t s00 = 0, s01 = 0, s02 = 0, s11 = 0, s12 = 0, s22 = 0, s0y = 0, s1y = 0, s2y = 0;
+  const auto is_near = [limit](std::int32_t d) __attribute__((always_inline)) {
+    return static_cast<std::int32_t>(d <= limit) & static_cast<std::int32_t>(d >= -limit);
+  };
+  for (int b = begin; b < end; ++b) {
+    const std::int32_t y = here[b] - rows.up1[b], x0 = rows.up1[b] - rows.up2[b];
+    const std::int32_t x1 = rows.up2[b] - rows.up3[b], x2 = rows.up3[b] - rows.up4[b];
+    // Absent places are far from all others; between two of them there is nothing to learn.
+    const std::int32_t learns = static_cast<std::int32_t>(here[b] != StripeGrid::kAbsent) & is_near(y) &
+                                is_near(x0) & is_near(x1) & is_near(x2);
+    const std::int32_t mask = -learns;
+    const std::int32_t m0 = x0 & mask, m1 = x1 & mask, m2 = x2 & mask, my = y & mask;
+    s00 += m0 * m0;
+    s01 += m0 * m1;
+    s02 += m0 * m2;
+    s11 += m1 * m1;
+    s12 += m1 * m2;
+    s22 += m2 * m2;
+    s0y += m0 * my;
+    s1y += m1 * my;
+    s2y += m2 * my;
+  }
+  sums.x0x0 += s00;
+  sums.x0x1 += s01;
+  sums.x0x2 += s02;
+  sums.x1x1 += s11;
+  sums.x1x2 += s12;
+  sums.x2x2 += s22;
+  sums.x0y += s0y;
+  sums.x1y += s1y;
+  sums.x2y += s2y;
+}
+
+RELIEVO_INLINE void slopes_body(const std::int32_t* here, const GridRows& rows, std::int32_t limit, int count,
+                                GridSlopes& sums) {
+  for (int b = 0; b < count; b += kPlacesOfASum)
+    slopes_of(here, rows, b, std::min(b + kPlacesOfASum, count), limit, sums);
+}
+
 RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const std::int32_t* __restrict below,
                                    std::int32_t spacing, int count, std::uint8_t* __restrict cells) {
   for (int b = 0; b < count; ++b) {
@@ -140,32 +190,39 @@ RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const s
   }
 }
 
-#define RELIEVO_KERNELS(set, attributes)                                                                    \
-  struct set {                                                                                              \
-    attributes static void predict(const GridRows& rows, const GridModel& model, int count,                 \
-                                   std::int32_t* expected) {                                                \
-      predict_body(rows, model, count, expected);                                                           \
-    }                                                                                                       \
-    attributes static void contexts(const std::uint8_t* sizes, const std::int32_t* up1, int count,          \
-                                    std::uint8_t* out) {                                                    \
-      contexts_body(sizes, up1, count, out);                                                                \
-    }                                                                                                       \
-    attributes static void residuals(const GridResiduals& line, int count) { residuals_body(line, count); } \
-    attributes static bool columns(const GridColumns& line, std::int32_t most, int count) {                 \
-      return columns_body(line, most, count);                                                               \
-    }                                                                                                       \
-    attributes static void diagonals(const std::int32_t* above, const std::int32_t* below,                  \
-                                     std::int32_t spacing, int count, std::uint8_t* cells) {                \
-      diagonals_body(above, below, spacing, count, cells);                                                  \
-    }                                                                                                       \
-    static GridKernels table(const char* name) {                                                            \
-      return {name, predict, contexts, residuals, columns, diagonals};                                      \
-    }                                                                                                       \
+#define RELIEVO_KERNELS(set, attributes, residuals_of, columns_of, there_of)                              \
+  struct set {                                                                                            \
+    attributes static void predict(const GridRows& rows, const GridModel& model, int count,               \
+                                   std::int32_t* expected) {                                              \
+      predict_body(rows, model, count, expected);                                                         \
+    }                                                                                                     \
+    attributes static void contexts(const std::uint8_t* sizes, const std::int32_t* up1, int count,        \
+                                    std::uint8_t* out) {                                                  \
+      contexts_body(sizes, up1, count, out);                                                              \
+    }                                                                                                     \
+    attributes static void residuals(const GridResiduals& line, int count) { residuals_of(line, count); } \
+    attributes static bool columns(const GridColumns& line, std::int32_t most, int count) {               \
+      return columns_of(line, most, count);                                                               \
+    }                                                                                                     \
+    attributes static void there(const std::int32_t* columns, int count, std::uint8_t* out) {             \
+      there_of(columns, count, out);                                                                      \
+    }                                                                                                     \
+    attributes static void slopes(const std::int32_t* here, const GridRows& rows, std::int32_t limit,     \
+                                  int count, GridSlopes& sums) {                                          \
+      slopes_body(here, rows, limit, count, sums);                                                        \
+    }                                                                                                     \
+    attributes static void diagonals(const std::int32_t* above, const std::int32_t* below,                \
+                                     std::int32_t spacing, int count, std::uint8_t* cells) {              \
+      diagonals_body(above, below, spacing, count, cells);                                                \
+    }                                                                                                     \
+    static GridKernels table(const char* name) {                                                          \
+      return {name, predict, contexts, residuals, columns, there, slopes, diagonals};                     \
+    }                                                                                                     \
   }
 
-RELIEVO_KERNELS(Portable, );
+RELIEVO_KERNELS(Portable, , residuals_body, columns_body, there_body);
 #if defined(__x86_64__)
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], avx2::residuals, avx2::columns, avx2::there);
 #endif
 
 }  // namespace

@@ -59,6 +59,13 @@ struct GridColumns {
   std::uint8_t* kinds;
 };
 
+/// Sums of products of x0, x1, x2, the differences of the lines above, nearest first, and y, that of the line
+/// itself, over places where none is beyond the limit.
+struct GridSlopes {
+  std::int64_t x0x0 = 0, x0x1 = 0, x0x2 = 0, x1x1 = 0, x1x2 = 0, x2x2 = 0, x0y = 0, x1y = 0, x2y = 0;
+  bool operator==(const GridSlopes&) const = default;
+};
+
 struct GridKernels {
   const char* name;
 
@@ -75,6 +82,13 @@ struct GridKernels {
 
   /// The reverse. False where a column is out of [-most, most]. `count` rounded up to 8 places.
   bool (*columns)(const GridColumns& line, std::int32_t most, int count);
+
+  /// 1 where there is a vertex, else 0. `count` rounded up to 8 places.
+  void (*there)(const std::int32_t* columns, int count, std::uint8_t* out);
+
+  /// Adds to `sums` of what the slopes of a line's columns are fitted by: see GridSlopes.
+  void (*slopes)(const std::int32_t* here, const GridRows& rows, std::int32_t limit, int count,
+                 GridSlopes& sums);
 
   /// Cells that are kBothTriangles get their diagonal; `below` is the line below. `count` cells.
   void (*diagonals)(const std::int32_t* above, const std::int32_t* below, std::int32_t spacing, int count,

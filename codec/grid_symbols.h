@@ -3,6 +3,7 @@
 // symbols. codec/FORMAT.md, "Geometry codec 2", has the same in words.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -23,6 +24,7 @@ constexpr int kCellBlockTable = kCellTable + kCellTables;  // eight whole cells
 constexpr int kMarkTable = kCellBlockTable + 1;            // interpolated, by the marks above and left
 constexpr int kControlTables = kMarkTable + 4;
 constexpr int kCellSymbols = 6;
+constexpr int kControlSymbols = 8;  // room for each of them
 
 constexpr int kResidualTables = 8;      // by the sizes above; the last where nothing is above
 constexpr std::uint8_t kFirstSize = 1;  // what is taken for the sizes above a slice
@@ -88,6 +90,13 @@ inline int place_context(const std::uint8_t* here, const std::uint8_t* above, co
          (key != nullptr ? key[b] << 4 : 0);
 }
 
+/// The same of eight places, a byte each.
+inline std::uint64_t place_contexts(const std::uint8_t* here, const std::uint8_t* above,
+                                    const std::uint8_t* key, int b) {
+  return load8(here + b - 1) | load8(above + b) << 1 | load8(above + b + 1) << 2 | load8(above + b - 1) << 3 |
+         (key != nullptr ? load8(key + b) << 4 : 0);
+}
+
 /// A vertex of a line; at first none.
 struct Last {
   std::int32_t column = 0;
@@ -122,15 +131,14 @@ inline bool uniform_cells(const std::uint8_t* good_here, const std::uint8_t* goo
          load8(below + b) == kOnes && above[b + 8] != 0 && below[b + 8] != 0;
 }
 
-/// Cells with three corners or four. `lack`: the corner that is not there, 4: none.
-inline int corners_of(const std::uint8_t* above, const std::uint8_t* below, int b, int& lack) {
-  const int there[4] = {above[b], below[b], below[b + 1], above[b + 1]};
-  const int count = there[0] + there[1] + there[2] + there[3];
-  lack = 4;
-  if (count == 3)
-    for (int c = 0; c < 4; ++c)
-      if (there[c] == 0) lack = c;
-  return count;
+/// Which corners of a cell are there, a bit each.
+inline unsigned corners_there(const std::uint8_t* above, const std::uint8_t* below, int b) {
+  return static_cast<unsigned>(above[b] | below[b] << 1 | below[b + 1] << 2 | above[b + 1] << 3);
+}
+constexpr std::array<std::uint8_t, 16> kCornerCounts{0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4};
+/// Of cells with three: the one that is not there.
+inline int missing_of(unsigned corners) {
+  return std::countr_zero(~corners & 15U);
 }
 
 /// What a cell of so many corners (3 or 4) holds, as a symbol: 0 as many triangles as there can be, 1 none,
@@ -143,7 +151,7 @@ inline int cell_symbol(std::uint8_t cell, int corners) {
 inline std::uint32_t triangles_of(int symbol, int corners) {
   return symbol == 1 ? 0U : symbol == 0 && corners == 4 ? 2U : 1U;
 }
-/// The reverse; `lack` as corners_of() has it.
+/// The reverse; `lack`: the corner that is not there, where there are three.
 inline std::uint8_t cell_of(int symbol, int corners, int lack) {
   if (symbol == 1) return 0;
   if (corners == 3) return static_cast<std::uint8_t>(1U << lack);

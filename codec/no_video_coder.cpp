@@ -11,6 +11,11 @@ const Error kMissing{
 
 }  // namespace
 
+const ChosenVideoEncoder& chosen_video_encoder() {
+  static const ChosenVideoEncoder chosen{.why_not_hardware = kMissing.message};
+  return chosen;
+}
+
 struct VideoEncoder::State {};
 struct VideoDecoder::State {};
 
@@ -18,7 +23,7 @@ VideoEncoder::VideoEncoder(std::unique_ptr<State> state) : state_(std::move(stat
 VideoEncoder::VideoEncoder(VideoEncoder&&) noexcept = default;
 VideoEncoder& VideoEncoder::operator=(VideoEncoder&&) noexcept = default;
 VideoEncoder::~VideoEncoder() = default;
-Result<VideoEncoder> VideoEncoder::create(const VideoFormat&, VideoSpeed) {
+Result<VideoEncoder> VideoEncoder::create(const VideoFormat&, VideoSpeed, VideoEncoderKind) {
   return kMissing;
 }
 Result<bool> VideoEncoder::encode(const VideoView&, const VideoPictureOptions&, Bytes&) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "codec/byte_io.h"
+#include "codec/rans_kernels.h"
 
 namespace relievo::rans {
 
@@ -22,8 +23,8 @@ void BitWriter::put(std::uint32_t value, int count) {
 }
 
 void BitWriter::put_unary(std::uint32_t value) {
-  for (std::uint32_t i = 0; i < value; ++i) put(1, 1);
-  put(0, 1);
+  for (; value >= 16; value -= 16) put(0xffffU, 16);
+  put((1U << value) - 1, static_cast<int>(value) + 1);
 }
 
 Bytes BitWriter::finish() {
@@ -61,75 +62,23 @@ std::uint32_t BitReader::get_unary(std::uint32_t most) {
   return value;
 }
 
-namespace {
-
-/// What a level takes of all others' share, in bits a symbol of the table: linear about the frequencies that
-/// were counted.
-const std::array<float, kLargestLevel + 1>& share_costs() {
-  static const auto costs = [] {
-    std::array<float, kLargestLevel + 1> out{};
-    for (int level = 1; level <= kLargestLevel; ++level)
-      out[static_cast<std::size_t>(level)] =
-          static_cast<float>(std::exp2(0.5 * (level - 1)) / kScale / std::log(2.0));
-    return out;
-  }();
-  return costs;
+Levels levels_of(std::span<const std::uint32_t> counts) {
+  std::array<std::uint32_t, kTablesAtOnce * kMostSymbols> all{};
+  std::copy(counts.begin(), counts.end(), all.begin());
+  std::array<Levels, kTablesAtOnce> out;
+  kernels().levels(all.data(), counts.size(), out.data());
+  return out.front();
 }
 
-}  // namespace
-
-Levels levels_of(std::span<const std::uint32_t> counts) {
-  constexpr float kNever = 1e30F;
-  Levels levels{};
-  std::uint64_t total = 0;
-  std::size_t used = 0;
-  for (std::size_t s = 0; s < counts.size(); ++s) {
-    total += counts[s];
-    if (counts[s] > 0) used = s + 1;
-  }
-  if (total == 0) return levels;
-  // The way through the levels on which they and the symbols together take the fewest bits: as
-  // write_levels() has it a level up takes two, a level down too, and none takes one.
-  const auto& shares = share_costs();
-  std::array<std::array<std::uint8_t, kLargestLevel + 1>, kMostSymbols> from{};
-  std::array<float, kLargestLevel + 1> best{}, next{};
-  for (std::size_t s = 0; s < used; ++s) {
-    if (s > 0) {
-      // From below or the same, then from above.
-      float least = kNever;
-      std::uint8_t at = 0;
-      for (std::uint8_t l = 0; l <= kLargestLevel; ++l, least += 2) {
-        if (best[l] < least) {
-          least = best[l];
-          at = l;
-        }
-        next[l] = least + 1;
-        from[s][l] = at;
-      }
-      least = kNever;
-      for (std::uint8_t l = kLargestLevel + 1; l-- > 0; least += 2) {
-        if (least < next[l]) {
-          next[l] = least;
-          from[s][l] = at;
-        }
-        if (best[l] < least) {
-          least = best[l];
-          at = l;
-        }
-      }
-      best = next;
-    }
-    const auto count = static_cast<float>(counts[s]);
-    for (std::uint8_t l = 1; l <= kLargestLevel; ++l)
-      best[l] += static_cast<float>(total) * shares[l] - 0.5F * count * static_cast<float>(l - 1);
-    if (counts[s] > 0) best[0] = kNever;
-  }
-  auto level = static_cast<std::uint8_t>(std::min_element(best.begin(), best.end()) - best.begin());
-  for (std::size_t s = used; s-- > 0;) {
-    levels[s] = level;
-    level = from[s][level];
-  }
-  return levels;
+std::vector<Levels> levels_of(std::span<const std::uint32_t> counts, std::size_t symbols) {
+  const std::size_t tables = counts.size() / symbols;
+  std::vector<Levels> out((tables + kTablesAtOnce - 1) / kTablesAtOnce * kTablesAtOnce);
+  std::vector<std::uint32_t> all(counts.begin(), counts.end());
+  all.resize(out.size() * symbols);
+  for (std::size_t t = 0; t < tables; t += kTablesAtOnce)
+    kernels().levels(all.data() + t * symbols, symbols, out.data() + t);
+  out.resize(tables);
+  return out;
 }
 
 void write_levels(const Levels& levels, BitWriter& out) {
@@ -239,11 +188,13 @@ EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
   if (f < 2) {
     // x / 1 would need a reciprocal of 2^32: floor(x (2^32 - 1) / 2^32) is x - 1, and the bias mends it.
     e.reciprocal = ~0U;
+    e.long_reciprocal = ~std::uint64_t{0};
     e.bias = start + kScale - 1;
   } else {
     const int shift = std::bit_width(f - 1);
     e.reciprocal = static_cast<std::uint32_t>(((std::uint64_t{1} << (shift + 31)) + f - 1) / f);
     e.shift = static_cast<std::uint16_t>(shift - 1);
+    e.long_reciprocal = ~std::uint64_t{0} / f + 1;
     e.bias = start;
   }
   return e;
@@ -253,9 +204,9 @@ EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
 
 void EncoderTables::set(std::size_t table, const Levels& levels) {
   const auto frequencies = frequencies_of(levels);
-  EncoderSymbol* symbols = symbols_.data() + table * kMostSymbols;
+  EncoderSymbol* symbols = symbols_.data() + table * alphabet_;
   std::uint32_t start = 0;
-  for (std::size_t s = 0; s < frequencies.size(); ++s) {
+  for (std::size_t s = 0; s < alphabet_; ++s) {
     if (frequencies[s] == 0) continue;
     symbols[s] = encoder_symbol(start, frequencies[s]);
     start += frequencies[s];
@@ -263,7 +214,7 @@ void EncoderTables::set(std::size_t table, const Levels& levels) {
 }
 
 void EncoderTables::set(std::size_t table, const BinaryLevel& level) {
-  EncoderSymbol* symbols = symbols_.data() + table * kMostSymbols;
+  EncoderSymbol* symbols = symbols_.data() + table * alphabet_;
   const std::uint32_t first = first_frequency(level);
   if (first > 0) symbols[0] = encoder_symbol(0, first);
   if (first < kScale) symbols[1] = encoder_symbol(first, kScale - first);
@@ -283,40 +234,6 @@ bool DecoderTable::set(const Levels& levels) {
   return usable;
 }
 
-namespace {
-
-/// Words are written from the end on; the one before `to` is written in any case.
-inline std::uint32_t put(std::uint32_t x, const EncoderSymbol& e, std::uint16_t*& to) {
-  to[-1] = static_cast<std::uint16_t>(x);
-  const bool full = x >= e.limit;
-  to -= full ? 1 : 0;
-  x = full ? x >> 16 : x;
-  const auto q = static_cast<std::uint32_t>((static_cast<std::uint64_t>(x) * e.reciprocal) >> 32) >> e.shift;
-  return x + e.bias + q * e.complement;
-}
-
-using States = std::array<std::uint32_t, kLanes>;
-
-/// A row, its last symbol first.
-void encode_row(const std::uint16_t* begin, const std::uint16_t* end, const EncoderSymbol* symbols,
-                States& states, std::uint16_t*& to) {
-  while ((end - begin) % kLanes != 0) {
-    --end;
-    std::uint32_t& x = states[static_cast<std::size_t>((end - begin) % kLanes)];
-    x = put(x, symbols[*end], to);
-  }
-  auto [a, b, c, d] = states;
-  for (; end != begin; end -= kLanes) {
-    d = put(d, symbols[end[-1]], to);
-    c = put(c, symbols[end[-2]], to);
-    b = put(b, symbols[end[-3]], to);
-    a = put(a, symbols[end[-4]], to);
-  }
-  states = {a, b, c, d};
-}
-
-}  // namespace
-
 void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts) {
   // In turns, since the same code often comes again before its count is written.
   constexpr std::size_t kTurns = 4;
@@ -329,31 +246,45 @@ void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> 
     for (std::size_t c = 0; c < counts.size(); ++c) counts[c] += turns[t * counts.size() + c];
 }
 
-void encode(const Rows& rows, const EncoderTables& tables, int lanes, std::vector<std::uint16_t>& words,
-            Bytes& out) {
-  const std::size_t count = rows.codes.size();
-  const EncoderSymbol* symbols = tables.symbols();
-  const std::size_t states_bytes = sizeof(std::uint32_t) * static_cast<std::size_t>(lanes);
-  const std::size_t at = out.size();
-  // Each symbol writes one word at most; put() touches one more.
-  if (words.size() < count + 1) words.resize(count + 1);
-  std::uint16_t* to = words.data() + words.size();
-  States states;
-  states.fill(kLow);
-  std::size_t end = count;
-  for (std::size_t r = rows.starts.size(); r-- > 0;) {
-    const std::size_t start = rows.starts[r];
-    if (lanes == kLanes) {
-      encode_row(rows.codes.data() + start, rows.codes.data() + end, symbols, states, to);
-    } else {
-      for (std::size_t i = end; i-- > start;) states[0] = put(states[0], symbols[rows.codes[i]], to);
-    }
-    end = start;
-  }
-  const auto bytes = static_cast<std::size_t>(words.data() + words.size() - to) * sizeof(std::uint16_t);
-  out.resize(at + states_bytes + bytes);
-  std::memcpy(out.data() + at, states.data(), states_bytes);
-  if (bytes > 0) std::memcpy(out.data() + at + states_bytes, to, bytes);
+namespace {
+
+/// Behind the last word there is none; what is before the first may be written, see StreamJob.
+constexpr std::size_t kSpareWords = 4;
+
+std::uint16_t* end_of_words(const Rows& rows, std::vector<std::uint16_t>& words) {
+  // Each symbol writes one word at most.
+  if (words.size() < rows.codes.size() + kSpareWords) words.resize(rows.codes.size() + kSpareWords);
+  return words.data() + words.size();
+}
+
+void append_stream(const StreamJob& job, std::size_t lanes, const std::vector<std::uint16_t>& words,
+                   Bytes& out) {
+  const auto* states = reinterpret_cast<const std::uint8_t*>(job.states.data());
+  out.insert(out.end(), states, states + lanes * sizeof job.states[0]);
+  const auto* first = reinterpret_cast<const std::uint8_t*>(job.to);
+  out.insert(out.end(), first, reinterpret_cast<const std::uint8_t*>(words.data() + words.size()));
+}
+
+constexpr States kFirstStates{kLow, kLow, kLow, kLow};
+
+}  // namespace
+
+void encode(const Stream& lanes, Words& words, Bytes& out) {
+  const Rows none;
+  StreamJob job{lanes.rows, lanes.tables.symbols(), end_of_words(lanes.rows, words.lanes), kFirstStates};
+  StreamJob single{none, nullptr, nullptr, kFirstStates};
+  kernels().encode(job, single);
+  append_stream(job, kLanes, words.lanes, out);
+}
+
+std::size_t encode(const Stream& single, const Stream& lanes, Words& words, Bytes& out) {
+  StreamJob one{single.rows, single.tables.symbols(), end_of_words(single.rows, words.single), kFirstStates};
+  StreamJob several{lanes.rows, lanes.tables.symbols(), end_of_words(lanes.rows, words.lanes), kFirstStates};
+  kernels().encode(several, one);
+  append_stream(one, 1, words.single, out);
+  const std::size_t end = out.size();
+  append_stream(several, kLanes, words.lanes, out);
+  return end;
 }
 
 Decoder::Decoder(std::span<const std::uint8_t> stream, int lanes) : lanes_(lanes) {

@@ -55,8 +55,9 @@ class BitReader {
 /// How often each symbol of an alphabet comes, in half octaves; 0: never.
 using Levels = std::array<std::uint8_t, kMostSymbols>;
 
-/// Levels of counted symbols.
+/// Levels of counted symbols; of several tables with so many symbols each.
 Levels levels_of(std::span<const std::uint32_t> counts);
+std::vector<Levels> levels_of(std::span<const std::uint32_t> counts, std::size_t symbols);
 void write_levels(const Levels& levels, BitWriter& out);
 /// Check the reader's ok().
 Levels read_levels(BitReader& in);
@@ -75,27 +76,31 @@ BinaryLevel read_binary_level(BitReader& in);
 /// Of the first symbol, of kScale; 0 where the alphabet is not used.
 std::uint16_t first_frequency(const BinaryLevel& level);
 
-/// One symbol as an encoder needs it; see put() in rans.cpp.
+/// One symbol as an encoder needs it; see put() and put_next() in rans_kernels.cpp.
 struct EncoderSymbol {
   std::uint32_t limit = 0;
   std::uint32_t reciprocal = 0, bias = 0;
   std::uint16_t complement = 0, shift = 0;
+  std::uint64_t long_reciprocal = 0;  // for a division without a shift
 };
 
-/// All tables of a stream. A symbol of a table is one number, its code: see code_of().
+/// All tables of a stream, with alphabets of up to so many symbols. A symbol of a table is one number, its
+/// code: see code_of().
 class EncoderTables {
  public:
-  explicit EncoderTables(std::size_t tables) : symbols_(tables * kMostSymbols) {}
+  explicit EncoderTables(std::size_t tables, std::size_t alphabet = kMostSymbols)
+      : alphabet_(alphabet), symbols_(tables * alphabet) {}
   void set(std::size_t table, const Levels& levels);
   void set(std::size_t table, const BinaryLevel& level);
   const EncoderSymbol* symbols() const { return symbols_.data(); }
 
  private:
+  std::size_t alphabet_;
   std::vector<EncoderSymbol> symbols_;
 };
 
-inline std::uint16_t code_of(int table, int symbol) {
-  return static_cast<std::uint16_t>(table * kMostSymbols + symbol);
+inline std::uint16_t code_of(int table, int symbol, int alphabet = kMostSymbols) {
+  return static_cast<std::uint16_t>(table * alphabet + symbol);
 }
 
 /// What rows decode to where their table is not usable.
@@ -122,9 +127,21 @@ struct Rows {
 /// Adds to `counts`, one for each code.
 void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts);
 
-/// Appends the coded rows. `lanes` is 1 or kLanes. `words` is scratch memory.
-void encode(const Rows& rows, const EncoderTables& tables, int lanes, std::vector<std::uint16_t>& words,
-            Bytes& out);
+struct Stream {
+  const Rows& rows;
+  const EncoderTables& tables;
+};
+
+/// Scratch memory of encode().
+struct Words {
+  std::vector<std::uint16_t> single, lanes;
+};
+
+/// Appends the coded rows of kLanes.
+void encode(const Stream& lanes, Words& words, Bytes& out);
+/// Appends a stream of one lane, whose rows mean nothing, and behind it one of kLanes: quicker than one after
+/// the other. Where in `out` the second one begins.
+std::size_t encode(const Stream& single, const Stream& lanes, Words& words, Bytes& out);
 
 /// Any bytes: behind their end zeros are read, and finished() is false.
 class Decoder {

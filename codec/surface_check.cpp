@@ -5,21 +5,69 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <string>
+
+#include "base/variants.h"
 
 namespace relievo {
 namespace {
 
-template <std::size_t N>
-bool all_finite(const std::vector<std::array<float, N>>& values) {
-  // All of them, without a way out between: several at a time.
+#define RELIEVO_INLINE [[gnu::always_inline]] inline
+
+// All numbers, without a way out between, by their bits: several at a time.
+
+RELIEVO_INLINE bool all_finite_body(const float* numbers, std::size_t count) {
   constexpr std::uint32_t kExponent = 0x7f800000U;
   std::uint32_t worst = 0;
-  const float* number = values.empty() ? nullptr : values.front().data();
-  for (std::size_t i = 0; i < N * values.size(); ++i)
-    worst |= (std::bit_cast<std::uint32_t>(number[i]) & kExponent) == kExponent ? 1U : 0U;
+  for (std::size_t i = 0; i < count; ++i)
+    worst |= (std::bit_cast<std::uint32_t>(numbers[i]) & kExponent) == kExponent ? 1U : 0U;
   return worst == 0;
+}
+
+/// Finite and not below 0, which may have a sign.
+RELIEVO_INLINE bool all_lengths_body(const float* numbers, std::size_t count) {
+  constexpr std::uint32_t kInfinity = 0x7f800000U, kMinus0 = 0x80000000U;
+  std::uint32_t worst = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto bits = std::bit_cast<std::uint32_t>(numbers[i]);
+    worst |= (bits == kMinus0 ? 0U : bits) >= kInfinity ? 1U : 0U;
+  }
+  return worst == 0;
+}
+
+struct Kernels {
+  bool (*all_finite)(const float* numbers, std::size_t count);
+  bool (*all_lengths)(const float* numbers, std::size_t count);
+};
+
+#define RELIEVO_KERNELS(set, attributes)                                          \
+  struct set {                                                                    \
+    attributes static bool all_finite(const float* numbers, std::size_t count) {  \
+      return all_finite_body(numbers, count);                                     \
+    }                                                                             \
+    attributes static bool all_lengths(const float* numbers, std::size_t count) { \
+      return all_lengths_body(numbers, count);                                    \
+    }                                                                             \
+    static Kernels table() { return {all_finite, all_lengths}; }                  \
+  }
+
+RELIEVO_KERNELS(Portable, );
+#if defined(__x86_64__)
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
+#endif
+
+const Kernels& kernels() {
+#if defined(__x86_64__)
+  static const Kernels best = variants(Portable::table(), Avx2::table()).back();
+#else
+  static const Kernels best = Portable::table();
+#endif
+  return best;
+}
+
+template <std::size_t N>
+bool all_finite(const std::vector<std::array<float, N>>& values) {
+  return values.empty() || kernels().all_finite(values.front().data(), N * values.size());
 }
 
 std::uint32_t largest_index(const std::vector<Triangle>& triangles) {
@@ -52,10 +100,8 @@ Status check_vertices(const Surface& surface) {
                  std::to_string(surface.sigmas_m.size()) + " sigmas and " +
                  std::to_string(surface.interpolated.size()) +
                  " marks of interpolation: give none or one a vertex"};
-  bool lengths = true;
-  for (const float sigma : surface.sigmas_m)
-    lengths &= static_cast<bool>((sigma >= 0) & (sigma <= std::numeric_limits<float>::max()));
-  if (!lengths) return Error{"surface has a sigma that is no length in metres"};
+  if (!kernels().all_lengths(surface.sigmas_m.data(), surface.sigmas_m.size()))
+    return Error{"surface has a sigma that is no length in metres"};
   if (!all_finite(surface.positions) || !all_finite(surface.normals) ||
       !all_finite(surface.texture_coordinates))
     return Error{"surface has a position, normal or texture coordinate that is not finite"};

@@ -88,12 +88,12 @@ std::unique_ptr<TextureDecoder> make_texture_decoder(TextureCodec codec) {
   return std::make_unique<StillDecoder>(*row->still);
 }
 
-Status check_texture_codec(TextureCodec codec) {
+Status check_texture_codec(TextureCodec codec, VideoEncoderKind kind) {
   const auto encoder = make_texture_encoder(codec);
   if (!encoder) return Error{"there is no texture codec " + texture_codec_name(codec)};
-  const Image8 picture(16, 16, 3);
+  const Image8 picture(640, 480, 3);  // hardware encoders take none much smaller
   Bytes unused;
-  const auto alone = encoder->encode(picture.view(), {}, unused);
+  const auto alone = encoder->encode(picture.view(), {.encoder = kind}, unused);
   return alone ? Status() : Status(alone.error());
 }
 

@@ -13,12 +13,14 @@
 #include "base/result.h"
 #include "base/stream.h"
 #include "codec/frame3d_codec.h"
+#include "codec/video_encoder_kind.h"
 
 namespace relievo {
 
 struct TextureEncodeOptions {
-  int quality = 80;  // 1..100; lossless codecs do not look at it
-  bool key = false;  // must decode alone
+  int quality = 80;                                    // 1..100; lossless codecs do not look at it
+  bool key = false;                                    // must decode alone
+  VideoEncoderKind encoder = VideoEncoderKind::kAuto;  // of H.264; another one begins with a key picture
 };
 
 /// Of one stream: the pictures of a codec may build on each other. One thread at a time.
@@ -26,7 +28,8 @@ class TextureEncoder {
  public:
   virtual ~TextureEncoder() = default;
   /// Appends the section of an RGB (3 channels) or grey (1) picture to `out`; true: it decodes alone. Fails
-  /// on a picture larger than the codec takes. The same pictures in the same order give the same bytes.
+  /// on a picture larger than the codec takes. The same pictures in the same order give the same bytes, but
+  /// of hardware encoders.
   virtual Result<bool> encode(View8 picture, const TextureEncodeOptions& options, Bytes& out) = 0;
 };
 
@@ -49,7 +52,7 @@ std::unique_ptr<TextureEncoder> make_texture_encoder(TextureCodec codec);
 std::unique_ptr<TextureDecoder> make_texture_decoder(TextureCodec codec);
 
 /// Fails where this build or machine cannot encode it, saying why: better known before a stream begins.
-Status check_texture_codec(TextureCodec codec);
+Status check_texture_codec(TextureCodec codec, VideoEncoderKind encoder = VideoEncoderKind::kAuto);
 
 /// Whether a section of this codec needs none before it. Looks at its first bytes alone.
 bool texture_is_key(TextureCodec codec, std::span<const std::uint8_t> section);

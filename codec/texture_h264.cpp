@@ -107,11 +107,12 @@ class Encoder final : public TextureEncoder {
     if (picture.channels != 3 && picture.channels != 1)
       return Error{"texture has " + std::to_string(picture.channels) + " channels, not 3 (RGB) or 1 (grey)"};
     const VideoFormat format = h264_texture_format(picture.width, picture.height);
-    if (!video_ || format_ != format) {
-      auto made = VideoEncoder::create(format);
+    if (!video_ || format_ != format || encoder_ != options.encoder) {
+      auto made = VideoEncoder::create(format, VideoSpeed::kSuperfast, options.encoder);
       if (!made) return made.error();
       video_.emplace(std::move(*made));
       format_ = format;
+      encoder_ = options.encoder;
     }
     Image8 larger;
     if (format.width != picture.width || format.height != picture.height) {
@@ -140,6 +141,7 @@ class Encoder final : public TextureEncoder {
 
   std::optional<VideoEncoder> video_;
   VideoFormat format_;
+  VideoEncoderKind encoder_{};
   Planes planes_;
   std::uint32_t last_ = kNothing;
 };

@@ -1,95 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/video_coder.h"
 
-extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavutil/opt.h>
-}
-
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
+
+#include "codec/h264_encoders.h"
+
+extern "C" {
+#include <libavutil/opt.h>
+}
 
 namespace relievo {
 namespace {
 
-template <auto Free>
-struct FreeWith {
-  template <typename T>
-  void operator()(T* pointer) const {
-    Free(&pointer);
-  }
-};
-using Codec = std::unique_ptr<AVCodecContext, FreeWith<avcodec_free_context>>;
-using Picture = std::unique_ptr<AVFrame, FreeWith<av_frame_free>>;
-using Packet = std::unique_ptr<AVPacket, FreeWith<av_packet_free>>;
-
 constexpr double kFinest = 1;  // 0 is another profile, lossless
 constexpr double kCoarsest = 51;
-
-std::string text_of(int code) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(code, text, sizeof text);
-  return text;
-}
-
-AVPixelFormat pixel_format(const VideoFormat& format) {
-  if (format.sampling == VideoSampling::kLuma) return format.bits == 8 ? AV_PIX_FMT_GRAY8 : AV_PIX_FMT_GRAY10;
-  return format.bits == 8 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV420P10;
-}
+constexpr double kQualityStep =
+    2;  // of those that open anew for another quality, and begin with a key picture
 
 /// What libavcodec's decoder may call it: full range has names of its own, and it adds chroma to luma.
 bool is_format(int found, const VideoFormat& format) {
-  if (found == pixel_format(format)) return true;
+  if (found == av_pixel_format(format)) return true;
   return format.bits == 8 ? found == AV_PIX_FMT_YUVJ420P || found == AV_PIX_FMT_YUV420P
                           : found == AV_PIX_FMT_YUV420P10;
 }
 
-const char* preset(VideoSpeed speed) {
-  switch (speed) {
-    case VideoSpeed::kUltrafast:
-      return "ultrafast";
-    case VideoSpeed::kSuperfast:
-      return "superfast";
-    case VideoSpeed::kVeryfast:
-      return "veryfast";
-  }
-  return "superfast";
-}
-
 int planes_of(const VideoFormat& format) {
   return format.sampling == VideoSampling::kLuma ? 1 : 3;
-}
-
-Result<Codec> open_encoder(const VideoFormat& format, VideoSpeed speed) {
-  av_log_set_level(AV_LOG_FATAL);
-  const AVCodec* x264 = avcodec_find_encoder_by_name("libx264");
-  if (x264 == nullptr)
-    return Error{"this libavcodec has no libx264: install Debian's, or choose another texture codec"};
-  Codec codec(avcodec_alloc_context3(x264));
-  codec->width = format.width;
-  codec->height = format.height;
-  codec->pix_fmt = pixel_format(format);
-  codec->time_base = {1, 30};  // quality is asked for, not a rate: no bit depends on it
-  codec->framerate = {30, 1};
-  codec->thread_count = 1;
-  codec->max_b_frames = 0;
-  codec->color_range = AVCOL_RANGE_JPEG;
-  codec->color_primaries = AVCOL_PRI_BT709;
-  codec->color_trc = AVCOL_TRC_IEC61966_2_1;
-  codec->colorspace = format.sampling == VideoSampling::kLuma ? AVCOL_SPC_UNSPECIFIED : AVCOL_SPC_SMPTE170M;
-  codec->chroma_sample_location = AVCHROMA_LOC_CENTER;
-  av_opt_set(codec->priv_data, "preset", preset(speed), 0);
-  av_opt_set(codec->priv_data, "tune", "zerolatency", 0);
-  av_opt_set_int(codec->priv_data, "forced-idr", 1, 0);
-  // Who encodes says which pictures are key pictures, and nobody else.
-  av_opt_set(codec->priv_data, "x264-params", "keyint=infinite:scenecut=0:sliced-threads=0", 0);
-  av_opt_set_double(codec->priv_data, "crf", VideoPictureOptions{}.rate_factor, 0);
-  if (const int code = avcodec_open2(codec.get(), x264, nullptr); code < 0)
-    return Error{"H.264 cannot be encoded at " + std::to_string(format.width) + "x" +
-                 std::to_string(format.height) + ": " + text_of(code)};
-  return codec;
 }
 
 }  // namespace
@@ -99,14 +39,25 @@ Result<Codec> open_encoder(const VideoFormat& format, VideoSpeed speed) {
 struct VideoEncoder::State {
   VideoFormat format;
   VideoSpeed speed;
-  Codec codec;
-  Picture picture{av_frame_alloc()};
-  Packet packet{av_packet_alloc()};
+  VideoEncoderKind kind;
+  AvCodec codec;
+  AvPicture picture{av_frame_alloc()};
   std::int64_t count = 0;
+  double opened_for = VideoPictureOptions{}.rate_factor;
+  bool is_first = true;  // since it was opened
+
+  Status open(double rate_factor) {
+    auto opened = open_h264_encoder(kind, format, speed, rate_factor);
+    if (!opened) return opened.error();
+    codec = std::move(*opened);
+    opened_for = rate_factor;
+    is_first = true;
+    return {};
+  }
 
   Status copy(const VideoView& from) {
     if (const int code = av_frame_make_writable(picture.get()); code < 0)
-      return Error{"no memory for a picture: " + text_of(code)};
+      return Error{"no memory for a picture: " + av_text(code)};
     const int sample_bytes = format.bits > 8 ? 2 : 1;
     for (int p = 0; p < planes_of(format); ++p) {
       const auto plane = static_cast<std::size_t>(p);
@@ -125,52 +76,60 @@ VideoEncoder::VideoEncoder(VideoEncoder&&) noexcept = default;
 VideoEncoder& VideoEncoder::operator=(VideoEncoder&&) noexcept = default;
 VideoEncoder::~VideoEncoder() = default;
 
-Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed speed) {
+Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed speed,
+                                          VideoEncoderKind kind) {
   if (auto status = check_video_format(format); !status) return status.error();
-  auto codec = open_encoder(format, speed);
-  if (!codec) return codec.error();
+  if (kind == VideoEncoderKind::kAuto) {
+    const bool is_usual = format.bits == 8 && format.sampling != VideoSampling::kLuma;
+    kind = is_usual ? chosen_video_encoder().kind : VideoEncoderKind::kX264;
+    if (kind != VideoEncoderKind::kX264) {  // which takes sizes that hardware does not
+      auto made = create(format, speed, kind);
+      if (made) return made;
+      kind = VideoEncoderKind::kX264;
+    }
+  }
   auto state = std::make_unique<State>();
   state->format = format;
   state->speed = speed;
-  state->codec = std::move(*codec);
-  state->picture->format = state->codec->pix_fmt;
+  state->kind = kind;
+  if (auto status = state->open(state->opened_for); !status) return status.error();
+  state->picture->format = av_pixel_format(format);
   state->picture->width = format.width;
   state->picture->height = format.height;
   state->picture->color_range = state->codec->color_range;
   if (const int code = av_frame_get_buffer(state->picture.get(), 0); code < 0)
-    return Error{"no memory for a picture: " + text_of(code)};
+    return Error{"no memory for a picture: " + av_text(code)};
   return VideoEncoder(std::move(state));
 }
 
 Result<bool> VideoEncoder::encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out) {
   State& s = *state_;
-  if (!s.codec) {  // an error before: what the receivers have is not known any more
-    auto codec = open_encoder(s.format, s.speed);
-    if (!codec) return codec.error();
-    s.codec = std::move(*codec);
-  }
+  const double factor = std::clamp(options.rate_factor, kFinest, kCoarsest);
+  const bool is_other = opens_for_quality(s.kind) && std::fabs(factor - s.opened_for) >= kQualityStep;
+  // After an error, too: what the receivers have is not known any more.
+  if (!s.codec || is_other)
+    if (auto status = s.open(factor); !status) return status.error();
   if (auto status = s.copy(picture); !status) return status.error();
-  av_opt_set_double(s.codec->priv_data, "crf", std::clamp(options.rate_factor, kFinest, kCoarsest), 0);
+  if (!opens_for_quality(s.kind)) av_opt_set_double(s.codec->priv_data, "crf", factor, 0);
   s.picture->pts = s.count++;
-  s.picture->pict_type = options.key ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
-  int code = avcodec_send_frame(s.codec.get(), s.picture.get());
-  if (code >= 0) code = avcodec_receive_packet(s.codec.get(), s.packet.get());
-  if (code < 0) {
+  s.picture->pict_type = options.key || s.is_first ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
+  const auto packet = encode_at_once(*s.codec, *s.picture);
+  if (!packet) {
     s.codec.reset();
-    return Error{"a picture cannot be encoded as H.264: " + text_of(code)};
+    return packet.error();
   }
-  append_lean_unit({s.packet->data, static_cast<std::size_t>(s.packet->size)}, out);
-  const bool is_key = (s.packet->flags & AV_PKT_FLAG_KEY) != 0;
-  av_packet_unref(s.packet.get());
-  return is_key;
+  s.is_first = false;
+  const AVPacket& coded = **packet;
+  append_lean_unit({coded.data, static_cast<std::size_t>(coded.size)}, out);
+  return (coded.flags & AV_PKT_FLAG_KEY) != 0;
 }
 
 // ---------------------------------------------------------------- decoder
 
 struct VideoDecoder::State {
-  Codec codec;
-  Picture picture{av_frame_alloc()};
-  Packet packet{av_packet_alloc()};
+  AvCodec codec;
+  AvPicture picture{av_frame_alloc()};
+  AvPacket packet{av_packet_alloc()};
   VideoFormat format;  // of the pictures it holds
   bool has_picture = false;
 
@@ -184,17 +143,17 @@ struct VideoDecoder::State {
     codec->err_recognition = AV_EF_EXPLODE;
     codec->error_concealment = 0;
     if (const int code = avcodec_open2(codec.get(), h264, nullptr); code < 0)
-      return Error{"H.264 cannot be decoded: " + text_of(code)};
+      return Error{"H.264 cannot be decoded: " + av_text(code)};
     return {};
   }
   Status take(std::span<const std::uint8_t> unit) {
     if (const int code = av_new_packet(packet.get(), static_cast<int>(unit.size())); code < 0)
-      return Error{"no memory for a picture: " + text_of(code)};
+      return Error{"no memory for a picture: " + av_text(code)};
     std::copy(unit.begin(), unit.end(), packet->data);
     int code = avcodec_send_packet(codec.get(), packet.get());
     av_packet_unref(packet.get());
     if (code >= 0) code = avcodec_receive_frame(codec.get(), picture.get());
-    if (code < 0) return Error{"video cannot be decoded: " + text_of(code)};
+    if (code < 0) return Error{"video cannot be decoded: " + av_text(code)};
     const bool damaged = (picture->flags & AV_FRAME_FLAG_CORRUPT) != 0 || picture->decode_error_flags != 0;
     if (damaged || picture->width != format.width || picture->height != format.height ||
         !is_format(picture->format, format))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// H.264 of planar pictures, without delay: one picture in, one access unit out. The encoder is libavcodec's
-// with libx264; a build without libavcodec (RELIEVO_VIDEO=OFF) says so where one is created.
+// H.264 of planar pictures, without delay: one picture in, one access unit out. Encoders are libavcodec's:
+// libx264, or the hardware's; a build without libavcodec (RELIEVO_VIDEO=OFF) says so where one is created.
 #pragma once
 
 #include <array>
@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "base/stream.h"
+#include "codec/video_encoder_kind.h"
 #include "codec/video_unit.h"
 
 namespace relievo {
@@ -31,12 +32,14 @@ struct VideoPictureOptions {
   bool key = false;  // an IDR picture, with its parameter sets; the first one is, whatever is said here
 };
 
-/// One stream. No B pictures, no lookahead, one slice and one thread, no SEI: the same pictures give the same
-/// bytes. One thread at a time.
+/// One stream. No B pictures, no lookahead, no SEI; of x264 one slice and one thread, too: the same pictures
+/// give the same bytes. Hardware encoders begin anew, with a key picture, where the quality changes. One
+/// thread at a time.
 class VideoEncoder {
  public:
-  /// Fails on a format that is no VideoFormat (see there), and without an H.264 encoder.
-  static Result<VideoEncoder> create(const VideoFormat& format, VideoSpeed speed = VideoSpeed::kSuperfast);
+  /// Fails on a format that is no VideoFormat (see there), and without that H.264 encoder.
+  static Result<VideoEncoder> create(const VideoFormat& format, VideoSpeed speed = VideoSpeed::kSuperfast,
+                                     VideoEncoderKind kind = VideoEncoderKind::kX264);
   VideoEncoder(VideoEncoder&&) noexcept;
   VideoEncoder& operator=(VideoEncoder&&) noexcept;
   ~VideoEncoder();

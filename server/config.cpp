@@ -122,6 +122,14 @@ class Reader {
     if (!codec) return refuse(*node, key, "must be " + texture_codec_names() + " in quotes");
     out = *codec;
   }
+  void texture_encoder(std::string_view key, VideoEncoderKind& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    const auto kind = value ? video_encoder_named(*value) : std::nullopt;
+    if (!kind) return refuse(*node, key, "must be " + video_encoder_names() + " in quotes");
+    out = *kind;
+  }
   void flag(std::string_view key, bool& out) {
     if (const toml::node* node = take(key)) {
       if (const auto value = node->value_exact<bool>())
@@ -305,6 +313,7 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.texture("texture", config.texture);
+  reader.texture_encoder("texture_encoder", config.texture_encoder);
   if (const auto quality = reader.integer("texture_quality", 1, 100))
     config.texture_quality = static_cast<int>(*quality);
   if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))
@@ -362,6 +371,7 @@ EncodeOptions encode_options(const StreamConfig& config) {
   options.step_bits = config.step_bits;
   options.draco_speed = config.draco_speed;
   options.texture = config.texture;
+  options.texture_encoder = config.texture_encoder;
   options.texture_quality =
       config.texture_quality.value_or(config.rate.texture_db > 0 ? kFinestQuality : kUsualQuality);
   const int usual = config.texture == TextureCodec::kH264 ? kVideoInterval : 1;
@@ -431,7 +441,8 @@ namespace {
 
 Status check_stream(const StreamConfig& stream) {
   if (const std::string wrong = stream_name()(name_of(stream)); !wrong.empty()) return Error{wrong};
-  if (const Status usable = check_texture_codec(stream.texture); !usable) return usable;
+  if (const Status usable = check_texture_codec(stream.texture, stream.texture_encoder); !usable)
+    return usable;
   if (const auto source = with_scheme(stream.source, stream.scheme); !source) return source.error();
   if (stream.rate.texture_db > 0 && stream.texture == TextureCodec::kPng)
     return Error{"psnr is kept of textures that lose something: leave it out with png"};

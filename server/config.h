@@ -43,6 +43,7 @@ struct StreamConfig {
   TextureCodec texture = TextureCodec::kJpeg;
   std::optional<int>
       texture_quality;  // the finest; not said: 80, or 95 where `rate` says how good it is to be
+  VideoEncoderKind texture_encoder = VideoEncoderKind::kAuto;  // of H.264
   RateTargets rate;
   std::string geometry = "grid";  // a name of codec/geometry_profile.h
   int step_bits = 6;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/serve.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "base/log.h"
 #include "cli/listen_address.h"
 #include "cli/service_manager.h"
+#include "codec/video_encoder_kind.h"
 #include "idl/cdr.h"
 #include "server/calibration_desk.h"
 #include "server/recording_desk.h"
@@ -54,6 +56,17 @@ void print_addresses(const ServeConfig& config, const std::vector<std::string>& 
                                    .c_str());
   }
   std::fflush(stdout);  // whoever waits for the address reads a pipe
+}
+
+/// Where the hardware was to make the pictures, if it could.
+void say_which_encoder(const std::vector<StreamConfig>& streams) {
+  const auto asks = [](const StreamConfig& s) {
+    return s.texture == TextureCodec::kH264 && s.texture_encoder == VideoEncoderKind::kAuto;
+  };
+  if (std::ranges::none_of(streams, asks)) return;
+  const ChosenVideoEncoder& chosen = chosen_video_encoder();
+  log_info("H.264 by " + std::string(video_encoder_name(chosen.kind)) +
+           (chosen.why_not_hardware.empty() ? "" : "; no hardware encoder: " + chosen.why_not_hardware));
 }
 
 /// What a running server cannot change.
@@ -114,6 +127,7 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
     streams.stop();
   });
   wishes.answer_with([&](const std::string& name) { streams.request_key_frame(name); });
+  say_which_encoder(config.all_streams());
   streams.apply(config.all_streams());
   calibrations.open(streams);
   const std::vector<std::string> opened = streams.opened();

@@ -23,7 +23,7 @@ namespace {
 struct Flags {
   std::optional<std::string> config, source, stream, interface, keys, web, record, record_folder, pre_roll,
       projector;
-  std::optional<std::string> decoder, geometry, texture, bit_rate, ladder;
+  std::optional<std::string> decoder, geometry, texture, texture_encoder, bit_rate, ladder;
   std::string scheme;
   std::shared_ptr<RecordingTexts> recording;
   std::shared_ptr<WebOptions> gateway;
@@ -47,6 +47,8 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
   if (flags.decoder) config.decoder = *flags.decoder == "paper" ? Decoder::kPaper : Decoder::kOrdered;
   if (flags.texture) config.texture = texture_codec_named(*flags.texture).value_or(config.texture);
+  if (flags.texture_encoder)
+    config.texture_encoder = video_encoder_named(*flags.texture_encoder).value_or(config.texture_encoder);
   if (flags.texture_quality) config.texture_quality = flags.texture_quality;
   set(flags.deadline_ms, config.rate.deadline_ms);
   set(flags.texture_db, config.rate.texture_db);
@@ -191,6 +193,14 @@ Command serve_command() {
                        "h264 (smallest; browsers show it on https and localhost alone)")
             ->check([](const std::string& name) {
               return texture_codec_named(name) ? "" : "give " + texture_codec_names();
+            })
+            ->type_name("NAME");
+        app.add_option(
+               "--texture-encoder", f->texture_encoder,
+               "Which encoder makes h264: auto (default: the hardware's where one opens, else x264), x264, "
+               "nvenc, vaapi or v4l2m2m")
+            ->check([](const std::string& name) {
+              return video_encoder_named(name) ? "" : "give " + video_encoder_names();
             })
             ->type_name("NAME");
         app.add_option("--texture-quality", f->texture_quality,

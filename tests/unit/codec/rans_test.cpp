@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "codec/rans.h"
+#include "codec/rans_kernels.h"
 #include "tests/support/make_surface.h"
 
 namespace relievo::rans {
@@ -35,7 +37,7 @@ TEST(Rans, FrequenciesAddUpWhateverTheLevels) {
 
 TEST(Rans, SymbolsComeBackFromAnyTables) {
   test::Random random(2);
-  std::vector<std::uint16_t> words;
+  Words words;
   for (int round = 0; round < 60; ++round) {
     const int lanes = round % 2 == 0 ? 1 : kLanes;
     EncoderTables encoders(3);
@@ -64,7 +66,12 @@ TEST(Rans, SymbolsComeBackFromAnyTables) {
       }
     }
     Bytes bytes;
-    encode(rows, encoders, lanes, words, bytes);
+    const Rows none;
+    if (lanes == kLanes) {
+      encode({rows, encoders}, words, bytes);
+    } else {
+      bytes.resize(encode({rows, encoders}, {none, encoders}, words, bytes));
+    }
     Decoder decoder(bytes, lanes);
     std::vector<std::uint8_t> got(symbols.size() + 1);
     for (std::size_t r = 0; r < rows.starts.size(); ++r) {
@@ -162,8 +169,9 @@ TEST(Rans, AlphabetsOfTwoKeepTheirOdds) {
       rows.codes.push_back(code_of(0, s));
     }
     Bytes bytes;
-    std::vector<std::uint16_t> words;
-    encode(rows, table, 1, words, bytes);
+    Words words;
+    const Rows none;
+    bytes.resize(encode({rows, table}, {none, table}, words, bytes));
     Decoder decoder(bytes, 1);
     for (const std::uint8_t s : symbols) ASSERT_EQ(decoder.one(first_frequency(level)), s != 0);
     EXPECT_TRUE(decoder.finished());
@@ -182,6 +190,81 @@ TEST(Rans, CodesAreCounted) {
   }
   count_codes(codes, counts);
   EXPECT_EQ(counts, expected);
+}
+
+/// Counts as residuals have them, or any.
+std::vector<std::uint32_t> some_counts(test::Random& random, std::size_t symbols) {
+  std::vector<std::uint32_t> counts(symbols);
+  const double first = std::exp2(random.below(14)), fall = 0.3 + 0.7 * random.unit();
+  for (std::size_t s = 0; s < symbols; ++s)
+    counts[s] =
+        static_cast<std::uint32_t>(first * std::pow(fall, static_cast<double>(s)) + random.unit() * 0.9);
+  return counts;
+}
+
+TEST(Rans, LevelsOfAllKernelsAgreeTableByTable) {
+  test::Random random(11);
+  for (int round = 0; round < 60; ++round) {
+    const std::size_t symbols = round % 3 == 0 ? 8 : kMostSymbols;
+    std::vector<std::uint32_t> counts;
+    for (std::size_t t = 0; t < kTablesAtOnce; ++t) {
+      const auto some =
+          random.below(5) == 0 ? std::vector<std::uint32_t>(symbols) : some_counts(random, symbols);
+      counts.insert(counts.end(), some.begin(), some.end());
+    }
+    std::array<Levels, kTablesAtOnce> reference, out;
+    all_kernels().front().levels(counts.data(), symbols, reference.data());
+    for (const Kernels& kernels : all_kernels()) {
+      kernels.levels(counts.data(), symbols, out.data());
+      ASSERT_EQ(out, reference) << kernels.name;
+    }
+    const auto all = levels_of(counts, symbols);
+    for (std::size_t t = 0; t < kTablesAtOnce; ++t) {
+      ASSERT_EQ(all[t], reference[t]);
+      ASSERT_EQ(levels_of(std::span(counts).subspan(t * symbols, symbols)), reference[t]) << t;
+    }
+  }
+}
+
+/// Streams of any lengths, the single one's the longer or the shorter; symbols so rare that most fill the
+/// state and so common that none does.
+TEST(Rans, StreamsOfAllKernelsAgree) {
+  test::Random random(12);
+  for (int round = 0; round < 200; ++round) {
+    EncoderTables tables(2);
+    const auto counts = some_counts(random, kMostSymbols);
+    std::vector<std::uint8_t> alphabet;
+    for (std::size_t s = 0; s < counts.size(); ++s)
+      if (counts[s] > 0) alphabet.push_back(static_cast<std::uint8_t>(s));
+    if (alphabet.empty()) continue;
+    tables.set(0, levels_of(counts));
+    tables.set(1, BinaryLevel{true, true, static_cast<std::uint8_t>(1 + random.below(20))});
+    const auto fill = [&](std::uint32_t rows, bool binary) {
+      Rows out;
+      for (std::uint32_t r = 0; r < rows; ++r) {
+        out.starts.push_back(static_cast<std::uint32_t>(out.codes.size()));
+        for (std::uint32_t i = random.below(50); i > 0; --i)
+          out.codes.push_back(
+              binary ? code_of(1, random.below(9) == 0)
+                     : code_of(0, alphabet[random.below(static_cast<std::uint32_t>(alphabet.size()))]));
+      }
+      return out;
+    };
+    const Rows lanes = fill(random.below(20), false), single = fill(random.below(40), true);
+    std::optional<std::pair<std::vector<std::uint16_t>, std::array<States, 2>>> reference;
+    for (const Kernels& kernels : all_kernels()) {
+      std::vector<std::uint16_t> a(lanes.codes.size() + 4), b(single.codes.size() + 4);
+      const States first{kLow, kLow, kLow, kLow};
+      StreamJob of_lanes{lanes, tables.symbols(), a.data() + a.size(), first};
+      StreamJob of_single{single, tables.symbols(), b.data() + b.size(), first};
+      kernels.encode(of_lanes, of_single);
+      std::pair out{std::vector<std::uint16_t>(of_lanes.to, a.data() + a.size()),
+                    std::array{of_lanes.states, of_single.states}};
+      out.first.insert(out.first.end(), of_single.to, b.data() + b.size());
+      if (!reference) reference = out;
+      ASSERT_EQ(out, *reference) << kernels.name << ", round " << round;
+    }
+  }
 }
 
 }  // namespace

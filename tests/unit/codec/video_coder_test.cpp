@@ -223,5 +223,38 @@ TEST(VideoCoderHostile, DamageNeverBreaksTheDecoder) {
   EXPECT_TRUE(decode.decode(key, kColour).ok());
 }
 
+/// On any machine: pictures come, from x264 where no hardware encoder opens, and then it is said why.
+TEST(VideoEncoders, AutoFallsBackAndSaysWhy) {
+  const ChosenVideoEncoder& chosen = chosen_video_encoder();
+  EXPECT_NE(chosen.kind, VideoEncoderKind::kAuto);
+  EXPECT_EQ(chosen.kind == VideoEncoderKind::kX264, !chosen.why_not_hardware.empty());
+  if (chosen.kind == VideoEncoderKind::kX264) {
+    for (const char* name : {"nvenc", "vaapi", "v4l2m2m"})
+      EXPECT_NE(chosen.why_not_hardware.find(name), std::string::npos) << chosen.why_not_hardware;
+  }
+  Film film{.format = {.width = 160, .height = 96}, .planes = {}, .bytes = {}};
+  auto encoder = VideoEncoder::create(film.format, VideoSpeed::kSuperfast, VideoEncoderKind::kAuto);
+  ASSERT_TRUE(encoder.ok()) << encoder.error().message;
+  Bytes unit;
+  const auto key = encoder->encode(film.picture(0), {}, unit);
+  ASSERT_TRUE(key.ok()) << key.error().message;
+  EXPECT_TRUE(*key);
+  auto back = decoder();
+  EXPECT_TRUE(back.decode(unit, film.format).ok());
+}
+
+/// One that is asked for by name and is not there is an error that names it, never another one.
+TEST(VideoEncoders, AForcedOneThatIsMissingIsAnError) {
+  for (const VideoEncoderKind kind :
+       {VideoEncoderKind::kNvenc, VideoEncoderKind::kVaapi, VideoEncoderKind::kV4l2m2m}) {
+    const auto encoder = VideoEncoder::create({.width = 160, .height = 96}, VideoSpeed::kSuperfast, kind);
+    if (encoder.ok()) continue;  // this machine has it
+    EXPECT_NE(encoder.error().message.find(video_encoder_name(kind)), std::string::npos);
+    EXPECT_NE(encoder.error().message.find("--texture-encoder"), std::string::npos);
+  }
+  EXPECT_FALSE(video_encoder_named("quicksync"));
+  EXPECT_EQ(video_encoder_named("vaapi"), VideoEncoderKind::kVaapi);
+}
+
 }  // namespace
 }  // namespace relievo

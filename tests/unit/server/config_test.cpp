@@ -101,6 +101,7 @@ threads = 3
 decoder = "paper"
 texture = "webp"
 texture_quality = 91
+texture_encoder = "x264"
 bitrate = 4_000_000
 deadline = 12.5
 psnr = 38
@@ -126,6 +127,7 @@ fill_holes = 3
   EXPECT_EQ(r.config.decoder, Decoder::kPaper);
   EXPECT_EQ(r.config.texture, TextureCodec::kWebp);
   EXPECT_EQ(r.config.texture_quality, 91);
+  EXPECT_EQ(r.config.texture_encoder, VideoEncoderKind::kX264);
   EXPECT_EQ(r.config.rate.bit_rate, 4e6);
   EXPECT_EQ(r.config.rate.deadline_ms, 12.5);
   EXPECT_EQ(r.config.rate.texture_db, 38);
@@ -341,6 +343,8 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\" or \"paper\""},
         Wrong{"threads_none", "threads = 0", "threads must be a whole number from 1 to 64"},
         Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},
+        Wrong{"encoder", "texture_encoder = \"quicksync\"",
+              "texture_encoder must be auto, x264, nvenc, vaapi or v4l2m2m in quotes"},
         Wrong{"quality_none", "texture_quality = 0", "texture_quality must be a whole number from 1 to 100"},
         Wrong{"quality_over", "texture_quality = 101", "texture_quality must be a whole number"},
         Wrong{"holes_over", "fill_holes = 17", "fill_holes must be a whole number from 0 to 16"},

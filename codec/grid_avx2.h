@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernels of the stripe grid by hand for AVX2, where a compiler's own are slow: octets beside columns. What
+// they do is said in grid_predict.h.
+#pragma once
+
+#if defined(__x86_64__)
+
+#include <immintrin.h>
+
+#include <cstdint>
+#include <cstring>
+
+#include "codec/grid_predict.h"
+#include "codec/rans.h"
+#include "codec/stripe_grid.h"
+
+namespace relievo::avx2 {
+
+#define RELIEVO_AVX2 [[gnu::target("avx2")]]
+
+/// Eight octets in the low half.
+RELIEVO_AVX2 inline __m128i load_octets(const std::uint8_t* from) {
+  return _mm_loadl_epi64(reinterpret_cast<const __m128i*>(from));
+}
+RELIEVO_AVX2 inline void store_octets(__m128i from, std::uint8_t* to) {
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(to), from);
+}
+RELIEVO_AVX2 inline __m256i load_ints(const std::int32_t* from) {
+  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+}
+RELIEVO_AVX2 inline void store_ints(__m256i from, std::int32_t* to) {
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), from);
+}
+/// Eight numbers of 16 bits; larger ones become the largest.
+RELIEVO_AVX2 inline __m128i narrow(__m256i ints) {
+  return _mm_packus_epi32(_mm256_castsi256_si128(ints), _mm256_extracti128_si256(ints, 1));
+}
+
+/// Which are folded residuals that are their own symbols, in tables that are not kAloneTable.
+RELIEVO_AVX2 inline __m128i is_direct(__m128i folded, __m128i tables) {
+  const __m128i direct = _mm_cmpeq_epi8(_mm_min_epu8(folded, _mm_set1_epi8(kDirectSymbols - 1)), folded);
+  return _mm_andnot_si128(_mm_cmpeq_epi8(tables, _mm_set1_epi8(kAloneTable)), direct);
+}
+/// GridPlaceKind of places that are done, and of those without a vertex; never both.
+RELIEVO_AVX2 inline __m128i kinds_of(__m128i done, __m128i absent) {
+  static_assert(kDone == 0 && kNoVertex == 1 && kByItself == 2);
+  return _mm_andnot_si128(done, _mm_add_epi8(_mm_set1_epi8(kByItself), absent));
+}
+/// Of folded residuals.
+RELIEVO_AVX2 inline __m128i sizes_of(__m128i folded) {
+  return _mm_avg_epu8(folded, _mm_setzero_si128());
+}
+
+RELIEVO_AVX2 inline __m256i within_tolerance(const GridResiduals& line, int b, __m256i columns,
+                                             __m256i expected, __m128i tables) {
+  const __m256i tolerance = _mm256_cvtepu8_epi32(load_octets(line.tolerance + b));
+  const __m256i off = _mm256_sub_epi32(columns, expected);
+  // Differences of places that are not there are far from any tolerance, whether or not they overflow.
+  const __m256i far =
+      _mm256_or_si256(_mm256_cmpgt_epi32(off, tolerance),
+                      _mm256_cmpgt_epi32(_mm256_sub_epi32(_mm256_setzero_si256(), tolerance), off));
+  const __m256i alone = _mm256_cvtepi8_epi32(_mm_cmpeq_epi8(tables, _mm_set1_epi8(kAloneTable)));
+  return _mm256_blendv_epi8(expected, columns, _mm256_or_si256(far, alone));
+}
+
+RELIEVO_AVX2 inline void residuals(const GridResiduals& line, int count) {
+  const __m256i kAbsent = _mm256_set1_epi32(StripeGrid::kAbsent);
+  for (int b = 0; b < count; b += 8) {
+    const __m128i tables = load_octets(line.tables + b);
+    const __m256i expected = load_ints(line.expected + b);
+    __m256i columns = load_ints(line.columns + b);
+    if (line.tolerance != nullptr) {
+      columns = within_tolerance(line, b, columns, expected, tables);
+      store_ints(columns, line.columns + b);
+    }
+    const __m256i d = _mm256_sub_epi32(columns, expected);
+    const __m256i folded = _mm256_xor_si256(_mm256_slli_epi32(d, 1), _mm256_srai_epi32(d, 31));
+    // Those that are no symbol become the first number above them, absent ones 255.
+    const __m256i seen = _mm256_min_epu32(folded, _mm256_set1_epi32(kDirectSymbols));
+    const __m256i gone = _mm256_srli_epi32(_mm256_cmpeq_epi32(columns, kAbsent), 24);
+    const __m128i symbols = narrow(_mm256_or_si256(seen, gone));
+    const __m128i octets = _mm_packus_epi16(symbols, symbols);
+    const __m128i absent = _mm_cmpeq_epi8(octets, _mm_set1_epi8(-1));
+    const __m128i done = is_direct(octets, tables);
+    store_octets(kinds_of(done, absent), line.kinds + b);
+    store_octets(_mm_blendv_epi8(load_octets(line.sizes + b), sizes_of(octets), done), line.sizes + b);
+    const __m128i first = _mm_mullo_epi16(_mm_cvtepu8_epi16(tables), _mm_set1_epi16(rans::kMostSymbols));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(line.codes + b), _mm_add_epi16(first, symbols));
+  }
+}
+
+RELIEVO_AVX2 inline bool columns(const GridColumns& line, std::int32_t most, int count) {
+  const __m256i kAbsent = _mm256_set1_epi32(StripeGrid::kAbsent);
+  const __m256i highest = _mm256_set1_epi32(most), lowest = _mm256_set1_epi32(-most);
+  __m256i unfair = _mm256_setzero_si256();
+  for (int b = 0; b < count; b += 8) {
+    const __m128i symbols = load_octets(line.symbols + b);
+    const __m128i absent = _mm_cmpeq_epi8(load_octets(line.there + b), _mm_setzero_si128());
+    const __m128i done = _mm_andnot_si128(absent, is_direct(symbols, load_octets(line.tables + b)));
+    store_octets(kinds_of(done, absent), line.kinds + b);
+    store_octets(_mm_blendv_epi8(load_octets(line.sizes + b), sizes_of(symbols), done), line.sizes + b);
+    const __m128i half = _mm_and_si128(_mm_srli_epi16(symbols, 1), _mm_set1_epi8(0x7f));
+    const __m128i odd = _mm_sub_epi8(_mm_setzero_si128(), _mm_and_si128(symbols, _mm_set1_epi8(1)));
+    const __m256i d = _mm256_cvtepi8_epi32(_mm_xor_si128(half, odd));
+    const __m256i column = _mm256_add_epi32(load_ints(line.expected + b), d);
+    const __m256i is_done = _mm256_cvtepi8_epi32(done);
+    const __m256i out =
+        _mm256_or_si256(_mm256_cmpgt_epi32(column, highest), _mm256_cmpgt_epi32(lowest, column));
+    unfair = _mm256_or_si256(unfair, _mm256_and_si256(is_done, out));
+    store_ints(_mm256_blendv_epi8(kAbsent, column, is_done), line.columns + b);
+  }
+  return _mm256_testz_si256(unfair, unfair) != 0;
+}
+
+RELIEVO_AVX2 inline void there(const std::int32_t* columns, int count, std::uint8_t* out) {
+  const __m256i kAbsent = _mm256_set1_epi32(StripeGrid::kAbsent);
+  for (int b = 0; b < count; b += 8) {
+    const __m256i absent = _mm256_cmpeq_epi32(load_ints(columns + b), kAbsent);
+    const __m128i shorts =
+        _mm_packs_epi32(_mm256_castsi256_si128(absent), _mm256_extracti128_si256(absent, 1));
+    store_octets(_mm_add_epi8(_mm_packs_epi16(shorts, shorts), _mm_set1_epi8(1)), out + b);
+  }
+}
+
+#undef RELIEVO_AVX2
+
+}  // namespace relievo::avx2
+
+#endif
