@@ -52,8 +52,8 @@ class RigPage {
       this.remember();
     };
     element('cards').append(
-      this.calibration.root,
       ...this.cards.map(({ root }) => root),
+      this.calibration.root,
       new ProjectorCard(() => this.stream).root,
     );
     setText(element('coverage-caption'), text.calibration.coverage);
