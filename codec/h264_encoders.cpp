@@ -2,6 +2,7 @@
 #include "codec/h264_encoders.h"
 
 extern "C" {
+#include <libavcodec/avcodec.h>
 #include <libavutil/hwcontext.h>
 #include <libavutil/opt.h>
 }
@@ -97,7 +98,7 @@ constexpr std::array kRows{Row{VideoEncoderKind::kNvenc, "h264_nvenc", set_nvenc
 void describe_pictures(const VideoFormat& format, AVCodecContext& codec) {
   codec.width = format.width;
   codec.height = format.height;
-  codec.pix_fmt = av_pixel_format(format);
+  codec.pix_fmt = static_cast<AVPixelFormat>(av_pixel_format(format));
   codec.time_base = {1, 30};  // quality is asked for, not a rate: no bit depends on it
   codec.framerate = {30, 1};
   codec.thread_count = 1;
@@ -128,13 +129,23 @@ Status try_out(VideoEncoderKind kind) {
 
 }  // namespace
 
+void FreeAv::operator()(AVCodecContext* codec) const {
+  avcodec_free_context(&codec);
+}
+void FreeAv::operator()(AVFrame* picture) const {
+  av_frame_free(&picture);
+}
+void FreeAv::operator()(AVPacket* packet) const {
+  av_packet_free(&packet);
+}
+
 std::string av_text(int code) {
   char text[AV_ERROR_MAX_STRING_SIZE] = {};
   av_strerror(code, text, sizeof text);
   return text;
 }
 
-AVPixelFormat av_pixel_format(const VideoFormat& format) {
+int av_pixel_format(const VideoFormat& format) {
   if (format.sampling == VideoSampling::kLuma) return format.bits == 8 ? AV_PIX_FMT_GRAY8 : AV_PIX_FMT_GRAY10;
   return format.bits == 8 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV420P10;
 }

@@ -2,31 +2,30 @@
 // libavcodec's H.264 encoders: how each is opened for pictures without delay. For video_coder.cpp alone.
 #pragma once
 
-extern "C" {
-#include <libavcodec/avcodec.h>
-}
-
 #include <memory>
 #include <string>
 
 #include "base/result.h"
 #include "codec/video_coder.h"
 
+struct AVCodecContext;
+struct AVFrame;
+struct AVPacket;
+
 namespace relievo {
 
-template <auto Free>
-struct FreeWith {
-  template <typename T>
-  void operator()(T* pointer) const {
-    Free(&pointer);
-  }
+struct FreeAv {
+  void operator()(AVCodecContext* codec) const;
+  void operator()(AVFrame* picture) const;
+  void operator()(AVPacket* packet) const;
 };
-using AvCodec = std::unique_ptr<AVCodecContext, FreeWith<avcodec_free_context>>;
-using AvPicture = std::unique_ptr<AVFrame, FreeWith<av_frame_free>>;
-using AvPacket = std::unique_ptr<AVPacket, FreeWith<av_packet_free>>;
+using AvCodec = std::unique_ptr<AVCodecContext, FreeAv>;
+using AvPicture = std::unique_ptr<AVFrame, FreeAv>;
+using AvPacket = std::unique_ptr<AVPacket, FreeAv>;
 
 std::string av_text(int code);
-AVPixelFormat av_pixel_format(const VideoFormat& format);
+/// An AVPixelFormat.
+int av_pixel_format(const VideoFormat& format);
 
 /// Those that take another quality only when they are opened anew; x264 takes it picture by picture.
 bool opens_for_quality(VideoEncoderKind kind);

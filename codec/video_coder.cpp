@@ -10,6 +10,7 @@
 #include "codec/h264_encoders.h"
 
 extern "C" {
+#include <libavcodec/avcodec.h>
 #include <libavutil/opt.h>
 }
 
