@@ -34,10 +34,13 @@ struct Flags {
   CameraOptions camera;
 };
 
+/// Where the flag was given.
+template <typename Flag, typename Field>
+void set(const Flag& flag, Field& field) {
+  if (flag) field = *flag;
+}
+
 void set_stream(const Flags& flags, StreamConfig& config) {
-  const auto set = [](const auto& flag, auto& field) {
-    if (flag) field = *flag;
-  };
   set(flags.source, config.source);
   set(flags.stream, config.stream);
   set(flags.record, config.record);
@@ -84,9 +87,6 @@ Result<ServeConfig> read(const Flags& flags) {
     if (const Status done = read_config(*flags.config, config); !done) return done.error();
   }
   if (const Status meant = check_flags(flags, config); !meant) return meant.error();
-  const auto set = [](const auto& flag, auto& field) {
-    if (flag) field = *flag;
-  };
   set(flags.interface, config.interface);
   set(flags.keys, config.keys);
   set(flags.web, config.web);
