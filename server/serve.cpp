@@ -14,6 +14,7 @@
 #include "idl/cdr.h"
 #include "server/recording_desk.h"
 #include "server/rig_desk.h"
+#include "server/stage_desk.h"
 #include "server/stream_set.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -22,7 +23,7 @@ namespace relievo {
 namespace {
 
 Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFrameWishes& wishes,
-                                               RecordingDesk* desk, RigDesk& rigs) {
+                                               RecordingDesk* desk, RigDesk& rigs, const StageDesk& stages) {
   if (config.web == "none") return std::unique_ptr<Gateway>();
   const auto address = parse_listen_address(config.web);
   if (!address) return address.error();
@@ -37,7 +38,8 @@ Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFra
                                                        return write_frame_cdr(name, frame);
                                                      }},
                          .recordings = desk,
-                         .rigs = &rigs});
+                         .rigs = &rigs,
+                         .stages = &stages});
 }
 
 void print_addresses(const ServeConfig& config, const std::vector<std::string>& streams,
@@ -94,15 +96,17 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
   if (!config.record_folder.empty()) desk.emplace(config.record_folder);
   RecordingDesk* const desk_or_none = desk ? &*desk : nullptr;
   RigDesk rigs(config.projector);
+  StageDesk stages;
   // The gateway first: a port in use should fail before anything is opened or announced.
-  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs);
+  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs, stages);
   if (!gateway) return gateway.error();
   StreamSet streams({.config = config,
                      .wishes = wishes,
                      .board = board,
                      .gateway = gateway->get(),
                      .desk = desk_or_none,
-                     .rigs = &rigs},
+                     .rigs = &rigs,
+                     .stages = &stages},
                     !config.streams.empty());
   stop.on_stop([&] {
     tell_stopping();

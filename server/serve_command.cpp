@@ -235,8 +235,9 @@ Command serve_command() {
         app.add_option(
                "--ladder", f->ladder,
                "Lower qualities to be had of the stream, made while somebody reads them: reduced (every "
-               "second line, half the texture's size), texture (that texture alone) or none (default "
-               "reduced,texture)")
+               "second line, half the texture's size), texture (that texture alone), slow (likewise, a frame "
+               "at a "
+               "time as the way to its readers has room) or none (default reduced,texture,slow)")
             ->check([](const std::string& names) {
               const auto rungs = parse_ladder(names);
               return rungs ? std::string() : rungs.error().message;

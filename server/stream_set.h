@@ -28,8 +28,8 @@ class StreamSet {
   /// Stops and waits.
   ~StreamSet();
 
-  /// From now on these run: those that do already, as they are configured, go on untouched; others end, or
-  /// begin. Returns when those have ended.
+  /// From now on these run: those that do already, as they are configured and with the same rig and pattern
+  /// in the files that they name, go on untouched; others end, or begin. Returns when those have ended.
   void apply(const std::vector<StreamConfig>& configs);
   /// Until all have ended. The first failure.
   Status wait();
@@ -43,6 +43,7 @@ class StreamSet {
  private:
   struct Entry {
     StreamConfig config;
+    std::string files;  // that it names, as they were when it began
     bool retries = false;
     bool again = false;  // it ran before: what is recorded goes to another file
     std::thread thread;
@@ -61,7 +62,7 @@ class StreamSet {
 
   const Surroundings around_;
   const bool retries_;
-  mutable std::mutex mutex_;  // of all that follows, but for an entry's first four
+  mutable std::mutex mutex_;  // of all that follows, but for an entry's first five
   mutable std::condition_variable changed_;
   std::map<std::string, std::unique_ptr<Entry>> entries_;
   bool stopping_ = false;

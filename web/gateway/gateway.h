@@ -17,6 +17,7 @@
 #include "base/web_options.h"
 #include "web/gateway/recording_control.h"
 #include "web/gateway/rig_control.h"
+#include "web/gateway/stage_times.h"
 
 namespace relievo {
 
@@ -39,6 +40,7 @@ struct GatewayOptions {
   std::optional<SampleFormat> samples{};           // none: no /foxglove
   RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   RigControl* rigs = nullptr;                      // likewise; null: no camera is here
+  const StageReport* stages = nullptr;             // likewise; null: no stream is made here
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 

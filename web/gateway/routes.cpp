@@ -199,6 +199,7 @@ std::vector<StreamSnapshot> all_streams(const RouteContext& context) {
   std::vector<StreamSnapshot> streams = context.hub.snapshot();
   for (StreamSnapshot& s : streams) {
     if (context.recordings != nullptr) s.recorded = context.recordings->state(s.info.stream);
+    if (context.stages != nullptr) s.stages = context.stages->stages(s.info.stream);
     s.looked_at = context.rigs != nullptr && context.rigs->has(s.info.stream);
   }
   return streams;

@@ -73,6 +73,7 @@ struct RouteContext {
   const WebOptions& options;
   RecordingControl* recordings = nullptr;  // none: nothing is recorded here
   RigControl* rigs = nullptr;              // none: no camera is here
+  const StageReport* stages = nullptr;     // none: no stream is made here
   bool foxglove = false;                   // there is an encoder for it
   std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only

@@ -41,6 +41,38 @@ class NetworkTest : public ::testing::Test {
   }
   std::filesystem::path file(int host) const { return folder_ / (std::to_string(host) + ".mcap"); }
 
+  /// A stream of 1.1 Mbit/s in full, 0.2 reduced.
+  static std::unique_ptr<Process> wide_server() {
+    auto server = std::make_unique<Process>(
+        Network::on(1, {program("relievo-server"), "serve", "--source", "sim:plane,rate=5,noise=3",
+                        "--stream", "wide", "--web", "none", "--interface", Network::kInterface}));
+    EXPECT_TRUE(server->wait_for_text("stream wide")) << server->err();
+    return server;
+  }
+  static std::unique_ptr<Process> stats(int host, const std::string& quality) {
+    return std::make_unique<Process>(Network::on(host, {program("relievo"), "stats", "wide", "--quality",
+                                                        quality, "--interface", Network::kInterface}));
+  }
+  /// Of what `relievo stats` says each second.
+  struct Line {
+    std::string quality;
+    double rate = 0, latency_ms = 0;
+  };
+  static std::optional<Line> last_line(const std::string& out) {
+    const auto end = out.rfind('\n');
+    if (end == std::string::npos || end == 0) return std::nullopt;
+    const auto begin = out.rfind('\n', end - 1);
+    const std::string text = out.substr(begin == std::string::npos ? 0 : begin + 1, end - begin - 1);
+    char quality[16] = {};
+    Line line;
+    const auto latency = text.find("latency");
+    if (latency == std::string::npos || std::sscanf(text.c_str(), "%15s %lf/s", quality, &line.rate) != 2)
+      return std::nullopt;
+    line.latency_ms = std::stod(text.substr(latency + 7));
+    line.quality = quality;
+    return line;
+  }
+
   struct Counts {
     std::uint64_t frames = 0, lost = 0;
   };
@@ -92,15 +124,7 @@ TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {
 TEST_F(NetworkTest, AClientOnAThinCableTakesTheQualityThatFits) {
   Network network(3);
   network.narrow(2, 400);
-  const std::string interface = Network::kInterface;
-  Process server(Network::on(
-      1, {program("relievo-server"), "serve", "--source", "sim:plane,rate=5,noise=3", "--stream", "wide",
-          "--web", "none", "--interface", interface}));  // 1.1 Mbit/s in full, 0.2 reduced
-  ASSERT_TRUE(server.wait_for_text("stream wide")) << server.err();
-  const auto stats = [&](int host, const std::string& quality) {
-    return std::make_unique<Process>(Network::on(
-        host, {program("relievo"), "stats", "wide", "--quality", quality, "--interface", interface}));
-  };
+  const auto server = wide_server();
   const auto beside = stats(3, "full");
   ASSERT_TRUE(beside->wait_for_text("full"));
   const auto thin = stats(2, "auto");
@@ -109,6 +133,50 @@ TEST_F(NetworkTest, AClientOnAThinCableTakesTheQualityThatFits) {
            thin->out().find("texture ") != std::string::npos;
   })) << thin->out()
       << thin->err();
+  beside->signal(SIGINT);
+  EXPECT_EQ(beside->wait(), 0);
+  std::istringstream lines(beside->out());
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
+  std::printf("%s", thin->out().c_str());
+}
+
+// Where nothing is lost, frames come later and later: proves that this too makes a client go down, and that
+// what it then gets is of now.
+TEST_F(NetworkTest, AClientBehindALongQueueTakesTheQualityThatFits) {
+  Network network(2);
+  network.narrow(2, 400, 60'000);
+  const auto server = wide_server();
+  const auto thin = stats(2, "auto");
+  EXPECT_TRUE(eventually([&] {
+    const auto line = last_line(thin->out());
+    return line && line->quality != "full" && line->rate > 1 && line->latency_ms < 1000;
+  })) << thin->out()
+      << thin->err();
+  EXPECT_EQ(thin->out().find(" 1 lost"), std::string::npos);
+  std::printf("%s", thin->out().c_str());
+}
+
+// Proves that a client whose way is narrower than the lowest quality gets frames one by one, as many as fit,
+// is told so, and disturbs nobody.
+TEST_F(NetworkTest, AClientOnACableTooThinForAnyQualityGetsWhatFits) {
+  Network network(3);
+  network.narrow(2, 64);
+  const auto server = wide_server();
+  const auto beside = stats(3, "full");
+  ASSERT_TRUE(beside->wait_for_text("full"));
+  const auto thin = stats(2, "auto");
+  int good = 0;
+  std::string seen;
+  EXPECT_TRUE(eventually([&] {  // some lines with frames that are of now, not one that was lucky
+    const std::string out = thin->out();
+    const auto line = out == seen ? std::nullopt : last_line(out);
+    seen = out;
+    good += line && line->quality == "slow" && line->rate > 0 && line->latency_ms < 5000;
+    return good >= 5;
+  })) << thin->out()
+      << thin->err();
+  EXPECT_NE(thin->err().find("carries less than the lowest quality"), std::string::npos) << thin->err();
   beside->signal(SIGINT);
   EXPECT_EQ(beside->wait(), 0);
   std::istringstream lines(beside->out());
