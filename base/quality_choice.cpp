@@ -28,6 +28,8 @@ Rung QualityChoice::add(std::int64_t now_ns, const Seen& seen) {
     window_from_ns_ = now_ns;
     return now_;  // since when these frames are is not known
   }
+  if (seen.arrived > 0)
+    window_.late_ns = window_.arrived == 0 ? seen.late_ns : std::min(window_.late_ns, seen.late_ns);
   window_.arrived += seen.arrived;
   window_.lost += seen.lost;
   window_.busy_ns += seen.busy_ns;
@@ -45,10 +47,11 @@ void QualityChoice::judge(std::int64_t now_ns) {
   const double lost = static_cast<double>(window_.lost) / static_cast<double>(window_.arrived + window_.lost);
   const double busy = static_cast<double>(window_.busy_ns) /
                       static_cast<double>(std::max<std::int64_t>(1, now_ns - window_from_ns_));
+  const std::int64_t late_ns = window_.late_ns;
   const std::int64_t from_ns = window_from_ns_;
   window_ = {};
   window_from_ns_ = now_ns;
-  if (lost > options_.most_lost || busy > options_.most_busy) {
+  if (lost > options_.most_lost || busy > options_.most_busy || late_ns > options_.most_late_ns) {
     calm_from_ns_ = -1;
     if (below() == now_) return;
     // Climbed in vain: the next time only after longer.
@@ -58,7 +61,7 @@ void QualityChoice::judge(std::int64_t now_ns) {
     climbed_ns_ = -1;
     return;
   }
-  if (lost > options_.calm_lost || busy > options_.calm_busy) {
+  if (lost > options_.calm_lost || busy > options_.calm_busy || late_ns > options_.calm_late_ns) {
     calm_from_ns_ = -1;
     return;
   }

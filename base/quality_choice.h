@@ -21,6 +21,8 @@ class QualityChoice {
     double most_busy = 0.9;   // share of the time that frames took; more: down
     double calm_lost = 0.02;  // what still counts as no trouble; between the two nothing changes
     double calm_busy = 0.6;
+    std::int64_t most_late_ns = 400'000'000;  // that each frame of a window waited on its way; more: down
+    std::int64_t calm_late_ns = 150'000'000;
     std::int64_t window_ns = kNanosecondsPerSecond;  // what is judged at once,
     std::uint64_t window_frames = 8;                 // and at least so many frames
     std::int64_t calm_ns = 5 * kNanosecondsPerSecond;
@@ -31,6 +33,7 @@ class QualityChoice {
     std::uint64_t arrived = 0;
     std::uint64_t lost = 0;    // sent to here, and not arrived or not taken
     std::int64_t busy_ns = 0;  // that frames took to decode and to use; 0 where it is not known
+    std::int64_t late_ns = 0;  // that those that arrived waited on their way at least; likewise
   };
 
   QualityChoice() : QualityChoice(Options{}) {}
@@ -53,7 +56,7 @@ class QualityChoice {
   Options options_;
   std::vector<Rung> rungs_{Rung::kFull};  // best first
   Rung now_ = Rung::kFull;
-  Seen window_;
+  Seen window_;  // late_ns: of the frame that waited least, since a queue that stays lets none pass it
   std::int64_t window_from_ns_ = -1;  // below 0: it begins with the next call
   std::int64_t calm_from_ns_ = -1;    // below 0: there is trouble, or it is not known
   std::int64_t climbed_ns_ = -1;      // to this rung; below 0: it was not climbed to

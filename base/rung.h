@@ -14,13 +14,16 @@ enum class Rung : std::uint8_t {
   kFull,     // the stream itself
   kReduced,  // every second line of the surface, half the texture's width and height
   kTexture,  // that texture alone
+  kSlow,     // likewise, one frame whenever its readers have asked for one: what their way carries
 };
 
-inline constexpr std::array<Rung, 3> kRungs = {Rung::kFull, Rung::kReduced, Rung::kTexture};
+inline constexpr std::array<Rung, 4> kRungs = {Rung::kFull, Rung::kReduced, Rung::kTexture, Rung::kSlow};
+/// Those of WebSocket clients, which ask for each frame on every rung.
+inline constexpr std::array<Rung, 3> kWebRungs = {Rung::kFull, Rung::kReduced, Rung::kTexture};
 
-/// "full", "reduced" or "texture".
+/// "full", "reduced", "texture" or "slow".
 constexpr std::string_view to_string(Rung rung) {
-  constexpr std::array<std::string_view, kRungs.size()> kNames = {"full", "reduced", "texture"};
+  constexpr std::array<std::string_view, kRungs.size()> kNames = {"full", "reduced", "texture", "slow"};
   return kNames[static_cast<std::size_t>(rung)];
 }
 constexpr std::optional<Rung> rung_named(std::string_view name) {

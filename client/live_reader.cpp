@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "base/lateness.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "codec/frame3d_codec.h"
@@ -89,6 +90,7 @@ class DdsLiveReader final : public LiveReader {
 
   void take(const FrameMessage& message) {
     const std::int64_t begin_ns = steady_now_ns();
+    seen_.late_ns = lateness_of(message, begin_ns);
     if (message.rung != rung_) decoder_ = FrameDecoder();
     const bool moved = std::exchange(rung_, message.rung) != message.rung;
     const bool decoded = decode(message);
@@ -97,9 +99,18 @@ class DdsLiveReader final : public LiveReader {
     seen_.arrived = 1;
     seen_.busy_ns = steady_now_ns() - begin_ns;
     count(message, decoded, moved, end_ns - begin_ns);
+    if (moved && rung_ == Rung::kSlow && !options_.quality)
+      log_warning("the way here carries less than the lowest quality of " + options_.stream +
+                  ": its texture comes one frame at a time, as many as get through");
     any_since_status_ = true;
     choose(seen_);
     seen_ = {};
+  }
+
+  std::int64_t lateness_of(const FrameMessage& message, std::int64_t now_ns) {
+    std::int64_t way_ns = 0;
+    if (__builtin_sub_overflow(utc_now_ns(), message.publish_time_ns, &way_ns)) return 0;  // a hostile peer's
+    return lateness_.add(now_ns, way_ns);
   }
 
   void choose(const QualityChoice::Seen& seen) {
@@ -159,6 +170,7 @@ class DdsLiveReader final : public LiveReader {
   Rung rung_;
   QualityChoice choice_;
   QualityChoice::Seen seen_;
+  Lateness lateness_;
   std::int64_t key_asked_ns_ = 0;
   std::uint64_t published_ = 0;      // when the last status was sent,
   Rung published_of_ = Rung::kFull;  // of that rung

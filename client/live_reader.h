@@ -23,7 +23,8 @@ class LiveReader {
   struct Options {
     DomainOptions domain;
     std::string stream;
-    std::optional<Rung> quality;    // nothing: whatever suits, measured by lost frames and the time they take
+    std::optional<Rung>
+        quality;  // nothing: whatever suits, measured by frames that are lost or late, and the time they take
     QualityChoice::Options choice;  // how that is decided
     // Each frame, on the reader's thread; what it takes here counts as what decoding takes.
     std::function<void(const Frame3D& frame, const FrameMessage& message)> frame;

@@ -138,8 +138,9 @@ Command record_command() {
             ->type_name("FILE");
         app.add_option("--quality", options->quality,
                        "full, or one of the server's ladder: reduced (every second line, half the texture's "
-                       "size), texture (that texture alone)")
-            ->check(CLI::IsMember({"full", "reduced", "texture"}))
+                       "size), texture (that texture alone), slow (likewise, a frame at a time as the "
+                       "network has room)")
+            ->check(CLI::IsMember({"full", "reduced", "texture", "slow"}))
             ->capture_default_str()
             ->type_name("NAME");
         app.add_option("--frames", options->frames, "Stop after this many frames")->check(whole_number(1));

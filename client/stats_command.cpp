@@ -105,10 +105,11 @@ Command stats_command() {
         auto options = std::make_shared<Options>();
         options->domain = add_domain_options(app);
         app.add_option("stream", options->stream, "Name of the stream")->type_name("NAME")->required();
-        app.add_option("--quality", options->quality,
-                       "full, reduced, texture, or auto: lower while frames are lost or take too long, and "
-                       "back after a quiet time")
-            ->check(CLI::IsMember({"auto", "full", "reduced", "texture"}))
+        app.add_option(
+               "--quality", options->quality,
+               "full, reduced, texture, slow (that texture, a frame at a time as the network has room), or "
+               "auto: lower while frames are lost, late or take too long, and back after a quiet time")
+            ->check(CLI::IsMember({"auto", "full", "reduced", "texture", "slow"}))
             ->capture_default_str()
             ->type_name("NAME");
         app.add_option("--seconds", options->seconds, "End after so long (default: at Ctrl-C)")

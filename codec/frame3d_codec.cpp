@@ -253,7 +253,8 @@ void FrameEncoder::request_key_frame() {
   state_->key_asked = true;
 }
 
-Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& options) {
+Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& options,
+                                   const std::function<void()>& geometry_done) {
   State& s = *state_;
   if (auto status = check_frame(frame, options); !status) return status.error();
   // Triangles are checked by those who read them: to_grid() and encode_draco().
@@ -270,6 +271,7 @@ Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& op
       asked || other_texture || other_grid || s.since_key < 0 || s.since_key + 1 >= options.key_interval;
   const auto coded = s.encode_geometry(frame.surface, options, want_key);
   if (!coded) return coded.error();
+  if (geometry_done) geometry_done();
   auto bytes = with_texture(frame, options, s.texture.get(), want_key, *coded);
   if (!bytes) {
     s.since_key = -1;  // what receivers would have to build on never reached them

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 
@@ -99,8 +100,10 @@ class FrameEncoder {
   ~FrameEncoder();
 
   /// As encode_frame(). A surface that does not lie on the grid of stripes and lines (the dense option's,
-  /// say) is sent as a Draco mesh, whatever the options say.
-  Result<Bytes> encode(const Frame3D& frame, const EncodeOptions& options);
+  /// say) is sent as a Draco mesh, whatever the options say. `geometry_done`, where given, is called between
+  /// the surface and the texture: for who measures what each takes.
+  Result<Bytes> encode(const Frame3D& frame, const EncodeOptions& options,
+                       const std::function<void()>& geometry_done = {});
 
   /// The next frame will be a key frame. Any thread.
   void request_key_frame();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <dds/dds.h>
+#include <dds/ddsc/dds_statistics.h>
 
 #include <algorithm>
 #include <array>
@@ -184,6 +185,15 @@ class DdsPublisher final : public Publisher {
   }
 
   int matched_readers() const override { return matched_readers_of(writer(Topic::kFrame)); }
+
+  std::uint64_t sent_again_bytes() const override {
+    dds_statistics* const statistics = dds_create_statistics(writer(Topic::kFrame));
+    if (statistics == nullptr) return 0;
+    const dds_stat_keyvalue* const found = dds_lookup_statistic(statistics, "rexmit_bytes");
+    const std::uint64_t bytes = found == nullptr ? 0 : found->u.u64;
+    dds_delete_statistics(statistics);
+    return bytes;
+  }
 
   ~DdsPublisher() override {
     // Waits for a call in progress; `wanted_` outlives it.

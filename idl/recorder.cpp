@@ -54,6 +54,11 @@ Recorder::Counts Recorder::counts() const {
   return counts_;
 }
 
+std::filesystem::path Recorder::file() const {
+  const std::lock_guard lock(mutex_);
+  return open_;
+}
+
 bool Recorder::done() const {
   std::lock_guard lock(mutex_);
   return limit_reached_ || error_.has_value();

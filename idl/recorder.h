@@ -52,6 +52,8 @@ class Recorder {
   Subscriber::Callbacks callbacks();
 
   Counts counts() const;
+  /// The file that is being written, or was last; empty before the first sample.
+  std::filesystem::path file() const;
   /// The limit of frames or seconds is reached, or writing has failed.
   bool done() const;
   /// Ok, or why writing has failed.

@@ -20,14 +20,20 @@ constexpr auto kTick = 100ms;
 constexpr auto kArrival = 500ms;     // of a stream's last frames
 constexpr std::size_t kAtOnce = 32;  // samples, before who asks for the state may look
 
-/// "face-2026-11-22T07-05-00Z.mcap".
-std::string new_name(const std::filesystem::path& folder, const std::string& stream, std::int64_t now_ns) {
+/// "face-2026-11-22T07-05-00Z.mcap", in the folder.
+std::filesystem::path new_target(const std::filesystem::path& folder, const std::string& stream,
+                                 std::int64_t now_ns) {
   const std::time_t now = now_ns / kNanosecondsPerSecond;
   std::tm utc{};
   gmtime_r(&now, &utc);
   char text[40];
   std::strftime(text, sizeof text, "-%Y-%m-%dT%H-%M-%SZ", &utc);
-  return unused_name(folder / (stream + text + ".mcap")).filename();
+  return unused_name(folder / (stream + text + ".mcap"));
+}
+
+/// What is written first of it.
+std::filesystem::path first_file(const std::filesystem::path& target, const SegmentOptions& segments) {
+  return segments.split() ? RecordingSegments(target, segments).next() : target;
 }
 
 }  // namespace
@@ -78,8 +84,9 @@ Status StreamRecorder::start() {
     return Error{end_ ? "the recording before is still being written to its end: try again"
                       : "'" + options_.stream + "' is being recorded already"};
   const std::int64_t now_ns = utc_now_ns();
+  target_ = new_target(options_.folder, options_.stream, now_ns);
   state_ = {.activity = RecordingActivity::kRecording,
-            .file = new_name(options_.folder, options_.stream, now_ns),
+            .file = first_file(target_, options_.recording.segments).filename(),
             .started_ns = now_ns,
             .pre_roll_s = options_.pre_roll_s,
             .message = {}};
@@ -107,7 +114,10 @@ RecordingState StreamRecorder::state() const {
 
 bool StreamRecorder::is_open(const std::string& file) const {
   const std::lock_guard lock(mutex_);
-  return open_ && state_.file == file;
+  if (!open_ || state_.file == file) return open_;
+  // The next one may have been begun since the state was last told.
+  return options_.recording.segments.split() && file > state_.file &&
+         file.starts_with(target_.stem().string() + '_');
 }
 
 void StreamRecorder::finish(std::uint64_t published) {
@@ -144,7 +154,7 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t end = std::min(end_.value_or(ring_.end()), ring_.end());
   while (info_ && next_ < end && samples.size() < kAtOnce) samples.push_back(ring_.at(next_++));
   const bool is_last = end_ && (next_ >= *end_ || !info_);
-  const std::string file = state_.file;
+  const std::filesystem::path target = target_;
   std::optional<RawSample> info;
   if (!recorder_ && !samples.empty()) {
     info = info_;
@@ -153,19 +163,21 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   lock.unlock();
 
   if (info) {
-    recorder_ = std::make_unique<Recorder>(Recorder::Options{
-        .file = options_.folder / file, .stream = options_.stream, .recording = {.sync_s = options_.sync_s}});
+    recorder_ = std::make_unique<Recorder>(
+        Recorder::Options{.file = target, .stream = options_.stream, .recording = options_.recording});
     to_recorder_ = recorder_->callbacks();
     write(*info);
   }
   for (const auto& sample : samples) write(*sample);
   Status written;
   Recorder::Counts counts;
+  std::filesystem::path file;
   if (recorder_) {
     recorder_->tick(utc_now_ns());
     written = recorder_->status();
     if (is_last && written) written = recorder_->finish();
     counts = recorder_->counts();
+    file = recorder_->file();
     if (is_last || !written) recorder_.reset();  // which closes the file
   }
   if (!written) log_warning(written.error().message + "; the stream goes on without a recording");
@@ -173,6 +185,7 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   lock.lock();
   state_.frames = counts.frames;
   state_.bytes = counts.bytes;
+  if (!file.empty()) state_.file = file.filename();
   if (!is_last && written) return;
   state_.activity = written ? RecordingActivity::kOff : RecordingActivity::kFailed;
   state_.message = written ? "" : written.error().message;

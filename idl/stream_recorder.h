@@ -32,7 +32,7 @@ class StreamRecorder {
     std::string stream;
     double pre_roll_s = 0;
     std::uint64_t keep_bytes = kPreRollBytes;
-    double sync_s = 0;  // as RecordingOptions
+    RecordingOptions recording{};  // `keep` is of one recording's files: no wish removes another one's
   };
   explicit StreamRecorder(Options options);
   StreamRecorder(const StreamRecorder&) = delete;
@@ -43,7 +43,8 @@ class StreamRecorder {
   /// What a Subscriber of the stream is to call; the recorder must outlive it.
   Subscriber::Callbacks callbacks();
 
-  /// A new file in the folder, STREAM-2026-11-22T07-05-00Z.mcap, that begins with the pre-roll. Fails where
+  /// A new file in the folder, STREAM-2026-11-22T07-05-00Z.mcap, or where it is to be split the first of
+  /// several, ...Z_000000.mcap, that begins with the pre-roll. Fails where
   /// one is being recorded. What the disk has against it shows in state().
   Status start();
   /// What came until now is in the file; it is whole when is_open() no longer says so. Fails where nothing is
@@ -70,6 +71,7 @@ class StreamRecorder {
   SampleRing ring_;
   std::optional<RawSample> info_;  // as received last
   RecordingState state_;
+  std::filesystem::path target_;      // as Recorder::Options::file
   bool open_ = false;                 // state_.file is being written
   std::uint64_t next_ = 0;            // the first of the ring that is not in it
   std::optional<std::uint64_t> end_;  // where it ends, once that is asked for

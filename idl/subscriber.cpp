@@ -136,7 +136,7 @@ class DdsSubscriber final : public Subscriber {
   void run() {
     for (;;) {
       dds_attach_t triggered[4];
-      const bool in_time = next_ || waits_with_frames();
+      const bool in_time = next_ || waits_with_frames() || frames_.asker;
       const auto count =
           dds_waitset_wait(waitset_.get(), triggered, 4, in_time ? kMakeTime_ns : DDS_INFINITY);
       bool stopping = false;
@@ -147,6 +147,8 @@ class DdsSubscriber final : public Subscriber {
       if (waits_with_frames()) begin_with_frames();
       if (next_) take_next();
       if (next_) break_before_make();
+      for (FrameLink* const link : {&frames_, next_ ? &*next_ : nullptr})
+        if (link != nullptr && link->asker) link->asker->tick(steady_now_ns());
       // Only now, so that a stream's last frames come before its end.
       for (const std::string& stream : ended_) tell_if_gone(stream);
     }
@@ -276,6 +278,7 @@ class DdsSubscriber final : public Subscriber {
         Known* known = remember(frame->stream, topic, sample);
         if (known == nullptr) return Error{"more streams than can be followed"};
         last_frame_ns_ = steady_now_ns();
+        if (frames_.asker) frames_.asker->got(last_frame_ns_);
         tell_there(*known);
         count_lost(*known, *frame, sample.publication_handle);
         raw(topic, frame->stream, cdr, sample);

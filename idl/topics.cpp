@@ -108,11 +108,12 @@ Result<Entity> create_group(std::int32_t participant, Role role, bool writing, c
   return create_group(participant, Role::kWatcher, writing, stream + "/" + std::string(to_string(rung)));
 }
 
-Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic) {
+Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic,
+                             std::optional<int> depth) {
   auto dds_topic = create_topic(participant, topic);
   if (!dds_topic) return dds_topic.error();
   const Qos qos = reliable_qos(row(topic).durability);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, row(topic).writer_depth);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth.value_or(row(topic).writer_depth));
   dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, kLiveliness_ns);
   // Otherwise a server's exit would read as "stream deleted" and a late joiner would get one sample at most.
   dds_qset_writer_data_lifecycle(qos.get(), false);

@@ -33,7 +33,9 @@ Result<Entity> create_group(std::int32_t participant, Role role, bool writing, c
 
 /// A writer or reader of `topic` in `group`, with the table's QoS. The DDS topic is made as needed and lives
 /// with the participant.
-Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic);
+/// `depth`: other than the table's many samples kept for who asks again.
+Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic,
+                             std::optional<int> depth = {});
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic);
 
 /// What is said beside the streams: never recorded.

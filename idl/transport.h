@@ -63,6 +63,8 @@ class Publisher {
   virtual Status publish(const ServerStatus& status) = 0;
   /// Readers of the frames, in all processes.
   virtual int matched_readers() const = 0;
+  /// Of frames, to readers that asked for them again. Any thread.
+  virtual std::uint64_t sent_again_bytes() const = 0;
 };
 
 /// Writes a lower rung of a stream's quality ladder, beside the Publisher of the stream itself; its readers
@@ -76,6 +78,9 @@ class RungPublisher {
   /// As Publisher::publish().
   virtual Status publish(const FrameMessage& frame) = 0;
   virtual int matched_readers() const = 0;
+  /// Whether a frame is to be published now. False of kSlow until its readers have asked for one, which must
+  /// decode alone.
+  virtual bool due() = 0;
 };
 
 /// Writes recorded samples unchanged: the bytes readers get are the recorded ones. Any thread, one call at a

@@ -420,10 +420,10 @@ Result<std::vector<Rung>> parse_ladder(const std::string& text) {
     if (!rung || *rung == Rung::kFull)
       return Error{
           "'" + name +
-          "' is no lower quality: there are reduced and texture, with a comma between them, and none"};
+          "' is no lower quality: there are reduced, texture and slow, with commas between them, and none"};
     out.push_back(*rung);
   }
-  if (out.empty()) return Error{"give reduced, texture, both with a comma between them, or none"};
+  if (out.empty()) return Error{"give reduced, texture, slow, with commas between them, or none"};
   std::sort(out.begin(), out.end());
   out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;

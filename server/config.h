@@ -51,7 +51,8 @@ struct StreamConfig {
   std::optional<int> key_interval;
   std::optional<double> bound_px;  // of visual
   int draco_speed = 4;
-  std::vector<Rung> ladder = {Rung::kReduced, Rung::kTexture};  // qualities besides the full one, best first
+  std::vector<Rung> ladder = {Rung::kReduced, Rung::kTexture,
+                              Rung::kSlow};  // qualities besides the full one, best first
 
   bool operator==(const StreamConfig&) const = default;
 };

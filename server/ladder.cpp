@@ -40,6 +40,9 @@ struct Ladder::Step {
   std::uint64_t sequence = 0;
   bool was_read = false;
   bool said = false;  // that it could not be published
+
+  bool takes_all() const { return !output.due && output.readers() > 0; }
+  bool takes() const { return output.readers() > 0 && (!output.due || output.due()); }
 };
 
 Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution)
@@ -61,8 +64,7 @@ void Ladder::add(Output output) {
 }
 
 bool Ladder::wanted() {
-  return std::any_of(steps_.begin(), steps_.end(),
-                     [](const auto& step) { return step->output.readers() > 0; });
+  return std::any_of(steps_.begin(), steps_.end(), [](const auto& step) { return step->takes(); });
 }
 
 void Ladder::take(Frame3D frame, std::int64_t capture_time_ns) {
@@ -71,7 +73,7 @@ void Ladder::take(Frame3D frame, std::int64_t capture_time_ns) {
   queue_.push_drop_oldest(Item(std::move(frame), capture_time_ns, &give_back_));
   if (queue_.drops() == before) return;
   for (const auto& step : steps_)
-    if (step->output.readers() > 0) ++step->drops;
+    if (step->takes_all()) ++step->drops;
 }
 
 void Ladder::end() {
@@ -89,8 +91,8 @@ void Ladder::run() {
     if (key) key_ns = now_ns;
     halve(item->frame.texture, half_);
     for (const auto& step : steps_) {
-      const bool is_read = step->output.readers() > 0;
-      if (key || (is_read && !step->was_read)) step->encoder.request_key_frame();
+      const bool is_read = step->takes();
+      if (key || (is_read && (step->output.due || !step->was_read))) step->encoder.request_key_frame();
       step->was_read = is_read;
       if (is_read) encode(*step, *item);
     }

@@ -39,6 +39,8 @@ class Ladder final : public LowerRungs {
     Rung rung;
     std::function<int()> readers;                        // now; any thread
     std::function<Status(const FrameMessage&)> publish;  // on the ladder's thread
+    // Whether the rung takes a frame now, which then decodes alone; empty: it takes each. Any thread.
+    std::function<bool()> due{};
   };
   /// Before the first take(), best rung first. What fails to be published is logged once, and the rung goes
   /// on.

@@ -114,6 +114,14 @@ class ThreadedPipeline final : public Pipeline {
     return s;
   }
 
+  StageTimes stages() const override {
+    StageTimes times = stats_.stages();
+    times.waiting_reconstruct = to_reconstruct_.size();
+    times.waiting_encode = to_encode_.size();
+    times.waiting_publish = to_publish_.size();
+    return times;
+  }
+
  private:
   template <typename T>
   void push(BoundedQueue<T>& queue, T item) {
@@ -285,11 +293,13 @@ class ThreadedPipeline final : public Pipeline {
         rate->apply(encode);
         place = rate->place();
       }
-      auto bytes = encoder_.encode(item->frame, encode);
+      std::int64_t geometry_ns = begin;
+      auto bytes = encoder_.encode(item->frame, encode, [&] { geometry_ns = steady_now_ns(); });
       if (!bytes) {
         fail(bytes.error());
         continue;
       }
+      stats_.encoded_parts(milliseconds(geometry_ns - begin), milliseconds(steady_now_ns() - geometry_ns));
       const bool is_key = is_key_frame(*bytes);
       if (is_key) key_ns = begin;
       if (rate) {
@@ -326,7 +336,9 @@ class ThreadedPipeline final : public Pipeline {
         message.sequence = sequence++;
         message.publish_time_ns = utc_now_ns();
         stats_.published(message.capture_time_ns, message.publish_time_ns, message.data->size());
+        const std::int64_t begin_ns = steady_now_ns();
         to_sinks(message);
+        stats_.handed_over(milliseconds(steady_now_ns() - begin_ns));
         add_time({milliseconds(steady_now_ns() - encoded->begin_ns), encoded->place});
       }
       if (steady_now_ns() < status_due_ns) continue;

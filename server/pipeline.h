@@ -18,6 +18,7 @@
 #include "codec/frame3d_codec.h"
 #include "server/frame_tap.h"
 #include "server/rate_control.h"
+#include "web/gateway/stage_times.h"
 
 namespace relievo {
 
@@ -83,6 +84,8 @@ class Pipeline {
 
   /// Counts so far. Any thread.
   virtual ServerStatus status() const = 0;
+  /// What its stages take, but for what is sent again. Any thread.
+  virtual StageTimes stages() const = 0;
 };
 
 }  // namespace relievo

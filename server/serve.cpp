@@ -17,6 +17,7 @@
 #include "server/calibration_desk.h"
 #include "server/recording_desk.h"
 #include "server/rig_desk.h"
+#include "server/stage_desk.h"
 #include "server/stream_set.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -26,7 +27,7 @@ namespace {
 
 Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFrameWishes& wishes,
                                                RecordingDesk* desk, RigDesk& rigs,
-                                               CalibrationDesk& calibrations) {
+                                               CalibrationDesk& calibrations, const StageDesk& stages) {
   if (config.web == "none") return std::unique_ptr<Gateway>();
   const auto address = parse_listen_address(config.web);
   if (!address) return address.error();
@@ -42,7 +43,8 @@ Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFra
                                                      }},
                          .recordings = desk,
                          .rigs = &rigs,
-                         .calibrations = &calibrations});
+                         .calibrations = &calibrations,
+                         .stages = &stages});
 }
 
 void print_addresses(const ServeConfig& config, const std::vector<std::string>& streams,
@@ -111,15 +113,17 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
   RecordingDesk* const desk_or_none = desk ? &*desk : nullptr;
   RigDesk rigs(config.projector);
   CalibrationDesk calibrations(rigs.driver(), config.projector);
+  StageDesk stages;
   // The gateway first: a port in use should fail before anything is opened or announced.
-  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs, calibrations);
+  const auto gateway = start_gateway(config, wishes, desk_or_none, rigs, calibrations, stages);
   if (!gateway) return gateway.error();
   StreamSet streams({.config = config,
                      .wishes = wishes,
                      .board = board,
                      .gateway = gateway->get(),
                      .desk = desk_or_none,
-                     .rigs = &rigs},
+                     .rigs = &rigs,
+                     .stages = &stages},
                     !config.streams.empty());
   stop.on_stop([&] {
     tell_stopping();

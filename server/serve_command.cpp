@@ -36,10 +36,13 @@ struct Flags {
   CameraOptions camera;
 };
 
+/// Where the flag was given.
+template <typename Flag, typename Field>
+void set(const Flag& flag, Field& field) {
+  if (flag) field = *flag;
+}
+
 void set_stream(const Flags& flags, StreamConfig& config) {
-  const auto set = [](const auto& flag, auto& field) {
-    if (flag) field = *flag;
-  };
   set(flags.source, config.source);
   set(flags.stream, config.stream);
   set(flags.record, config.record);
@@ -88,9 +91,6 @@ Result<ServeConfig> read(const Flags& flags) {
     if (const Status done = read_config(*flags.config, config); !done) return done.error();
   }
   if (const Status meant = check_flags(flags, config); !meant) return meant.error();
-  const auto set = [](const auto& flag, auto& field) {
-    if (flag) field = *flag;
-  };
   set(flags.interface, config.interface);
   set(flags.keys, config.keys);
   set(flags.web, config.web);
@@ -254,8 +254,9 @@ Command serve_command() {
         app.add_option(
                "--ladder", f->ladder,
                "Lower qualities to be had of the stream, made while somebody reads them: reduced (every "
-               "second line, half the texture's size), texture (that texture alone) or none (default "
-               "reduced,texture)")
+               "second line, half the texture's size), texture (that texture alone), slow (likewise, a frame "
+               "at a "
+               "time as the way to its readers has room) or none (default reduced,texture,slow)")
             ->check([](const std::string& names) {
               const auto rungs = parse_ladder(names);
               return rungs ? std::string() : rungs.error().message;

@@ -96,7 +96,7 @@ class OnRequest {
     const auto options = recording_options(config.recording);
     if (!options) return options.error();
     recorder_.emplace(StreamRecorder::Options{
-        .folder = desk_.folder(), .stream = stream_, .pre_roll_s = *pre_roll_s, .sync_s = options->sync_s});
+        .folder = desk_.folder(), .stream = stream_, .pre_roll_s = *pre_roll_s, .recording = *options});
     auto created = Subscriber::create(domain_options(config), stream_, recorder_->callbacks());
     if (!created) return created.error();
     subscriber_ = *std::move(created);
@@ -136,6 +136,7 @@ class RunningStream final : public ServedStream {
   ~RunningStream() override {
     if (announced_) around_.gateway->withdraw(name_);
     if (around_.rigs != nullptr) around_.rigs->remove(name_);
+    if (around_.stages != nullptr) around_.stages->remove(name_);
     around_.board.forget(name_);
   }
 
@@ -190,6 +191,12 @@ Status RunningStream::open() {
   if (!pipeline) return pipeline.error();
   if (probe_) around_.rigs->add(name_, *probe_);
   pipeline_ = *std::move(pipeline);
+  if (around_.stages != nullptr)
+    around_.stages->add(name_, [pipeline = pipeline_.get(), publisher = publisher_.get()] {
+      StageTimes times = pipeline->stages();
+      times.sent_again_bytes = publisher->sent_again_bytes();
+      return times;
+    });
   return {};
 }
 
@@ -232,6 +239,13 @@ Status RunningStream::raise_ladder(const PipelineOptions& options) {
                                       [ladder = ladder_.get()] { ladder->request_key_frame(); });
     if (!made) return made.error();
     RungPublisher* const publisher = rungs_.emplace_back(*std::move(made)).get();
+    if (rung == Rung::kSlow) {
+      ladder_->add({.rung = rung,
+                    .readers = [publisher] { return publisher->matched_readers(); },
+                    .publish = [publisher](const FrameMessage& frame) { return publisher->publish(frame); },
+                    .due = [publisher] { return publisher->due(); }});
+      continue;
+    }
     Gateway* const gateway = around_.gateway;
     ladder_->add({.rung = rung,
                   .readers =

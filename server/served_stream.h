@@ -11,6 +11,7 @@
 #include "server/recording_desk.h"
 #include "server/rig_desk.h"
 #include "server/sinks.h"
+#include "server/stage_desk.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
 
@@ -24,6 +25,7 @@ struct Surroundings {
   Gateway* gateway = nullptr;     // null: none
   RecordingDesk* desk = nullptr;  // null: nothing is recorded on request
   RigDesk* rigs = nullptr;        // null: nobody looks at the rigs
+  StageDesk* stages = nullptr;    // null: nobody asks what stages take
 };
 
 DomainOptions domain_options(const ServeConfig& config);

@@ -36,11 +36,28 @@ void PipelineStats::reconstructed(double ms, const FilterCounts& filters) {
   std::lock_guard lock(mutex_);
   filters_ += filters;
   reconstruct_ms_.add(ms);
+  stages_.reconstruct.add(ms * 1e-3);
 }
 
 void PipelineStats::encoded(double ms) {
   std::lock_guard lock(mutex_);
   encode_ms_.add(ms);
+}
+
+void PipelineStats::encoded_parts(double geometry_ms, double texture_ms) {
+  std::lock_guard lock(mutex_);
+  stages_.encode_geometry.add(geometry_ms * 1e-3);
+  stages_.encode_texture.add(texture_ms * 1e-3);
+}
+
+void PipelineStats::handed_over(double ms) {
+  std::lock_guard lock(mutex_);
+  stages_.publish.add(ms * 1e-3);
+}
+
+StageTimes PipelineStats::stages() const {
+  std::lock_guard lock(mutex_);
+  return stages_;
 }
 
 void PipelineStats::rate_level(std::uint32_t level) {

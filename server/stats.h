@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "base/stream.h"
+#include "web/gateway/stage_times.h"
 
 namespace relievo {
 
@@ -29,11 +30,17 @@ class PipelineStats {
   void lost_in_capture(std::uint64_t frames);
   void reconstructed(double ms, const FilterCounts& filters = {});
   void encoded(double ms);
+  /// The same, by the parts of a frame.
+  void encoded_parts(double geometry_ms, double texture_ms);
+  /// That all sinks have taken a frame.
+  void handed_over(double ms);
   void published(std::int64_t capture_time_ns, std::int64_t publish_time_ns, std::size_t bytes = 0);
   void rate_level(std::uint32_t level);
 
   /// All but `stream`, `state`, `message` and the queues' drops; `now_ns` in UTC.
   ServerStatus snapshot(std::int64_t now_ns) const;
+  /// The times alone.
+  StageTimes stages() const;
 
  private:
   mutable std::mutex mutex_;
@@ -44,6 +51,7 @@ class PipelineStats {
   std::array<std::size_t, 64> publish_bytes_{};   // and sizes
   std::uint32_t rate_level_ = 0;
   FilterCounts filters_;
+  StageTimes stages_;
   RollingMedian reconstruct_ms_, encode_ms_, latency_ms_;
 };
 

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -13,6 +16,22 @@ namespace relievo {
 namespace {
 
 constexpr std::chrono::seconds kRetry{5};
+
+/// What is in the files that a camera's stream names. They are a few kilobytes; one that cannot be read has
+/// its own words when the stream is opened.
+std::string files_of(const StreamConfig& config) {
+  std::string all;
+  if (!config.source.starts_with("v4l2:")) return all;
+  std::vector<std::filesystem::path> files{config.camera.rig, config.camera.pattern};
+  if (config.camera.pattern.empty())  // then it is beside the rig
+    files[1] = std::filesystem::path(config.camera.rig).replace_filename("pattern.yaml");
+  for (const auto& file : files) {
+    std::ifstream in(file, std::ios::binary);
+    all.append(std::istreambuf_iterator<char>(in), {});
+    all += '\0';
+  }
+  return all;
+}
 
 }  // namespace
 
@@ -30,7 +49,8 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
   applying_ = true;
   for (auto it = entries_.begin(); it != entries_.end();) {
     const auto found = wanted.find(it->first);
-    if (found != wanted.end() && *found->second == it->second->config) {
+    if (found != wanted.end() && *found->second == it->second->config &&
+        files_of(*found->second) == it->second->files) {
       wanted.erase(found);
       ++it;
       continue;
@@ -45,6 +65,7 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
   for (const auto& [name, config] : wanted) {
     auto& entry = entries_[name] = std::make_unique<Entry>();
     entry->config = *config;
+    entry->files = files_of(*config);
     entry->retries = retries_ || was_applied_;
     entry->again = was_applied_;
     entry->stopping = stopping_;

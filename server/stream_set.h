@@ -29,8 +29,8 @@ class StreamSet final : public StreamPauses {
   /// Stops and waits.
   ~StreamSet() override;
 
-  /// From now on these run: those that do already, as they are configured, go on untouched; others end, or
-  /// begin. Returns when those have ended.
+  /// From now on these run: those that do already, as they are configured and with the same rig and pattern
+  /// in the files that they name, go on untouched; others end, or begin. Returns when those have ended.
   void apply(const std::vector<StreamConfig>& configs);
   /// Until all have ended. The first failure.
   Status wait();
@@ -49,6 +49,7 @@ class StreamSet final : public StreamPauses {
  private:
   struct Entry {
     StreamConfig config;
+    std::string files;  // that it names, as they were when it began
     bool retries = false;
     bool again = false;  // it ran before: what is recorded goes to another file
     std::thread thread;
@@ -70,7 +71,7 @@ class StreamSet final : public StreamPauses {
 
   const Surroundings around_;
   const bool retries_;
-  mutable std::mutex mutex_;  // of all that follows, but for an entry's first four
+  mutable std::mutex mutex_;  // of all that follows, but for an entry's first five
   mutable std::condition_variable changed_;
   std::map<std::string, std::unique_ptr<Entry>> entries_;
   bool stopping_ = false;

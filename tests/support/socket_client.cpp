@@ -139,6 +139,8 @@ WsClient::WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std
       headers + "\r\n");
   const Response response = read_response(*tcp_);
   status_ = response.status;
+  if (const auto agreed = response.headers.find("sec-websocket-protocol"); agreed != response.headers.end())
+    subprotocol_ = agreed->second;
   if (response.headers.count("sec-websocket-extensions") != 0) status_ = -1;  // nobody asked for deflate here
 }
 

@@ -75,7 +75,8 @@ class WsClient {
   /// Upgrades a connection at any address of `port`.
   WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std::string& target,
            const std::string& headers = {});
-  int status() const { return status_; }  // 101 where upgraded
+  int status() const { return status_; }                           // 101 where upgraded
+  const std::string& subprotocol() const { return subprotocol_; }  // that the server agreed on
   bool send(const std::string& text, int opcode = 1);
   bool credit(int n) { return send(R"({"type":"credit","n":)" + std::to_string(n) + "}"); }
   /// The next message that is no ping; nothing after the time or at the end.
@@ -87,6 +88,7 @@ class WsClient {
  private:
   std::unique_ptr<TcpClient> tcp_;
   int status_ = 0;
+  std::string subprotocol_;
 };
 
 std::uint64_t u64_at(const std::string& bytes, std::size_t at);

@@ -3,6 +3,7 @@
 // them.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string_view>
 
@@ -12,7 +13,9 @@
 
 namespace relievo {
 
-inline constexpr std::string_view kFoxgloveProtocol = "foxglove.websocket.v1";
+/// Two names of one protocol: newer clients of Foxglove offer only the first, older ones only the second.
+inline constexpr std::array<std::string_view, 2> kFoxgloveProtocols = {"foxglove.sdk.v1",
+                                                                       "foxglove.websocket.v1"};
 
 /// `hub` and `format` must outlive it. A frame follows as soon as the one before it was taken by the system,
 /// and those that come meanwhile are dropped and counted as for want of credit.

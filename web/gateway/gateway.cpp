@@ -9,6 +9,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <limits>
 #include <set>
 #include <thread>
@@ -32,6 +33,7 @@ using namespace std::chrono_literals;
 constexpr auto kShutdownTime = 500ms;  // for the goodbye, at destruction
 constexpr int kSpareConnections = 64;  // beyond max_clients, for plain HTTP
 constexpr int kPerAddress = 32;
+constexpr int kDiskThreads = 2;  // one that a disk keeps waiting leaves one for others
 constexpr double kRequestsPerSecond = 200;
 constexpr double kBurst_s = 5;  // of requests at that rate, at once
 constexpr double kUnlimited = std::numeric_limits<int>::max();
@@ -104,6 +106,12 @@ class Server : public Gateway, private ConnectionHost {
     return make_stream_feed(hub_, reply.websocket->stream);
   }
   std::chrono::milliseconds request_time() const override { return options_.request_time; }
+  void from_disk(std::function<void()> read, std::function<void()> done) override {
+    net::post(disk_, [this, read = std::move(read), done = std::move(done)]() mutable {
+      read();
+      net::post(io_, std::move(done));
+    });
+  }
   void add(std::shared_ptr<Connection> connection) override { connections_.insert(std::move(connection)); }
   void remove(const std::shared_ptr<Connection>& connection) override;
 
@@ -119,6 +127,7 @@ class Server : public Gateway, private ConnectionHost {
   Hub hub_;
   AddressLimits limits_, own_limits_;
   net::io_context io_{1};
+  net::thread_pool disk_{kDiskThreads};  // waits for slow disks, so that the loop does not
   std::unique_ptr<Listener> listener_;
   net::steady_timer shutdown_deadline_{io_};
   std::set<std::shared_ptr<Connection>> connections_;
@@ -143,6 +152,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .recordings = options_.recordings,
                                    .rigs = options_.rigs,
                                    .calibrations = options_.calibrations,
+                                   .stages = options_.stages,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});

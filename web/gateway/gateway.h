@@ -18,6 +18,7 @@
 #include "web/gateway/calibration_control.h"
 #include "web/gateway/recording_control.h"
 #include "web/gateway/rig_control.h"
+#include "web/gateway/stage_times.h"
 
 namespace relievo {
 
@@ -41,6 +42,7 @@ struct GatewayOptions {
   RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   RigControl* rigs = nullptr;                      // likewise; null: no camera is here
   CalibrationControl* calibrations = nullptr;      // likewise
+  const StageReport* stages = nullptr;             // likewise; null: no stream is made here
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
 };
 

@@ -48,6 +48,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   void upgrade(const HttpReply& granted);
   void reply(HttpReply content, bool head, unsigned version, bool keep_alive);
   void send_file(std::uint64_t offset, bool keep_alive);
+  void send_part(std::uint64_t offset, std::size_t n, bool keep_alive);
   void on_replied(bool keep_alive);
   void on_failed(Io io, Refusal why);
   void finish();
@@ -59,7 +60,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   std::optional<http::request_parser<http::string_body>> parser_;
   HttpReply content_;
   std::string head_;
-  std::vector<std::uint8_t> file_bytes_;  // on their way
+  std::vector<std::uint8_t> file_bytes_;  // on their way, from the disk or to the client
   std::int64_t waiting_since_ns_ = steady_now_ns();
   bool any_request_ = false;
   bool awaits_request_ = false;
@@ -196,7 +197,15 @@ void HttpSession::send_file(std::uint64_t offset, bool keep_alive) {
     return on_replied(keep_alive);
   }
   file_bytes_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kFileAtOnce, left)));
-  const std::size_t n = content_.file->read(offset, file_bytes_);
+  const auto n = std::make_shared<std::size_t>(0);
+  host_.from_disk([self = shared_from_this(), file = content_.file, offset,
+                   n] { *n = file->read(offset, self->file_bytes_); },
+                  [self = shared_from_this(), offset, n, keep_alive] {
+                    if (!self->finished_) self->send_part(offset, *n, keep_alive);
+                  });
+}
+
+void HttpSession::send_part(std::uint64_t offset, std::size_t n, bool keep_alive) {
   if (n == 0) return finish();  // it has become shorter: the client sees that some is missing
   waiting_since_ns_ = steady_now_ns();
   transport_->expire_after(host_.request_time());

@@ -246,7 +246,8 @@ std::vector<Rung> Hub::rungs(const Watcher& watcher) const {
   std::vector<Rung> out;
   const auto it = streams_.find(watcher.stream);
   if (it == streams_.end() || !it->second->facts.status) return out;
-  for (const RungStatus& rung : it->second->facts.status->rungs) out.push_back(rung.rung);
+  for (const RungStatus& rung : it->second->facts.status->rungs)
+    if (rung.rung != Rung::kSlow) out.push_back(rung.rung);
   return out;
 }
 
@@ -319,7 +320,7 @@ std::vector<StreamSnapshot> Hub::snapshot() const {
     if (!entry->live) continue;
     out.push_back(entry->facts);
     out.back().watchers = entry->watchers.size();
-    for (const Rung rung : kRungs)
+    for (const Rung rung : kWebRungs)
       for (const auto& watcher : entry->watchers)
         out.back().watchers_of[static_cast<std::size_t>(rung)] += is_on(*watcher, rung);
   }

@@ -19,6 +19,7 @@
 #include "base/rung.h"
 #include "base/stream.h"
 #include "web/gateway/histogram.h"
+#include "web/gateway/stage_times.h"
 
 namespace relievo {
 
@@ -32,10 +33,11 @@ struct StreamSnapshot {
   std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
   std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
-  std::array<std::size_t, kRungs.size()> watchers_of{};  // of each rung, on it or on their way to it
+  std::array<std::size_t, kWebRungs.size()> watchers_of{};  // of each rung, on it or on their way to it
   std::optional<std::int64_t> clock_offset_ns;  // of the server's clock to this one, where it is known
   std::filesystem::path recording;              // that it is played from; empty: none that clients may read
   std::optional<RecordingState> recorded;       // on request; not the hub's to know, filled in by who asks
+  std::optional<StageTimes> stages;             // likewise, of a stream that is made in this process
   bool looked_at = false;                       // likewise: its camera's frames can be (/api/rig)
   // From the capture of each frame until it was published, was here, and was handed to a client's connection.
   Histogram published_after, here_after, sent_after;

@@ -63,6 +63,36 @@ std::string label(const std::string& value) {
   return "\"" + out + "\"";
 }
 
+/// Of streams that are made in this process.
+void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
+  const auto each = [&](const char* name, const char* type, const char* help, const auto& write) {
+    out.family(name, type, help);
+    for (const auto& s : streams)
+      if (s.stages) write("stream=" + label(s.info.stream), *s.stages);
+  };
+  each("relievo_stage_seconds", "histogram", "What each stage takes for a frame, without waiting for it.",
+       [&](const std::string& stream, const StageTimes& times) {
+         out.histogram(stream + ",stage=\"reconstruct\"", times.reconstruct);
+         out.histogram(stream + ",stage=\"encode_geometry\"", times.encode_geometry);
+         out.histogram(stream + ",stage=\"encode_texture\"", times.encode_texture);
+         out.histogram(stream + ",stage=\"publish\"", times.publish);
+       });
+  each("relievo_stage_waiting", "gauge", "Frames that wait before a stage.",
+       [&](const std::string& stream, const StageTimes& times) {
+         const auto depth = [&](const char* stage, std::size_t frames) {
+           out.sample("{" + stream + ",stage=\"" + stage + "\"}", static_cast<double>(frames));
+         };
+         depth("reconstruct", times.waiting_reconstruct);
+         depth("encode", times.waiting_encode);
+         depth("publish", times.waiting_publish);
+       });
+  each("relievo_stream_sent_again_bytes_total", "counter",
+       "Bytes of frames that DDS readers asked for again.",
+       [&](const std::string& stream, const StageTimes& times) {
+         out.sample("{" + stream + "}", static_cast<double>(times.sent_again_bytes));
+       });
+}
+
 }  // namespace
 
 std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts) {
@@ -179,7 +209,7 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   out.family("relievo_gateway_quality_clients", "gauge",
              "WebSocket clients on a quality of the stream, or on their way to it.");
   for (const auto& s : streams)
-    for (const Rung rung : kRungs)
+    for (const Rung rung : kWebRungs)
       out.sample("{stream=" + label(s.info.stream) + ",quality=\"" + std::string(to_string(rung)) + "\"}",
                  static_cast<double>(s.watchers_of[static_cast<std::size_t>(rung)]));
   out.family("relievo_gateway_clock_offset_seconds", "gauge",
@@ -231,6 +261,7 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
                  s.status->state == state ? 1 : 0);
     }
   }
+  write_stages(out, streams);
   return out.take();
 }
 

@@ -165,6 +165,7 @@ Result<ClientMessage> parse_client_message(std::string_view text) {
     const auto want = json.find("want");
     const std::string name = want != json.end() && want->is_string() ? want->get<std::string>() : "";
     message.want = rung_named(name);
+    if (message.want == Rung::kSlow) message.want.reset();
     if (!message.want && name != "auto")
       return Error{"quality without a \"want\" of auto, full, reduced or texture"};
     message.type = ClientMessage::Type::kQuality;
@@ -180,7 +181,7 @@ std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::
   Json list = Json::array();
   for (const auto& s : streams) {
     Json clients_of;
-    for (const Rung rung : kRungs)
+    for (const Rung rung : kWebRungs)
       clients_of[std::string(to_string(rung))] = s.watchers_of[static_cast<std::size_t>(rung)];
     list.push_back(
         {{"name", s.info.stream},

@@ -135,9 +135,13 @@ bool offers(std::string_view subprotocols, std::string_view wanted) {
 
 HttpReply foxglove_socket(const HttpRequest& request, const RouteContext& context) {
   if (!context.foxglove) return text_reply(404, "nothing here");
-  if (request.upgrade && !offers(request.subprotocols, kFoxgloveProtocol))
-    return text_reply(400, "this address speaks the subprotocol " + std::string(kFoxgloveProtocol) + " only");
-  return websocket(request, {.stream = {}, .subprotocol = std::string(kFoxgloveProtocol)}, context);
+  const auto agreed = std::find_if(kFoxgloveProtocols.begin(), kFoxgloveProtocols.end(),
+                                   [&](auto name) { return offers(request.subprotocols, name); });
+  if (request.upgrade && agreed == kFoxgloveProtocols.end())
+    return text_reply(400,
+                      "this address speaks the subprotocols foxglove.sdk.v1 and foxglove.websocket.v1 only");
+  const std::string name(agreed == kFoxgloveProtocols.end() ? "" : *agreed);
+  return websocket(request, {.stream = {}, .subprotocol = name}, context);
 }
 
 }  // namespace
@@ -196,6 +200,7 @@ std::vector<StreamSnapshot> all_streams(const RouteContext& context) {
   std::vector<StreamSnapshot> streams = context.hub.snapshot();
   for (StreamSnapshot& s : streams) {
     if (context.recordings != nullptr) s.recorded = context.recordings->state(s.info.stream);
+    if (context.stages != nullptr) s.stages = context.stages->stages(s.info.stream);
     s.looked_at = context.rigs != nullptr && context.rigs->has(s.info.stream);
   }
   return streams;

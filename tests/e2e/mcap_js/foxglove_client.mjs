@@ -34,9 +34,16 @@ try {
     });
     ended.then((code) => reject(new Error(`the server ended with ${code}`)));
   });
-  const client = new FoxgloveClient({
-    ws: new WebSocket(`ws://${address}/foxglove`, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]),
-  });
+  // The newer name, which Foxglove's application and its SDK speak now, is the same protocol.
+  for (const name of [FoxgloveClient.SUPPORTED_SUBPROTOCOL, "foxglove.sdk.v1"]) await read(address, name);
+} finally {
+  server.kill("SIGTERM");
+  await ended;
+}
+process.exit(0);
+
+async function read(address, subprotocol) {
+  const client = new FoxgloveClient({ ws: new WebSocket(`ws://${address}/foxglove`, [subprotocol]) });
   const frames = await new Promise((resolve, reject) => {
     const got = [];
     let reader;
@@ -62,9 +69,5 @@ try {
     assert.ok(frame.data.byteLength > 100, `${frame.data.byteLength} bytes`);
     if (i > 0) assert.ok(frame.sequence_number > frames[i - 1].frame.sequence_number);
   });
-  console.log(`${kFrames} frames read by @foxglove/ws-protocol and decoded by their schema`);
-} finally {
-  server.kill("SIGTERM");
-  await ended;
+  console.log(`${kFrames} frames read by @foxglove/ws-protocol as ${subprotocol} and decoded by their schema`);
 }
-process.exit(0);

@@ -104,9 +104,9 @@ void Network::lose(int host, int of_1000) {
   must(kNft + " add rule netdev losses " + port_name(host) + rule);
 }
 
-void Network::narrow(int host, int kbit_s) {
+void Network::narrow(int host, int kbit_s, int queue_ms) {
   must(kTc + " qdisc add dev " + port_name(host) + " root tbf rate " + std::to_string(kbit_s) +
-       "kbit burst 16kb latency 50ms");
+       "kbit burst 16kb latency " + std::to_string(queue_ms) + "ms");
 }
 
 void Network::cut(int host) {

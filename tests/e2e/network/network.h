@@ -28,8 +28,9 @@ class Network {
 
   /// So many of 1000 packets to the host, and as many from it, are lost at random.
   void lose(int host, int of_1000);
-  /// The cable to the host carries so many kilobits a second, and 50 ms of them wait at most.
-  void narrow(int host, int kbit_s);
+  /// The cable to the host carries so many kilobits a second, and so long may bytes wait for it; the others
+  /// are lost.
+  void narrow(int host, int kbit_s, int queue_ms = 50);
   /// Pulls the host's cable, or plugs it in again.
   void cut(int host);
   void join(int host);

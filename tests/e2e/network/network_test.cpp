@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -40,6 +41,38 @@ class NetworkTest : public ::testing::Test {
                            "--out", file(host), "--json"}));
   }
   std::filesystem::path file(int host) const { return folder_ / (std::to_string(host) + ".mcap"); }
+
+  /// A stream of 1.1 Mbit/s in full, 0.2 reduced.
+  static std::unique_ptr<Process> wide_server() {
+    auto server = std::make_unique<Process>(
+        Network::on(1, {program("relievo-server"), "serve", "--source", "sim:plane,rate=5,noise=3",
+                        "--stream", "wide", "--web", "none", "--interface", Network::kInterface}));
+    EXPECT_TRUE(server->wait_for_text("stream wide")) << server->err();
+    return server;
+  }
+  static std::unique_ptr<Process> stats(int host, const std::string& quality) {
+    return std::make_unique<Process>(Network::on(host, {program("relievo"), "stats", "wide", "--quality",
+                                                        quality, "--interface", Network::kInterface}));
+  }
+  /// Of what `relievo stats` says each second.
+  struct Line {
+    std::string quality;
+    double rate = 0, latency_ms = 0;
+  };
+  static std::optional<Line> last_line(const std::string& out) {
+    const auto end = out.rfind('\n');
+    if (end == std::string::npos || end == 0) return std::nullopt;
+    const auto begin = out.rfind('\n', end - 1);
+    const std::string text = out.substr(begin == std::string::npos ? 0 : begin + 1, end - begin - 1);
+    char quality[16] = {};
+    Line line;
+    const auto latency = text.find("latency");
+    if (latency == std::string::npos || std::sscanf(text.c_str(), "%15s %lf/s", quality, &line.rate) != 2)
+      return std::nullopt;
+    line.latency_ms = std::stod(text.substr(latency + 7));
+    line.quality = quality;
+    return line;
+  }
 
   struct Counts {
     std::uint64_t frames = 0, lost = 0;
@@ -92,15 +125,7 @@ TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {
 TEST_F(NetworkTest, AClientOnAThinCableTakesTheQualityThatFits) {
   Network network(3);
   network.narrow(2, 400);
-  const std::string interface = Network::kInterface;
-  Process server(Network::on(
-      1, {program("relievo-server"), "serve", "--source", "sim:plane,rate=5,noise=3", "--stream", "wide",
-          "--web", "none", "--interface", interface}));  // 1.1 Mbit/s in full, 0.2 reduced
-  ASSERT_TRUE(server.wait_for_text("stream wide")) << server.err();
-  const auto stats = [&](int host, const std::string& quality) {
-    return std::make_unique<Process>(Network::on(
-        host, {program("relievo"), "stats", "wide", "--quality", quality, "--interface", interface}));
-  };
+  const auto server = wide_server();
   const auto beside = stats(3, "full");
   ASSERT_TRUE(beside->wait_for_text("full"));
   const auto thin = stats(2, "auto");
@@ -117,34 +142,86 @@ TEST_F(NetworkTest, AClientOnAThinCableTakesTheQualityThatFits) {
   std::printf("%s", thin->out().c_str());
 }
 
+// Where nothing is lost, frames come later and later: proves that this too makes a client go down, and that
+// what it then gets is of now.
+TEST_F(NetworkTest, AClientBehindALongQueueTakesTheQualityThatFits) {
+  Network network(2);
+  network.narrow(2, 400, 60'000);
+  const auto server = wide_server();
+  const auto thin = stats(2, "auto");
+  EXPECT_TRUE(eventually([&] {
+    const auto line = last_line(thin->out());
+    return line && line->quality != "full" && line->rate > 1 && line->latency_ms < 1000;
+  })) << thin->out()
+      << thin->err();
+  EXPECT_EQ(thin->out().find(" 1 lost"), std::string::npos);
+  std::printf("%s", thin->out().c_str());
+}
+
+// Proves that a client whose way is narrower than the lowest quality gets frames one by one, as many as fit,
+// is told so, and disturbs nobody.
+TEST_F(NetworkTest, AClientOnACableTooThinForAnyQualityGetsWhatFits) {
+  Network network(3);
+  network.narrow(2, 64);
+  const auto server = wide_server();
+  const auto beside = stats(3, "full");
+  ASSERT_TRUE(beside->wait_for_text("full"));
+  const auto thin = stats(2, "auto");
+  int good = 0;
+  std::string seen;
+  EXPECT_TRUE(eventually([&] {  // some lines with frames that are of now, not one that was lucky
+    const std::string out = thin->out();
+    const auto line = out == seen ? std::nullopt : last_line(out);
+    seen = out;
+    good += line && line->quality == "slow" && line->rate > 0 && line->latency_ms < 5000;
+    return good >= 5;
+  })) << thin->out()
+      << thin->err();
+  EXPECT_NE(thin->err().find("carries less than the lowest quality"), std::string::npos) << thin->err();
+  beside->signal(SIGINT);
+  EXPECT_EQ(beside->wait(), 0);
+  std::istringstream lines(beside->out());
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
+  std::printf("%s", thin->out().c_str());
+}
+
 // A receiver forgets a sender that it has not heard of for 10 s, and has to find it anew.
-TEST_F(NetworkTest, WhoIsStoppedOrCutOffComesBackKnowsWhatHeLostAndDisturbsNobody) {
+TEST_F(NetworkTest, OfEightOneIsStoppedOneCutOffAndOneLosesPacketsAndTheOthersLoseNothing) {
   constexpr int kFrames = 600, kRate_Hz = 20;
-  Network network(4);
-  const auto steady = recorder(2), stopped = recorder(3), cut_off = recorder(4);
-  const auto server = publisher(50'000, kRate_Hz, kFrames, 3);
-  for (const int host : {2, 3, 4}) ASSERT_TRUE(wait_for_size(file(host), 1));
+  constexpr int kStopped = 3, kCutOff = 4, kLossy = 5, kLast = 9;
+  Network network(kLast);
+  network.lose(kLossy, 50);
+  std::map<int, std::unique_ptr<Process>> recorders;
+  for (int host = 2; host <= kLast; ++host) recorders[host] = recorder(host);
+  const auto server = publisher(50'000, kRate_Hz, kFrames, kLast - 1);
+  for (int host = 2; host <= kLast; ++host) ASSERT_TRUE(wait_for_size(file(host), 1)) << host;
   std::this_thread::sleep_for(2s);
-  stopped->signal(SIGSTOP);
-  network.cut(4);
+  recorders[kStopped]->signal(SIGSTOP);
+  network.cut(kCutOff);
   std::this_thread::sleep_for(15s);
-  stopped->signal(SIGCONT);
-  network.join(4);
+  recorders[kStopped]->signal(SIGCONT);
+  network.join(kCutOff);
   const std::int64_t back_ns = utc_now_ns();
   ASSERT_TRUE(server->wait_for_text("done")) << server->err();
   std::this_thread::sleep_for(kLastOnesArrive);
 
-  const Counts all = stop(*steady);
-  EXPECT_EQ(all.frames, kFrames);
-  EXPECT_EQ(all.lost, 0);
-  for (const auto& [host, recorder] : {std::pair{3, stopped.get()}, {4, cut_off.get()}}) {
-    const Counts some = stop(*recorder);
-    EXPECT_EQ(some.frames + some.lost, kFrames) << "host " << host;
-    EXPECT_GT(some.lost, 0);
+  for (const auto& [host, one] : recorders) {
+    const Counts counts = stop(*one);
+    EXPECT_EQ(counts.frames + counts.lost, kFrames) << "host " << host;
+    if (host == kLossy) {
+      EXPECT_GE(counts.frames, kFrames * 99 / 100);
+      continue;
+    }
+    if (host != kStopped && host != kCutOff) {
+      EXPECT_EQ(counts.lost, 0) << "host " << host;
+      continue;
+    }
+    EXPECT_GT(counts.lost, 0) << "host " << host;
     const auto after_s = came_back_after_s(host, back_ns);
     ASSERT_TRUE(after_s) << "host " << host;
     std::printf("host %d is back after %.2f s; lost %llu frames\n", host, *after_s,
-                static_cast<unsigned long long>(some.lost));
+                static_cast<unsigned long long>(counts.lost));
   }
 }
 

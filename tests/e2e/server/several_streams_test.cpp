@@ -147,6 +147,58 @@ TEST_F(SeveralStreams, AReloadChangesWhatChangedAndNothingElse) {
   EXPECT_EQ(server.process().wait(), 0) << server.process().err();
 }
 
+// A camera that is not there is tried again, and each stream that begins says so anew.
+TEST_F(SeveralStreams, AReloadNoticesAChangedRigUnderUnchangedSettings) {
+  const fs::path rig = folder_ / "rig.yaml", pattern = folder_ / "pattern.yaml";
+  fs::copy_file(folder_ / "one" / "rig.yaml", rig);
+  fs::copy_file(folder_ / "one" / "pattern.yaml", pattern);
+  write(table("left", "one") + "[[stream]]\nname = \"camera\"\nsource = \"v4l2:/dev/no-such-camera\"\n" +
+        "[stream.camera]\nrig = \"" + rig.string() + "\"\n");
+  WebServer server(command());
+  const Reader left("left");
+  const auto begun = [&] {
+    const std::string err = server.process().err();
+    std::size_t count = 0;
+    for (auto at = err.find("it is tried again"); at != std::string::npos;
+         at = err.find("it is tried again", at + 1))
+      ++count;
+    return count;
+  };
+  ASSERT_TRUE(eventually([&] { return begun() == 1; })) << server.process().err();
+  ASSERT_TRUE(left.gets(2));
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  ASSERT_TRUE(left.gets(5));
+  EXPECT_EQ(begun(), 1U) << "nothing changed";
+  for (const fs::path& changed : {rig, pattern}) {
+    const std::size_t before = begun();
+    std::ofstream(changed, std::ios::app) << "# measured anew\n";
+    ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+    EXPECT_TRUE(eventually([&] { return begun() == before + 1; })) << changed << server.process().err();
+  }
+  EXPECT_EQ(left.starts().size(), 1U);
+  EXPECT_EQ(left.gaps(), 0U);
+}
+
+TEST_F(SeveralStreams, MetricsSayWhatEachStageTakes) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("left", 3)) << server.process().err();
+  ASSERT_TRUE(server.goes_on("right", 3)) << server.process().err();
+  const std::string metrics = request(server.port(), "GET", "/metrics").body;
+  const auto value = [&](const std::string& name) {
+    const auto at = metrics.find("\n" + name + " ");
+    return at == std::string::npos ? -1 : std::stod(metrics.substr(at + name.size() + 2));
+  };
+  for (const std::string stream : {"left", "right"}) {
+    for (const std::string stage : {"reconstruct", "encode_geometry", "encode_texture", "publish"}) {
+      const std::string labels = "{stream=\"" + stream + "\",stage=\"" + stage + "\"}";
+      EXPECT_GE(value("relievo_stage_seconds_count" + labels), 3) << labels;
+      EXPECT_GT(value("relievo_stage_seconds_sum" + labels), 0) << labels;
+    }
+    EXPECT_GE(value("relievo_stage_waiting{stream=\"" + stream + "\",stage=\"encode\"}"), 0);
+    EXPECT_EQ(value("relievo_stream_sent_again_bytes_total{stream=\"" + stream + "\"}"), 0);
+  }
+}
+
 TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   WebServer server(command());
   const Reader left("left");

@@ -40,6 +40,10 @@ QualityChoice::Seen a_fifth_lost(Rung) {
   return {.arrived = 4, .lost = 1};
 }
 
+QualityChoice::Seen late(Rung) {
+  return {.arrived = 1, .busy_ns = kFrame_ns / 10, .late_ns = 500'000'000};
+}
+
 TEST(QualityChoice, StaysWhereAllIsWell) {
   Receiver receiver;
   receiver.run(100, calm);
@@ -47,8 +51,8 @@ TEST(QualityChoice, StaysWhereAllIsWell) {
   EXPECT_EQ(receiver.moves, 0);
 }
 
-TEST(QualityChoice, GoesDownAStepAtATimeForLossAndForSlowness) {
-  for (const auto& trouble : {too_slow, a_fifth_lost}) {
+TEST(QualityChoice, GoesDownAStepAtATimeForLossForSlownessAndForFramesThatComeLate) {
+  for (const auto& trouble : {too_slow, a_fifth_lost, late}) {
     Receiver receiver;
     receiver.run(1.2, trouble);
     EXPECT_EQ(receiver.choice.now(), Rung::kReduced);
@@ -126,6 +130,25 @@ TEST(QualityChoice, LeavesARungThatIsGone) {
   receiver.choice.offer({Rung::kReduced});
   EXPECT_EQ(receiver.choice.now(), Rung::kReduced);
   receiver.choice.offer({});
+  EXPECT_EQ(receiver.choice.now(), Rung::kFull);
+}
+
+// After standing still for a moment, a machine gets what waited meanwhile, and then what is new.
+TEST(QualityChoice, SomeLateFramesAmongOthersAreNoQueue) {
+  Receiver receiver;
+  int i = 0;
+  receiver.run(60, [&](Rung rung) { return i++ % 10 == 0 ? calm(rung) : late(rung); });
+  EXPECT_EQ(receiver.moves, 0);
+}
+
+TEST(QualityChoice, AQueueThatIsShortKeepsItFromGoingUp) {
+  Receiver receiver;
+  receiver.run(1.2, late);
+  ASSERT_EQ(receiver.choice.now(), Rung::kReduced);
+  const auto waits = [](Rung) { return QualityChoice::Seen{.arrived = 1, .late_ns = 250'000'000}; };
+  receiver.run(30, waits);
+  EXPECT_EQ(receiver.choice.now(), Rung::kReduced);
+  receiver.run(10, calm);
   EXPECT_EQ(receiver.choice.now(), Rung::kFull);
 }
 

@@ -193,6 +193,30 @@ TEST_F(LadderTest, WhoLeavesItOpenGetsAStreamThatHasNoStatus) {
   EXPECT_TRUE(publish_until([&] { return inbox.count(Rung::kFull) >= 3; }));
 }
 
+TEST_F(LadderTest, TheSlowRungHasAFrameForEachThatItsReaderAskedFor) {
+  auto made = RungPublisher::create(kDomain, "ladder", Rung::kSlow, [this] { reduced_.request_key_frame(); });
+  ASSERT_TRUE(made) << made.error().message;
+  rung_ = *std::move(made);
+  EXPECT_FALSE(rung_->due());
+  Inbox inbox;
+  auto reader = read(inbox, "ladder", Rung::kSlow);
+  std::size_t sent = 0;
+  ASSERT_TRUE(eventually([&] {
+    if (rung_->due()) {
+      publish();
+      ++sent;
+    }
+    return inbox.count(Rung::kSlow) >= 5;
+  }));
+  EXPECT_LE(sent, inbox.count(Rung::kSlow) + 1) << "one is under way at most";
+  EXPECT_EQ(inbox.lost, 0U);
+  reader.reset();
+  EXPECT_TRUE(eventually([&] {
+    if (rung_->due()) publish();  // what it asked for before it left
+    return rung_->matched_readers() == 0 && !rung_->due();
+  }));
+}
+
 TEST_F(LadderTest, TheEndOfTheServerIsNoticedOnALowerRungToo) {
   Inbox inbox;
   std::atomic<bool> gone{false};

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <filesystem>
+#include <set>
 
 #include "codec/recording.h"
 #include "idl/cdr.h"
@@ -144,6 +146,35 @@ TEST_F(RecordedOnRequest, OneAfterTheOtherEachWithItsPreRoll) {
   }
   EXPECT_NE(files[0], files[1]);
   EXPECT_NE(files[1], files[2]);
+}
+
+TEST_F(RecordedOnRequest, IsSplitAndKeptAsIsSaidOfRecordings) {
+  start({.recording = {.segments = {.split_bytes = 40'000, .keep_bytes = 100'000}}});
+  ASSERT_TRUE(recorder_->start());
+  const std::string first = recorder_->state().file;
+  EXPECT_THAT(first, MatchesRegex("face-[0-9TZ-]+_000000.mcap"));
+  EXPECT_TRUE(recorder_->is_open(first));
+  ASSERT_TRUE(eventually([&] {  // until the first one has made room for others
+    publish(10);
+    return recorder_->state().file > first && !std::filesystem::exists(folder_ / first);
+  }));
+  EXPECT_FALSE(recorder_->is_open(first));
+  ASSERT_TRUE(recorder_->stop());
+  ASSERT_TRUE(closes());
+  std::set<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+    files.insert(entry.path().filename());
+  EXPECT_GT(files.size(), 1U);
+  EXPECT_EQ(*files.rbegin(), recorder_->state().file);
+  std::vector<std::uint64_t> frames;
+  for (const std::string& name : files) {
+    EXPECT_FALSE(recorder_->is_open(name));
+    const auto more = frames_in(name);
+    frames.insert(frames.end(), more.begin(), more.end());
+  }
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back() - frames.front() + 1, frames.size()) << "no frame is missing between the files";
+  EXPECT_EQ(recorder_->state().lost, 0U);
 }
 
 TEST_F(RecordedOnRequest, AFolderThatIsGoneIsSaidAndTheNextTryWorks) {

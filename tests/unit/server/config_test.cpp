@@ -70,7 +70,7 @@ TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
 }
 
 TEST(Config, TheLadderIsAListOfLowerQualities) {
-  EXPECT_EQ(read("").config.ladder, (std::vector{Rung::kReduced, Rung::kTexture}));
+  EXPECT_EQ(read("").config.ladder, (std::vector{Rung::kReduced, Rung::kTexture, Rung::kSlow}));
   EXPECT_EQ(read("ladder = []\n").config.ladder, std::vector<Rung>{});
   EXPECT_EQ(read("ladder = [\"texture\"]\n").config.ladder, std::vector{Rung::kTexture});
   EXPECT_EQ(read("ladder = [\"texture\", \"reduced\", \"texture\"]\n").config.ladder,

@@ -125,6 +125,19 @@ TEST_F(Foxglove, NonsenseIsToldOrClosesTheConnection) {
   }
 }
 
+TEST_F(Foxglove, EitherNameOfTheProtocolIsAgreedOn) {
+  const struct {
+    const char *offered, *agreed;
+  } cases[] = {{"foxglove.sdk.v1", "foxglove.sdk.v1"},
+               {"foxglove.websocket.v1", "foxglove.websocket.v1"},
+               {"foxglove.websocket.v1, foxglove.sdk.v1", "foxglove.sdk.v1"}};
+  for (const auto& c : cases) {
+    const WsClient client = connect(std::string("Sec-WebSocket-Protocol: ") + c.offered + "\r\n");
+    EXPECT_EQ(client.status(), 101) << c.offered;
+    EXPECT_EQ(client.subprotocol(), c.agreed) << c.offered;
+  }
+}
+
 TEST_F(Foxglove, WhoDoesNotSpeakItIsTold) {
   EXPECT_EQ(connect("Sec-WebSocket-Protocol: foxglove.websocket.v2\r\n").status(), 400);
   EXPECT_EQ(connect("").status(), 400);

@@ -4,14 +4,32 @@
 #include "web/gateway/recording_route.h"
 
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "tests/support/temp_folder.h"
 #include "tests/unit/web/gateway_fixture.h"
 #include "web/gateway/byte_range.h"
+
+namespace {
+std::mutex stuck_disk;
+std::atomic<int> waiting_reads{0};
+}  // namespace
+
+// In place of the system's, for the gateway's reads of recordings.
+extern "C" ssize_t pread(int descriptor, void* into, size_t bytes, off_t offset) {
+  ++waiting_reads;
+  { const std::lock_guard lock(stuck_disk); }
+  --waiting_reads;
+  return syscall(SYS_pread64, descriptor, into, bytes, offset);
+}
 
 namespace relievo::test {
 namespace {
@@ -70,6 +88,28 @@ class Recordings : public GatewayTest {
   const std::filesystem::path file = folder / "a take of yesterday.mcap";
   std::string content;
 };
+
+// A disk that stands still (pread below) keeps who reads from it waiting, and nobody else.
+TEST_F(Recordings, ASlowDiskHoldsNobodyElseUp) {
+  stuck_disk.lock();
+  {
+    std::jthread reader([&] { EXPECT_EQ(get().body, content); });
+    EXPECT_TRUE(eventually([] { return waiting_reads == 1; }));
+    EXPECT_EQ(request(port, "GET", "/healthz").status, 200);
+    WsClient client(port, "face");
+    client.credit(1);
+    gateway->publish("face", make_frame(7));
+    EXPECT_TRUE(client.next_of("frame"));
+    stuck_disk.unlock();
+  }
+  stuck_disk.lock();
+  TcpClient leaves(port);
+  leaves.send("GET /recordings/face.mcap HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+  EXPECT_TRUE(eventually([] { return waiting_reads == 1; }));
+  std::jthread stops([&] { gateway.reset(); });
+  std::this_thread::sleep_for(100ms);
+  stuck_disk.unlock();  // its last read ends with the gateway gone
+}
 
 TEST_F(Recordings, AreListedAndReadInParts) {
   const auto stream = nlohmann::json::parse(request(port, "GET", "/api/streams").body)["streams"][0];
