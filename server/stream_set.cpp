@@ -141,6 +141,7 @@ void StreamSet::resume(const std::string& stream) {
   const std::lock_guard lock(mutex_);
   const auto found = entries_.find(stream);
   if (found == entries_.end()) return;
+  found->second->files = files_of(found->second->config);  // which may be new, and are those that it opens
   found->second->paused = false;
   changed_.notify_all();
 }
