@@ -155,8 +155,8 @@ TEST_F(NetworkTest, AClientBehindALongQueueTakesTheQualityThatFits) {
   })) << thin->out()
       << thin->err();
   std::istringstream lines(thin->out());
-  for (std::string line;
-       std::getline(lines, line);) {  // the slow quality's older frames give way to newer ones
+  for (std::string line; std::getline(lines, line);) {
+    // The slow quality's older frames give way to newer ones.
     if (line.starts_with("full")) EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
   }
   std::printf("%s", thin->out().c_str());
