@@ -25,11 +25,6 @@ class Backdrop {
   /// Where the boundary was last seen to stand still, NaN where it never was.
   float column_px(int line, int boundary) const { return seen(line, boundary).column_px; }
 
-  /// True where it is known, under that slide, to be at that place.
-  bool knows(int slide, int line, int boundary, float column_px) const {
-    return stands(line, boundary, column_px) && seen(line, boundary).has[static_cast<std::size_t>(slide)];
-  }
-
   /// True where it is at that place.
   bool stands(int line, int boundary, float column_px) const;
 

@@ -36,7 +36,7 @@ constexpr float kAlike = 0.2F;      // the same, where the step is seen, too
 constexpr float kSameEdge_px = 0.3F;
 constexpr float kRoom_px = 2.F;       // no other edge so near to what comes back
 constexpr float kRestored_px = 0.1F;  // its standard deviation
-constexpr int kLooksEvery = 4;        // frames
+constexpr int kLooksEvery = 8;        // lines: it takes time, and what stands still stays
 
 // Standard deviations, measured on simulated scenes.
 constexpr float kBetween_px = 0.12F;  // between the lines above and below,
@@ -145,7 +145,6 @@ void Growth::measure_pitch() {
 void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
                            const SequenceResult& result) {
   const float* before = row(before_, line);
-  const bool turn = line % kLooksEvery == frame_ / 2 % kLooksEvery;
   for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
        e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
     const int b = result.boundary[e];
@@ -153,7 +152,7 @@ void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage
     const float column = edges.edges[e].column_px;
     if (edges.edges[e].sigma_px > kSure_px) continue;
     if (result.still[e] == 0 && !(std::fabs(before[b] - column) < kStands_px)) continue;
-    if (turn || !backdrop_.knows(view.slide, line, b, column)) backdrop_.remember(view, line, b, column);
+    backdrop_.remember(view, line, b, column);
   }
 }
 
@@ -365,7 +364,10 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Seq
   fill(view.field.width, result, edges, recovered);
   const int lines = std::min(lines_, view.field.height);
   std::size_t added = 0;
-  for (int line = 0; line < lines; ++line) remember_line(view, line, edges, result);
+  // Under one slide, then under the other; all lines at first.
+  for (int line = 0; line < lines; ++line)
+    if (frame_ < 2 * kLooksEvery || line % kLooksEvery == frame_ / 2 % kLooksEvery)
+      remember_line(view, line, edges, result);
   for (int line = 0; line < lines; ++line) added += restore_line(view, line, edges, result, recovered);
   for (int line = 0; line < lines; ++line)
     if (view.motion != nullptr && view.motion->line_moves(line)) drop_line(view, line, edges, result);
