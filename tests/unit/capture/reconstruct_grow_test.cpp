@@ -110,6 +110,16 @@ TEST(Growth, WhereTheFieldShowsOtherColoursThereIsNone) {
   EXPECT_EQ(f.grow(), 0U);
 }
 
+TEST(Growth, WhereColoursFallInsteadOfRisingNothingOutsideThePictureIsRead) {
+  Frame f;
+  f.lose(7, 3);  // green ends there and blue begins
+  for (int x = 45; x < 90; ++x) {
+    f.picture.row(7)[3 * x + 1] = static_cast<std::uint8_t>(40 + 3 * (x - 45));
+    f.picture.row(7)[3 * x + 2] = static_cast<std::uint8_t>(200 - 3 * (x - 45));
+  }
+  EXPECT_EQ(f.grow(), 0U);
+}
+
 TEST(Growth, WhereTheFieldShowsNoLightThereIsNone) {
   Frame f;
   f.lose(7, 3);
