@@ -197,11 +197,7 @@ Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
   bool done = false;
   const StoppedSource ended(**source, stop);
   const auto take = [&](const StillCollector& collector) -> Result<bool> {
-    std::vector<Image8> pictures;
-    for (StripePair& pair : collector.pairs()) {
-      pictures.push_back(std::move(pair.lit));
-      pictures.push_back(std::move(pair.complement));
-    }
+    std::vector<Image8> pictures = collector.pictures();
     const auto colours = tell_colours(pictures);
     if (!colours) {
       log_info("at rest, but not used: " + colours.error().message);

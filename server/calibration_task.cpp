@@ -56,11 +56,7 @@ class ColourTask final : public CalibrationTask {
   TakenView take(const StillCollector& collector) override {
     result_.reset();
     TakenView out{.name = numbered("Sheet", ++taken_), .used = false, .says = {}};
-    std::vector<Image8> pictures;
-    for (StripePair& pair : collector.pairs()) {
-      pictures.push_back(std::move(pair.lit));
-      pictures.push_back(std::move(pair.complement));
-    }
+    std::vector<Image8> pictures = collector.pictures();
     const auto colours = tell_colours(pictures);
     if (!colours) {
       out.says = colours.error().message;

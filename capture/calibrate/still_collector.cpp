@@ -94,6 +94,15 @@ bool StillCollector::add(const CapturedFrame& frame) {
   return true;
 }
 
+std::vector<Image8> StillCollector::pictures() const {
+  std::vector<Image8> out;
+  for (StripePair& pair : pairs()) {
+    out.push_back(std::move(pair.lit));
+    out.push_back(std::move(pair.complement));
+  }
+  return out;
+}
+
 std::size_t StillCollector::at_rest() const {
   // What was not seen for two cycles is of before something moved.
   return static_cast<std::size_t>(std::count_if(shown_.begin(), shown_.end(), [&](const Shown& s) {

@@ -22,6 +22,8 @@ class StillCollector {
 
   /// The means of each frame of the cycle, as whole pictures, in the order in which they were first seen.
   std::vector<StripePair> pairs() const;
+  /// The same, each pair's slide and then its complement.
+  std::vector<Image8> pictures() const;
 
   /// Frames of the cycle that were seen twice since something moved: 0 while it moves, up to the cycle.
   std::size_t at_rest() const;

@@ -101,6 +101,14 @@ class NetworkTest : public ::testing::Test {
     }
   }
 
+  static void end_without_loss(Process& stats) {
+    stats.signal(SIGINT);
+    EXPECT_EQ(stats.wait(), 0);
+    std::istringstream lines(stats.out());
+    for (std::string line; std::getline(lines, line);)
+      EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
+  }
+
   const TempFolder folder_;
   static inline std::string unavailable_;
 };
@@ -134,11 +142,7 @@ TEST_F(NetworkTest, AClientOnAThinCableTakesTheQualityThatFits) {
            thin->out().find("texture ") != std::string::npos;
   })) << thin->out()
       << thin->err();
-  beside->signal(SIGINT);
-  EXPECT_EQ(beside->wait(), 0);
-  std::istringstream lines(beside->out());
-  for (std::string line; std::getline(lines, line);)
-    EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
+  end_without_loss(*beside);
   std::printf("%s", thin->out().c_str());
 }
 
@@ -183,11 +187,7 @@ TEST_F(NetworkTest, AClientOnACableTooThinForAnyQualityGetsWhatFits) {
   })) << thin->out()
       << thin->err();
   EXPECT_NE(thin->err().find("carries less than the lowest quality"), std::string::npos) << thin->err();
-  beside->signal(SIGINT);
-  EXPECT_EQ(beside->wait(), 0);
-  std::istringstream lines(beside->out());
-  for (std::string line; std::getline(lines, line);)
-    EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
+  end_without_loss(*beside);
   std::printf("%s", thin->out().c_str());
 }
 
