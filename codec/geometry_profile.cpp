@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "codec/row_names.h"
+
 namespace relievo {
 namespace {
 
@@ -43,12 +45,7 @@ bool set_geometry_profile(std::string_view name, EncodeOptions& options) {
 }
 
 std::string geometry_profile_names() {
-  std::string names;
-  for (const Profile& profile : kProfiles) {
-    if (!names.empty()) names += &profile == &kProfiles.back() ? " or " : ", ";
-    names += profile.name;
-  }
-  return names;
+  return names_of(kProfiles);
 }
 
 }  // namespace relievo

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "codec/jpeg_texture.h"
+#include "codec/row_names.h"
 #include "codec/texture_h264.h"
 #include "codec/texture_png.h"
 #include "codec/texture_webp.h"
@@ -118,12 +119,7 @@ std::optional<TextureCodec> texture_codec_named(std::string_view name) {
 }
 
 std::string texture_codec_names() {
-  std::string names;
-  for (const Row& row : kRows) {
-    if (!names.empty()) names += &row == &kRows.back() ? " or " : ", ";
-    names += row.name;
-  }
-  return names;
+  return names_of(kRows);
 }
 
 }  // namespace relievo

@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "codec/row_names.h"
+
 namespace relievo {
 namespace {
 
@@ -29,12 +31,7 @@ std::optional<VideoEncoderKind> video_encoder_named(std::string_view name) {
 }
 
 std::string video_encoder_names() {
-  std::string names;
-  for (const Row& row : kRows) {
-    if (!names.empty()) names += &row == &kRows.back() ? " or " : ", ";
-    names += row.name;
-  }
-  return names;
+  return names_of(kRows);
 }
 
 }  // namespace relievo
