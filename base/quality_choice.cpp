@@ -48,16 +48,17 @@ void QualityChoice::judge(std::int64_t now_ns) {
   const double busy = static_cast<double>(window_.busy_ns) /
                       static_cast<double>(std::max<std::int64_t>(1, now_ns - window_from_ns_));
   const std::int64_t late_ns = window_.late_ns;
+  const Rung lower = window_.arrived == 0 ? rungs_.back() : below();
   const std::int64_t from_ns = window_from_ns_;
   window_ = {};
   window_from_ns_ = now_ns;
   if (lost > options_.most_lost || busy > options_.most_busy || late_ns > options_.most_late_ns) {
     calm_from_ns_ = -1;
-    if (below() == now_) return;
+    if (lower == now_) return;
     // Climbed in vain: the next time only after longer.
     const bool in_vain = climbed_ns_ >= 0 && now_ns - climbed_ns_ < wait_ns_;
     wait_ns_ = in_vain ? std::min(2 * wait_ns_, options_.most_calm_ns) : options_.calm_ns;
-    move(below());
+    move(lower);
     climbed_ns_ = -1;
     return;
   }

@@ -11,9 +11,10 @@
 
 namespace relievo {
 
-/// Goes down as soon as a window of frames was too much, up a rung after a longer time without trouble. A
-/// rung that turns out too much again soon after it was climbed to has to be waited for twice as long the
-/// next time, so that a receiver at its limit does not go to and fro. One thread. Pure: no clock of its own.
+/// Goes down as soon as a window of frames was too much: by a rung, or to the lowest one where not a single
+/// frame came. Goes up a rung after a longer time without trouble. A rung that turns out too much again soon
+/// after it was climbed to has to be waited for twice as long the next time, so that a receiver at its limit
+/// does not go to and fro. One thread. Pure: no clock of its own.
 class QualityChoice {
  public:
   struct Options {

@@ -103,10 +103,14 @@ TEST(QualityChoice, ForgetsTheWaitingOnceAClimbHasHeld) {
   EXPECT_EQ(receiver.choice.now(), Rung::kFull);
 }
 
-TEST(QualityChoice, WhereNothingComesThroughItGoesDown) {
+TEST(QualityChoice, WhereNothingComesThroughItGoesToTheLowestRungAtOnceAndUpAgainStepByStep) {
   Receiver receiver;
   receiver.run(1.2, [](Rung) { return QualityChoice::Seen{.lost = 1}; });
+  EXPECT_EQ(receiver.choice.now(), Rung::kTexture);
+  receiver.run(7, calm);
   EXPECT_EQ(receiver.choice.now(), Rung::kReduced);
+  receiver.run(7, calm);
+  EXPECT_EQ(receiver.choice.now(), Rung::kFull);
 }
 
 TEST(QualityChoice, AStreamThatStandsStillTellsNothing) {
