@@ -94,7 +94,7 @@ Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, 
                   const Truths& truths, Judges& judges) {
   const bool interlaced = frame.scan == Scan::kInterlaced;
   const auto at = [&](const ImageF& truth, int half) {
-    return interlaced ? truth_of_field(truth, first_row(frame.field_order, half)) : truth.clone();
+    return interlaced ? truth_of_field(truth, half) : truth.clone();
   };
   if (completed && completed->between) {
     if (interlaced && !truths.before.empty()) {

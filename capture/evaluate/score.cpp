@@ -22,9 +22,9 @@ std::size_t at(int row, int column, int width) {
 
 }  // namespace
 
-ImageF truth_of_field(const ImageF& truth, int first) {
+ImageF truth_of_field(const ImageF& truth, int half) {
   ImageF out = truth.clone();
-  if (first == 0 || truth.height() < 2) return out;
+  if (half == 0 || truth.height() < 2) return out;
   for (int y = 0; y < truth.height(); y += 2) {
     const float* above = truth.row(y > 0 ? y - 1 : y + 1);
     const float* below = truth.row(y + 1 < truth.height() ? y + 1 : y - 1);

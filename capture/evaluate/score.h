@@ -27,9 +27,9 @@ struct Score {
   double p95_um_per_m = 0;
 };
 
-/// The truth on even rows at the time of the field whose first row is `first` (0 or 1): as it is, or between
-/// the rows of the other field above and below. Odd rows stay as they are.
-ImageF truth_of_field(const ImageF& truth, int first);
+/// The truth on even rows at the time of a frame's first field (0), as it is, or of its second (1): between
+/// the odd rows above and below. Odd rows stay as they are.
+ImageF truth_of_field(const ImageF& truth, int half);
 
 /// Collects frames of one take. One thread.
 class Scorer {

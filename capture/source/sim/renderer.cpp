@@ -201,10 +201,15 @@ RenderedFrame Renderer::render(std::uint64_t index, bool with_truth) const {
   for (const int half : {0, 1}) {
     const double time_s = (static_cast<double>(index) + 0.5 * half) / rig_.frame_rate;
     const std::uint64_t number = 2 * index + static_cast<unsigned>(half);
-    const Field field{glows(number), time_s, interlaced ? first_row(rig_.field_order, half) : 0,
-                      interlaced ? 2 : 1, number};
-    render_field(field, interlaced || half == 0 ? frame.picture : frame.complement,
-                 interlaced || half == 0 ? truth : nullptr);
+    Field field{glows(number), time_s, interlaced ? first_row(rig_.field_order, half) : 0, interlaced ? 2 : 1,
+                number};
+    const bool has_truth = interlaced || half == 0;
+    const bool truth_beside = interlaced && field.first_row != half;
+    render_field(field, has_truth ? &frame.picture : &frame.complement,
+                 has_truth && !truth_beside ? truth : nullptr);
+    if (truth == nullptr || !truth_beside) continue;
+    field.first_row = half;
+    render_field(field, nullptr, truth);
   }
   return frame;
 }
@@ -228,7 +233,7 @@ std::array<Renderer::Glow, 2> Renderer::glows(std::uint64_t field) const {
   return {glow(slot, 1 - beyond), glow(slot + 1, beyond)};
 }
 
-void Renderer::render_field(const Field& field, Image8& out, ImageF* truth) const {
+void Renderer::render_field(const Field& field, Image8* out, ImageF* truth) const {
   const double period_s = options_.period / rig_.frame_rate;
   const double turns = field.time_s / period_s;
   std::vector<Placed> shapes;
@@ -241,9 +246,11 @@ void Renderer::render_field(const Field& field, Image8& out, ImageF* truth) cons
   Row row(rig_.camera.width);
   for (int y = field.first_row; y < rig_.camera.height; y += field.row_step) {
     trace_row(shapes, field, y, row);
-    if (!chroma_kernel_.empty()) blur_chroma(row);
-    quantise(row, scramble(field.noise_key * 65536 + static_cast<unsigned>(y)), out.row(y));
-    if (truth) std::copy(row.depth.begin(), row.depth.end(), truth->row(y));
+    if (out != nullptr) {
+      if (!chroma_kernel_.empty()) blur_chroma(row);
+      quantise(row, scramble(field.noise_key * 65536 + static_cast<unsigned>(y)), out->row(y));
+    }
+    if (truth != nullptr) std::copy(row.depth.begin(), row.depth.end(), truth->row(y));
   }
 }
 

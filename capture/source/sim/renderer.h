@@ -34,8 +34,9 @@ class Renderer {
 
   /// Camera frame `index`, lost ones counted: it shows what the pattern's
   /// scheme has for it (capture/pattern/schedule.h). Each field is rendered at its
-  /// own time, half a frame apart; each row of the truth at its field's time, a progressive truth at the
-  /// first picture's. The same index gives the same bytes on every thread.
+  /// own time, half a frame apart. The truth is of the first field's time, where lines of geometry lie: on
+  /// even rows, whichever field is first; on odd rows of the second's. A progressive truth is of the first
+  /// picture's. The same index gives the same bytes on every thread.
   RenderedFrame render(std::uint64_t index, bool with_truth) const;
 
  private:
@@ -55,7 +56,8 @@ class Renderer {
   };
 
   std::array<Glow, 2> glows(std::uint64_t field) const;
-  void render_field(const Field& field, Image8& out, ImageF* truth) const;
+  /// Rows of `out` and `truth`, those of which are not null.
+  void render_field(const Field& field, Image8* out, ImageF* truth) const;
   void trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const;
   Vec3 shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,
              Vec3 direction, Vec3 direction_step) const;
