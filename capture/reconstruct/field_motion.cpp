@@ -10,10 +10,11 @@ namespace {
 
 constexpr int kFurthest_px = 8;  // either way
 constexpr int kShifts = 2 * kFurthest_px + 1;
-constexpr int kFirstLook_px = 2;   // what holds still leaves more stripes at so far either way
-constexpr int kStep_px = 4;        // stripes left over are steps over so many columns
-constexpr int kEveryLine = 8;      // of a cell
-constexpr int kAround = 1;         // cells on each side that are measured together
+constexpr int kFirstLook_px = 2;  // what holds still leaves more stripes at so far either way
+constexpr int kStep_px = 4;       // stripes left over are steps over so many columns
+constexpr int kEveryLine = 8;     // of a cell
+constexpr int kAround = 1;        // cells on each side that are measured together
+constexpr float kUsualWidth = 640;
 constexpr float kClearer = 0.85F;  // of the stripes left without a shift, those left with it
 constexpr float kStill_px = 0.5F;  // less makes no difference
 constexpr float kAlike_px = 1.5F;  // between cells of one surface
@@ -148,6 +149,7 @@ void MotionFinder::find(View8 slide, View8 complement, WorkerPool& pool, FieldMo
   rows_ = (slide.height + FieldMotion::kCellLines - 1) / FieldMotion::kCellLines;
   if (slide.width <= 4 * kFurthest_px) return;
   out.cells = cells_;
+  out.scale = std::max(1.F, static_cast<float>(slide.width) / kUsualWidth);
   const std::size_t cells = static_cast<std::size_t>(cells_) * static_cast<std::size_t>(rows_);
   out.px.resize(cells);
   out.moves.assign(static_cast<std::size_t>(rows_), 0);

@@ -21,6 +21,7 @@ struct FieldMotion {
   static constexpr int kCellLines = 8;
 
   int cells = 0;                    // in a row of them
+  float scale = 1;                  // of distances, by the camera's width: 1 up to 640 columns
   std::vector<float> px;            // [row][cell]: from the slide's exposure to the complement's; 0: none
   std::vector<std::uint8_t> moves;  // [row]: a cell of it does; empty: nothing does anywhere
 

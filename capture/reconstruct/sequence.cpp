@@ -23,7 +23,7 @@ constexpr OrderRules kOrder{
     .max_missing = 3,
 };
 constexpr float kJump = -1.6F;       // a depth step: anything may follow
-constexpr float kUnexpected = 1.0F;  // less for a boundary where no depth seen before would put it
+constexpr float kUnexpected = 2.0F;  // less for a boundary where no depth seen before would put it
 constexpr int kMaxSkipped = 3;       // false edges between two that follow each other
 constexpr float kClear = 0.5F;       // of a channel's evidence: leaves no doubt about its sign
 constexpr float kNoStripe = -100;    // agreement with what no stripe is
@@ -183,6 +183,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
         const auto [low, high] = (*context.expected)[static_cast<std::size_t>(boundary[i])];
         if (edge.column_px < low || edge.column_px > high) gains[i] -= kUnexpected;
       }
+      expect_moved(edges, line, index, context, boundary, used, gains);
     }
     const float jump_from = best_so_far + kJump;
     const bool jump = jump_from > 0;  // a path may start anywhere

@@ -115,6 +115,10 @@ class SequenceDecoder {
                    int boundary) const;
   bool moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
                          int boundary) const;
+  bool was_near(int line, int lines, const SequenceContext& context, int boundary, float was_px,
+                float off_px) const;
+  void expect_moved(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                    const std::int32_t* boundary, int count, float* gains) const;
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);

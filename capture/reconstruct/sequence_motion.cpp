@@ -11,11 +11,15 @@
 namespace relievo {
 namespace {
 
+constexpr float kAnywhere = std::numeric_limits<float>::infinity();
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-constexpr float kOff_px = 2;               // between where a boundary was and where its edge's motion says,
-constexpr float kOffShare = 0.2F;          // and of that motion more
-constexpr std::uint32_t kLeastInARow = 3;  // edges that confirm a run, whatever its others do
-constexpr int kLines = 2;                  // above and below, on which that is looked for
+constexpr float kOff_px = 2;                // between where a boundary was and where its edge's motion says,
+constexpr float kOffShare = 0.2F;           // and of that motion more
+constexpr std::uint32_t kLeastInARow = 3;   // edges that confirm a run, whatever its others do
+constexpr std::uint32_t kContradicted = 4;  // one edge in so many of a run is let pass
+constexpr float kNear_px = 3;     // of where an edge's motion says it was: a boundary that was there
+constexpr float kWasNear = 2.5F;  // gains so much
+constexpr int kLines = 2;         // above and below, on which that is looked for
 
 }  // namespace
 
@@ -27,7 +31,7 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
   const float moved =
       context.motion->between_frames(*context.before_motion, line, column, context.before_fields);
   const float was = column - moved;
-  const float off = kOff_px + kOffShare * std::fabs(moved);
+  const float off = kOff_px * context.motion->scale + kOffShare * std::fabs(moved);
   for (int l = std::max(0, line - kLines); l <= std::min(edges.lines - 1, line + kLines); ++l) {
     const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
                               static_cast<std::size_t>(boundary);
@@ -38,6 +42,31 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
   return false;
 }
 
+/// Whether the frame before had a boundary near a column on the lines about one.
+bool SequenceDecoder::was_near(int line, int lines, const SequenceContext& context, int boundary,
+                               float was_px, float off_px) const {
+  for (int l = std::max(0, line - kLines); l <= std::min(lines - 1, line + kLines); ++l) {
+    const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
+                              static_cast<std::size_t>(boundary);
+    if (std::fabs((*context.before_px)[place] - was_px) < off_px) return true;
+  }
+  return false;
+}
+
+/// Of an edge's candidates, what the frame before speaks for gains: where the scene moved, the other slide's
+/// frame often shows another surface, and agrees with a wrong boundary by chance.
+void SequenceDecoder::expect_moved(const EdgeImage& edges, int line, std::uint32_t e,
+                                   const SequenceContext& context, const std::int32_t* boundary, int count,
+                                   float* gains) const {
+  if (context.before_px == nullptr || context.motion == nullptr || beside_[e].tracked) return;
+  const FieldMotion& motion = *context.motion;
+  const float column = edges.edges[e].column_px;
+  const float was =
+      column - motion.between_frames(*context.before_motion, line, column, context.before_fields);
+  for (int i = 0; i < count; ++i)
+    if (was_near(line, edges.lines, context, boundary[i], was, kNear_px * motion.scale)) gains[i] += kWasNear;
+}
+
 /// Whether an edge that moves cannot be a boundary by where that was before.
 bool SequenceDecoder::unconfirmed(const EdgeImage& edges, int line, std::uint32_t e,
                                   const SequenceContext& context, int boundary) const {
@@ -46,7 +75,7 @@ bool SequenceDecoder::unconfirmed(const EdgeImage& edges, int line, std::uint32_
   return !beside_[e].tracked && !moved_as_measured(edges, line, e, context, boundary);
 }
 
-/// Gives up edges on lines where something moves that the frame before does not confirm.
+/// Gives up edges on lines where something moves that the frame before contradicts, or does not confirm.
 void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const SequenceContext& context,
                                    Scratch& scratch, SequenceResult& out) {
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
@@ -62,6 +91,7 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
     const std::uint32_t first = e;
     float motion = context.motion->at(line, edges.edges[e].column_px);
     std::uint32_t confirmed = 0;
+    std::uint32_t contradicted = 0;
     std::uint32_t in_a_row = 0;
     std::uint32_t most_in_a_row = 0;
     bool goes_on = true;
@@ -69,6 +99,8 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
       const int boundary = out.boundary[e];
       const bool is_confirmed = boundary >= 0 && !unconfirmed(edges, line, e, context, boundary);
       confirmed += is_confirmed;
+      contradicted +=
+          boundary >= 0 && !is_confirmed && was_near(line, edges.lines, context, boundary, 0, kAnywhere);
       in_a_row = is_confirmed ? in_a_row + 1 : 0;
       most_in_a_row = std::max(most_in_a_row, in_a_row);
       if (++e == end) break;
@@ -78,6 +110,8 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
                 std::fabs(motion - before) < FieldMotion::kSurface_px;
     }
     if (2 * confirmed >= e - first || most_in_a_row >= kLeastInARow) continue;
+    // What was hidden in the frame before, or not decoded, is no contradiction.
+    if (e - first >= kLeastInARow && contradicted * kContradicted <= e - first) continue;
     for (std::uint32_t i = first; i < e; ++i) {
       scratch.in_order -= out.boundary[i] >= 0;
       out.boundary[i] = -1;
