@@ -15,13 +15,15 @@ namespace {
 
 // On each host but the server's: a recorder and two browsers. So few frames a second that a loaded machine
 // sends and reads them: a browser has room for two that come at once.
-constexpr const char* kSource = "sim:plane,rate=4,noise=3";
+constexpr const char* kSource = "sim:plane,rate=2,noise=3";
 constexpr int kStopped = 3, kCutOff = 4, kLossy = 5, kSlow = 6, kLast = 9;
-constexpr auto kSlowTakes = 2500ms;  // a tenth of the stream's rate
+constexpr auto kSlowTakes = 5s;  // a tenth of the stream's rate
 constexpr auto kTrouble = 15s;
 constexpr double kBackAwake_s = 2,
                  kBackOnTheCable_s = 6;  // what users are promised; it takes a tenth and a third
 constexpr std::int64_t kAfterwards_ns = 3 * kNanosecondsPerSecond;  // watched of those that came back
+
+enum class Losses { kNone, kSome, kAny };
 
 /// A browser on a host.
 class Browser : public WebWatch {
@@ -113,12 +115,11 @@ class NetworkCrowd : public OnANetwork {
     return lost_of(browsers_[index(host)][i]->frames(), all_watch_ns_);
   }
 
-  /// `misses`: frames came while it could have none. What a network loses may arrive all the same.
-  static void expect_losses(int host, const char* who, std::uint64_t lost, bool misses) {
-    if (misses) {
-      EXPECT_GT(lost, 0) << who << " on host " << host;
-    } else if (host != kLossy) {
+  static void expect_losses(int host, const char* who, std::uint64_t lost, Losses losses) {
+    if (losses == Losses::kNone) {
       EXPECT_EQ(lost, 0) << who << " on host " << host;
+    } else if (losses == Losses::kSome) {
+      EXPECT_GT(lost, 0) << who << " on host " << host;
     }
     if (lost > 0) std::printf("%s on host %d lost %llu\n", who, host, static_cast<unsigned long long>(lost));
   }
@@ -160,10 +161,17 @@ TEST_F(NetworkCrowd, WhoIsInTroubleComesBackAndTheOthersLoseNothing) {
 
   for (int host = 2; host <= kLast; ++host) {
     for (std::size_t i = 0; i < browsers_[index(host)].size(); ++i) {
-      const bool misses = host == kCutOff || (i == 0 && (host == kSlow || host == kStopped));
-      expect_losses(host, "browser", browser_lost(host, i), misses);
+      const bool in_trouble = host == kCutOff || (i == 0 && (host == kSlow || host == kStopped));
+      expect_losses(host, "browser", browser_lost(host, i),
+                    in_trouble       ? Losses::kSome
+                    : host == kLossy ? Losses::kAny
+                                     : Losses::kNone);
     }
-    expect_losses(host, "recorder", recorder_lost(host), host == kStopped || host == kCutOff);
+    // One that is stopped finds what its system and the server kept for it: of large buffers it may be all.
+    expect_losses(host, "recorder", recorder_lost(host),
+                  host == kCutOff                      ? Losses::kSome
+                  : host == kStopped || host == kLossy ? Losses::kAny
+                                                       : Losses::kNone);
     if (host == kStopped || host == kCutOff) expect_return(host, back_ns);
   }
 }
