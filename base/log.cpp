@@ -3,25 +3,56 @@
 
 #include <atomic>
 #include <cstdio>
+#include <ctime>
 #include <string>
+
+#include "base/log_format.h"
+#include "base/time.h"
 
 namespace relievo {
 namespace {
 
 std::atomic<LogLevel> g_level{LogLevel::kInfo};
+std::atomic<LogFormat> g_format{LogFormat::kText};
 
-const char* prefix(LogLevel level) {
+std::string name_of(LogLevel level) {
   switch (level) {
     case LogLevel::kError:
-      return "error: ";
+      return "error";
     case LogLevel::kWarning:
-      return "warning: ";
+      return "warning";
     case LogLevel::kInfo:
-      return "";
+      return "info";
     case LogLevel::kDebug:
-      return "debug: ";
+      return "debug";
   }
-  return "";
+  return "unknown";
+}
+
+std::string utc_text(std::int64_t now_ns) {
+  const std::time_t now_s = now_ns / kNanosecondsPerSecond;
+  std::tm utc{};
+  gmtime_r(&now_s, &utc);
+  char text[32], millis[8];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+  std::snprintf(millis, sizeof millis, ".%03dZ",
+                static_cast<int>(now_ns % kNanosecondsPerSecond / 1'000'000));
+  return std::string(text) + millis;
+}
+
+std::string quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (static_cast<unsigned char>(c) < 0x20) {
+      char code[8];
+      std::snprintf(code, sizeof code, "\\u%04x", static_cast<unsigned>(c));
+      out += code;
+      continue;
+    }
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
 }
 
 }  // namespace
@@ -33,11 +64,23 @@ LogLevel log_level() {
   return g_level;
 }
 
+void set_log_format(LogFormat format) {
+  g_format = format;
+}
+LogFormat log_format() {
+  return g_format;
+}
+
+std::string log_line(LogFormat format, LogLevel level, std::string_view message, std::int64_t now_ns) {
+  if (format == LogFormat::kText)
+    return (level == LogLevel::kInfo ? std::string() : name_of(level) + ": ") + std::string(message);
+  return "{\"time\":\"" + utc_text(now_ns) + "\",\"level\":\"" + name_of(level) +
+         "\",\"message\":" + quoted(message) + "}";
+}
+
 void log(LogLevel level, std::string_view message) {
   if (level > g_level) return;
-  std::string line = prefix(level);
-  line += message;
-  line += '\n';
+  const std::string line = log_line(g_format, level, message, utc_now_ns()) + '\n';
   std::fwrite(line.data(), 1, line.size(), stderr);  // one call, so that lines of threads do not mix
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/log_format.h"
 #include "cli/help.h"
 
 namespace relievo {
@@ -18,6 +19,7 @@ namespace {
 struct Verbosity {
   bool verbose = false;
   bool quiet = false;
+  bool json_log = false;
   bool version = false;
 };
 
@@ -25,6 +27,7 @@ struct Verbosity {
 void add_common_flags(CLI::App& app, Verbosity& verbosity) {
   auto* verbose = app.add_flag("-v,--verbose", verbosity.verbose, "Log more");
   app.add_flag("-q,--quiet", verbosity.quiet, "Log errors only, draw no progress bar")->excludes(verbose);
+  app.add_flag("--log-json", verbosity.json_log, "Log lines as JSON: time (UTC), level, message");
   app.add_flag_callback(
       "--version", [] { throw CLI::CallForVersion(RELIEVO_VERSION, 0); }, "Print the version and exit");
 }
@@ -35,6 +38,12 @@ std::string one_line(std::string text) {
     if (c == '\n') c = ' ';
   }
   return text;
+}
+
+/// The one line that says what was not done, and who says it.
+void say_failed(const std::string& who, const std::string& why) {
+  if (log_format() == LogFormat::kJson) return log_error(who + ": " + one_line(why));
+  std::fprintf(stderr, "%s: error: %s\n", who.c_str(), one_line(why).c_str());
 }
 
 int usage_error(const std::string& name, const std::string& message) {
@@ -54,9 +63,7 @@ std::string first_word(int argc, char** argv) {
 int flush_results(const std::string& name, int code) {
   std::cout.flush();
   if (std::fflush(stdout) == 0 && std::cout.good()) return code;
-  std::fprintf(stderr,
-               "%s: error: cannot write the results to standard output: it is closed or its disk is full\n",
-               name.c_str());
+  say_failed(name, "cannot write the results to standard output: it is closed or its disk is full");
   return code == kExitDone ? kExitFailed : code;
 }
 
@@ -97,14 +104,14 @@ int parse_and_run(const std::string& name, const std::string& description,
 
   if (verbosity.verbose) set_log_level(LogLevel::kDebug);
   if (verbosity.quiet) set_log_level(LogLevel::kError);
+  if (verbosity.json_log) set_log_format(LogFormat::kJson);
   for (const auto& [sub, action] : actions) {
     if (!sub->parsed()) continue;
     const Status status = action(stop);
     if (status.ok()) return flush_results(name, kExitDone);
     std::cout.flush();
     std::fflush(stdout);
-    std::fprintf(stderr, "%s %s: error: %s\n", name.c_str(), sub->get_name().c_str(),
-                 one_line(status.error().message).c_str());
+    say_failed(name + ' ' + sub->get_name(), status.error().message);
     return kExitFailed;
   }
   return kExitUsage;  // not reached: one command is required
@@ -117,7 +124,7 @@ int run_program(const std::string& name, const std::string& description, const s
   try {
     return parse_and_run(name, description, commands, argc, argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "%s: error: %s\n", name.c_str(), one_line(e.what()).c_str());
+    say_failed(name, e.what());
     return kExitFailed;
   }
 }

@@ -110,6 +110,9 @@ class DdsPublisher final : public Publisher {
       auto writer = create_writer(participant, publisher->group_.get(), topic);
       if (!writer) return writer.error();
       publisher->writers_[static_cast<std::size_t>(topic)] = std::move(writer).value();
+      auto cdr1 = create_cdr1_writer(participant, publisher->group_.get(), topic);
+      if (!cdr1) return cdr1.error();
+      publisher->cdr1_writers_[static_cast<std::size_t>(topic)] = std::move(cdr1).value();
     }
     if (auto status = publisher->publish(info); !status) return status.error();
     auto notice = SecuredNotice::create(*publisher->domain_, info.stream);
@@ -123,6 +126,9 @@ class DdsPublisher final : public Publisher {
   }
 
   Status publish(const FrameMessage& frame) override {
+    if (const std::int32_t cdr1 = cdr1_writer(Topic::kFrame); matched_readers_of(cdr1) > 0) {
+      if (auto status = write_frame(cdr1, stream_, frame); !status) return status;
+    }
     return write_frame(writer(Topic::kFrame), stream_, frame);
   }
 
@@ -181,10 +187,12 @@ class DdsPublisher final : public Publisher {
     lend(sample.rung_drops, drops);
     lend(sample.rung_encode_ms, encode_ms);
     lend(sample.rung_bit_rates, bit_rates);
-    return written(dds_write(writer(Topic::kStatus), &sample), Topic::kStatus);
+    return write(Topic::kStatus, &sample);
   }
 
-  int matched_readers() const override { return matched_readers_of(writer(Topic::kFrame)); }
+  int matched_readers() const override {
+    return matched_readers_of(writer(Topic::kFrame)) + matched_readers_of(cdr1_writer(Topic::kFrame));
+  }
 
   std::uint64_t sent_again_bytes() const override {
     dds_statistics* const statistics = dds_create_statistics(writer(Topic::kFrame));
@@ -199,6 +207,7 @@ class DdsPublisher final : public Publisher {
     // Waits for a call in progress; `wanted_` outlives it.
     dds_set_listener(requests_.get(), nullptr);
     dds_set_listener(writer(Topic::kFrame), nullptr);
+    dds_set_listener(cdr1_writer(Topic::kFrame), nullptr);
   }
 
  private:
@@ -222,6 +231,7 @@ class DdsPublisher final : public Publisher {
     });
     dds_set_listener(requests_.get(), listener.get());
     dds_set_listener(writer(Topic::kFrame), listener.get());
+    dds_set_listener(cdr1_writer(Topic::kFrame), listener.get());
     return {};
   }
 
@@ -245,15 +255,21 @@ class DdsPublisher final : public Publisher {
         static_cast<std::uint32_t>(stripes.size());
     sample.pattern.stripes._buffer = stripes.data();
     sample.pattern.scheme = to_dds(info.pattern.scheme);
-    return written(dds_write(writer(Topic::kInfo), &sample), Topic::kInfo);
+    return write(Topic::kInfo, &sample);
+  }
+
+  Status write(Topic topic, const void* sample) {
+    if (auto status = written(dds_write(cdr1_writer(topic), sample), topic); !status) return status;
+    return written(dds_write(writer(topic), sample), topic);
   }
 
   std::int32_t writer(Topic topic) const { return writers_[static_cast<std::size_t>(topic)].get(); }
+  std::int32_t cdr1_writer(Topic topic) const { return cdr1_writers_[static_cast<std::size_t>(topic)].get(); }
 
   std::string stream_;
   std::shared_ptr<Domain> domain_;
   Entity group_;
-  std::array<Entity, kTopics.size()> writers_;
+  std::array<Entity, kTopics.size()> writers_, cdr1_writers_;
   SecuredNotice notice_;
   std::unique_ptr<ClockService> clock_;
   Entity request_group_;

@@ -17,6 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kTick = 100ms;
+constexpr auto kLook = 5s;           // at the disk's room
 constexpr auto kArrival = 500ms;     // of a stream's last frames
 constexpr std::size_t kAtOnce = 32;  // samples, before who asks for the state may look
 
@@ -87,6 +88,7 @@ Status StreamRecorder::start() {
   target_ = new_target(options_.folder, options_.stream, now_ns);
   state_ = {.activity = RecordingActivity::kRecording,
             .file = first_file(target_, options_.recording.segments).filename(),
+            .room_bytes = state_.room_bytes,
             .started_ns = now_ns,
             .pre_roll_s = options_.pre_roll_s,
             .message = {}};
@@ -136,15 +138,27 @@ bool StreamRecorder::has_work() const {
 void StreamRecorder::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
+    look_at_disk(lock);
     if (open_)
       wake_.wait_for(lock, kTick, [&] { return has_work(); });
     else
-      wake_.wait(lock, [&] { return open_ || ending_; });
+      wake_.wait_for(lock, kLook, [&] { return open_ || ending_; });
     if (open_)
       write_some(lock);
     else if (ending_)
       return;
   }
+}
+
+void StreamRecorder::look_at_disk(std::unique_lock<std::mutex>& lock) {
+  const std::int64_t now_ns = steady_now_ns();
+  if (looked_ns_ && now_ns - *looked_ns_ < std::chrono::nanoseconds(kLook).count()) return;
+  looked_ns_ = now_ns;
+  lock.unlock();  // a disk may be slow
+  std::error_code ignored;
+  const auto room = std::filesystem::space(options_.folder, ignored).available;
+  lock.lock();
+  state_.room_bytes = ignored ? 0 : room;
 }
 
 /// Of the ring into the file, which ends where that is asked for or the disk takes no more.

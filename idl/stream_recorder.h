@@ -64,6 +64,7 @@ class StreamRecorder {
   void write_some(std::unique_lock<std::mutex>& lock);
   void write(const RawSample& sample);
   bool has_work() const;
+  void look_at_disk(std::unique_lock<std::mutex>& lock);
 
   const Options options_;
   mutable std::mutex mutex_;  // of all up to the thread's own
@@ -80,6 +81,7 @@ class StreamRecorder {
 
   std::unique_ptr<Recorder> recorder_;  // of the thread alone
   Subscriber::Callbacks to_recorder_;
+  std::optional<std::int64_t> looked_ns_;  // at the disk
   std::thread thread_;
 };
 

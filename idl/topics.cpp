@@ -7,6 +7,7 @@
 
 #include "idl/idl_text.h"
 #include "relievo.h"
+#include "relievo_cdr1.h"
 
 namespace relievo {
 namespace {
@@ -35,22 +36,49 @@ const TopicRow& row(Topic topic) {
   return rows[static_cast<std::size_t>(topic)];
 }
 
-Qos reliable_qos(dds_durability_kind_t durability) {
+Qos reliable_qos(dds_durability_kind_t durability,
+                 dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2) {
   Qos qos(dds_create_qos());
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, kMaxBlocking_ns);
   dds_qset_durability(qos.get(), durability);
-  const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
   dds_qset_data_representation(qos.get(), 1, &representation);
   return qos;
 }
 
+// In XCDR2 as far as nothing else is said, also of types that could be had in others: Cyclone wants all
+// topics of a name alike.
 Result<Entity> create_topic(std::int32_t participant, const dds_topic_descriptor_t& type,
                             const std::string& name) {
-  return take_entity(dds_create_topic(participant, &type, name.c_str(), nullptr, nullptr), "topic " + name);
+  const Qos qos(dds_create_qos());
+  const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
+  dds_qset_data_representation(qos.get(), 1, &representation);
+  return take_entity(dds_create_topic(participant, &type, name.c_str(), qos.get(), nullptr), "topic " + name);
 }
 
 Result<Entity> create_topic(std::int32_t participant, Topic topic) {
   return create_topic(participant, *row(topic).type, topic_type(topic).topic_name);
+}
+
+/// Says that it is the topic's own type, and nothing of how that is made: readers go by its name then.
+dds_topic_descriptor_t cdr1_type(Topic topic) {
+  static_assert(sizeof(relievo_StreamInfo) == sizeof(relievo_cdr1_StreamInfo) &&
+                sizeof(relievo_Frame) == sizeof(relievo_cdr1_Frame) &&
+                sizeof(relievo_ServerStatus) == sizeof(relievo_cdr1_ServerStatus));
+  static const dds_topic_descriptor_t* const types[] = {
+      &relievo_cdr1_StreamInfo_desc, &relievo_cdr1_Frame_desc, &relievo_cdr1_ServerStatus_desc};
+  const dds_topic_descriptor_t& cdr1 = *types[static_cast<std::size_t>(topic)];
+  return {.m_size = cdr1.m_size,
+          .m_align = cdr1.m_align,
+          .m_flagset = cdr1.m_flagset & ~static_cast<std::uint32_t>(DDS_TOPIC_XTYPES_METADATA),
+          .m_nkeys = cdr1.m_nkeys,
+          .m_typename = row(topic).type->m_typename,
+          .m_keys = cdr1.m_keys,
+          .m_nops = cdr1.m_nops,
+          .m_ops = cdr1.m_ops,
+          .m_meta = cdr1.m_meta,
+          .type_information = {},
+          .type_mapping = {},
+          .restrict_data_representation = cdr1.restrict_data_representation};
 }
 
 struct SideRow {
@@ -108,11 +136,11 @@ Result<Entity> create_group(std::int32_t participant, Role role, bool writing, c
   return create_group(participant, Role::kWatcher, writing, stream + "/" + std::string(to_string(rung)));
 }
 
-Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic,
+namespace {
+
+Result<Entity> create_writer(std::int32_t group, Topic topic, Result<Entity> dds_topic, Qos qos,
                              std::optional<int> depth) {
-  auto dds_topic = create_topic(participant, topic);
   if (!dds_topic) return dds_topic.error();
-  const Qos qos = reliable_qos(row(topic).durability);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth.value_or(row(topic).writer_depth));
   dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, kLiveliness_ns);
   // Otherwise a server's exit would read as "stream deleted" and a late joiner would get one sample at most.
@@ -123,6 +151,20 @@ Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic
   }
   return take_entity(dds_create_writer(group, dds_topic->get(), qos.get(), nullptr),
                      "writer of " + topic_type(topic).topic_name);
+}
+
+}  // namespace
+
+Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic topic,
+                             std::optional<int> depth) {
+  return create_writer(group, topic, create_topic(participant, topic), reliable_qos(row(topic).durability),
+                       depth);
+}
+
+Result<Entity> create_cdr1_writer(std::int32_t participant, std::int32_t group, Topic topic) {
+  const dds_topic_descriptor_t type = cdr1_type(topic);
+  return create_writer(group, topic, create_topic(participant, type, topic_type(topic).topic_name),
+                       reliable_qos(row(topic).durability, DDS_DATA_REPRESENTATION_XCDR1), std::nullopt);
 }
 
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic) {

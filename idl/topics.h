@@ -38,6 +38,10 @@ Result<Entity> create_writer(std::int32_t participant, std::int32_t group, Topic
                              std::optional<int> depth = {});
 Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic topic);
 
+/// The same for readers that know XCDR1 alone, such as Fast DDS 2: they find no other, and ours not this one.
+/// Takes the samples of the other writer.
+Result<Entity> create_cdr1_writer(std::int32_t participant, std::int32_t group, Topic topic);
+
 /// What is said beside the streams: never recorded.
 enum class SideTopic : std::uint8_t {
   kKeyFrameRequest,  // watchers to servers; one that nobody hears is gone

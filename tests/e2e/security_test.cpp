@@ -5,12 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/own_domain.h"
 #include "tests/support/patience.h"
 #include "tests/support/process.h"
+#include "tests/support/replace_in.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo {
@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::program;
+using test::replace_in;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -113,15 +114,6 @@ TEST_F(Security, WatchersDoNotPublish) {
   auto server = publish(keys_of("second"));
   ASSERT_TRUE(server->wait_for_text("live")) << server->err();
   EXPECT_THAT(streams_until(keys_of("viewer"), "face").out, HasSubstr("face"));
-}
-
-void replace_in(const fs::path& file, const std::string& from, const std::string& to) {
-  std::ifstream in(file, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(in)), {});
-  const auto at = text.find(from);
-  ASSERT_NE(at, std::string::npos);
-  text.replace(at, from.size(), to);
-  std::ofstream(file, std::ios::binary) << text;
 }
 
 TEST_F(Security, DamagedKeysAreNamed) {

@@ -20,19 +20,32 @@ std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadl
 
 }  // namespace
 
-TcpClient::TcpClient(std::uint16_t port, int receive_buffer_bytes) {
-  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+TcpClient::TcpClient(std::uint16_t port, int receive_buffer_bytes)
+    : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   if (receive_buffer_bytes > 0) {
     setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
   }
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port);
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  if (connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    close(fd_);
-    fd_ = -1;
-  }
+  connect_to("127.0.0.1", port);
+}
+
+TcpClient::TcpClient(const std::string& address, std::uint16_t port, std::chrono::milliseconds patience)
+    : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  timeval time{};
+  time.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(patience).count();
+  time.tv_usec = std::chrono::duration_cast<std::chrono::microseconds>(patience % 1s).count();
+  setsockopt(fd_, SOL_SOCKET, SO_SNDTIMEO, &time, sizeof time);  // connect(2) keeps it too
+  connect_to(address, port);
+}
+
+void TcpClient::connect_to(const std::string& address, std::uint16_t port) {
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(port);
+  if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) == 1 &&
+      connect(fd_, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0)
+    return;
+  close(fd_);
+  fd_ = -1;
 }
 
 TcpClient::TcpClient(TcpClient&& other) noexcept

@@ -18,6 +18,8 @@ namespace relievo::test {
 class TcpClient {
  public:
   explicit TcpClient(std::uint16_t port, int receive_buffer_bytes = 0);
+  /// To another host's IPv4 address; not connected where it does not answer within that time.
+  TcpClient(const std::string& address, std::uint16_t port, std::chrono::milliseconds patience);
   TcpClient(TcpClient&& other) noexcept;
   TcpClient& operator=(TcpClient&&) = delete;
   virtual ~TcpClient();
@@ -34,6 +36,9 @@ class TcpClient {
   /// As recv(2), when there is something to read.
   virtual long read(char* into, std::size_t bytes);
   virtual bool has_more() const { return false; }  // was read already, and waits
+
+ private:
+  void connect_to(const std::string& address, std::uint16_t port);
 
   int fd_ = -1;
   bool at_end_ = false;

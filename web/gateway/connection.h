@@ -64,6 +64,8 @@ class ConnectionHost {
   virtual std::unique_ptr<WsFeed> make_feed(const HttpReply& reply) = 0;
   /// How long a request may take to arrive whole, and each part of its answer to leave.
   virtual std::chrono::milliseconds request_time() const = 0;
+  /// How long a WebSocket message may take to leave.
+  virtual std::chrono::milliseconds message_time() const = 0;
   /// Calls `read`, which may wait for a disk, on a thread beside the loop's, and then `done` on the loop's.
   virtual void from_disk(std::function<void()> read, std::function<void()> done) = 0;
   virtual void add(std::shared_ptr<Connection> connection) = 0;

@@ -106,6 +106,7 @@ class Server : public Gateway, private ConnectionHost {
     return make_stream_feed(hub_, reply.websocket->stream);
   }
   std::chrono::milliseconds request_time() const override { return options_.request_time; }
+  std::chrono::milliseconds message_time() const override { return options_.message_time; }
   void from_disk(std::function<void()> read, std::function<void()> done) override {
     net::post(disk_, [this, read = std::move(read), done = std::move(done)]() mutable {
       read();

@@ -44,6 +44,7 @@ struct GatewayOptions {
   CalibrationControl* calibrations = nullptr;      // likewise
   const StageReport* stages = nullptr;             // likewise; null: no stream is made here
   std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
+  std::chrono::milliseconds message_time{20'000};  // for a WebSocket message to leave
 };
 
 /// Runs on a thread of its own from start() to destruction. Every function may be called from any thread and

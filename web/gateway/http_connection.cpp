@@ -224,9 +224,14 @@ void HttpSession::on_replied(bool keep_alive) {
 }
 
 void HttpSession::on_failed(Io io, Refusal why) {
+  const bool began = awaits_request_ && (buffer_.size() > 0 || parser_->got_some());
   // Between requests browsers keep connections that they do not need: nobody is slow then.
-  const bool idle = any_request_ && awaits_request_ && buffer_.size() == 0 && !parser_->got_some();
-  if (io == Io::kTimeout ? !idle : why == Refusal::kTls) host_.counts().refuse(why);
+  const bool idle = any_request_ && awaits_request_ && !began;
+  if (io == Io::kTimeout ? !idle : why == Refusal::kTls) {
+    host_.counts().refuse(why);
+  } else if (io == Io::kClosed && began) {
+    host_.counts().refuse(Refusal::kMalformed);  // a request without an end
+  }
   finish();
 }
 

@@ -158,6 +158,8 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   per_recording("relievo_recording_lost_frames", "Frames that should be in it and are not.",
                 &RecordingState::lost);
   per_recording("relievo_recording_bytes", "Of samples in it.", &RecordingState::bytes);
+  per_recording("relievo_recording_room_bytes", "That the disk of recordings on request still takes.",
+                &RecordingState::room_bytes);
 
   const auto per_status = [&](const char* name, const char* type, const char* help, auto value) {
     out.family(name, type, help);

@@ -21,8 +21,7 @@ using ErrorCode = boost::system::error_code;
 using namespace std::chrono_literals;
 
 constexpr auto kHandshakeTimeout = 10s;
-constexpr auto kIdleTimeout = 30s;   // half of it quiet sends a ping
-constexpr auto kWriteTimeout = 20s;  // a client that takes longer for one message is gone
+constexpr auto kIdleTimeout = 30s;  // half of it quiet sends a ping
 constexpr std::size_t kMessageLimit = 4 * 1024;
 constexpr Rate kMessageRate{.per_s = 500, .burst = 1000};
 
@@ -61,11 +60,15 @@ class BeastStream {
   }
 
  private:
+  static ErrorCode error_of(Io io) {
+    if (io == Io::kDone) return {};
+    return io == Io::kTimeout ? net::error::timed_out : net::error::connection_reset;
+  }
   // Beast's handlers can only be moved, functions only hold what can be copied.
   template <typename Handler>
   static Transport::Done callback(Handler handler) {
     return [done = std::make_shared<Handler>(std::move(handler))](Io io, std::size_t bytes) {
-      (*done)(io == Io::kDone ? ErrorCode() : ErrorCode(net::error::connection_reset), bytes);
+      (*done)(error_of(io), bytes);
     };
   }
 
@@ -109,6 +112,7 @@ class WsConnection : public Connection, public std::enable_shared_from_this<WsCo
   void on_message();
   void pump();
   void refuse(const WsClose& close);
+  void fail(ErrorCode error);
   void finish();
 
   ConnectionHost& host_;
@@ -154,10 +158,11 @@ void WsConnection::open() {
 
 void WsConnection::read() {
   ws_.async_read(incoming_, [self = shared_from_this()](ErrorCode error, std::size_t) {
-    if (error == ws::error::message_too_big || error == ws::error::buffer_overflow) {
-      self->host_.counts().refuse(Refusal::kMessage);  // Beast has said 1009
+    if (error == ws::error::message_too_big || error == ws::error::buffer_overflow ||
+        error == ws::condition::protocol_violation) {
+      self->host_.counts().refuse(Refusal::kMessage);  // Beast has said 1009 or 1002
     }
-    if (error) return self->finish();
+    if (error) return self->fail(error);
     self->on_message();
   });
 }
@@ -186,7 +191,7 @@ void WsConnection::pump() {
   if (outgoing_ || !started_ || closing_ || finished_) return;
   outgoing_ = feed_->next();
   if (!outgoing_) return;
-  transport_->expire_after(kWriteTimeout);
+  transport_->expire_after(host_.message_time());
   ws_.text(outgoing_->text != nullptr);
   std::array<net::const_buffer, 2> parts;
   if (outgoing_->text) {
@@ -196,7 +201,7 @@ void WsConnection::pump() {
     if (outgoing_->data) parts[1] = net::buffer(*outgoing_->data);
   }
   ws_.async_write(parts, [self = shared_from_this()](ErrorCode error, std::size_t) {
-    if (error || self->finished_) return self->finish();
+    if (error || self->finished_) return self->fail(error);
     self->transport_->expire_never();
     self->feed_->on_sent(*self->outgoing_);
     self->outgoing_.reset();
@@ -209,6 +214,12 @@ void WsConnection::refuse(const WsClose& close) {
   closing_ = true;
   ws_.async_close({static_cast<ws::close_code>(close.code), close.why},
                   [self = shared_from_this()](ErrorCode) { self->finish(); });
+}
+
+/// Reading and writing both do where the client did not take its message in time: the first of them counts.
+void WsConnection::fail(ErrorCode error) {
+  if (!finished_ && error == net::error::timed_out) host_.counts().refuse(Refusal::kSlow);
+  finish();
 }
 
 void WsConnection::close() {

@@ -5,29 +5,19 @@
 
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 
-#include "base/time.h"
-#include "codec/recording.h"
-#include "tests/e2e/network/network.h"
+#include "tests/e2e/network/on_a_network.h"
 #include "tests/support/patience.h"
-#include "tests/support/process.h"
-#include "tests/support/temp_folder.h"
 
 namespace relievo::test {
 namespace {
 
 constexpr auto kLastOnesArrive = 6s;  // after the publisher is done, with what had to be sent again
 
-class NetworkTest : public ::testing::Test {
+class NetworkTest : public OnANetwork {
  protected:
-  static void SetUpTestSuite() { unavailable_ = Network::enter(); }
-  void SetUp() override {
-    if (!unavailable_.empty()) GTEST_SKIP() << "no network of its own: " << unavailable_;
-  }
-
   /// Publishes numbered frames of host 1 once `readers` are there.
   std::unique_ptr<Process> publisher(std::size_t bytes, int rate_hz, int frames, int readers) {
     return std::make_unique<Process>(Network::on(
@@ -35,12 +25,7 @@ class NetworkTest : public ::testing::Test {
             std::to_string(frames), std::to_string(readers), Network::kInterface}));
   }
 
-  std::unique_ptr<Process> recorder(int host) {
-    return std::make_unique<Process>(
-        Network::on(host, {program("relievo"), "record", "numbers", "--interface", Network::kInterface,
-                           "--out", file(host), "--json"}));
-  }
-  std::filesystem::path file(int host) const { return folder_ / (std::to_string(host) + ".mcap"); }
+  std::unique_ptr<Process> recorder(int host) { return OnANetwork::recorder(host, "numbers"); }
 
   /// A stream of 1.1 Mbit/s in full, 0.2 reduced.
   static std::unique_ptr<Process> wide_server() {
@@ -74,33 +59,6 @@ class NetworkTest : public ::testing::Test {
     return line;
   }
 
-  struct Counts {
-    std::uint64_t frames = 0, lost = 0;
-  };
-  /// What a recorder says at its end.
-  Counts stop(Process& recorder) {
-    recorder.signal(SIGINT);
-    EXPECT_EQ(recorder.wait(), 0) << recorder.err();
-    const auto said = nlohmann::json::parse(recorder.out(), nullptr, false);
-    if (said.is_discarded()) {
-      ADD_FAILURE() << recorder.out() << recorder.err();
-      return {};
-    }
-    return {said["frames"], said["lost"]};
-  }
-
-  /// When a host's recorder had its first frame after a time, in seconds after it; nothing where it had none.
-  std::optional<double> came_back_after_s(int host, std::int64_t time_ns) const {
-    const auto reader = RecordingReader::open(file(host));
-    if (!reader) return std::nullopt;
-    for (;;) {
-      const auto message = (*reader)->next();
-      if (!message || !*message) return std::nullopt;
-      const bool frame = (*reader)->summary().channels[(*message)->channel].topic == "relievo/frame";
-      if (frame && (*message)->log_time_ns > time_ns) return seconds((*message)->log_time_ns - time_ns);
-    }
-  }
-
   static void end_without_loss(Process& stats) {
     stats.signal(SIGINT);
     EXPECT_EQ(stats.wait(), 0);
@@ -108,9 +66,6 @@ class NetworkTest : public ::testing::Test {
     for (std::string line; std::getline(lines, line);)
       EXPECT_NE(line.find(" 0 lost"), std::string::npos) << line;
   }
-
-  const TempFolder folder_;
-  static inline std::string unavailable_;
 };
 
 TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/log_format.h"
 #include "cli/progress.h"
 
 namespace relievo {
@@ -47,6 +48,15 @@ std::vector<Command> one_command(std::function<Status(int, StopSignal&)> action)
              app.add_option("--count", *count, "how many");
              return [action, count](StopSignal& stop) { return action(*count, stop); };
            }}};
+}
+
+TEST(Program, SaysFailuresToProgramsToo) {
+  const auto o = run(one_command([](int, StopSignal&) { return Status(Error{"no such\nfile"}); }),
+                     {"work", "--log-json"});
+  set_log_format(LogFormat::kText);  // of this process, for the tests after this one
+  EXPECT_EQ(o.code, 1);
+  EXPECT_THAT(o.err, HasSubstr(R"("level":"error","message":"tool work: no such file"})"));
+  EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1);
 }
 
 TEST(Program, RunsTheCommandWithItsOptions) {

@@ -44,5 +44,10 @@ TEST(Interface, DiscoversWithoutMulticastByAskingTheMachineItself) {
   EXPECT_THAT(domain_config(kEthernet), HasSubstr("<AllowMulticast>spdp</AllowMulticast>"));
 }
 
+TEST(Interface, SaysOftenThatItIsThereWhereOnePacketTellsAll) {
+  EXPECT_THAT(domain_config(kEthernet), HasSubstr("<SPDPInterval>2s</SPDPInterval>"));
+  EXPECT_THAT(domain_config(kLoopback), Not(HasSubstr("SPDPInterval")));
+}
+
 }  // namespace
 }  // namespace relievo

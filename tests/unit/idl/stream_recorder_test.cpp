@@ -94,6 +94,15 @@ class RecordedOnRequest : public testing::Test {
   std::atomic<std::uint64_t> arrived_ = 0;
 };
 
+TEST_F(RecordedOnRequest, SaysWhatItsDiskStillTakes) {
+  start({});
+  EXPECT_TRUE(eventually([&] { return recorder_->state().room_bytes > 0; }));
+  ASSERT_TRUE(recorder_->start());
+  EXPECT_GT(recorder_->state().room_bytes, 0u);
+  std::filesystem::remove_all(folder_.path());
+  EXPECT_TRUE(eventually([&] { return recorder_->state().room_bytes == 0; })) << "there is none any more";
+}
+
 TEST_F(RecordedOnRequest, BeginsWithWhatCameBefore) {
   start({.pre_roll_s = 3600});
   EXPECT_EQ(recorder_->state().activity, RecordingActivity::kOff);

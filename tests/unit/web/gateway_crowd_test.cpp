@@ -5,6 +5,7 @@
 
 #include <deque>
 
+#include "tests/support/noise.h"
 #include "tests/unit/web/gateway_fixture.h"
 
 namespace relievo::test {
@@ -36,16 +37,10 @@ TEST_F(GatewayCrowd, AThousandThatOnlyMakeNoiseDisturbNobody) {
   ASSERT_TRUE(watcher.next_of("info"));
   watcher.credit(8);
   std::deque<TcpClient> crowd;  // of whom so many at a time stay, as far as they are let
-  std::uint32_t random = 7;
   for (int i = 0; i < 1000; ++i) {
     crowd.emplace_back(port);
     ASSERT_TRUE(crowd.back().connected());
-    std::string noise = i % 3 == 0 ? "GET / HTTP/1.1\r\nX: " : i % 3 == 1 ? "\x16\x03\x01" : "";
-    for (int k = 0; k < 40; ++k) {
-      random = random * 1664525u + 1013904223u;
-      noise += static_cast<char>(random >> 24);
-    }
-    crowd.back().send(noise);
+    crowd.back().send(noise(i));
     if (crowd.size() > 500) crowd.pop_front();
     if (i % 10 == 0) expect_frame(watcher);
   }
@@ -53,7 +48,43 @@ TEST_F(GatewayCrowd, AThousandThatOnlyMakeNoiseDisturbNobody) {
   WsClient another(port, "face");
   EXPECT_EQ(another.status(), 101);
   expect_frame(watcher);
-  EXPECT_GT(refused("places") + refused("malformed"), 500);
+  crowd.clear();
+  EXPECT_TRUE(eventually([&] { return refused("places") + refused("malformed") >= 1000; }))
+      << refused("places") << " and " << refused("malformed");
+}
+
+TEST_F(GatewayCrowd, WhoOnlyConnectsIsNoNuisance) {
+  TcpClient(port).send("");
+  {
+    const TcpClient idle(port);  // as browsers do in advance
+    ASSERT_EQ(request(port, "GET", "/healthz").status, 200);
+  }
+  TcpClient(port).send("GET / HT");
+  EXPECT_TRUE(eventually([&] { return refused("malformed") == 1; }));
+}
+
+TEST_F(GatewayCrowd, WhoSpeaksNoWebSocketOnOneIsCounted) {
+  gateway->announce(make_info());
+  WsClient watcher(port, "face");
+  ASSERT_TRUE(watcher.next_of("info"));
+  watcher.credit(8);
+  WsClient noise(port, "face");
+  ASSERT_TRUE(noise.next_of("info"));
+  noise.send("a kind of frame that there is not", 3);
+  EXPECT_TRUE(eventually([&] { return refused("message") == 1; }));
+  expect_frame(watcher);
+}
+
+TEST_F(GatewayCrowd, WhoDoesNotReadHisFramesIsCutOff) {
+  start({.port = 0, .message_time = 200ms});
+  gateway->announce(make_info());
+  WsClient stuck(port, "face", {}, 4096);
+  stuck.credit(8);
+  ASSERT_TRUE(eventually([&] {  // more than the system's buffers take
+    gateway->publish("face", make_frame(0, 4'000'000));
+    return refused("slow") == 1;
+  }));
+  EXPECT_TRUE(eventually([&] { return metric("relievo_gateway_clients") == 0; }));
 }
 
 TEST_F(GatewayCrowd, WhoTricklesHisRequestIsCutOff) {

@@ -30,7 +30,11 @@ class OneStream final : public RecordingControl {
   }
   Status start(const std::string&) override {
     if (state_.activity == RecordingActivity::kRecording) return Error{"is recorded already"};
-    state_ = {.activity = RecordingActivity::kRecording, .file = "face-1.mcap", .frames = 3, .bytes = 7};
+    state_ = {.activity = RecordingActivity::kRecording,
+              .file = "face-1.mcap",
+              .frames = 3,
+              .bytes = 7,
+              .room_bytes = 11};
     std::ofstream(folder_ / state_.file) << "content";
     return {};
   }
@@ -153,6 +157,7 @@ TEST_F(RecordingApi, MetricsSayWhatItDoes) {
   EXPECT_EQ(metric("relievo_recording_state{stream=\"face\",state=\"recording\"}"), 1);
   EXPECT_EQ(metric("relievo_recording_frames{stream=\"face\"}"), 3);
   EXPECT_EQ(metric("relievo_recording_bytes{stream=\"face\"}"), 7);
+  EXPECT_EQ(metric("relievo_recording_room_bytes{stream=\"face\"}"), 11);
 }
 
 TEST_F(RecordingApi, WithoutAFolderItSaysHow) {

@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: Apache-2.0
+// The TOML file of config.h.
+#include <toml++/toml.h>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cli/quantities.h"
+#include "cli/size_option.h"
+#include "cli/web_flags.h"
+#include "codec/geometry_profile.h"
+#include "codec/texture_codec.h"
+#include "server/camera_flags.h"
+#include "server/config.h"
+#include "server/options.h"
+
+namespace relievo {
+namespace {
+
+std::string place(const std::filesystem::path& file, const toml::source_region& at) {
+  return file.string() + ":" + std::to_string(at.begin.line) + ": ";
+}
+
+/// Reads one table, remembering the first thing wrong.
+class Reader {
+ public:
+  Reader(const std::filesystem::path& file, const toml::table& table) : file_(file), table_(table) {}
+
+  void text(std::string_view key, std::string& out) {
+    if (const toml::node* node = take(key)) {
+      if (const auto value = node->value_exact<std::string>())
+        out = *value;
+      else
+        refuse(*node, key, "must be a string in quotes");
+    }
+  }
+  /// Text that the flag of that name takes.
+  void checked(std::string_view key, const ValueCheck& check, std::string& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    if (!value) return refuse(*node, key, "must be a string in quotes");
+    if (const std::string wrong = check(*value); !wrong.empty())
+      return refuse(*node, key, "is wrong: " + wrong);
+    out = *value;
+  }
+  /// A list of such texts.
+  void checked(std::string_view key, const ValueCheck& check, std::vector<std::string>& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const toml::array* list = node->as_array();
+    if (list == nullptr) return refuse(*node, key, "must be a list of strings in quotes");
+    out.clear();
+    for (const toml::node& entry : *list) {
+      const auto value = entry.value_exact<std::string>();
+      if (!value) return refuse(entry, key, "must be a list of strings in quotes");
+      if (const std::string wrong = check(*value); !wrong.empty())
+        return refuse(entry, key, "is wrong: " + wrong);
+      out.push_back(*value);
+    }
+  }
+  void decoder(std::string_view key, Decoder& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    if (value == "ordered") {
+      out = Decoder::kOrdered;
+    } else if (value == "paper") {
+      out = Decoder::kPaper;
+    } else {
+      refuse(*node, key, "must be \"ordered\" or \"paper\"");
+    }
+  }
+  void scheme(std::string_view key, std::string& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    if (!value || !scheme_named(*value))
+      return refuse(*node, key, "must be " + scheme_names() + " in quotes");
+    out = *value;
+  }
+  void geometry(std::string_view key, std::string& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    EncodeOptions unused;
+    if (!value || !set_geometry_profile(*value, unused))
+      return refuse(*node, key, "must be " + geometry_profile_names() + " in quotes");
+    out = *value;
+  }
+  /// A list of lower rungs.
+  void ladder(std::string_view key, std::vector<Rung>& out) {
+    std::vector<std::string> names;
+    const bool given = table_.contains(key);
+    checked(
+        key,
+        [](const std::string& name) {
+          const auto rungs = parse_ladder(name);
+          return name == "none" || name.find(',') != std::string::npos
+                     ? "there are \"reduced\", \"texture\" and \"slow\", and [] for none"
+                 : rungs ? std::string()
+                         : rungs.error().message;
+        },
+        names);
+    if (!given || error_) return;
+    std::string all;
+    for (const std::string& name : names) all += (all.empty() ? "" : ",") + name;
+    out = parse_ladder(all.empty() ? "none" : all).value();
+  }
+  void texture(std::string_view key, TextureCodec& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    const auto codec = value ? texture_codec_named(*value) : std::nullopt;
+    if (!codec) return refuse(*node, key, "must be " + texture_codec_names() + " in quotes");
+    out = *codec;
+  }
+  void texture_encoder(std::string_view key, VideoEncoderKind& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    const auto kind = value ? video_encoder_named(*value) : std::nullopt;
+    if (!kind) return refuse(*node, key, "must be " + video_encoder_names() + " in quotes");
+    out = *kind;
+  }
+  void flag(std::string_view key, bool& out) {
+    if (const toml::node* node = take(key)) {
+      if (const auto value = node->value_exact<bool>())
+        out = *value;
+      else
+        refuse(*node, key, "must be true or false");
+    }
+  }
+  std::optional<std::int64_t> integer(std::string_view key, std::int64_t least, std::int64_t most) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return std::nullopt;
+    const auto value = node->value_exact<std::int64_t>();
+    if (value && *value >= least && *value <= most) return *value;
+    refuse(*node, key,
+           "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+    return std::nullopt;
+  }
+  void rate(std::string_view key, double& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value<double>();  // a whole number too
+    if (!value || !(*value >= kLeastRate && *value <= kMostRate))
+      return refuse(*node, key, "must be a number of pictures a second from 0.1 to 1000");
+    out = *value;
+  }
+  void number(std::string_view key, const std::string& range, double least, double most, double& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value<double>();  // a whole number too
+    if (!value || !(*value >= least && *value <= most))
+      return refuse(*node, key, "must be a number of " + range);
+    out = *value;
+  }
+  void bound(std::string_view key, std::optional<double>& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value<double>();  // a whole number too
+    if (!value || !(*value >= kLeastBound_px && *value <= kMostBound_px))
+      return refuse(*node, key, "must be a number of pixels from 0.01 to 8");
+    out = *value;
+  }
+  void size(std::string_view key, int& width, int& height) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const auto value = node->value_exact<std::string>();
+    const auto size = value ? parse_size(*value) : std::nullopt;
+    if (!size) return refuse(*node, key, "must be a size such as \"640x480\", in quotes");
+    width = size->width;
+    height = size->height;
+  }
+  /// A table of names and values, each a number, text in quotes, true or false.
+  void controls(std::string_view key, std::vector<CameraControl>& out) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    const toml::table* table = node->as_table();
+    if (table == nullptr) return refuse(*node, key, "must be a table of controls");
+    // In the order of the lines, since one control may have to be set before another.
+    std::vector<std::pair<toml::source_position, CameraControl>> ordered;
+    for (const auto& [name, value] : *table) {
+      std::string text;
+      if (const auto number = value.value_exact<std::int64_t>())
+        text = std::to_string(*number);
+      else if (const auto flag = value.value_exact<bool>())
+        text = *flag ? "1" : "0";
+      else if (const auto quoted = value.value_exact<std::string>())
+        text = *quoted;
+      else
+        return refuse(value, name.str(), "must be a whole number, true, false, or text in quotes");
+      ordered.push_back({name.source().begin, {std::string(name.str()), text}});
+    }
+    std::stable_sort(ordered.begin(), ordered.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (auto& [at, control] : ordered) out.push_back(std::move(control));
+  }
+  /// What `read` makes of a table within this one.
+  template <typename Read>
+  void table(std::string_view key, const Read& read) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    if (node->as_table() == nullptr)
+      return refuse(*node, key, "must be a table: write [" + std::string(key) + "]");
+    Reader inner(file_, *node->as_table());
+    read(inner);
+    if (const Status done = inner.finish(); !done && !error_) error_ = done.error();
+  }
+  void integer(std::string_view key, std::int64_t least, std::int64_t most, int& out) {
+    if (const auto value = integer(key, least, most)) out = static_cast<int>(*value);
+  }
+
+  /// [[KEY]], once or more.
+  bool has_tables(std::string_view key) const {
+    const toml::node* node = table_.get(key);
+    return node != nullptr && node->is_array_of_tables();
+  }
+  /// What `read` makes of each of them.
+  template <typename Read>
+  void tables(std::string_view key, const Read& read) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return;
+    for (const toml::node& entry : *node->as_array()) {
+      Reader inner(file_, *entry.as_table());
+      read(inner);
+      if (const Status done = inner.finish(); !done && !error_) error_ = done.error();
+    }
+  }
+  /// The whole table.
+  void refuse(const std::string& why) {
+    if (!error_) error_ = Error{place(file_, table_.source()) + why};
+  }
+
+  Status finish() {
+    for (const auto& [key, node] : table_) {
+      if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) continue;
+      std::string all;
+      for (const std::string_view name : known_) all += " " + std::string(name);
+      refuse(node, key.str().empty() ? "\"\"" : key.str(), "is no setting; there are:" + all);
+    }
+    return error_ ? Status(*error_) : Status();
+  }
+
+ private:
+  const toml::node* take(std::string_view key) {
+    known_.push_back(key);
+    return table_.get(key);
+  }
+  void refuse(const toml::node& node, std::string_view key, const std::string& why) {
+    if (!error_) error_ = Error{place(file_, node.source()) + std::string(key) + " " + why};
+  }
+
+  const std::filesystem::path& file_;
+  const toml::table& table_;
+  std::vector<std::string_view> known_;  // string literals
+  std::optional<Error> error_;
+};
+
+void read_camera(Reader& reader, CameraOptions& camera) {
+  reader.text("rig", camera.rig);
+  reader.text("pattern", camera.pattern);
+  reader.text("input", camera.input);
+  reader.text("standard", camera.standard);
+  reader.text("format", camera.format);
+  reader.size("size", camera.width, camera.height);
+  reader.rate("rate", camera.rate);
+  reader.text("field", camera.field);
+  reader.text("field_order", camera.field_order);
+  reader.flag("odd_pairs", camera.odd_pairs);
+  reader.flag("dmabuf", camera.dmabuf);
+  reader.integer("buffers", kLeastBuffers, kMostBuffers, camera.buffers);
+  reader.controls("controls", camera.controls);
+}
+
+void read_recording(Reader& reader, ServeConfig& config) {
+  reader.text("folder", config.record_folder);
+  reader.checked("pre_roll", pre_roll(), config.pre_roll);
+  RecordingTexts& recording = config.recording;
+  reader.checked("split_size", byte_count(), recording.split_size);
+  reader.checked("split_every", duration(), recording.split_every);
+  reader.checked("keep_size", byte_count(), recording.keep_size);
+  reader.checked("keep_for", duration(), recording.keep_for);
+  reader.checked("sync", sync_policy(), recording.sync);
+}
+
+void read_projector(Reader& reader, ProjectorConfig& projector) {
+  reader.text("output", projector.output);
+  reader.integer("refreshes", 1, kMostRefreshes, projector.refreshes);
+  reader.size("size", projector.width, projector.height);
+}
+
+/// All but its name.
+void read_stream(Reader& reader, StreamConfig& config) {
+  reader.text("source", config.source);
+  reader.scheme("scheme", config.scheme);
+  reader.text("record", config.record);
+  if (const auto frames = reader.integer("frames", 1, std::numeric_limits<std::int64_t>::max())) {
+    config.frames = static_cast<std::uint64_t>(*frames);
+  }
+  reader.flag("loop", config.loop);
+  reader.flag("fast", config.fast);
+  reader.integer("threads", 1, 64, config.threads);
+  reader.decoder("decoder", config.decoder);
+  reader.flag("dense", config.surface.dense);
+  reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
+  reader.texture("texture", config.texture);
+  reader.texture_encoder("texture_encoder", config.texture_encoder);
+  if (const auto quality = reader.integer("texture_quality", 1, 100))
+    config.texture_quality = static_cast<int>(*quality);
+  if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))
+    config.rate.bit_rate = static_cast<double>(*bits);
+  reader.number("deadline", "milliseconds from 0.5 to 1000", kLeastDeadline_ms, kMostDeadline_ms,
+                config.rate.deadline_ms);
+  reader.number("psnr", "decibels from 20 to 60", kLeastTexture_db, kMostTexture_db, config.rate.texture_db);
+  reader.geometry("geometry", config.geometry);
+  reader.integer("step_bits", 0, 8, config.step_bits);
+  reader.bound("bound", config.bound_px);
+  if (const auto frames = reader.integer("key_interval", 1, 1000))
+    config.key_interval = static_cast<int>(*frames);
+  reader.integer("draco_speed", 0, 9, config.draco_speed);
+  reader.ladder("ladder", config.ladder);
+  reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
+}
+
+/// A table [[stream]].
+void read_one_of_many(Reader& reader, ServeConfig& config) {
+  StreamConfig stream = config;
+  stream.camera.controls.clear();  // a camera's own
+  reader.checked("name", stream_name(), stream.stream);
+  read_stream(reader, stream);
+  for (const StreamConfig& other : config.streams) {
+    if (name_of(other) == name_of(stream))
+      reader.refuse("two streams are called '" + name_of(stream) + "': give each a name of its own");
+    if (!stream.record.empty() && other.record == stream.record)
+      reader.refuse("two streams are recorded to " + stream.record + ": give each a file of its own");
+  }
+  config.streams.push_back(std::move(stream));
+}
+
+void read_gateway(Reader& reader, WebOptions& gateway) {
+  reader.text("tls_cert", gateway.tls_cert);
+  reader.text("tls_key", gateway.tls_key);
+  reader.text("token_file", gateway.token_file);
+  reader.flag("open", gateway.open);
+  reader.checked("allow_origins", web_origin(), gateway.origins);
+  const auto count = [&](std::string_view key, std::optional<int>& out) {
+    if (const auto value = reader.integer(key, 1, kMostClients)) out = static_cast<int>(*value);
+  };
+  count("max_clients", gateway.max_clients);
+  count("max_per_address", gateway.max_per_address);
+  if (const auto rate = reader.integer("max_rate", std::lround(kLeastWebRate), std::lround(kMostWebRate)))
+    gateway.max_rate = static_cast<double>(*rate);
+}
+
+}  // namespace
+
+Status read_config(const std::filesystem::path& file, ServeConfig& config) {
+  std::ifstream in(file);
+  std::error_code ignored;
+  if (!in || std::filesystem::is_directory(file, ignored))  // a folder opens, and reads as an empty file
+    return Error{"cannot read the configuration " + file.string() + ": does it exist and may you read it?"};
+  std::stringstream text;
+  text << in.rdbuf();
+  toml::table table;
+  try {
+    table = toml::parse(text.str(), file.string());
+  } catch (const toml::parse_error& error) {
+    return Error{place(file, error.source()) + std::string(error.description())};
+  }
+  Reader reader(file, table);
+  read_stream(reader, config);
+  reader.integer("domain", 0, 230, config.domain);
+  reader.text("interface", config.interface);
+  reader.text("keys", config.keys);
+  reader.text("web", config.web);
+  reader.table("recording", [&](Reader& recording) { read_recording(recording, config); });
+  reader.table("projector", [&](Reader& projector) { read_projector(projector, config.projector); });
+  reader.table("gateway", [&](Reader& gateway) { read_gateway(gateway, config.gateway); });
+  // Last, since what is said outside of them holds for all.
+  if (!reader.has_tables("stream"))
+    reader.text("stream", config.stream);
+  else
+    reader.tables("stream", [&](Reader& stream) { read_one_of_many(stream, config); });
+  return reader.finish();
+}
+
+}  // namespace relievo

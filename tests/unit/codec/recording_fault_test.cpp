@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings that are cut short, damaged or lie, and disks that are full.
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <numeric>
+
+#include "codec/byte_io.h"
+#include "codec/mcap_records.h"
+#include "codec/recording.h"
+#include "tests/support/temp_folder.h"
+#include "tests/unit/codec/sample_recording.h"
+
+namespace relievo {
+namespace {
+
+using namespace test;
+
+TEST(RecordingFault, WhatIsNoRecordingIsRefused) {
+  test::TempFolder folder;
+  EXPECT_FALSE(RecordingReader::open(folder / "none.mcap").ok());
+  EXPECT_FALSE(RecordingReader::open(folder.path()).ok());
+  write_file(folder / "text", Bytes{'h', 'e', 'l', 'l', 'o', ' ', 'w', 'o', 'r', 'l', 'd'});
+  const auto reader = RecordingReader::open(folder / "text");
+  ASSERT_FALSE(reader.ok());
+  EXPECT_NE(reader.error().message.find("not a recording"), std::string::npos);
+}
+
+/// Every byte a crash can cut at.
+TEST(RecordingFault, CutAnywhereGivesEveryWholeChunk) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  const Bytes whole = read_file(folder / "a.mcap");
+  std::size_t before = 0;
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    write_file(folder / "cut.mcap", std::span(whole).first(size));
+    const auto reader = open(folder / "cut.mcap");
+    ASSERT_TRUE(reader->summary().recovered) << size;
+    ASSERT_LE(reader->summary().lost_bytes, size);
+    const ReadBack back = read_all(*reader);
+    ASSERT_TRUE(back.errors.empty()) << size << back.errors[0];
+    ASSERT_EQ(back.messages.size(), reader->summary().messages);
+    ASSERT_TRUE(back.messages.size() % 5 == 0 || back.messages.size() == 23)
+        << "a part of a chunk at " << size;
+    ASSERT_GE(back.messages.size(), before);
+    before = back.messages.size();
+    for (std::size_t i = 0; i < back.messages.size(); ++i)
+      ASSERT_EQ(back.messages[i].data, payload(static_cast<int>(i), 40));
+  }
+  EXPECT_EQ(before, 23u) << "a cut within the index loses no message";
+}
+
+TEST(RecordingFault, ZerosThatAPowerLossLeftAreNotRecords) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  Bytes bytes = read_file(folder / "a.mcap");
+  bytes.erase(bytes.end() - 100, bytes.end());
+  bytes.insert(bytes.end(), 4096, 0);
+  write_file(folder / "a.mcap", bytes);
+  const auto reader = open(folder / "a.mcap");
+  EXPECT_TRUE(reader->summary().recovered);
+  EXPECT_GT(reader->summary().lost_bytes, 4000u);  // the first few may complete the record that was cut
+  EXPECT_EQ(read_all(*reader).messages.size(), 23u);
+}
+
+TEST(RecordingFault, AFlippedBitCostsItsChunkAndIsNamed) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 23);
+  Bytes bytes = read_file(folder / "a.mcap");
+  const Bytes wanted = payload(7, 40);  // in the second chunk
+  const auto at = std::search(bytes.begin(), bytes.end(), wanted.begin(), wanted.end());
+  ASSERT_NE(at, bytes.end());
+  *at ^= 0x10;
+  write_file(folder / "bad.mcap", bytes);
+  const auto reader = open(folder / "bad.mcap");
+  EXPECT_FALSE(reader->summary().recovered);
+  const ReadBack back = read_all(*reader);
+  ASSERT_EQ(back.errors.size(), 1u);
+  EXPECT_NE(back.errors[0].find("CRC"), std::string::npos);
+  EXPECT_NE(back.errors[0].find("at byte"), std::string::npos);
+  ASSERT_EQ(back.messages.size(), 18u);
+  EXPECT_EQ(back.messages[4].sequence, 4u);
+  EXPECT_EQ(back.messages[5].sequence, 10u);
+}
+
+TEST(RecordingFault, ADamagedAttachmentIsLeftOutAndNamed) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 6);
+  Bytes bytes = read_file(folder / "a.mcap");
+  const Bytes wanted = payload(99, 300);
+  const auto at = std::search(bytes.begin(), bytes.end(), wanted.begin(), wanted.end());
+  *(at + 50) ^= 1;
+  write_file(folder / "bad.mcap", bytes);
+  const auto reader = open(folder / "bad.mcap");
+  EXPECT_EQ(reader->summary().attachments.size(), 1u);
+  ASSERT_EQ(reader->summary().damage.size(), 1u);
+  EXPECT_NE(reader->summary().damage[0].find("pattern.yaml"), std::string::npos);
+  EXPECT_EQ(read_all(*reader).messages.size(), 6u);
+}
+
+/// Whatever the index says, and whether it is believed, is withstood.
+void look_around(RecordingReader& reader) {
+  static_cast<void>(reader.times(0).ok());
+  const auto none = [](std::uint16_t, std::span<const std::uint8_t>) { return false; };
+  EXPECT_EQ(reader.find_last(kStart_ns + 8 * kStep_ns, none), std::nullopt);
+}
+
+TEST(RecordingFault, EveryFlippedByteIsWithstood) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 11, 20);
+  const Bytes whole = read_file(folder / "a.mcap");
+  std::size_t wrong = 0;
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    Bytes bytes = whole;
+    bytes[at] ^= at % 2 == 0 ? 0xff : 0x01;
+    write_file(folder / "bad.mcap", bytes);
+    const auto reader = RecordingReader::open(folder / "bad.mcap");
+    if (!reader) continue;
+    const ReadBack back = read_all(**reader);
+    ASSERT_LT(back.errors.size(), 100u) << at;
+    for (const auto& m : back.messages) wrong += m.data != payload(static_cast<int>(m.sequence), 20);
+    look_around(**reader);
+  }
+  EXPECT_EQ(wrong, 0u) << "messages that were changed but not reported";
+}
+
+/// The same where no CRC catches it first: what the index says must be checked against the file.
+TEST(RecordingFault, AnIndexThatLiesIsWithstood) {
+  const test::TempFolder folder;
+  write_sample(folder / "a.mcap", 11, 20);
+  Bytes whole = read_file(folder / "a.mcap");
+  std::fill(whole.end() - 12, whole.end() - 8, std::uint8_t{0});  // the summary's CRC: none
+  const Bytes data_end{0x0f, 4, 0, 0, 0, 0, 0, 0, 0};
+  const auto summary = std::search(whole.begin(), whole.end(), data_end.begin(), data_end.end());
+  ASSERT_NE(summary, whole.end());
+  test::Random random(11);
+  for (auto at = summary - whole.begin(); at < static_cast<std::ptrdiff_t>(whole.size()); ++at) {
+    for (const int value : {0x00, 0xff, 0x80, static_cast<int>(random.below(256))}) {
+      Bytes bytes = whole;
+      bytes[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(value);
+      write_file(folder / "bad.mcap", bytes);
+      const auto reader = RecordingReader::open(folder / "bad.mcap");
+      if (!reader) continue;
+      ASSERT_LT(read_all(**reader).errors.size(), 100u) << at;
+      ASSERT_TRUE((*reader)->seek(kStart_ns + 5 * kStep_ns).ok());
+      static_cast<void>((*reader)->next().ok());
+      look_around(**reader);
+    }
+  }
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  EXPECT_LT(usage.ru_maxrss, 500'000) << "kibibytes";
+}
+
+/// Where the contents of the records of that kind begin, outside chunks.
+std::vector<std::size_t> contents_of(const Bytes& file, mcap::Op op) {
+  std::vector<std::size_t> out;
+  std::span<const std::uint8_t> rest = std::span(file).subspan(mcap::kMagic.size());
+  while (const auto record = mcap::take_record(rest))
+    if (record->op == op) out.push_back(static_cast<std::size_t>(record->content.data() - file.data()));
+  return out;
+}
+
+/// Found by the fuzzer: a chunk whose messages are of other times than is said of it made time run backwards.
+TEST(RecordingFault, TimesOfChunksThatLieDoNotMixMessages) {
+  const test::TempFolder folder;
+  constexpr int kMessages = 23;
+  write_sample(folder / "a.mcap", kMessages, 20);
+  const Bytes whole = read_file(folder / "a.mcap");
+  const std::uint64_t late = kStart_ns + 100 * kStep_ns;
+  const auto numbers = [](const ReadBack& back) {
+    std::vector<std::uint32_t> out;
+    for (const auto& m : back.messages) out.push_back(m.sequence);
+    return out;
+  };
+  std::vector<std::uint32_t> all(kMessages);
+  std::iota(all.begin(), all.end(), 0U);
+
+  // What the chunk says itself, where there is no index: its messages know better.
+  Bytes bytes = whole;
+  put(bytes, contents_of(whole, mcap::Op::kChunk).at(1), late);
+  write_file(folder / "chunk.mcap", bytes);
+  const auto walked = RecordingReader::open(folder / "chunk.mcap", {.rebuild_index = true});
+  ASSERT_TRUE(walked.ok());
+  EXPECT_EQ(numbers(read_all(**walked)), all);
+
+  // What the index says: the chunk is left out and named, and found without the index.
+  bytes = whole;
+  std::fill(bytes.end() - 12, bytes.end() - 8, std::uint8_t{0});  // the summary's CRC: none
+  put(bytes, contents_of(whole, mcap::Op::kChunkIndex).at(1), late);
+  write_file(folder / "index.mcap", bytes);
+  const ReadBack back = read_all(*open(folder / "index.mcap"));
+  ASSERT_EQ(back.errors.size(), 1U);
+  EXPECT_NE(back.errors[0].find("relievo recover"), std::string::npos) << back.errors[0];
+  auto found = numbers(back);
+  EXPECT_TRUE(std::ranges::is_sorted(found));
+  EXPECT_EQ(found.size(), all.size() - 5);
+  const auto rebuilt = RecordingReader::open(folder / "index.mcap", {.rebuild_index = true});
+  ASSERT_TRUE(rebuilt.ok());
+  EXPECT_EQ(numbers(read_all(**rebuilt)), all);
+}
+
+TEST(RecordingFault, ACompressedChunkIsRefusedInWords) {
+  const test::TempFolder folder;
+  Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
+  mcap::append_header(bytes, "another writer");
+  mcap::append_chunk_header(bytes, {.start_time = 1,
+                                    .end_time = 2,
+                                    .uncompressed_size = 100,
+                                    .uncompressed_crc = 0,
+                                    .compression = "zstd",
+                                    .records_size = 8});
+  bytes.insert(bytes.end(), 8, 0x28);
+  write_file(folder / "a.mcap", bytes);
+  const ReadBack back = read_all(*open(folder / "a.mcap"));
+  ASSERT_EQ(back.errors.size(), 1u);
+  EXPECT_NE(back.errors[0].find("compressed with zstd, which is not supported"), std::string::npos);
+}
+
+/// A limit on the file's size stands in for a full disk: both make write() fail in the middle of a chunk.
+TEST(RecordingFault, AFullDiskEndsTheRecordingReadable) {
+  test::TempFolder folder;
+  for (const rlim_t limit : {3000, 3900, 5000}) {
+    const auto file = folder / ("full" + std::to_string(limit) + ".mcap");
+    const pid_t child = fork();
+    if (child == 0) {
+      std::signal(SIGXFSZ, SIG_IGN);
+      const rlimit size{limit, limit};
+      setrlimit(RLIMIT_FSIZE, &size);
+      auto writer = RecordingWriter::create(file, {.chunk_ns = 5 * kStep_ns, .chunk_bytes = 1 << 20});
+      if (!writer || !(*writer)->add_channel(schema(), channel("t"))) _exit(2);
+      for (int i = 0; i < 200; ++i) {
+        const auto status = (*writer)->write(message(0, i, 100));
+        if (status.ok()) continue;
+        const bool named = status.error().message.find(file.string()) != std::string::npos;
+        const bool stays = !(*writer)->write(message(0, i, 100)).ok() && !(*writer)->finish().ok();
+        _exit(named && stays ? 0 : 3);
+      }
+      _exit(4);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    ASSERT_EQ(WEXITSTATUS(status), 0);
+    const auto reader = open(file);
+    const ReadBack back = read_all(*reader);
+    EXPECT_TRUE(back.errors.empty());
+    EXPECT_GE(back.messages.size(), 10u);
+    EXPECT_EQ(back.messages.size() % 5, 0u);
+    EXPECT_EQ(reader->summary().lost_bytes, 0u) << "cut back to whole records";
+    EXPECT_FALSE(reader->summary().recovered) << "there was room for the index";
+    EXPECT_LE(std::filesystem::file_size(file), limit);
+  }
+}
+
+/// A file system of its own, that only this process sees, and nothing left behind.
+bool mount_small_disk(const std::filesystem::path& folder, const char* size) {
+  return ::unshare(CLONE_NEWNS) == 0 && ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+         ::mount("none", folder.c_str(), "tmpfs", 0, size) == 0;
+}
+
+/// 0: it ended whole, with its index, and says why.
+int record_until_full(const std::filesystem::path& file, std::size_t message_bytes) {
+  auto writer = RecordingWriter::create(file, {.chunk_ns = 5 * kStep_ns});
+  if (!writer || !(*writer)->add_channel(schema(), channel("t"))) return 2;
+  int written = 0;
+  while (written < 10000 && (*writer)->write(message(0, written, message_bytes)).ok()) ++written;
+  const Status ended = (*writer)->finish();
+  if (ended.ok() || ended.error().message.find("no space left") == std::string::npos) return 3;
+  const auto reader = RecordingReader::open(file);
+  if (!reader || (*reader)->summary().recovered) return 4;
+  const ReadBack back = read_all(**reader);
+  const auto missing = static_cast<std::size_t>(written) - back.messages.size();
+  return back.errors.empty() && back.messages.size() > 20 && missing <= 5 ? 0 : 5;
+}
+
+TEST(RecordingFault, ADiskThatFillsUpLeavesRoomForTheIndex) {
+  constexpr int kNoSmallDisk = 77;
+  for (const std::size_t message_bytes : {90u, 1000u, 7000u}) {
+    test::TempFolder folder;
+    const pid_t child = fork();
+    if (child == 0)
+      _exit(mount_small_disk(folder.path(), "size=1m") ? record_until_full(folder / "a.mcap", message_bytes)
+                                                       : kNoSmallDisk);
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    if (WEXITSTATUS(status) == kNoSmallDisk) GTEST_SKIP() << "may not mount a small file system here";
+    EXPECT_EQ(WEXITSTATUS(status), 0) << message_bytes;
+  }
+}
+
+TEST(Recording, ReservedRoomIsGivenBack) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 200, 3000);
+  struct stat info {};
+  ASSERT_EQ(::stat((folder / "a.mcap").c_str(), &info), 0);
+  EXPECT_LE(info.st_blocks * 512, info.st_size + 64 * 1024);
+}
+
+TEST(RecordingFault, NoRoomAtAllLeavesNoFile) {
+  test::TempFolder folder;
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit size{10, 10};
+    setrlimit(RLIMIT_FSIZE, &size);
+    _exit(RecordingWriter::create(folder / "a.mcap", {}).ok() ? 1 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.mcap"));
+}
+
+TEST(RecordingFault, KillLosesOnlyTheOpenChunk) {
+  test::TempFolder folder;
+  int ready[2];
+  ASSERT_EQ(pipe(ready), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    auto writer = RecordingWriter::create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns});
+    (*writer)->add_channel(schema(), channel("t")).ok();
+    for (int i = 0; i < 23; ++i) (*writer)->write(message(0, i, 100)).ok();
+    static_cast<void>(!::write(ready[1], "x", 1));
+    pause();
+    _exit(0);
+  }
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  close(ready[0]);
+  close(ready[1]);
+  const auto reader = open(folder / "a.mcap");
+  EXPECT_TRUE(reader->summary().recovered);
+  EXPECT_EQ(read_all(*reader).messages.size(), 20u);
+}
+
+}  // namespace
+}  // namespace relievo

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pipeline between a source and sinks that a test controls.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "server/pipeline.h"
+#include "tests/unit/server/fakes.h"
+
+namespace relievo::test {
+
+inline PipelineOptions fast_and_lossless() {
+  PipelineOptions options;
+  options.stream = "test";
+  options.paced = false;
+  options.lossless = true;
+  return options;
+}
+
+inline std::unique_ptr<Pipeline> make(FieldSource& source, std::vector<FrameSink*> sinks,
+                                      const PipelineOptions& options) {
+  auto made = Pipeline::create(source, std::move(sinks), options);
+  EXPECT_TRUE(made) << made.error().message;
+  return *std::move(made);
+}
+
+inline std::vector<std::uint64_t> numbers(const std::vector<FrameMessage>& frames) {
+  std::vector<std::uint64_t> out;
+  for (const FrameMessage& f : frames) out.push_back(f.number);
+  return out;
+}
+
+inline std::vector<std::uint64_t> range(std::uint64_t first, std::uint64_t end) {
+  std::vector<std::uint64_t> out(end - first);
+  std::iota(out.begin(), out.end(), first);
+  return out;
+}
+
+inline void expect_no_gaps(const std::vector<FrameMessage>& frames) {
+  for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].sequence, i);
+}
+
+class PipelineTest : public ::testing::Test {
+ protected:
+  const StripedScene scene_ = striped_scene();
+  const Frames frames_{scene_};
+  CollectingSink sink_;
+};
+
+}  // namespace relievo::test
