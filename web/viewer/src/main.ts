@@ -155,7 +155,8 @@ class Viewer {
       way: this.view?.navigator.way,
       drawn: this.view?.drawn,
       busy: this.view?.isBusy,
-      scale: this.view?.movingScale,
+      scale: this.view?.moving.scale,
+      drawingMs: this.view?.moving.ms,
       depthRange: this.view?.depthRange,
       gridStep: this.view?.gridStep,
       besides: this.companions?.report(),
@@ -180,6 +181,10 @@ class Viewer {
     try {
       return new View(this.ui.canvas, element<HTMLCanvasElement>('overlay'), {
         beforeDraw: () => this.draw(),
+        drawn: () => {
+          this.session.drawn();
+          this.companions?.drawn();
+        },
         contextLost: (lost) => (this.problem = lost ? text.contextLost : null),
         way: (way) => this.change({ way }),
       });
@@ -239,6 +244,7 @@ class Viewer {
       this.session.meter,
       () => this.session.status,
       () => this.session.source?.kept ?? null,
+      () => this.view?.moving ?? null,
       () => (this.offered === null ? null : whyText(this.offered)),
     );
   }

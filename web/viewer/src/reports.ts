@@ -42,7 +42,7 @@ export function report(viewer: Reporting): void {
       return [...rgba.slice((row * width + column) * 4, (row * width + column) * 4 + 4)];
     },
     pick: (x, y) => viewer.view?.pick({ x, y }) ?? null,
-    toPage: (point) => viewer.view?.navigator.toPage(point) ?? null,
+    toPage: (point) => viewer.view?.navigator.projection()(point) ?? null,
     extent: () => viewer.view?.shown?.extent ?? null,
     surface: () => {
       const frame = viewer.view?.shown ?? null;
