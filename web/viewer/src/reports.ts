@@ -2,6 +2,7 @@
 // What the page tells tests and bug reports of itself.
 import { crc32 } from './crc32';
 import { pixelsOf, type PixelReport } from './pixels';
+import type { Playback } from './source';
 import type { View } from './view';
 
 declare global {
@@ -56,4 +57,13 @@ export function report(viewer: Reporting): void {
     link: () => viewer.link(),
     pose: () => viewer.view?.navigator.pose ?? null,
   };
+}
+
+/** What the time line shows. */
+export function playbackReport(playback: Playback | null): object | null {
+  if (playback === null) return null;
+  const keys = Array.from(playback.times, (_, i) => playback.isKey(playback.first + i));
+  const gaps = keys.map((_, i) => playback.gapBefore(playback.first + i));
+  const { first, index, position, playing, speed, loop, following } = playback;
+  return { first, index, position, playing, speed, loop, following, keys, gaps, times: [...playback.times] };
 }
