@@ -236,7 +236,7 @@ export const text = {
     viewKeys: [
       ['Drag, or arrow keys', 'turn'],
       ['Right or two-finger drag, or Shift + arrows', 'move'],
-      ['Wheel, pinch, or + −', 'zoom'],
+      ['Wheel, pinch, +\u00a0−', 'zoom'],
       ['W A S D Q E', 'fly; Shift: faster'],
       ['Double-click', 'set the pivot'],
       ['R', 'reset the view'],

@@ -377,7 +377,7 @@ export class View {
       const at: Label['at'] = [(min[0] + max[0]) / 2 + this.offsets[i]!, min[1] - 0.1 * (max[1] - min[1]), (min[2] + max[2]) / 2];
       return [{ at, text: names[i]!, colour: '--text' }];
     });
-    return [...ground, ...above];
+    return [...above, ...ground]; // the first ones have their place
   }
 
   private get pixelRatio(): number {
