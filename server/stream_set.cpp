@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <set>
 #include <utility>
 
 #include "base/log.h"
@@ -67,6 +66,7 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
     entry->config = *config;
     entry->files = files_of(*config);
     entry->retries = retries_ || was_applied_;
+    entry->paused = paused_.count(name) != 0;
     entry->again = was_applied_;
     entry->stopping = stopping_;
     entry->thread = std::thread([this, e = entry.get()] { run(*e); });
@@ -124,6 +124,7 @@ Status StreamSet::pause(const std::string& stream) {
   };
   Entry* entry = find();
   if (entry == nullptr || entry->ended) return Error{"the stream '" + stream + "' has ended"};
+  paused_.insert(stream);
   entry->paused = true;
   entry->retries = true;  // what it finds when it goes on ends no server
   if (entry->stream != nullptr) entry->stream->stop();
@@ -133,12 +134,14 @@ Status StreamSet::pause(const std::string& stream) {
     entry = find();
     return entry == nullptr || entry->waiting || entry->ended;
   });
-  if (entry == nullptr || entry->ended) return Error{"the stream '" + stream + "' has ended meanwhile"};
-  return {};
+  if (entry != nullptr && !entry->ended) return {};
+  paused_.erase(stream);
+  return Error{"the stream '" + stream + "' has ended meanwhile"};
 }
 
 void StreamSet::resume(const std::string& stream) {
   const std::lock_guard lock(mutex_);
+  paused_.erase(stream);
   const auto found = entries_.find(stream);
   if (found == entries_.end()) return;
   found->second->files = files_of(found->second->config);  // which may be new, and are those that it opens

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -74,6 +75,8 @@ class StreamSet final : public StreamPauses {
   mutable std::mutex mutex_;  // of all that follows, but for an entry's first five
   mutable std::condition_variable changed_;
   std::map<std::string, std::unique_ptr<Entry>> entries_;
+  std::set<std::string>
+      paused_;  // by calibrations, which have their cameras whatever is configured meanwhile
   bool stopping_ = false;
   bool applying_ = false;
   bool was_applied_ = false;

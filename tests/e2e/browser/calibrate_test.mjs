@@ -6,7 +6,7 @@
 // Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync } from 'node:fs';
+import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 
@@ -17,7 +17,8 @@ import { Server } from './server.mjs';
 const [serverPath, screenshots] = process.argv.slice(2);
 const kScene = 'width=320,height=240,scan=progressive,stripes=40,distortion=1';
 const kSource = `sim:object,${kScene},rate=10`;
-const kBoard = 'chessboard:7x5:40mm';
+const kChessboard = 'chessboard:7x5:40mm';
+const kCharuco = 'charuco:7x5:40mm:30mm:4X4_50';
 
 const browser = await launchChromium();
 const complaints = [];
@@ -54,7 +55,7 @@ const shot = async (page, name) => {
 async function choose(page, kind) {
   await page.waitForSelector('#calibration:not([hidden])');
   await page.selectOption('#calibration select', kind);
-  if (kind === 'geometry') await page.fill('#calibration-board', kBoard);
+  if (kind === 'geometry') await page.fill('#calibration-board', kChessboard);
   await page.click('#calibration button:has-text("Start")');
   await reaches(page, 'watching');
 }
@@ -246,6 +247,68 @@ const checks = {
       );
     } finally {
       await screen.close();
+    }
+  },
+
+  async 'a ChArUco board is chosen by name, and its views are taken'() {
+    await withRig(['--source', `sim:object,${kScene.replace('320,height=240', '640,height=480')},rate=10`], async (server) => {
+      const page = await open(server.address);
+      await page.waitForSelector('#calibration:not([hidden])');
+      await page.selectOption('#calibration select', 'geometry');
+      await page.selectOption('#calibration .board select', 'charuco');
+      assert.match(await page.inputValue('#calibration-board'), /^charuco:/);
+      assert.match(await page.textContent('#calibration .board small'), /marker/);
+      await page.fill('#calibration-board', kChessboard);
+      assert.equal(await page.inputValue('#calibration .board select'), 'chessboard', 'what is typed says which it is');
+      await page.fill('#calibration-board', kCharuco);
+      await shot(page, 'charuco-choice');
+      await page.click('#calibration button:has-text("Start")');
+      await reaches(page, 'watching');
+      assert.equal((await state(server)).board, kCharuco);
+      await press(page, 'take');
+      await page.waitForSelector('#calibration-views li');
+      assert.match(await page.textContent('#calibration-views [data-used=true]'), /24 corners/);
+      await shot(page, 'charuco');
+      await press(page, 'cancel');
+      await reaches(page, 'off');
+      await goesOn(server);
+      await page.context().close();
+    });
+  },
+
+  async 'a configuration that is read again disturbs no calibration, and holds after it'() {
+    const folder = mkdtempSync(join(tmpdir(), 'relievo-calibrate-'));
+    const [config, rig] = [join(folder, 'server.toml'), join(folder, 'rig.yaml')];
+    const configure = (scene) =>
+      writeFileSync(config, `[[stream]]\nname = "rig"\nsource = "sim:${scene},${kScene},rate=10"\n[stream.camera]\nrig = "${rig}"\n`);
+    configure('object');
+    const server = await Server.start(serverPath, ['--config', config]);
+    const readAgain = async (times) => {
+      server.process.kill('SIGHUP');
+      await eventually('it is not read again', () => server.said.split('the configuration was read again').length > times);
+    };
+    try {
+      const page = await open(server.address);
+      await choose(page, 'colour');
+      await readAgain(1);
+      assert.equal((await state(server)).state, 'watching');
+      configure('face');
+      await readAgain(2);
+      assert.equal((await state(server)).state, 'watching');
+      await press(page, 'take');
+      await reaches(page, 'solved');
+      assert.deepEqual(await streams(server), [], 'the stream took its camera back from the calibration');
+      await press(page, 'keep');
+      await reaches(page, 'off');
+      await goesOn(server);
+      const [{ source, status }] = await streams(server);
+      assert.match(source, /^sim:face/);
+      assert.match(status.message, /not calibrated/); // its geometry, of which nothing is known yet
+      assert.match(readFileSync(rig, 'utf8'), /colour_matrix/);
+      await page.context().close();
+    } finally {
+      await server.kill();
+      rmSync(folder, { recursive: true, force: true });
     }
   },
 

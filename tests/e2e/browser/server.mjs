@@ -12,8 +12,13 @@ export class Server {
     const network = ['--web', '127.0.0.1:0', '--domain', domain, '--interface', 'lo'];
     const server = new Server();
     server.process = spawn(path, ['serve', ...options, ...network], {
-      stdio: ['ignore', 'pipe', 'inherit'],
+      stdio: ['ignore', 'pipe', 'pipe'],
       env: { ...process.env, ...environment },
+    });
+    server.said = ''; // its log
+    server.process.stderr.on('data', (text) => {
+      server.said += text;
+      process.stderr.write(text);
     });
     server.exited = new Promise((resolve) => server.process.once('exit', (code, signal) => resolve({ code, signal })));
     const address = await new Promise((resolve, reject) => {

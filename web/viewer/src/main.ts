@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
 import { loadDisplay, storeDisplay, type Display } from './display';
+import { listenToCommands, toggleFullscreen } from './commands';
 import { Companions } from './companions';
 import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
 import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
-import { listenToKeys } from './keys';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
 import { MeasurePanel } from './measurePanel';
@@ -14,27 +14,27 @@ import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Picture } from './picture';
 import type { DecodedFrame } from './messages';
-import { offeredRungs, wantedQuality, type ListedStream, type Quality, type StreamList } from './protocol';
+import { offeredRungs, wantedQuality, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
-import { report } from './reports';
+import { playbackReport, report } from './reports';
 import { address, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
 import { StatisticsPanel } from './statisticsPanel';
+import { ServerList } from './streamList';
 import type { StreamsPanel } from './streamsPanel';
 import { TakePanel } from './takePanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
 import { View } from './view';
 
-const kListEveryMs = 2000;
 const kRefreshMs = 250;
 
 class Viewer {
   private readonly ui: Ui;
-  private readonly panels = new Panels();
+  readonly panels = new Panels();
   private readonly legend = new Legend();
   private readonly picture = new Picture();
   private readonly displayPanel: DisplayPanel;
@@ -42,7 +42,7 @@ class Viewer {
   private readonly measure: MeasurePanel | null;
   private readonly companions: Companions | null;
   private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
-  private readonly timeline = new Timeline(
+  readonly timeline = new Timeline(
     element('timeline'),
     (shown) => document.body.classList.toggle('with-timeline', shown),
     (name) => {
@@ -51,23 +51,19 @@ class Viewer {
     },
   );
   private timed: string | null = null; // a stream beside the first that the time line is of
-  private readonly record: RecordControl;
+  readonly record: RecordControl;
   private readonly session: Session;
   readonly view: View | null;
-  private display: Display;
+  display: Display;
   private quality: Quality | null = wantedQuality(location.search); // of live streams; null: nobody has chosen
   private shared: Shared | null; // by the link that was opened, until something else is chosen
   private pictureAlone = false; // what comes is no surface
   private posed = false; // the link's view is shown
 
   private problem: string | null = null;
-  private listed = false; // the last list arrived
-  private listFailed = false;
-  private nextListAt = 0;
   private chosenByPerson = false; // the stream, by the address or the picker
-  private streams: ListedStream[] = [];
+  private readonly server = new ServerList();
   private wantedBesides: string[] = []; // by the address, until the list says what they are
-  private hint = '';
   private note = ''; // on the file shown
   private stream: string | null = null;
   private triedRecording = false; // of that stream
@@ -85,7 +81,7 @@ class Viewer {
       },
       retry: () => {
         this.session.source?.retryNow();
-        this.nextListAt = 0;
+        this.server.retryNow();
       },
     });
     this.shared = readShared(location.hash, loadDisplay());
@@ -96,7 +92,7 @@ class Viewer {
       changed: () => this.refresh(),
       described: (info, seen) => this.view?.restart(info.camera, seen),
       ready: () => this.view?.invalidate(),
-      hint: (hint) => (this.hint = hint),
+      hint: (hint) => (this.server.hint = hint),
       unusable: (message) => (this.problem = text.noDecoder(message)),
     });
     const picker = new FilePicker((file) => void this.openFile(file));
@@ -112,9 +108,9 @@ class Viewer {
     this.makeStatistics();
     this.makeTake();
     this.panels.action('reset', () => this.view?.navigator.reset());
-    if (document.fullscreenEnabled) this.panels.action('fullscreen', () => this.toggleFullscreen());
+    if (document.fullscreenEnabled) this.panels.action('fullscreen', toggleFullscreen);
     fillHelp(this.panels.panel('help', text.help.title));
-    this.listen();
+    listenToCommands(this, this.ui.canvas);
     void this.makeImmersive();
     this.change({});
     this.openAddressed(new URLSearchParams(location.search));
@@ -150,12 +146,13 @@ class Viewer {
       state: this.presentation?.state,
       stream: this.stream,
       file: this.file,
-      playback: this.playbackReport(),
+      playback: playbackReport(this.session.source?.playback ?? null),
       mode: this.view?.mode,
       way: this.view?.navigator.way,
       drawn: this.view?.drawn,
       busy: this.view?.isBusy,
-      scale: this.view?.movingScale,
+      scale: this.view?.moving.scale,
+      drawingMs: this.view?.moving.ms,
       depthRange: this.view?.depthRange,
       gridStep: this.view?.gridStep,
       besides: this.companions?.report(),
@@ -167,19 +164,14 @@ class Viewer {
     };
   }
 
-  private playbackReport(): object | null {
-    const p = this.session.source?.playback;
-    if (!p) return null;
-    const keys = Array.from(p.times, (_, i) => p.isKey(p.first + i));
-    const gaps = keys.map((_, i) => p.gapBefore(p.first + i));
-    const { first, index, position, playing, speed, loop, following } = p;
-    return { first, index, position, playing, speed, loop, following, keys, gaps, times: [...p.times] };
-  }
-
   private makeView(): View | null {
     try {
       return new View(this.ui.canvas, element<HTMLCanvasElement>('overlay'), {
         beforeDraw: () => this.draw(),
+        drawn: () => {
+          this.session.drawn();
+          this.companions?.drawn();
+        },
         contextLost: (lost) => (this.problem = lost ? text.contextLost : null),
         way: (way) => this.change({ way }),
       });
@@ -207,7 +199,7 @@ class Viewer {
     this.streamsPanel ??= new StreamsPanel(body, {
       choose: (name) => this.choose(name),
       beside: (name, on) => {
-        if (on) this.companions?.add(name, this.streams.find((s) => s.name === name));
+        if (on) this.companions?.add(name, this.server.find(name));
         else this.companions?.remove(name);
         this.writeAddress();
       },
@@ -239,6 +231,7 @@ class Viewer {
       this.session.meter,
       () => this.session.status,
       () => this.session.source?.kept ?? null,
+      () => this.view?.moving ?? null,
       () => (this.offered === null ? null : whyText(this.offered)),
     );
   }
@@ -265,49 +258,6 @@ class Viewer {
     const measuring = this.measure?.isOpen === true;
     this.session.decoder.want = { ...wants, quality: wants.quality || measuring };
     this.companions?.wish(measuring);
-  }
-
-  private listen(): void {
-    const navigator = this.view?.navigator;
-    listenToKeys({
-      mode: (mode) => this.change({ mode }),
-      way: (way) => this.change({ way }),
-      orbit: (right, up) => navigator?.orbit(right, up),
-      pan: (right, up) => navigator?.pan(right, up),
-      zoom: (factor) => navigator?.zoom(factor),
-      command: (key) => this.command(key),
-    });
-    this.ui.canvas.addEventListener('dblclick', (event) => {
-      const hit = this.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
-      if (hit === null) return;
-      const [x, y, z] = hit.point;
-      navigator?.setPivot([x + hit.right, y, z]);
-    });
-  }
-
-  private command(key: string): boolean {
-    const commands: Record<string, () => void> = {
-      r: () => this.view?.navigator.reset(),
-      f: () => this.toggleFullscreen(),
-      h: () => document.body.classList.toggle('bare'),
-      g: () => this.change({ grid: !this.display.grid }),
-      v: () => this.change({ split: !this.display.split }),
-      b: () => this.panels.toggle('display'),
-      n: () => this.panels.toggle('streams'),
-      m: () => this.panels.toggle('measure'),
-      i: () => this.panels.toggle('statistics'),
-      t: () => this.panels.toggle('take'),
-      x: () => this.record.toggle(),
-      '?': () => this.panels.toggle('help'),
-      escape: () => this.panels.close(),
-    };
-    commands[key]?.();
-    return commands[key] !== undefined || this.timeline.command(key);
-  }
-
-  private toggleFullscreen(): void {
-    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
-    done.catch(() => undefined); // refused by the browser: nothing changes
   }
 
   private choose(name: string): void {
@@ -367,7 +317,7 @@ class Viewer {
 
   /** A stream that is played from a file is watched by the file, each page at its own place of it. */
   private async preferRecording(): Promise<void> {
-    const listed = this.streams.find((s) => s.name === this.stream);
+    const listed = this.server.find(this.stream);
     if (this.triedRecording || listed === undefined) return;
     if (typeof listed.recording !== 'string') return this.missMoment();
     this.triedRecording = true;
@@ -481,16 +431,12 @@ class Viewer {
     const playing = source === null ? null : source.playback.playing ? 'playing' : 'paused';
     const following = source?.playback.following ?? null; // null: of a recording
     const offline = source !== null && !source.connected; // it tries again by itself
-    if (now >= this.nextListAt && !document.hidden && !offline) {
-      this.nextListAt = now + kListEveryMs;
-      void this.list();
-    }
-    const listRetryInS = this.listFailed ? Math.ceil(Math.max(0, this.nextListAt - now) / 1000) : null;
+    if (!offline) void this.list();
     this.presentation = present({
       problem: this.problem,
       everConnected: this.session.everConnected,
-      connected: source === null ? this.listed : source.connected,
-      retryInS: source === null ? listRetryInS : source.retryInS,
+      connected: source === null ? this.server.arrived : source.connected,
+      retryInS: source === null ? this.server.retryInS : source.retryInS,
       stream: this.stream,
       announced: info !== null,
       seen,
@@ -498,7 +444,7 @@ class Viewer {
       serverMessage: status?.message ?? '',
       quietMs: now - this.session.lastFrameAt,
       frameRate: info?.frame_rate ?? 0,
-      hint: this.hint,
+      hint: this.server.hint,
       file: following !== null ? null : (playing ?? (this.file !== null ? 'surface' : null)),
       shifted: following === false ? playing : null,
     });
@@ -507,38 +453,29 @@ class Viewer {
       this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: seen };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
-    this.streamsPanel?.show(this.streams, this.stream, this.companions?.names ?? []);
-    this.ui.showStreams(this.streams, this.stream, this.file ?? info?.source ?? '', this.note);
+    this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? []);
+    this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note);
     this.qualityControl.show(this.offered);
     this.showTimeline();
     this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }
 
   private async list(): Promise<void> {
-    try {
-      const response = await fetch(new URL('api/streams', document.baseURI), {
-        cache: 'no-store',
-        signal: AbortSignal.timeout(5000),
-      });
-      if (!response.ok) throw new Error(`HTTP ${response.status}`);
-      const list = (await response.json()) as StreamList;
-      this.listed = true;
-      this.listFailed = false;
-      this.session.everConnected = true;
-      this.streams = list.streams;
-      for (const { name, recorder } of list.streams) this.record.listed(name, recorder);
-      this.hint = list.hint;
-      const first = list.streams[0];
-      const missing = this.session.info === null && !list.streams.some((s) => s.name === this.stream);
-      if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);
-      void this.preferRecording();
-      for (const name of this.wantedBesides) this.companions?.add(name, list.streams.find((s) => s.name === name));
-      this.wantedBesides = [];
-    } catch {
-      this.listed = false;
-      this.listFailed = true;
-    }
+    if (!(await this.server.refresh())) return;
+    if (this.server.arrived) this.useList();
     this.refresh();
+  }
+
+  private useList(): void {
+    const { streams } = this.server;
+    this.session.everConnected = true;
+    for (const { name, recorder } of streams) this.record.listed(name, recorder);
+    const first = streams[0];
+    const missing = this.session.info === null && this.server.find(this.stream) === undefined;
+    if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);
+    void this.preferRecording();
+    for (const name of this.wantedBesides) this.companions?.add(name, this.server.find(name));
+    this.wantedBesides = [];
   }
 }
 

@@ -11,6 +11,19 @@ export interface Mark {
 
 type Project = (point: Vec3) => { x: number; y: number } | null;
 
+/** By its middle. */
+interface Box {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+export const overlap = (a: Box, b: Box): boolean =>
+  Math.abs(a.x - b.x) < (a.width + b.width) / 2 && Math.abs(a.y - b.y) < (a.height + b.height) / 2;
+
+const kApart = 3; // pixels between two words
+const kLine = 11;
 const kFont = '11px system-ui, sans-serif';
 
 export class Overlay {
@@ -39,9 +52,14 @@ export class Overlay {
     const style = getComputedStyle(this.canvas);
     const halo = style.getPropertyValue('--halo');
     const accent = style.getPropertyValue('--mark');
+    const taken: Box[] = [];
     for (const { at, text, colour } of labels) {
       const place = project(at);
-      if (place !== null) this.text(text, place.x, place.y + 9, style.getPropertyValue(colour), halo);
+      if (place === null) continue;
+      const box = { x: place.x, y: place.y + 9, width: c.measureText(text).width + kApart, height: kLine };
+      if (taken.some((other) => overlap(box, other))) continue; // neither could be read
+      taken.push(box);
+      this.text(text, box.x, box.y, style.getPropertyValue(colour), halo);
     }
     for (const mark of this.marks()) this.mark(mark, project, accent, halo);
   }

@@ -24,6 +24,7 @@ export class RemoteFile implements Bytes {
   /** Throws where the server has no such file, or does not give parts of it. */
   static async open(url: URL, fetch: Fetch = (at, init) => window.fetch(at, init)): Promise<RemoteFile> {
     const head = await fetch(url, { headers: { Range: 'bytes=0-0' }, cache: 'no-store' });
+    if (head.status === 404) throw new Error('it is not there (HTTP 404)');
     const size = Number(/\/(\d+)$/.exec(head.headers.get('content-range') ?? '')?.[1]);
     const etag = head.headers.get('etag') ?? '';
     if (head.status !== 206 || !Number.isSafeInteger(size) || etag === '') {

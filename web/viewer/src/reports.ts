@@ -2,6 +2,7 @@
 // What the page tells tests and bug reports of itself.
 import { crc32 } from './crc32';
 import { pixelsOf, type PixelReport } from './pixels';
+import type { Playback } from './source';
 import type { View } from './view';
 
 declare global {
@@ -42,7 +43,7 @@ export function report(viewer: Reporting): void {
       return [...rgba.slice((row * width + column) * 4, (row * width + column) * 4 + 4)];
     },
     pick: (x, y) => viewer.view?.pick({ x, y }) ?? null,
-    toPage: (point) => viewer.view?.navigator.toPage(point) ?? null,
+    toPage: (point) => viewer.view?.navigator.projection()(point) ?? null,
     extent: () => viewer.view?.shown?.extent ?? null,
     surface: () => {
       const frame = viewer.view?.shown ?? null;
@@ -56,4 +57,13 @@ export function report(viewer: Reporting): void {
     link: () => viewer.link(),
     pose: () => viewer.view?.navigator.pose ?? null,
   };
+}
+
+/** What the time line shows. */
+export function playbackReport(playback: Playback | null): object | null {
+  if (playback === null) return null;
+  const keys = Array.from(playback.times, (_, i) => playback.isKey(playback.first + i));
+  const gaps = keys.map((_, i) => playback.gapBefore(playback.first + i));
+  const { first, index, position, playing, speed, loop, following } = playback;
+  return { first, index, position, playing, speed, loop, following, keys, gaps, times: [...playback.times] };
 }

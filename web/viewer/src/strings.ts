@@ -143,10 +143,12 @@ export const text = {
       reconstruct: 'server: reconstructs in',
       encode: 'server: encodes in',
       decodeTime: 'this page: decodes in',
+      drawTime: 'this page: draws in',
       clock: "server's clock ahead by",
       keptTime: 'the last',
       keptBytes: 'memory',
     },
+    drawn: (time: string, percent: number) => (percent === 100 ? time : `${time}, at ${percent} % of the screen's resolution`),
     keptOf: (now: string, most: string) => `${now} of at most ${most}`,
     serverDrops: (s: StreamStatus) =>
       `${s.drops_capture} capture, ${s.drops_reconstruct} reconstruct, ${s.drops_encode} encode, ${s.drops_publish} publish`,
@@ -234,7 +236,7 @@ export const text = {
     viewKeys: [
       ['Drag, or arrow keys', 'turn'],
       ['Right or two-finger drag, or Shift + arrows', 'move'],
-      ['Wheel, pinch, or + −', 'zoom'],
+      ['Wheel, pinch, +\u00a0−', 'zoom'],
       ['W A S D Q E', 'fly; Shift: faster'],
       ['Double-click', 'set the pivot'],
       ['R', 'reset the view'],

@@ -58,7 +58,7 @@ export class Ui {
     if (text !== null) setText(line, `${text}.`);
   }
 
-  showStreams(streams: ListedStream[], chosen: string | null, source: string, note: string): void {
+  showStreams(streams: readonly ListedStream[], chosen: string | null, source: string, note: string): void {
     const names = streams.map((s) => s.name);
     if (chosen !== null && !names.includes(chosen)) names.push(chosen);
     names.sort();

@@ -64,6 +64,6 @@ describe('RemoteFile', () => {
 
   it('is not opened where the server gives no parts', async () => {
     await expect(RemoteFile.open(url, async () => new Response('all of it', { status: 200 }))).rejects.toThrow('HTTP 200');
-    await expect(RemoteFile.open(url, async () => new Response('', { status: 404 }))).rejects.toThrow('HTTP 404');
+    await expect(RemoteFile.open(url, async () => new Response('', { status: 404 }))).rejects.toThrow('it is not there (HTTP 404)');
   });
 });

@@ -2,7 +2,7 @@
 // Goes with a person through a calibration: what to do, a button that takes a view, what became of each, the
 // result.
 import { button, chooser, make, setText, toggle } from '../dom';
-
+import { BoardField } from './boardField';
 import {
   calibrationNow,
   orderCalibration,
@@ -19,8 +19,6 @@ import { text } from './strings';
 const say = text.calibration;
 const kEveryMs = 1500;
 const kEveryWhileUnderWayMs = 250;
-const kBoardKey = 'relievo.board';
-const kUsualBoard = 'chessboard:9x7:25mm';
 
 export class CalibrationCard {
   private readonly next = make('p', { className: 'next', id: 'calibration-next' });
@@ -35,19 +33,13 @@ export class CalibrationCard {
     this.kind = kind;
     this.showKind();
   }).row;
-  private readonly board = make('input', {
-    id: 'calibration-board',
-    value: localStorage.getItem(kBoardKey) ?? kUsualBoard,
-    spellcheck: false,
-    autocomplete: 'off',
-  });
-  private readonly boardRow = make('label', { className: 'row' }, make('span', {}, say.board), this.board);
+  private readonly board = new BoardField();
   private readonly about = make('p', { className: 'quiet' });
   private readonly choice = make(
     'div',
     { className: 'controls' },
     this.kinds,
-    this.boardRow,
+    this.board.root,
     this.about,
     button(say.start, say.startTitle, () => void this.start()),
   );
@@ -105,7 +97,7 @@ export class CalibrationCard {
   }
 
   private showKind(): void {
-    this.boardRow.hidden = this.kind !== 'geometry';
+    this.board.root.hidden = this.kind !== 'geometry';
     setText(this.about, say.about[this.kind]);
   }
 
@@ -119,8 +111,7 @@ export class CalibrationCard {
   }
 
   private start(): Promise<void> {
-    localStorage.setItem(kBoardKey, this.board.value);
-    return this.answer(startCalibration(this.stream()!, this.kind, this.board.value.trim()));
+    return this.answer(startCalibration(this.stream()!, this.kind, this.board.value));
   }
 
   private order(action: Action): Promise<void> {

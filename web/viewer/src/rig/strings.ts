@@ -85,6 +85,12 @@ export const text = {
       geometry: 'With a chessboard or ChArUco board at 8 or more poses. Calibrate colours first.',
     },
     board: 'Board',
+    boards: { chessboard: 'Chessboard', charuco: 'ChArUco' },
+    boardSize: 'Its size',
+    boardParts: {
+      chessboard: 'Inner corners across and down, side of a square. All of it must be seen.',
+      charuco: 'Squares across and down, their side, side of a marker, and its dictionary where it is not 4X4_50. A part of it may be hidden.',
+    },
     start: 'Start',
     startTitle: 'The stream pauses meanwhile',
     actions: {
