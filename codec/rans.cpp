@@ -188,13 +188,11 @@ EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
   if (f < 2) {
     // x / 1 would need a reciprocal of 2^32: floor(x (2^32 - 1) / 2^32) is x - 1, and the bias mends it.
     e.reciprocal = ~0U;
-    e.long_reciprocal = ~std::uint64_t{0};
     e.bias = start + kScale - 1;
   } else {
     const int shift = std::bit_width(f - 1);
     e.reciprocal = static_cast<std::uint32_t>(((std::uint64_t{1} << (shift + 31)) + f - 1) / f);
     e.shift = static_cast<std::uint16_t>(shift - 1);
-    e.long_reciprocal = ~std::uint64_t{0} / f + 1;
     e.bias = start;
   }
   return e;
@@ -235,6 +233,7 @@ bool DecoderTable::set(const Levels& levels) {
 }
 
 void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts) {
+  if (codes.empty()) return;
   // In turns, since the same code often comes again before its count is written.
   constexpr std::size_t kTurns = 4;
   std::vector<std::uint32_t> turns(kTurns * counts.size());

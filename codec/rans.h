@@ -76,12 +76,11 @@ BinaryLevel read_binary_level(BitReader& in);
 /// Of the first symbol, of kScale; 0 where the alphabet is not used.
 std::uint16_t first_frequency(const BinaryLevel& level);
 
-/// One symbol as an encoder needs it; see put() and put_next() in rans_kernels.cpp.
+/// One symbol as an encoder needs it; see put() in rans_kernels.cpp.
 struct EncoderSymbol {
   std::uint32_t limit = 0;
   std::uint32_t reciprocal = 0, bias = 0;
   std::uint16_t complement = 0, shift = 0;
-  std::uint64_t long_reciprocal = 0;  // for a division without a shift
 };
 
 /// All tables of a stream, with alphabets of up to so many symbols. A symbol of a table is one number, its
