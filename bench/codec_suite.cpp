@@ -168,6 +168,7 @@ std::vector<Codec> codecs(const SourceInfo& source) {
   options.bound_px = 1;
   all.push_back(grid("visual-1px", source, options));
   for (const int bits : {8, 9, 10, 11}) all.push_back(draco(0, bits));  // as coarse as visual
+  all.push_back(draco(5, 11));                                          // at no smaller error than grid
   for (const int bits : {12, 0})
     for (const int speed : {0, 4, 5, 7, 9}) all.push_back(draco(speed, bits));
   return all;
