@@ -187,11 +187,19 @@ RELIEVO_AVX2 unsigned mask_of(__m256i lanes) {
 
 constexpr std::uint32_t kFirstOfSix = 0x41041U;  // of four cells' six bits each
 
-/// Of cells' six bits, whether all are there: the lowest one, from every sixth bit to every eighth.
+/// From every sixth bit to every eighth.
+std::uint32_t spread(std::uint32_t firsts_of_six) {
+  return firsts_of_six * 0x55U & 0x01010101U;
+}
+/// Of cells' six bits, whether all are there.
 std::uint32_t whole_cells(std::uint32_t bits) {
   bits &= bits >> 1;  // two
   const std::uint32_t four = bits & bits >> 2;
-  return (four & bits >> 4 & kFirstOfSix) * 0x55U & 0x01010101U;
+  return spread(four & bits >> 4 & kFirstOfSix);
+}
+
+RELIEVO_AVX2 std::uint32_t bits_of(const __m256i* lanes) {
+  return mask_of(lanes[0]) | mask_of(lanes[1]) << 8 | mask_of(lanes[2]) << 16;
 }
 
 std::uint32_t load4(const std::uint8_t* from) {
@@ -205,39 +213,41 @@ std::uint32_t load4(const std::uint8_t* from) {
   constexpr std::uint32_t kFourOnes = 0x01010101U;
   const __m256i u = _mm256_set1_epi32(static_cast<std::int32_t>(run.upper));
   const __m256i l = _mm256_set1_epi32(static_cast<std::int32_t>(run.lower));
-  // The corners of two triangles a cell: straight u l l+1 | l+1 u+1 u, turned l l+1 u+1 | u+1 u l. As both
-  // rings begin at another corner, a number is as one or the other has it, never as both.
-  __m256i straight[3] = {
+  // The corners of two triangles a cell: straight u l l+1 | l+1 u+1 u, turned l l+1 u+1 | u+1 u l.
+  const __m256i straight[3] = {
       _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b01110001), _mm256_setr_epi32(0, 0, 1, 1, 1, 0, 1, 1)),
       _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b00011100), _mm256_setr_epi32(2, 2, 2, 1, 2, 2, 3, 3)),
       _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b11000111), _mm256_setr_epi32(3, 2, 3, 3, 4, 4, 4, 3))};
-  __m256i turned[3] = {
+  const __m256i turned[3] = {
       _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b00011100), _mm256_setr_epi32(0, 1, 1, 1, 0, 0, 1, 2)),
       _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b11000111), _mm256_setr_epi32(2, 2, 1, 1, 2, 3, 3, 3)),
       _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b01110001), _mm256_setr_epi32(2, 2, 3, 4, 4, 4, 3, 3))};
-  const __m256i four = _mm256_set1_epi32(4);
-  const std::uint8_t *const right_of_upper = run.right + run.upper, *const right_of_lower =
-                                                                        run.right + run.lower;
+  const std::uint8_t* const right_of_upper = run.right + run.upper;
+  const std::uint8_t* const right_of_lower = run.right + run.lower;
+  __m256i before = _mm256_setzero_si256();  // cells
   std::size_t cells = 0;
   for (const std::size_t most = run.triangles.size() / 2; cells + 4 <= most; cells += 4) {
     const auto* from = reinterpret_cast<const __m256i*>(run.triangles.data() + 2 * cells);
-    std::uint32_t as_straight = 0, as_turned = 0;
+    __m256i as_straight[3], as_turned[3], as_one = _mm256_set1_epi32(-1);
     for (int part = 0; part < 3; ++part) {
-      const __m256i have = _mm256_loadu_si256(from + part);
-      as_straight |= mask_of(_mm256_cmpeq_epi32(have, straight[part])) << 8 * part;
-      as_turned |= mask_of(_mm256_cmpeq_epi32(have, turned[part])) << 8 * part;
-      straight[part] = _mm256_add_epi32(straight[part], four);
-      turned[part] = _mm256_add_epi32(turned[part], four);
+      const __m256i have = _mm256_sub_epi32(_mm256_loadu_si256(from + part), before);
+      as_straight[part] = _mm256_cmpeq_epi32(have, straight[part]);
+      as_turned[part] = _mm256_cmpeq_epi32(have, turned[part]);
+      as_one = _mm256_and_si256(as_one, _mm256_or_si256(as_straight[part], as_turned[part]));
     }
-    const std::uint32_t is_straight = whole_cells(as_straight);
+    before = _mm256_add_epi32(before, _mm256_set1_epi32(4));
+    const std::uint32_t bits = bits_of(as_straight), firsts = bits & kFirstOfSix;
     const std::uint32_t taken = load4(run.cell + cells);
-    const std::uint32_t fills = (is_straight | whole_cells(as_turned)) & load4(right_of_upper + cells) &
-                                load4(right_of_lower + cells) & ~((taken + 15 * kFourOnes) >> 4);
+    const std::uint32_t open = load4(right_of_upper + cells) & load4(right_of_lower + cells) &
+                               ~((taken + 15 * kFourOnes) >> 4) & kFourOnes;
     static_assert(grid_cell::kStraight == 2 * grid_cell::kTurned);
-    const std::uint32_t kinds = grid_cell::kTurned * (kFourOnes + is_straight);
-    if (fills != kFourOnes) {
+    const std::uint32_t kinds = grid_cell::kTurned * (kFourOnes + spread(firsts));
+    // Most likely all numbers are as one of the two has them, and those of a cell as the same one.
+    if (open != kFourOnes || bits != firsts * 63 || mask_of(as_one) != 0xffU) {
+      const std::uint32_t fills = (whole_cells(bits) | whole_cells(bits_of(as_turned))) & open;
       const int count = std::countr_zero(~fills & kFourOnes) / 8;
-      const std::uint32_t all = taken | (kinds & ((1U << 8 * count) - 1));
+      const auto those = static_cast<std::uint32_t>((std::uint64_t{1} << 8 * count) - 1);
+      const std::uint32_t all = taken | (kinds & those);
       std::memcpy(run.cell + cells, &all, sizeof all);
       return cells + static_cast<std::size_t>(count);
     }
