@@ -147,7 +147,7 @@ void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8
       put(kBlockTable + uniform, all ? 0 : 1);
       if (all) continue;
     }
-    const std::uint64_t contexts_of = place_contexts(here, above, key, b);
+    const std::uint64_t contexts_of = load8(here + b - 1) | place_contexts_around(above, key, b);
     static_assert(kPlaceTables * kControlSymbols <= 256);
     put_eight(0, contexts_of * kControlSymbols + load8(here + b));
     to_ += last - b - 8;

@@ -84,16 +84,10 @@ inline int uniform_places(const std::uint8_t* left, const std::uint8_t* above, c
                     (key == nullptr || load8(key + b) == all);
   return same ? v : -1;
 }
-inline int place_context(const std::uint8_t* here, const std::uint8_t* above, const std::uint8_t* key,
-                         int b) {
-  return here[b - 1] | above[b] << 1 | above[b + 1] << 2 | above[b - 1] << 3 |
-         (key != nullptr ? key[b] << 4 : 0);
-}
-
-/// The same of eight places, a byte each.
-inline std::uint64_t place_contexts(const std::uint8_t* here, const std::uint8_t* above,
-                                    const std::uint8_t* key, int b) {
-  return load8(here + b - 1) | load8(above + b) << 1 | load8(above + b + 1) << 2 | load8(above + b - 1) << 3 |
+/// A place's context is whether there is a vertex left of it and what the bits say that are around it else,
+/// of eight places a byte each.
+inline std::uint64_t place_contexts_around(const std::uint8_t* above, const std::uint8_t* key, int b) {
+  return load8(above + b) << 1 | load8(above + b + 1) << 2 | load8(above + b - 1) << 3 |
          (key != nullptr ? load8(key + b) << 4 : 0);
 }
 

@@ -294,35 +294,6 @@ Decoder::Decoder(std::span<const std::uint8_t> stream, int lanes) : lanes_(lanes
   if (ok_) words_ = stream.subspan(reader.position());
 }
 
-inline std::uint32_t Decoder::refill(std::uint32_t state) {
-  std::uint16_t word = 0;
-  if (words_.size() - at_ >= 2) {
-    std::memcpy(&word, words_.data() + at_, 2);
-    at_ += 2;
-  } else {
-    ok_ = false;
-  }
-  return state << 16 | word;
-}
-
-std::uint8_t Decoder::one(const DecoderTable& table) {
-  std::uint32_t& x = states_[0];
-  const std::uint32_t slot = table.slots[x & (kScale - 1)];
-  x = (slot >> 8 & 0xfffU) * (x >> kScaleBits) + (slot >> 20);
-  if (x < kLow) x = refill(x);
-  return static_cast<std::uint8_t>(slot);
-}
-
-bool Decoder::one(std::uint16_t first_frequency) {
-  std::uint32_t& x = states_[0];
-  const std::uint32_t slot = x & (kScale - 1);
-  const bool second = slot >= first_frequency;
-  const std::uint32_t f = second ? kScale - first_frequency : first_frequency;
-  x = f * (x >> kScaleBits) + slot - (second ? first_frequency : 0U);
-  if (x < kLow) x = refill(x);
-  return second;
-}
-
 void Decoder::row(std::span<const DecoderTable> tables, const std::uint8_t* table, std::size_t count,
                   std::uint8_t* symbols) {
   auto states = states_;
