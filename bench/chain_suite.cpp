@@ -12,6 +12,7 @@
 #include "base/time.h"
 #include "bench/chain_clients.h"
 #include "bench/frames.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
@@ -284,8 +285,7 @@ Command chain_suite() {
   return {"chain", "The whole chain at the camera's pace: rate, latency, processor, memory, drops",
           [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
-                ->capture_default_str();
+            add_source_option(app, options->source);
             app.add_option("--clients", options->clients, "DDS readers that decode")
                 ->check(CLI::Range(0, 64))
                 ->capture_default_str();
@@ -302,11 +302,9 @@ Command chain_suite() {
             app.add_option("--interface", options->domain.interface,
                            "Network interface, by name or address (default: the first that reaches others)")
                 ->type_name("NAME");
-            app.add_option("--threads", options->threads, "That reconstruct")
-                ->check(CLI::Range(1, 64))
-                ->capture_default_str();
+            add_threads_option(app, options->threads);
             add_decoder_option(app, options->decoder);
-            app.add_flag("--json", options->json, "Print JSON");
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

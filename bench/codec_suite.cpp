@@ -9,6 +9,7 @@
 #include "base/time.h"
 #include "bench/frames.h"
 #include "bench/grid_stages.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/surface_error.h"
@@ -24,8 +25,7 @@ namespace {
 
 struct Options {
   std::string source = "sim:object";
-  int frames = 20;
-  int rounds = 3;
+  Repeats repeats;
   std::vector<std::string> only;
   Decoder decoder = ReconstructOptions{}.decoder;
   bool json = false;
@@ -168,6 +168,7 @@ std::vector<Codec> codecs(const SourceInfo& source) {
   options.bound_px = 1;
   all.push_back(grid("visual-1px", source, options));
   for (const int bits : {8, 9, 10, 11}) all.push_back(draco(0, bits));  // as coarse as visual
+  all.push_back(draco(5, 11));                                          // at no smaller error than grid
   for (const int bits : {12, 0})
     for (const int speed : {0, 4, 5, 7, 9}) all.push_back(draco(speed, bits));
   return all;
@@ -218,7 +219,7 @@ Status measure(const Codec& codec, const Judge& by, const Job& job, Samples& sam
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.frames + 1, stop, {.truth = true});
+  const auto loop = FrameLoop::load(options.source, options.repeats.frames + 1, stop, {.truth = true});
   if (!loop) return loop.error();
   if (!*loop) return {};
   const auto frames = reconstruct_all(**loop, options.decoder, stop);
@@ -248,7 +249,7 @@ Status run(const Options& options, StopSignal& stop) {
   std::vector<Samples> samples(all.size());
   Samples warm_up;
   GridStages stages(source.rig, source.pattern);
-  for (int round = 0; round < options.rounds; ++round) {
+  for (int round = 0; round < options.repeats.rounds; ++round) {
     for (std::size_t c = 0; c < all.size(); ++c) {
       if (const Status done = measure(all[c], by, jobs.front(), warm_up); !done) return done;
       for (const Job& job : jobs) {
@@ -281,7 +282,7 @@ Status run(const Options& options, StopSignal& stop) {
   print({.suite = "codec",
          .settings = {{"source", options.source},
                       {"frames", static_cast<double>(jobs.size())},
-                      {"rounds", static_cast<double>(options.rounds)},
+                      {"rounds", static_cast<double>(options.repeats.rounds)},
                       {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")}},
          .figures = std::move(figures),
          .rows = std::move(rows),
@@ -303,17 +304,11 @@ Status run(const Options& options, StopSignal& stop) {
 Command codec_suite() {
   return {"codec", "Geometry codecs: bytes, time and error", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
-                ->capture_default_str();
-            app.add_option("--frames", options->frames, "Frames to code")
-                ->check(CLI::Range(1, 10000))
-                ->capture_default_str();
-            app.add_option("--rounds", options->rounds, "Times that each codec codes all of them")
-                ->check(CLI::Range(1, 1000))
-                ->capture_default_str();
+            add_source_option(app, options->source);
+            add_repeat_options(app, options->repeats);
             app.add_option("--only", options->only, "Only codecs whose names begin so; may be given often");
             add_decoder_option(app, options->decoder);
-            app.add_flag("--json", options->json, "Print JSON");
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

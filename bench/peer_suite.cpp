@@ -14,6 +14,7 @@
 
 #include "base/parallel.h"
 #include "base/time.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/still_scene.h"
 #include "bench/suites.h"
@@ -220,7 +221,7 @@ Command peer_suite() {
             app.add_option("--runs", options->runs, "Of each decoder; of stripes 20 times as many")
                 ->check(CLI::Range(1, 1000))
                 ->capture_default_str();
-            app.add_flag("--json", options->json, "Print JSON");
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

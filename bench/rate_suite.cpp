@@ -7,6 +7,7 @@
 
 #include "base/time.h"
 #include "bench/frames.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "codec/frame3d_codec.h"
@@ -21,8 +22,7 @@ namespace {
 struct Options {
   std::string source = "sim:walk";
   std::string geometry = "metric", texture = "h264";
-  int frames = 30;
-  int rounds = 3;
+  Repeats repeats{.frames = 30};
   bool json = false;
 };
 
@@ -71,7 +71,7 @@ double usual(std::vector<double> values) {
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.frames + 1, stop);
+  const auto loop = FrameLoop::load(options.source, options.repeats.frames + 1, stop);
   if (!loop) return loop.error();
   if (!*loop) return {};
   const auto frames = reconstruct_all(**loop, ReconstructOptions{}.decoder, stop);
@@ -81,7 +81,7 @@ Status run(const Options& options, StopSignal& stop) {
   // Round by round, so that whatever else the machine does meets all levels alike.
   const auto levels = rate_levels();
   std::vector<Samples> samples(levels.size());
-  for (int round = 0; round < options.rounds; ++round) {
+  for (int round = 0; round < options.repeats.rounds; ++round) {
     for (std::size_t l = 0; l < levels.size(); ++l) {
       if (stop.stopped()) return {};
       if (const Status done = measure(**loop, **frames, options_of(options, levels[l]), samples[l]); !done)
@@ -109,7 +109,7 @@ Status run(const Options& options, StopSignal& stop) {
                       {"geometry", options.geometry},
                       {"texture", options.texture},
                       {"frames", static_cast<double>((*frames)->size())},
-                      {"rounds", static_cast<double>(options.rounds)}},
+                      {"rounds", static_cast<double>(options.repeats.rounds)}},
          .figures = {{"frame_rate", rate}},
          .rows = std::move(rows),
          .notes = {"Reference: level 0. size, time: of that. PSNR: of the textures that decode alone."}},
@@ -122,8 +122,7 @@ Status run(const Options& options, StopSignal& stop) {
 Command rate_suite() {
   return {"rate", "Levels of the rate control: bytes, time and PSNR", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
-                ->capture_default_str();
+            add_source_option(app, options->source);
             app.add_option("--geometry", options->geometry, "As of serve")
                 ->check([](const std::string& name) {
                   EncodeOptions unused;
@@ -135,13 +134,8 @@ Command rate_suite() {
                   return texture_codec_named(name) ? "" : "give " + texture_codec_names();
                 })
                 ->capture_default_str();
-            app.add_option("--frames", options->frames, "Frames to code")
-                ->check(CLI::Range(2, 10000))
-                ->capture_default_str();
-            app.add_option("--rounds", options->rounds, "Times that each level codes all of them")
-                ->check(CLI::Range(1, 1000))
-                ->capture_default_str();
-            app.add_flag("--json", options->json, "Print JSON");
+            add_repeat_options(app, options->repeats, 2);
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

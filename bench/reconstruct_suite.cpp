@@ -6,6 +6,7 @@
 #include "base/time.h"
 #include "bench/frames.h"
 #include "bench/memory.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
@@ -127,18 +128,15 @@ Status run(const Options& options, StopSignal& stop) {
 Command reconstruct_suite() {
   return {"reconstruct", "Camera frames to surfaces: ms a frame and a stage", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
-                ->capture_default_str();
+            add_source_option(app, options->source);
             add_size_option(app, "--size", options->size, "Of the simulated camera (default 640x480)");
             app.add_option("--stripes", options->stripes, "Of the simulated projector (default 90)")
                 ->check(CLI::Range(2, 8192));
-            app.add_option("--threads", options->threads, "That reconstruct")
-                ->check(CLI::Range(1, 64))
-                ->capture_default_str();
+            add_threads_option(app, options->threads);
             app.add_option("--frames", options->frames, "Timed frames (default 100 and 3 s at least)")
                 ->check(CLI::PositiveNumber);
             add_decoder_option(app, options->decoder);
-            app.add_flag("--json", options->json, "Print JSON");
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

@@ -10,6 +10,7 @@
 
 #include "base/time.h"
 #include "bench/frames.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "cli/checks.h"
@@ -180,8 +181,7 @@ Status run(const Options& options, StopSignal& stop) {
 Command recording_suite() {
   return {"recording", "Seeking in a long recording", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
-                ->capture_default_str();
+            add_source_option(app, options->source);
             app.add_option("--minutes", options->minutes, "Length of the recording at 30 frames a second")
                 ->check(number(0.1, 600))
                 ->capture_default_str();
@@ -194,7 +194,7 @@ Command recording_suite() {
             app.add_option("--dir", options->folder,
                            "Where the file is written (default: the temporary folder)")
                 ->type_name("DIR");
-            app.add_flag("--json", options->json, "Print JSON");
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

@@ -6,6 +6,7 @@
 
 #include "base/time.h"
 #include "bench/frames.h"
+#include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "codec/texture_codec.h"
@@ -15,8 +16,7 @@ namespace {
 
 struct Options {
   std::string source = "sim:face";
-  int frames = 20;
-  int rounds = 3;
+  Repeats repeats;
   bool json = false;
 };
 
@@ -95,7 +95,7 @@ class Stream {
 };
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.frames + 1, stop);
+  const auto loop = FrameLoop::load(options.source, options.repeats.frames + 1, stop);
   if (!loop) return loop.error();
   if (!*loop) return {};
   const auto frames = reconstruct_all(**loop, ReconstructOptions{}.decoder, stop);
@@ -105,7 +105,7 @@ Status run(const Options& options, StopSignal& stop) {
   // Round by round, so that whatever else the machine does meets all codecs alike.
   const std::vector<Codec> all = codecs();
   std::vector<Samples> samples(all.size());
-  for (int round = 0; round < options.rounds; ++round) {
+  for (int round = 0; round < options.repeats.rounds; ++round) {
     for (std::size_t c = 0; c < all.size(); ++c) {
       Samples warm_up;
       if (const Status done = Stream(all[c]).add((*frames)->front().texture, warm_up); !done) return done;
@@ -137,7 +137,7 @@ Status run(const Options& options, StopSignal& stop) {
   print({.suite = "texture",
          .settings = {{"source", options.source},
                       {"frames", static_cast<double>((*frames)->size())},
-                      {"rounds", static_cast<double>(options.rounds)},
+                      {"rounds", static_cast<double>(options.repeats.rounds)},
                       {"width", static_cast<double>(picture.width())},
                       {"height", static_cast<double>(picture.height())}},
          .figures = {{"raw_bytes", static_cast<double>(picture.size())}},
@@ -154,15 +154,9 @@ Status run(const Options& options, StopSignal& stop) {
 Command texture_suite() {
   return {"texture", "Texture codecs: bytes, time and PSNR", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
-            app.add_option("--source", options->source, "sim:SCENE[,KEY=VALUE...] or take:DIR")
-                ->capture_default_str();
-            app.add_option("--frames", options->frames, "Pictures to code")
-                ->check(CLI::Range(1, 10000))
-                ->capture_default_str();
-            app.add_option("--rounds", options->rounds, "Times that each codec codes all of them")
-                ->check(CLI::Range(1, 1000))
-                ->capture_default_str();
-            app.add_flag("--json", options->json, "Print JSON");
+            add_source_option(app, options->source);
+            add_repeat_options(app, options->repeats);
+            add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

@@ -257,8 +257,8 @@ Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& op
                                    const std::function<void()>& geometry_done) {
   State& s = *state_;
   if (auto status = check_frame(frame, options); !status) return status.error();
-  // Triangles are checked by those who read them: to_grid() and encode_draco().
-  if (auto status = check_vertices(frame.surface); !status) return status.error();
+  // What goes is checked by those who read it: to_grid() and encode_draco().
+  if (auto status = check_counts(frame.surface); !status) return status.error();
   const bool asked = s.key_asked.exchange(false);
   const bool other_texture = s.texture_codec != options.texture;
   if (other_texture) s.texture = make_texture_encoder(options.texture);

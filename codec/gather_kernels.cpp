@@ -46,8 +46,15 @@ Gathered vertices_portable(const GatherVertices& job) {
   return done;
 }
 
-bool is_any_far_portable(std::span<const Vec3f> positions, float farthest_m) {
-  return !std::ranges::all_of(positions, [farthest_m](const Vec3f& p) { return p[2] < farthest_m; });
+constexpr std::uint32_t kExponent = 0x7f800000U;  // of a number; all of it where the number is not finite
+
+Reach reach_portable(std::span<const Vec3f> positions, float farthest_m) {
+  bool finite = true, near = true;
+  for (const Vec3f& p : positions) {
+    for (const float x : p) finite &= (std::bit_cast<std::uint32_t>(x) & kExponent) != kExponent;
+    near &= p[2] < farthest_m;
+  }
+  return !finite ? Reach::kNotFinite : near ? Reach::kNear : Reach::kFar;
 }
 
 /// Two numbers of vertices side by side, as they lie in memory.
@@ -153,71 +160,98 @@ RELIEVO_AVX2 unsigned mask_of(__m256i lanes) {
   return done;
 }
 
-[[gnu::target("avx2")]] bool is_any_far_avx2(std::span<const Vec3f> positions, float farthest_m) {
+[[gnu::target("avx2")]] Reach reach_avx2(std::span<const Vec3f> positions, float farthest_m) {
   constexpr float kAny = std::numeric_limits<float>::infinity();
   const float f = farthest_m;
-  // Eight positions: of x and y nothing is asked.
+  // Eight positions: of x and y nothing is asked but that they are finite.
   const __m256 limits[3] = {_mm256_setr_ps(kAny, kAny, f, kAny, kAny, f, kAny, kAny),
                             _mm256_setr_ps(f, kAny, kAny, f, kAny, kAny, f, kAny),
                             _mm256_setr_ps(kAny, f, kAny, kAny, f, kAny, kAny, f)};
+  const __m256i exponent = _mm256_set1_epi32(static_cast<std::int32_t>(kExponent));
   __m256 far = _mm256_setzero_ps();
+  __m256i endless = _mm256_setzero_si256();
   std::size_t i = 0;
   for (; i + 8 <= positions.size(); i += 8) {
     const float* from = positions[i].data();
-    for (int part = 0; part < 3; ++part)
-      far = _mm256_or_ps(far, _mm256_cmp_ps(_mm256_loadu_ps(from + 8 * part), limits[part], _CMP_NLT_UQ));
+    for (int part = 0; part < 3; ++part) {
+      const __m256 numbers = _mm256_loadu_ps(from + 8 * part);
+      far = _mm256_or_ps(far, _mm256_cmp_ps(numbers, limits[part], _CMP_NLT_UQ));
+      const __m256i bits = _mm256_and_si256(_mm256_castps_si256(numbers), exponent);
+      endless = _mm256_or_si256(endless, _mm256_cmpeq_epi32(bits, exponent));
+    }
   }
-  return _mm256_movemask_ps(far) != 0 || is_any_far_portable(positions.subspan(i), farthest_m);
+  const Reach rest = reach_portable(positions.subspan(i), farthest_m);
+  if (mask_of(endless) != 0 || rest == Reach::kNotFinite) return Reach::kNotFinite;
+  return _mm256_movemask_ps(far) != 0 ? Reach::kFar : rest;
 }
 
-/// Of 24 numbers, six a cell, which are as expected: one bit a cell, the lowest of its six.
-RELIEVO_AVX2 std::uint32_t cells_like(const __m256i* have, const __m256i* expected) {
-  std::uint32_t same = 0;
-  for (int part = 0; part < 3; ++part)
-    same |= mask_of(_mm256_cmpeq_epi32(have[part], expected[part])) << 8 * part;
-  same &= same >> 1;  // two
-  const std::uint32_t four = same & same >> 2;
-  return four & same >> 4 & 0x41041U;
+constexpr std::uint32_t kFirstOfSix = 0x41041U;  // of four cells' six bits each
+
+/// From every sixth bit to every eighth.
+std::uint32_t spread(std::uint32_t firsts_of_six) {
+  return firsts_of_six * 0x55U & 0x01010101U;
+}
+/// Of cells' six bits, whether all are there.
+std::uint32_t whole_cells(std::uint32_t bits) {
+  bits &= bits >> 1;  // two
+  const std::uint32_t four = bits & bits >> 2;
+  return spread(four & bits >> 4 & kFirstOfSix);
+}
+
+RELIEVO_AVX2 std::uint32_t bits_of(const __m256i* lanes) {
+  return mask_of(lanes[0]) | mask_of(lanes[1]) << 8 | mask_of(lanes[2]) << 16;
+}
+
+std::uint32_t load4(const std::uint8_t* from) {
+  std::uint32_t four;
+  std::memcpy(&four, from, sizeof four);
+  return four;
 }
 
 /// Four cells at a time.
 [[gnu::target("avx2")]] std::size_t fill_run_avx2(const FilledRun& run) {
   constexpr std::uint32_t kFourOnes = 0x01010101U;
-  constexpr std::uint32_t kFirstBits = 0x41041U;
-  const auto load4 = [](const std::uint8_t* from) {
-    std::uint32_t four;
-    std::memcpy(&four, from, sizeof four);
-    return four;
-  };
-  const auto u = static_cast<std::int32_t>(run.upper), l = static_cast<std::int32_t>(run.lower);
+  const __m256i u = _mm256_set1_epi32(static_cast<std::int32_t>(run.upper));
+  const __m256i l = _mm256_set1_epi32(static_cast<std::int32_t>(run.lower));
   // The corners of two triangles a cell: straight u l l+1 | l+1 u+1 u, turned l l+1 u+1 | u+1 u l.
-  __m256i straight[3] = {_mm256_setr_epi32(u, l, l + 1, l + 1, u + 1, u, u + 1, l + 1),
-                         _mm256_setr_epi32(l + 2, l + 2, u + 2, u + 1, u + 2, l + 2, l + 3, l + 3),
-                         _mm256_setr_epi32(u + 3, u + 2, u + 3, l + 3, l + 4, l + 4, u + 4, u + 3)};
-  __m256i turned[3] = {_mm256_setr_epi32(l, l + 1, u + 1, u + 1, u, l, l + 1, l + 2),
-                       _mm256_setr_epi32(u + 2, u + 2, u + 1, l + 1, l + 2, l + 3, u + 3, u + 3),
-                       _mm256_setr_epi32(u + 2, l + 2, l + 3, l + 4, u + 4, u + 4, u + 3, l + 3)};
-  const __m256i four = _mm256_set1_epi32(4);
+  const __m256i straight[3] = {
+      _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b01110001), _mm256_setr_epi32(0, 0, 1, 1, 1, 0, 1, 1)),
+      _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b00011100), _mm256_setr_epi32(2, 2, 2, 1, 2, 2, 3, 3)),
+      _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b11000111), _mm256_setr_epi32(3, 2, 3, 3, 4, 4, 4, 3))};
+  const __m256i turned[3] = {
+      _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b00011100), _mm256_setr_epi32(0, 1, 1, 1, 0, 0, 1, 2)),
+      _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b11000111), _mm256_setr_epi32(2, 2, 1, 1, 2, 3, 3, 3)),
+      _mm256_add_epi32(_mm256_blend_epi32(l, u, 0b01110001), _mm256_setr_epi32(2, 2, 3, 4, 4, 4, 3, 3))};
+  const std::uint8_t* const right_of_upper = run.right + run.upper;
+  const std::uint8_t* const right_of_lower = run.right + run.lower;
+  __m256i before = _mm256_setzero_si256();  // cells
   std::size_t cells = 0;
-  for (; 2 * cells + 8 <= run.triangles.size(); cells += 4) {
-    if (load4(run.right + run.upper + cells) != kFourOnes ||
-        load4(run.right + run.lower + cells) != kFourOnes || load4(run.cell + cells) != 0)
-      break;
+  for (const std::size_t most = run.triangles.size() / 2; cells + 4 <= most; cells += 4) {
     const auto* from = reinterpret_cast<const __m256i*>(run.triangles.data() + 2 * cells);
-    const __m256i have[3] = {_mm256_loadu_si256(from), _mm256_loadu_si256(from + 1),
-                             _mm256_loadu_si256(from + 2)};
-    const std::uint32_t is_straight = cells_like(have, straight);
-    if ((is_straight | cells_like(have, turned)) != kFirstBits) break;
-    // From every sixth bit to every eighth.
-    const std::uint32_t spread = (is_straight & 1U) | (is_straight & 0x40U) << 2 |
-                                 (is_straight & 0x1000U) << 4 | (is_straight & 0x40000U) << 6;
-    static_assert(grid_cell::kStraight == 2 * grid_cell::kTurned);
-    const std::uint32_t kinds = grid_cell::kTurned * (kFourOnes + spread);
-    std::memcpy(run.cell + cells, &kinds, sizeof kinds);
+    __m256i as_straight[3], as_turned[3], as_one = _mm256_set1_epi32(-1);
     for (int part = 0; part < 3; ++part) {
-      straight[part] = _mm256_add_epi32(straight[part], four);
-      turned[part] = _mm256_add_epi32(turned[part], four);
+      const __m256i have = _mm256_sub_epi32(_mm256_loadu_si256(from + part), before);
+      as_straight[part] = _mm256_cmpeq_epi32(have, straight[part]);
+      as_turned[part] = _mm256_cmpeq_epi32(have, turned[part]);
+      as_one = _mm256_and_si256(as_one, _mm256_or_si256(as_straight[part], as_turned[part]));
     }
+    before = _mm256_add_epi32(before, _mm256_set1_epi32(4));
+    const std::uint32_t bits = bits_of(as_straight), firsts = bits & kFirstOfSix;
+    const std::uint32_t taken = load4(run.cell + cells);
+    const std::uint32_t open = load4(right_of_upper + cells) & load4(right_of_lower + cells) &
+                               ~((taken + 15 * kFourOnes) >> 4) & kFourOnes;
+    static_assert(grid_cell::kStraight == 2 * grid_cell::kTurned);
+    const std::uint32_t kinds = grid_cell::kTurned * (kFourOnes + spread(firsts));
+    // Most likely all numbers are as one of the two has them, and those of a cell as the same one.
+    if (open != kFourOnes || bits != firsts * 63 || mask_of(as_one) != 0xffU) {
+      const std::uint32_t fills = (whole_cells(bits) | whole_cells(bits_of(as_turned))) & open;
+      const int count = std::countr_zero(~fills & kFourOnes) / 8;
+      const auto those = static_cast<std::uint32_t>((std::uint64_t{1} << 8 * count) - 1);
+      const std::uint32_t all = taken | (kinds & those);
+      std::memcpy(run.cell + cells, &all, sizeof all);
+      return cells + static_cast<std::size_t>(count);
+    }
+    std::memcpy(run.cell + cells, &kinds, sizeof kinds);
   }
   const auto done = static_cast<std::uint32_t>(cells);
   return cells + fill_run_portable({run.triangles.subspan(2 * cells), run.right, run.upper + done,
@@ -226,14 +260,14 @@ RELIEVO_AVX2 std::uint32_t cells_like(const __m256i* have, const __m256i* expect
 
 #endif
 
-constexpr GatherKernels kPortable{"portable", vertices_portable, is_any_far_portable, fill_run_portable};
+constexpr GatherKernels kPortable{"portable", vertices_portable, reach_portable, fill_run_portable};
 
 }  // namespace
 
 const std::vector<GatherKernels>& all_gather_kernels() {
 #if defined(__x86_64__)
   static const auto kernels =
-      variants(kPortable, GatherKernels{"avx2", vertices_avx2, is_any_far_avx2, fill_run_avx2});
+      variants(kPortable, GatherKernels{"avx2", vertices_avx2, reach_avx2, fill_run_avx2});
 #else
   static const auto kernels = variants(kPortable);
 #endif

@@ -25,6 +25,9 @@ inline std::uint32_t place_key(const GridPoint& at) {
 }
 constexpr std::uint32_t kRightKey = 1, kBelowKey = 1U << 16;  // from a place's key to its neighbours'
 
+/// Of vertices' positions.
+enum class Reach { kNear, kFar, kNotFinite };
+
 enum class Gathered { kAll, kOutside, kTwice };
 
 /// Vertices on their way to a grid.
@@ -50,8 +53,8 @@ struct GatherKernels {
   /// Columns of all vertices, to the nearest step, and `right`. Stops at the first vertex that is outside or
   /// at a place that is taken.
   Gathered (*vertices)(const GatherVertices& job);
-  /// Whether a vertex is not nearer than that; of no meaning where a position is not finite.
-  bool (*is_any_far)(std::span<const Vec3f> positions, float farthest_m);
+  /// Whether a vertex is not nearer than that.
+  Reach (*reach)(std::span<const Vec3f> positions, float farthest_m);
   /// How many filled cells there are, which are told their diagonal.
   std::size_t (*fill_run)(const FilledRun& run);
 };

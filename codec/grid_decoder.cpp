@@ -112,7 +112,8 @@ struct GridDecoder::Scratch {
 };
 
 void GridDecoder::Scratch::read_places(const Input& in, int line, const std::uint8_t* above,
-                                       std::uint8_t* here, rans::Decoder& control) {
+                                       std::uint8_t* here, rans::Decoder& shared) {
+  rans::Decoder control = shared;
   const std::uint8_t* key = nullptr;
   const int boundaries = in.grid.boundaries;
   if (in.key != nullptr) {
@@ -129,13 +130,20 @@ void GridDecoder::Scratch::read_places(const Input& in, int line, const std::uin
         continue;
       }
     }
-    for (int i = b; i < last; ++i)
-      here[i] = control.one(in.tables.first[static_cast<std::size_t>(place_context(here, above, key, i))]);
+    std::uint64_t around = place_contexts_around(above, key, b);
+    std::uint64_t eight = 0, left = here[b - 1];
+    for (int i = 0; i < last - b; ++i, around >>= 8) {
+      left = control.one(in.tables.first[around % 256 | left]) ? 1 : 0;
+      eight |= left << 8 * i;
+    }
+    std::memcpy(here + b, &eight, sizeof eight);
   }
+  shared = control;
 }
 
 bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint8_t* above,
-                                      rans::Decoder& control) {
+                                      rans::Decoder& shared) {
+  rans::Decoder control = shared;
   const std::uint8_t* below = above + in.grid.stride();
   std::uint8_t* cells = in.grid.cells.data() + in.grid.at(line, 0);
   const std::uint8_t* good_above = good[0].data() + StripeGrid::kMargin;
@@ -171,6 +179,7 @@ bool GridDecoder::Scratch::read_cells(const Input& in, int line, const std::uint
     }
   }
   std::swap(good[0], good[1]);
+  shared = control;
   return true;
 }
 

@@ -60,6 +60,28 @@ struct GridEncoder::Slice {
 
  private:
   void put(int table, int symbol) { *to_++ = rans::code_of(table, symbol, kControlSymbols); }
+  /// Eight, by their codes from a table's first one on, a byte each.
+  void put_eight(int table, std::uint64_t codes) {
+    using Octets = std::uint8_t __attribute__((vector_size(8)));
+    using Codes = std::uint16_t __attribute__((vector_size(16)));
+    Octets octets;
+    std::memcpy(&octets, &codes, sizeof octets);
+    const Codes all = __builtin_convertvector(octets, Codes) + rans::code_of(table, 0, kControlSymbols);
+    std::memcpy(to_, &all, sizeof all);
+    to_ += 8;
+  }
+  /// Those of them that `put` has a 1 for.
+  void put_some(int table, std::uint64_t codes, std::uint64_t put) {
+    if (put == kOnes) {
+      put_eight(table, codes);
+      return;
+    }
+    const std::uint16_t first = rans::code_of(table, 0, kControlSymbols);
+    for (int i = 0; i < 8; ++i) {
+      *to_ = static_cast<std::uint16_t>(first + (codes >> 8 * i & 255));
+      to_ += put >> 8 * i & 1;
+    }
+  }
   void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
   void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
   void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
@@ -125,11 +147,10 @@ void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8
       put(kBlockTable + uniform, all ? 0 : 1);
       if (all) continue;
     }
-    const std::uint64_t contexts_of = place_contexts(here, above, key, b);
+    const std::uint64_t contexts_of = load8(here + b - 1) | place_contexts_around(above, key, b);
     static_assert(kPlaceTables * kControlSymbols <= 256);
-    const std::uint64_t codes = contexts_of * kControlSymbols + load8(here + b);  // of tables from 0 on
-    for (int i = 0; i < 8; ++i) to_[i] = static_cast<std::uint8_t>(codes >> 8 * i);
-    to_ += last - b;
+    put_eight(0, contexts_of * kControlSymbols + load8(here + b));
+    to_ += last - b - 8;
   }
 }
 
@@ -154,18 +175,12 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
         continue;
       }
     }
-    std::uint8_t left = good_here[b - 1];
-    for (int i = b; i < last; ++i) {
-      const int corners = kCornerCounts[corners_there(above, below, i)];
-      if (corners < 3) {
-        good_here[i] = left = 0;
-        continue;
-      }
-      const int symbol = cell_symbol(cells[i], corners);
-      triangles += triangles_of(symbol, corners);
-      put(kCellTable + (corners == 4 ? 4 : 0) + 2 * left + good_above[i], symbol);
-      good_here[i] = left = symbol == 0;
-    }
+    const std::uint64_t asked = last - b == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * (last - b)) - 1;
+    const EightCells eight =
+        eight_cells(cells + b, above + b, below + b, asked, load8(good_above + b), good_here[b - 1]);
+    triangles += eight.triangles;
+    std::memcpy(good_here + b, &eight.good, sizeof eight.good);
+    put_some(kCellTable, eight.codes, eight.coded);
   }
   std::swap(good[0], good[1]);
 }
@@ -211,10 +226,12 @@ void GridEncoder::Slice::read_columns(const Input& in, int line) {
       to += 8;
       continue;
     }
+    const bool some_alone = (load8(kinds.data() + b) & kByItself * kOnes) != 0;
     for (int i = b; i < b + 8; ++i) {  // behind the last boundary there are no vertices
       const auto at = static_cast<std::size_t>(i);
-      if (kinds[at] == kDone) *to++ = line_codes[at];
-      if (kinds[at] == kByItself) read_alone(in, line, rows, i, to);
+      *to = line_codes[at];
+      to += kinds[at] == kDone ? 1 : 0;
+      if (some_alone && kinds[at] == kByItself) read_alone(in, line, rows, i, to);
     }
   }
   const auto count = static_cast<std::size_t>(to - residuals.codes.data());

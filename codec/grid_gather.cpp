@@ -115,7 +115,9 @@ Status Gather::vertices() {
       break;
   }
   out_.vertices = static_cast<std::uint32_t>(surface_.grid.size());
-  far_ = kernels.is_any_far(surface_.positions, farthest_m_);
+  const Reach reach = kernels.reach(surface_.positions, farthest_m_);
+  if (reach == Reach::kNotFinite) return Error{"surface has a position that is not finite"};
+  far_ = reach == Reach::kFar;
   return {};
 }
 

@@ -84,16 +84,10 @@ inline int uniform_places(const std::uint8_t* left, const std::uint8_t* above, c
                     (key == nullptr || load8(key + b) == all);
   return same ? v : -1;
 }
-inline int place_context(const std::uint8_t* here, const std::uint8_t* above, const std::uint8_t* key,
-                         int b) {
-  return here[b - 1] | above[b] << 1 | above[b + 1] << 2 | above[b - 1] << 3 |
-         (key != nullptr ? key[b] << 4 : 0);
-}
-
-/// The same of eight places, a byte each.
-inline std::uint64_t place_contexts(const std::uint8_t* here, const std::uint8_t* above,
-                                    const std::uint8_t* key, int b) {
-  return load8(here + b - 1) | load8(above + b) << 1 | load8(above + b + 1) << 2 | load8(above + b - 1) << 3 |
+/// A place's context is whether there is a vertex left of it and what the bits say that are around it else,
+/// of eight places a byte each.
+inline std::uint64_t place_contexts_around(const std::uint8_t* above, const std::uint8_t* key, int b) {
+  return load8(above + b) << 1 | load8(above + b + 1) << 2 | load8(above + b - 1) << 3 |
          (key != nullptr ? load8(key + b) << 4 : 0);
 }
 
@@ -151,6 +145,35 @@ inline int cell_symbol(std::uint8_t cell, int corners) {
 inline std::uint32_t triangles_of(int symbol, int corners) {
   return symbol == 1 ? 0U : symbol == 0 && corners == 4 ? 2U : 1U;
 }
+/// cell_symbol() of eight cells at once, a byte each; cells are good that hold as many triangles as there can
+/// be. `asked`: 255 for each, 0 behind a line's end. `left`: whether the one before the first is good.
+struct EightCells {
+  std::uint64_t coded;  // which have three corners or four; all others say nothing here
+  std::uint64_t good;
+  std::uint64_t codes;  // of symbols, see rans::code_of(), from kCellTable's first one on
+  std::uint32_t triangles;
+};
+inline EightCells eight_cells(const std::uint8_t* cells, const std::uint8_t* above, const std::uint8_t* below,
+                              std::uint64_t asked, std::uint64_t good_above, std::uint8_t left) {
+  constexpr std::uint64_t kMany = 15 * kOnes;
+  const std::uint64_t corners = load8(above) + load8(above + 1) + load8(below) + load8(below + 1);
+  const std::uint64_t four = corners >> 2 & kOnes;
+  const std::uint64_t coded = (corners + kOnes) >> 2 & kOnes & asked;
+  const std::uint64_t cell = load8(cells);
+  const std::uint64_t any = (cell + kMany) >> 4 & coded;
+  static_assert(grid_cell::kStraight == 0b1010 && grid_cell::kTurned == 0b0101);
+  const std::uint64_t opposite = cell & cell >> 2;
+  const std::uint64_t one = any & four & ~(opposite | opposite >> 1);
+  const std::uint64_t which =
+      ((cell >> 1 | cell >> 3) & kOnes) + ((cell >> 2 | cell >> 3) & kOnes) * 2;  // of one's corners
+  const std::uint64_t symbols = (coded ^ any) | (one * 0xff & (2 * kOnes + which));
+  const std::uint64_t good = any ^ one;
+  const std::uint64_t tables = 4 * four + 2 * (good << 8 | left) + good_above;
+  static_assert(kCellTables * kControlSymbols <= 256);
+  return {coded, good, tables * kControlSymbols + symbols,
+          static_cast<std::uint32_t>((any + (good & four)) * kOnes >> 56)};
+}
+
 /// The reverse; `lack`: the corner that is not there, where there are three.
 inline std::uint8_t cell_of(int symbol, int corners, int lack) {
   if (symbol == 1) return 0;

@@ -188,13 +188,11 @@ EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
   if (f < 2) {
     // x / 1 would need a reciprocal of 2^32: floor(x (2^32 - 1) / 2^32) is x - 1, and the bias mends it.
     e.reciprocal = ~0U;
-    e.long_reciprocal = ~std::uint64_t{0};
     e.bias = start + kScale - 1;
   } else {
     const int shift = std::bit_width(f - 1);
     e.reciprocal = static_cast<std::uint32_t>(((std::uint64_t{1} << (shift + 31)) + f - 1) / f);
     e.shift = static_cast<std::uint16_t>(shift - 1);
-    e.long_reciprocal = ~std::uint64_t{0} / f + 1;
     e.bias = start;
   }
   return e;
@@ -235,6 +233,7 @@ bool DecoderTable::set(const Levels& levels) {
 }
 
 void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts) {
+  if (codes.empty()) return;
   // In turns, since the same code often comes again before its count is written.
   constexpr std::size_t kTurns = 4;
   std::vector<std::uint32_t> turns(kTurns * counts.size());
@@ -293,35 +292,6 @@ Decoder::Decoder(std::span<const std::uint8_t> stream, int lanes) : lanes_(lanes
     states_[static_cast<std::size_t>(lane)] = reader.read<std::uint32_t>();
   ok_ = reader.ok();
   if (ok_) words_ = stream.subspan(reader.position());
-}
-
-inline std::uint32_t Decoder::refill(std::uint32_t state) {
-  std::uint16_t word = 0;
-  if (words_.size() - at_ >= 2) {
-    std::memcpy(&word, words_.data() + at_, 2);
-    at_ += 2;
-  } else {
-    ok_ = false;
-  }
-  return state << 16 | word;
-}
-
-std::uint8_t Decoder::one(const DecoderTable& table) {
-  std::uint32_t& x = states_[0];
-  const std::uint32_t slot = table.slots[x & (kScale - 1)];
-  x = (slot >> 8 & 0xfffU) * (x >> kScaleBits) + (slot >> 20);
-  if (x < kLow) x = refill(x);
-  return static_cast<std::uint8_t>(slot);
-}
-
-bool Decoder::one(std::uint16_t first_frequency) {
-  std::uint32_t& x = states_[0];
-  const std::uint32_t slot = x & (kScale - 1);
-  const bool second = slot >= first_frequency;
-  const std::uint32_t f = second ? kScale - first_frequency : first_frequency;
-  x = f * (x >> kScaleBits) + slot - (second ? first_frequency : 0U);
-  if (x < kLow) x = refill(x);
-  return second;
 }
 
 void Decoder::row(std::span<const DecoderTable> tables, const std::uint8_t* table, std::size_t count,

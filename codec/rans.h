@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -76,12 +77,11 @@ BinaryLevel read_binary_level(BitReader& in);
 /// Of the first symbol, of kScale; 0 where the alphabet is not used.
 std::uint16_t first_frequency(const BinaryLevel& level);
 
-/// One symbol as an encoder needs it; see put() and put_next() in rans_kernels.cpp.
+/// One symbol as an encoder needs it; see put() in rans_kernels.cpp.
 struct EncoderSymbol {
   std::uint32_t limit = 0;
   std::uint32_t reciprocal = 0, bias = 0;
   std::uint16_t complement = 0, shift = 0;
-  std::uint64_t long_reciprocal = 0;  // for a division without a shift
 };
 
 /// All tables of a stream, with alphabets of up to so many symbols. A symbol of a table is one number, its
@@ -152,15 +152,39 @@ class Decoder {
   /// One row of `count` symbols.
   void row(std::span<const DecoderTable> tables, const std::uint8_t* table, std::size_t count,
            std::uint8_t* symbols);
-  /// The next symbol of a stream with one lane.
-  std::uint8_t one(const DecoderTable& table);
+  /// The next symbol of a stream with one lane. Inline, as is the next one, so that whoever reads many from a
+  /// copy of the decoder keeps its state in registers: each symbol waits for the one before.
+  std::uint8_t one(const DecoderTable& table) {
+    std::uint32_t& x = states_[0];
+    const std::uint32_t slot = table.slots[x & (kScale - 1)];
+    x = (slot >> 8 & 0xfffU) * (x >> kScaleBits) + (slot >> 20);
+    if (x < kLow) x = refill(x);
+    return static_cast<std::uint8_t>(slot);
+  }
   /// The same of an alphabet of two.
-  bool one(std::uint16_t first_frequency);
+  bool one(std::uint16_t first_frequency) {
+    std::uint32_t& x = states_[0];
+    const std::uint32_t slot = x & (kScale - 1);
+    const bool second = slot >= first_frequency;
+    const std::uint32_t f = second ? kScale - first_frequency : first_frequency;
+    x = f * (x >> kScaleBits) + slot - (second ? first_frequency : 0U);
+    if (x < kLow) x = refill(x);
+    return second;
+  }
   /// All was read, and read rightly: the states are back where the encoder began.
   bool finished() const;
 
  private:
-  std::uint32_t refill(std::uint32_t state);
+  std::uint32_t refill(std::uint32_t state) {
+    std::uint16_t word = 0;
+    if (words_.size() - at_ >= 2) {
+      std::memcpy(&word, words_.data() + at_, 2);
+      at_ += 2;
+    } else {
+      ok_ = false;
+    }
+    return state << 16 | word;
+  }
   std::span<const std::uint8_t> words_;
   std::size_t at_ = 0;
   bool ok_ = true;

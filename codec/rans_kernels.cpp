@@ -27,27 +27,64 @@ RELIEVO_INLINE std::uint32_t put(std::uint32_t x, const EncoderSymbol& e, std::u
   return x + e.bias + q * e.complement;
 }
 
-/// The same where each symbol waits for the one before, and few fill the state: with a branch, which is
-/// foreseen, and with as few steps one after the other as there can be.
-RELIEVO_INLINE std::uint32_t put_next(std::uint32_t x, const EncoderSymbol& e, std::uint16_t*& to) {
-  if (x >= e.limit) [[unlikely]] {
-    *--to = static_cast<std::uint16_t>(x);
-    x >>= 16;
+/// A stream of one lane, where each symbol waits for the one before: with as few steps one after the other as
+/// there can be. A quotient follows from the one before by one multiplication, as
+/// (x + bias + q complement) reciprocal = (x + bias) reciprocal + q (complement reciprocal), whose second
+/// product does not wait. The sum is below 2^63, so it is exact though parts of it overflow.
+class SingleLane {
+ public:
+  explicit SingleLane(const StreamJob& job)
+      : begin_(job.rows.codes.data()),
+        code_(begin_ + job.rows.codes.size()),
+        symbols_(job.symbols),
+        x_(job.states[0]),
+        to_(job.to) {
+    if (code_ == begin_) return;
+    symbol_ = symbols_ + *--code_;
+    divide();
   }
-  __extension__ using Wide = unsigned __int128;
-  const auto q = static_cast<std::uint32_t>(static_cast<Wide>(x) * e.long_reciprocal >> 64);
-  return x + e.bias + q * e.complement;
-}
+  /// The next symbols, at most so many; the row's first one is left to finish().
+  RELIEVO_INLINE void put(std::size_t most) {
+    for (auto n = std::min(most, static_cast<std::size_t>(code_ - begin_)); n > 0; --n)
+      put_before(symbols_ + *--code_);
+  }
+  RELIEVO_INLINE void finish(StreamJob& job) {
+    put(static_cast<std::size_t>(code_ - begin_));
+    if (symbol_ != nullptr) x_ += symbol_->bias + quotient_ * symbol_->complement;
+    job.states[0] = static_cast<std::uint32_t>(x_);
+    job.to = to_;
+  }
 
-/// The single lane's next symbols, at most so many.
-RELIEVO_INLINE void put_some(StreamJob& job, std::size_t& left, std::size_t most) {
-  const std::uint16_t* codes = job.rows.codes.data();
-  std::uint32_t x = job.states[0];
-  std::uint16_t* to = job.to;
-  for (std::size_t n = std::min(most, left); n > 0; --n) x = put_next(x, job.symbols[codes[--left]], to);
-  job.states[0] = x;
-  job.to = to;
-}
+ private:
+  /// With a branch, since few symbols fill the state, which is foreseen.
+  RELIEVO_INLINE void divide() {
+    if (x_ >= symbol_->limit) [[unlikely]] {
+      *--to_ = static_cast<std::uint16_t>(x_);
+      x_ >>= 16;
+    }
+    quotient_ = x_ * symbol_->reciprocal >> (32 + symbol_->shift);
+  }
+  RELIEVO_INLINE void put_before(const EncoderSymbol* next) {
+    const std::uint64_t complement = symbol_->complement, reciprocal = next->reciprocal;
+    const std::uint64_t sum = x_ + symbol_->bias;
+    std::uint64_t ahead = complement * reciprocal;
+    asm("" : "+r"(ahead));  // or else compilers make one product of both
+    const std::uint64_t divided = sum * reciprocal + quotient_ * ahead;
+    x_ = sum + quotient_ * complement;
+    quotient_ = divided >> (32 + next->shift);
+    symbol_ = next;
+    if (x_ >= next->limit) [[unlikely]]
+      divide();
+  }
+
+  const std::uint16_t* begin_;
+  const std::uint16_t* code_;
+  const EncoderSymbol* symbols_;
+  std::uint64_t x_;
+  std::uint16_t* to_;
+  const EncoderSymbol* symbol_ = nullptr;  // whose turn it is
+  std::uint64_t quotient_ = 0;             // of the state by its frequency
+};
 
 /// A row, its last symbol first.
 void encode_row(const std::uint16_t* begin, const std::uint16_t* end, StreamJob& job) {
@@ -73,8 +110,7 @@ void encode_portable(StreamJob& lanes, StreamJob& single) {
     encode_row(lanes.rows.codes.data() + start, lanes.rows.codes.data() + end, lanes);
     end = start;
   }
-  std::size_t left = single.rows.codes.size();
-  put_some(single, left, left);
+  SingleLane(single).finish(single);
 }
 
 #if defined(__x86_64__)
@@ -127,10 +163,9 @@ constexpr EncoderSymbol kNothing{.limit = 1U << 31};
 [[gnu::target("avx2")]] void encode_avx2(StreamJob& lanes, StreamJob& single) {
   __m128i states = load(lanes.states.data());
   std::uint16_t* to = lanes.to;
-  StreamJob beside = single;  // by itself, so that a compiler keeps it in registers
-  std::size_t left = single.rows.codes.size();
+  SingleLane beside(single);
   const std::size_t steps = lanes.rows.codes.size() / kLanes + 1;
-  const std::size_t at_once = (left + steps - 1) / steps;
+  const std::size_t at_once = (single.rows.codes.size() + steps - 1) / steps;
   const EncoderSymbol* const symbols = lanes.symbols;
   const std::uint16_t* end = lanes.rows.codes.data() + lanes.rows.codes.size();
   for (std::size_t r = lanes.rows.starts.size(); r-- > 0;) {
@@ -146,14 +181,12 @@ constexpr EncoderSymbol kNothing{.limit = 1U << 31};
       const EncoderSymbol* const four[kLanes] = {symbols + end[0], symbols + end[1], symbols + end[2],
                                                  symbols + end[3]};
       states = put_four(states, four, to);
-      put_some(beside, left, at_once);
+      beside.put(at_once);
     }
   }
-  put_some(beside, left, left);
   _mm_storeu_si128(reinterpret_cast<__m128i*>(lanes.states.data()), states);
   lanes.to = to;
-  single.states = beside.states;
-  single.to = beside.to;
+  beside.finish(single);
 }
 
 #endif

@@ -75,7 +75,8 @@ inline bool straight_diagonal(std::int32_t c0, std::int32_t c1, std::int32_t c2,
 }
 
 /// Fails where the surface does not lie on such a grid (no places, two vertices at one, triangles across
-/// cells): it has to be sent as a mesh. `with_quality`: sigmas and marks of interpolation too. Vertices so
+/// cells), which has to be sent as a mesh, and where a position is not finite. The surface must pass
+/// check_counts(). `with_quality`: sigmas and marks of interpolation too. Vertices so
 /// far away that half a step may turn them behind the camera are left out with their triangles.
 Status to_grid(const Surface& surface, const GridCalibration& calibration, int step_bits, bool with_quality,
                StripeGrid& out);

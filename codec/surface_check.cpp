@@ -87,7 +87,7 @@ bool normalise(Vec3f& v) {
 
 }  // namespace
 
-Status check_vertices(const Surface& surface) {
+Status check_counts(const Surface& surface) {
   const std::size_t count = surface.positions.size();
   const auto matches = [count](std::size_t size) { return size == 0 || size == count; };
   if (!matches(surface.normals.size()) || !matches(surface.texture_coordinates.size()))
@@ -100,26 +100,22 @@ Status check_vertices(const Surface& surface) {
                  std::to_string(surface.sigmas_m.size()) + " sigmas and " +
                  std::to_string(surface.interpolated.size()) +
                  " marks of interpolation: give none or one a vertex"};
+  return {};
+}
+
+Status check_surface(const Surface& surface) {
+  if (Status status = check_counts(surface); !status) return status;
   if (!kernels().all_lengths(surface.sigmas_m.data(), surface.sigmas_m.size()))
     return Error{"surface has a sigma that is no length in metres"};
   if (!all_finite(surface.positions) || !all_finite(surface.normals) ||
       !all_finite(surface.texture_coordinates))
     return Error{"surface has a position, normal or texture coordinate that is not finite"};
-  return {};
-}
-
-Status check_triangles(const Surface& surface) {
   const std::size_t count = surface.positions.size();
   if (const std::uint32_t largest = largest_index(surface.triangles);
       !surface.triangles.empty() && largest >= count)
     return Error{"surface has a triangle on vertex " + std::to_string(largest) + " of " +
                  std::to_string(count)};
   return {};
-}
-
-Status check_surface(const Surface& surface) {
-  const Status status = check_vertices(surface);
-  return status ? check_triangles(surface) : status;
 }
 
 std::vector<Vec3f> surface_normals(const Surface& surface) {

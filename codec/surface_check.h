@@ -13,9 +13,8 @@ namespace relievo {
 /// vertex, where a number is not finite, or where a triangle names a vertex that is not there.
 Status check_surface(const Surface& surface);
 
-/// The same but for the triangles, and theirs: for who looks at them anyway.
-Status check_vertices(const Surface& surface);
-Status check_triangles(const Surface& surface);
+/// How many there are of each, alone: for who looks at the numbers that it needs anyway.
+Status check_counts(const Surface& surface);
 
 /// Unit normals, one a vertex, towards the side from which the triangles run counter-clockwise (the camera):
 /// the triangles' mean, weighted by area. A vertex without triangles looks to the camera. The surface must

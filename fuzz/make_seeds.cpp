@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// fuzz_seeds SOURCE_DIR OUT: sound inputs of every fuzz target, OUT/TARGET/*, from the conformance vectors
-// and the writers.
+// fuzz_seeds SOURCE_DIR OUT [TARGET]: sound inputs of every fuzz target, or of that one, OUT/TARGET/*, from
+// the conformance vectors and the writers.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 
+#include "base/result.h"
 #include "codec/byte_io.h"
 #include "codec/mcap_records.h"
 #include "codec/recording.h"
@@ -28,12 +30,14 @@ Bytes read(const fs::path& file) {
 }
 void write(const fs::path& file, const Bytes& bytes) {
   fs::create_directories(file.parent_path());
-  std::ofstream(file, std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream out(file, std::ios::binary);
+  out.exceptions(std::ios::failbit | std::ios::badbit);
+  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.close();
 }
 
 /// Each vector, those to be refused too, and each sequence of frames that build on one another.
-void frames(const fs::path& conformance, const fs::path& out) {
+Status frames(const fs::path& conformance, const fs::path& out) {
   for (const char* folder : {"frame_v1", "grid_v1", "draco_grid_v1"}) {
     for (const auto& entry : fs::directory_iterator(conformance / folder))
       if (entry.path().extension() == ".rlv")
@@ -48,6 +52,7 @@ void frames(const fs::path& conformance, const fs::path& out) {
       append_bytes(all, read(conformance / "grid_v1" / frame["file"].get<std::string>()));
     write(out / ("sequence_" + std::to_string(number++)), all);
   }
+  return {};
 }
 
 /// So that changes are not all caught by a CRC before they get anywhere.
@@ -63,25 +68,38 @@ Bytes without_crcs(Bytes bytes) {
   return bytes;
 }
 
-bool recordings(const Bytes& frame, const fs::path& out) {
+/// A frame as a sample.
+Bytes frame_sample(const fs::path& conformance) {
+  return write_frame_cdr({"face", 1, 2, 3, 4, read(conformance / "grid_v1" / "plain.rlv")});
+}
+
+Status record(const fs::path& file, const Bytes& sample) {
+  const auto writer = RecordingWriter::create(file, {.chunk_ns = 100});
+  if (!writer) return writer.error();
+  const RecordingSchema schema{"relievo::Frame", "omgidl", "struct Frame {};"};
+  for (const char* topic : {"relievo/frame", "relievo/status"})
+    if (auto status = (*writer)->add_channel(schema, {topic, "cdr", schema.name, {{"stream", "s"}}}); !status)
+      return status.error();
+  if (auto status = (*writer)->add_attachment({"rig.yaml", "application/yaml", 5, {'a', ':', ' ', '1'}});
+      !status)
+    return status.error();
+  for (std::uint16_t i = 0; i < 9; ++i)
+    if (auto status = (*writer)->write({static_cast<std::uint16_t>(i % 2), i, 1000 + 30 * i, 1000, sample});
+        !status)
+      return status.error();
+  const auto finished = (*writer)->finish();
+  return finished ? Status() : finished.error();
+}
+
+Status recordings(const fs::path& conformance, const fs::path& out) {
   const test::TempFolder folder;
   const fs::path file = folder / "a.mcap";
-  {
-    const auto writer = RecordingWriter::create(file, {.chunk_ns = 100});
-    if (!writer) return false;
-    const RecordingSchema schema{"relievo::Frame", "omgidl", "struct Frame {};"};
-    for (const char* topic : {"relievo/frame", "relievo/status"})
-      if (!(*writer)->add_channel(schema, {topic, "cdr", schema.name, {{"stream", "s"}}})) return false;
-    if (!(*writer)->add_attachment({"rig.yaml", "application/yaml", 5, {'a', ':', ' ', '1'}})) return false;
-    for (std::uint16_t i = 0; i < 9; ++i)
-      if (!(*writer)->write({static_cast<std::uint16_t>(i % 2), i, 1000 + 30 * i, 1000, frame})) return false;
-    if (!(*writer)->finish()) return false;
-  }
+  if (auto status = record(file, frame_sample(conformance)); !status) return status;
   const Bytes whole = read(file);
   write(out / "whole", whole);
   write(out / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)});
   write(out / "no_crcs", without_crcs(whole));
-  return true;
+  return {};
 }
 
 void append_text(Bytes& out, std::string_view text) {
@@ -150,8 +168,17 @@ Bytes status_sample() {
   return sample_of(body);
 }
 
+Status samples(const fs::path& conformance, const fs::path& out) {
+  write(out / "frame", frame_sample(conformance));
+  write(out / "info", info_sample());
+  write(out / "status", status_sample());
+  if (const auto info = read_info_cdr(info_sample()); !info) return info.error();
+  if (const auto status = read_status_cdr(status_sample()); !status) return status.error();
+  return {};
+}
+
 /// As texture.cpp reads them: three pictures of each codec that this build can encode.
-bool textures(const fs::path& out) {
+Status textures(const fs::path&, const fs::path& out) {
   for (const auto codec :
        {TextureCodec::kJpeg, TextureCodec::kWebp, TextureCodec::kPng, TextureCodec::kH264}) {
     if (!check_texture_codec(codec)) continue;
@@ -161,19 +188,22 @@ bool textures(const fs::path& out) {
     append(bytes, std::uint16_t{24});
     for (int i = 0; i < 3; ++i) {
       Bytes section;
-      if (!encoder->encode(test::picture(40, 24).view(), {.quality = 60, .key = i == 0}, section))
-        return false;
+      if (const auto made =
+              encoder->encode(test::picture(40, 24).view(), {.quality = 60, .key = i == 0}, section);
+          !made)
+        return made.error();
       append(bytes, static_cast<std::uint16_t>(section.size()));
       append_bytes(bytes, section);
     }
     write(out / std::to_string(static_cast<int>(codec)), bytes);
   }
-  return true;
+  return {};
 }
 
-bool takes(const fs::path& out) {
+Status takes(const fs::path&, const fs::path& out) {
   const test::TempFolder folder;
-  if (!test::write_striped_take(test::striped_scene(), folder.path(), 2)) return false;
+  if (!test::write_striped_take(test::striped_scene(), folder.path(), 2))
+    return Error{"the take cannot be written"};
   std::uint8_t number = 0;  // in the order of take.cpp
   for (const char* file :
        {"rig.yaml", "pattern.yaml", "timestamps.csv", "frames/000000.png", "truth/000000.npy"}) {
@@ -181,27 +211,30 @@ bool takes(const fs::path& out) {
     append_bytes(bytes, read(folder / file));
     write(out / fs::path(file).filename(), bytes);
   }
-  return true;
+  return {};
 }
+
+struct Target {
+  const char* name;
+  Status (*make)(const fs::path& conformance, const fs::path& out);
+};
+constexpr Target kTargets[] = {
+    {"frame", frames}, {"recording", recordings}, {"cdr", samples}, {"texture", textures}, {"take", takes}};
 
 }  // namespace
 }  // namespace relievo
 
 int main(int argc, char** argv) {
   using namespace relievo;
-  if (argc != 3) return 2;
+  if (argc != 3 && argc != 4) return 2;
   const fs::path conformance = fs::path(argv[1]) / "tests" / "conformance";
   const fs::path out = argv[2];
-  const Bytes frame = read(conformance / "grid_v1" / "plain.rlv");
-  frames(conformance, out / "frame");
-  write(out / "cdr" / "frame", write_frame_cdr({"face", 1, 2, 3, 4, frame}));
-  write(out / "cdr" / "info", info_sample());
-  write(out / "cdr" / "status", status_sample());
-  const bool info = read_info_cdr(info_sample()).ok();
-  const bool status = read_status_cdr(status_sample()).ok();
-  const bool made = info && status &&
-                    recordings(write_frame_cdr({"face", 1, 2, 3, 4, frame}), out / "recording") &&
-                    textures(out / "texture") && takes(out / "take");
-  if (!made) std::fprintf(stderr, "a seed cannot be made, or is not sound\n");
+  bool made = true;
+  for (const Target& target : kTargets) {
+    if (argc == 4 && std::string_view(argv[3]) != target.name) continue;
+    const Status status = target.make(conformance, out / target.name);
+    if (!status) std::fprintf(stderr, "seeds of %s: %s\n", target.name, status.error().message.c_str());
+    made = made && status.ok();
+  }
   return made ? 0 : 1;
 }

@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <limits>
 #include <optional>
+#include <utility>
 
 #include "codec/gather_kernels.h"
 #include "codec/grid_predict.h"
+#include "codec/grid_symbols.h"
 #include "codec/point_kernels.h"
 #include "codec/rans.h"
 #include "codec/stripe_grid.h"
@@ -295,9 +299,65 @@ TEST(GridKernels, GatheringAgrees) {
         ASSERT_EQ(right, right_of) << kernels.name;
       }
       for (const float farthest : {0.F, s.positions[any()][2], 1e9F})
-        EXPECT_EQ(kernels.is_any_far(s.positions, farthest),
-                  all_gather_kernels().front().is_any_far(s.positions, farthest));
+        EXPECT_EQ(kernels.reach(s.positions, farthest),
+                  all_gather_kernels().front().reach(s.positions, farthest));
     }
+  }
+}
+
+TEST(GridKernels, OnePositionThatIsFarOrNotFiniteIsFoundAnywhere) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  for (const GatherKernels& kernels : all_gather_kernels()) {
+    for (std::size_t count : {0, 1, 7, 8, 9, 24, 29}) {
+      std::vector<Vec3f> positions(count, {1e9F, -1e9F, 1});
+      EXPECT_EQ(kernels.reach(positions, 2), Reach::kNear) << kernels.name;
+      for (std::size_t i = 0; i < 3 * count; ++i) {
+        float& number = positions[i / 3][i % 3];
+        const float before = std::exchange(number, 3.F);
+        EXPECT_EQ(kernels.reach(positions, 2), i % 3 == 2 ? Reach::kFar : Reach::kNear) << kernels.name;
+        for (const float endless : {kInfinity, -kInfinity, std::numeric_limits<float>::quiet_NaN()}) {
+          number = endless;
+          EXPECT_EQ(kernels.reach(positions, 2), Reach::kNotFinite) << kernels.name << ' ' << i;
+        }
+        number = before;
+      }
+    }
+  }
+}
+
+/// Cells of a line by themselves and eight at once: the same symbols in the same tables.
+TEST(GridSymbols, EightCellsAreAsEachByItself) {
+  test::Random random(9);
+  constexpr std::array<std::uint8_t, 7> kCells{0, 1, 2, 4, 8, grid_cell::kStraight, grid_cell::kTurned};
+  for (int round = 0; round < 4000; ++round) {
+    std::array<std::uint8_t, 9> above{}, below{};
+    std::array<std::uint8_t, 8> cells{}, good_above{};
+    const std::uint32_t holes = 1 + random.below(8);
+    for (auto* line : {&above, &below})
+      for (std::uint8_t& there : *line) there = random.below(holes) > 0;
+    for (std::uint8_t& good : good_above) good = random.below(2) > 0;
+    for (std::uint8_t& cell : cells) cell = kCells[random.below(kCells.size())];
+    const int count = round % 2 == 0 ? 8 : 1 + static_cast<int>(random.below(8));
+    const auto asked = count == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * count) - 1;
+    auto left = static_cast<std::uint8_t>(random.below(2));
+    const grid::EightCells eight = grid::eight_cells(cells.data(), above.data(), below.data(), asked,
+                                                     grid::load8(good_above.data()), left);
+    std::uint32_t triangles = 0;
+    for (int i = 0; i < 8; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      const int corners = grid::kCornerCounts[grid::corners_there(above.data(), below.data(), i)];
+      const bool coded = corners >= 3 && i < count;
+      ASSERT_EQ(eight.coded >> 8 * i & 255, coded);
+      const int symbol = coded ? grid::cell_symbol(cells[at], corners) : 1;
+      ASSERT_EQ(eight.good >> 8 * i & 255, symbol == 0);
+      if (coded) {
+        const int table = (corners == 4 ? 4 : 0) + 2 * left + good_above[at];
+        ASSERT_EQ(eight.codes >> 8 * i & 255, rans::code_of(table, symbol, grid::kControlSymbols));
+        triangles += grid::triangles_of(symbol, corners);
+      }
+      left = symbol == 0;
+    }
+    ASSERT_EQ(eight.triangles, triangles);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -339,6 +340,21 @@ TEST(Grid, WhatLiesOnNoGridGoesAsAMesh) {
   EXPECT_EQ(codec_of(across), GeometryCodec::kDracoMesh);
   EXPECT_EQ(codec_of(Frame3D{}), GeometryCodec::kDracoMesh);
   EXPECT_EQ(codec_of(test::grid_frame(scene)), GeometryCodec::kGrid);
+}
+
+TEST(Grid, APositionThatIsNotFiniteIsRefusedAndWhatDoesNotGoIsNotLookedAt) {
+  const test::GridScene scene;
+  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+  Frame3D frame = test::grid_frame(scene);
+  frame.surface.normals.assign(frame.surface.positions.size(),
+                               {0, 0, std::numeric_limits<float>::infinity()});
+  const auto bytes = encoder.encode(frame, grid_options());
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  EXPECT_EQ(read_frame_header(*bytes)->geometry, GeometryCodec::kGrid);
+  frame.surface.positions[frame.surface.positions.size() / 2][1] = std::numeric_limits<float>::quiet_NaN();
+  const auto refused = encoder.encode(frame, grid_options());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("not finite"), std::string::npos);
 }
 
 TEST(Grid, TheOrderOfTrianglesChangesNothingAndWrongOnesAreFoundAnywhere) {
