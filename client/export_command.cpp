@@ -28,6 +28,7 @@ struct Options {
   std::string format = "ply";
   double depth_unit_mm = 1;
   bool reencode = false;
+  bool draco = false;
   std::shared_ptr<RangeOptions> range;
   bool json = false;
 };
@@ -77,7 +78,8 @@ Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, Record
   ExportTarget target{.out = options.out,
                       .rig = {},
                       .depth_unit_m = 1e-3 * options.depth_unit_mm,
-                      .reencode = options.reencode};
+                      .reencode = options.reencode,
+                      .draco = options.draco};
   if (const auto info = recorded.read_info()) target.rig = info->rig;
   return format_named(options.format).make(target);
 }
@@ -139,42 +141,51 @@ Status run(const Options& options, StopSignal& stop) {
 }  // namespace
 
 Command export_command() {
-  return {"export", "Write the frames of a recording as files that other programs open", [](CLI::App& app) {
-            auto options = std::make_shared<Options>();
-            std::vector<std::string> names;
-            for (const ExportFormat& format : export_formats()) names.emplace_back(format.name);
-            app.add_option("file", options->file, "Recording")->type_name("FILE")->required();
-            app.add_option(
-                   "--out", options->out,
-                   "Folder, where files are named after their camera frames; of animation (.glb) and video "
-                   "(.mp4, .mkv) the one file")
-                ->type_name("PATH")
-                ->required();
-            app.add_option(
-                   "--format", options->format,
-                   "ply, glb, obj (the textured surface), png (the texture), depth (texture and 16-bit depth "
-                   "as PNGs of a camera without distortion, which camera.json describes), animation (all "
-                   "frames in one GLB that plays them) or video (of the texture; as recorded where it is "
-                   "H.264)")
-                ->check(CLI::IsMember(names))
-                ->capture_default_str();
-            app.add_option("--depth-unit", options->depth_unit_mm, "Of depth: millimetres a step; 65,535 fit")
-                ->check(CLI::Range(0.001, 100.0))
-                ->type_name("MM")
-                ->capture_default_str();
-            app.add_flag("--reencode", options->reencode,
-                         "Of video: code it anew even where it could be copied");
-            app.add_option("--stream", options->stream, "Which stream, where the file holds several")
-                ->type_name("NAME");
-            options->range = add_range_options(app);
-            app.add_flag("--json", options->json, "Print the result as JSON");
-            app.footer(
-                "Examples:\n"
-                "  relievo export face.mcap --format glb --frames 30:59 --out DIR\n"
-                "  relievo export face.mcap --format animation --from 1 --to 5 --out face.glb\n"
-                "  relievo export face.mcap --format video --out face.mp4");
-            return [options](StopSignal& stop) { return run(*options, stop); };
-          }};
+  return {
+      "export", "Write the frames of a recording as files that other programs open", [](CLI::App& app) {
+        auto options = std::make_shared<Options>();
+        std::vector<std::string> names;
+        for (const ExportFormat& format : export_formats()) names.emplace_back(format.name);
+        app.add_option("file", options->file, "Recording")->type_name("FILE")->required();
+        app.add_option(
+               "--out", options->out,
+               "Folder, where files are named after their camera frames; of animation (.glb) and video "
+               "(.mp4, .mkv) the one file")
+            ->type_name("PATH")
+            ->required();
+        app.add_option(
+               "--format", options->format,
+               "ply, glb, obj (the textured surface), png (the texture), depth (texture and 16-bit depth "
+               "as PNGs of a camera without distortion, which camera.json describes), animation (all "
+               "frames in one GLB that plays them) or video (of the texture; as recorded where it is "
+               "H.264)")
+            ->check(CLI::IsMember(names))
+            ->capture_default_str();
+        app.add_option("--depth-unit", options->depth_unit_mm, "Of depth: millimetres a step; 65,535 fit")
+            ->check(CLI::Range(0.001, 100.0))
+            ->type_name("MM")
+            ->capture_default_str();
+        app.add_flag("--reencode", options->reencode, "Of video: code it anew even where it could be copied");
+        app.add_flag("--draco", options->draco,
+                     "Of glb and animation: surfaces compressed (KHR_draco_mesh_compression), for viewers "
+                     "that have Draco");
+        app.add_option("--stream", options->stream, "Which stream, where the file holds several")
+            ->type_name("NAME");
+        options->range = add_range_options(app);
+        app.add_flag("--json", options->json, "Print the result as JSON");
+        app.final_callback([options] {
+          if (options->draco && !format_named(options->format).has_draco)
+            throw CLI::ValidationError(
+                "--draco", "there is no Draco in " + options->format + ": it is of glb and animation");
+        });
+        app.footer(
+            "Examples:\n"
+            "  relievo export face.mcap --format glb --frames 30:59 --out DIR\n"
+            "  relievo export face.mcap --format glb --draco --out DIR\n"
+            "  relievo export face.mcap --format animation --from 1 --to 5 --out face.glb\n"
+            "  relievo export face.mcap --format video --out face.mp4");
+        return [options](StopSignal& stop) { return run(*options, stop); };
+      }};
 }
 
 }  // namespace relievo

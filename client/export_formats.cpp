@@ -58,6 +58,19 @@ class FileWriter final : public FolderWriter {
   WriteFile write_;
 };
 
+class GlbWriter final : public FolderWriter {
+ public:
+  explicit GlbWriter(const ExportTarget& target)
+      : FolderWriter(target.out), options_{.draco = target.draco} {}
+
+ private:
+  Status write(const fs::path& folder, const Frame3D& frame) override {
+    return write_glb(folder / file_name(frame.number, ".glb"), frame, options_);
+  }
+
+  GlbOptions options_;
+};
+
 /// Texture and depth as a camera without lens distortion sees them, and what that camera is.
 class DepthWriter final : public FolderWriter {
  public:
@@ -89,9 +102,11 @@ class DepthWriter final : public FolderWriter {
 
 class AnimationWriter final : public ExportWriter {
  public:
-  explicit AnimationWriter(fs::path file) : file_(std::move(file)) {}
+  explicit AnimationWriter(const ExportTarget& target) : file_(target.out), options_{.draco = target.draco} {}
 
-  Status add(const Frame3D& frame, std::span<const std::uint8_t>) override { return animation_.add(frame); }
+  Status add(const Frame3D& frame, std::span<const std::uint8_t>) override {
+    return animation_.add(frame, options_);
+  }
   Status finish() override {
     const auto bytes = animation_.finish();
     return bytes ? write_whole_file(file_, *bytes)
@@ -100,6 +115,7 @@ class AnimationWriter final : public ExportWriter {
 
  private:
   fs::path file_;
+  GlbOptions options_;
   GlbAnimation animation_;
 };
 
@@ -177,13 +193,14 @@ Made make_files(const ExportTarget& target) {
 Status ply(const fs::path& file, const Frame3D& frame) {
   return write_ply(file, frame.surface, frame.texture.view());
 }
-Status glb(const fs::path& file, const Frame3D& frame) {
-  return write_glb(file, frame);
-}
 Status png(const fs::path& file, const Frame3D& frame) {
   return write_png(file, frame.texture.view());
 }
-constexpr const char *kPly = ".ply", *kGlb = ".glb", *kObj = ".obj", *kPng = ".png";
+constexpr const char *kPly = ".ply", *kObj = ".obj", *kPng = ".png";
+
+Made make_glb(const ExportTarget& target) {
+  return Made(std::make_unique<GlbWriter>(target));
+}
 
 Made make_depth(const ExportTarget& target) {
   if (!target.rig)
@@ -194,7 +211,7 @@ Made make_depth(const ExportTarget& target) {
 }
 
 Made make_animation(const ExportTarget& target) {
-  return Made(std::make_unique<AnimationWriter>(target.out));
+  return Made(std::make_unique<AnimationWriter>(target));
 }
 
 Made make_video(const ExportTarget& target) {
@@ -203,13 +220,13 @@ Made make_video(const ExportTarget& target) {
   return Made(std::make_unique<VideoWriter>(*std::move(file), target.reencode));
 }
 
-constexpr ExportFormat kFormats[] = {{"ply", false, make_files<&kPly, ply>},
-                                     {"glb", false, make_files<&kGlb, glb>},
-                                     {"obj", false, make_files<&kObj, write_obj>},
-                                     {"png", false, make_files<&kPng, png>},
-                                     {"depth", false, make_depth},
-                                     {"animation", true, make_animation},
-                                     {"video", true, make_video}};
+constexpr ExportFormat kFormats[] = {{"ply", false, false, make_files<&kPly, ply>},
+                                     {"glb", false, true, make_glb},
+                                     {"obj", false, false, make_files<&kObj, write_obj>},
+                                     {"png", false, false, make_files<&kPng, png>},
+                                     {"depth", false, false, make_depth},
+                                     {"animation", true, true, make_animation},
+                                     {"video", true, false, make_video}};
 
 }  // namespace
 

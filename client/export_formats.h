@@ -19,6 +19,7 @@ struct ExportTarget {
   std::optional<Rig> rig;     // nothing where the recording has no description
   double depth_unit_m = 1e-3;
   bool reencode = false;  // of video: even what could be copied
+  bool draco = false;     // of formats that have it
 };
 
 /// One thread.
@@ -34,6 +35,7 @@ class ExportWriter {
 struct ExportFormat {
   const char* name;
   bool is_one_file;
+  bool has_draco;
   Result<std::unique_ptr<ExportWriter>> (*make)(const ExportTarget& target);
 };
 std::span<const ExportFormat> export_formats();

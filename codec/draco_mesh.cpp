@@ -106,8 +106,10 @@ std::vector<Vec2f> stepped(std::vector<Vec2f> coordinates, int bits) {
 /// that a decoder can bound its memory by what it received) the plainer coding, which cannot be.
 enum class Packing { kBest, kPlain };
 
-Result<Bytes> encode(const Surface& surface, const Selection& kept, const EncodeOptions& options,
-                     const Volume& volume, Packing packing) {
+/// Fills the bytes and the ids of `out`, whose volume is that of the quantisation.
+Status encode(const Surface& surface, const Selection& kept, const EncodeOptions& options, Packing packing,
+              EncodedGeometry& out) {
+  const Volume& volume = out.volume;
   const bool is_mesh = !kept.triangles.empty();
   draco::Mesh mesh;  // is a PointCloud too
   mesh.set_num_points(kept.vertices);
@@ -155,7 +157,11 @@ Result<Bytes> encode(const Surface& surface, const Selection& kept, const Encode
   draco::EncoderBuffer buffer;
   const draco::Status status = encoder.EncodeToBuffer(&buffer);
   if (!status.ok()) return Error{"Draco cannot encode this surface: " + status.error_msg_string()};
-  return Bytes(buffer.data(), buffer.data() + buffer.size());
+  out.bytes.assign(buffer.data(), buffer.data() + buffer.size());
+  out.position_id = position;
+  out.coordinate_id = coordinate;
+  out.normal_id = normal;
+  return {};
 }
 
 std::string is_not(const DracoCounts& found, std::uint32_t vertices, std::uint32_t triangles) {
@@ -239,11 +245,9 @@ Result<EncodedGeometry> encode_draco(const Surface& surface, const EncodeOptions
     if (kept.new_index[v] != kDropped) encoded.sent.push_back(v);
   try {
     for (const Packing packing : {Packing::kBest, Packing::kPlain}) {
-      auto bytes = encode(surface, kept, options, encoded.volume, packing);
-      if (!bytes) return bytes.error();
-      const auto counts = allowed_draco_counts(*bytes);
+      if (auto status = encode(surface, kept, options, packing, encoded); !status) return status.error();
+      const auto counts = allowed_draco_counts(encoded.bytes);
       if (!counts) return counts.error().in("what Draco encoded cannot be sent");
-      encoded.bytes = std::move(*bytes);
       encoded.vertices = counts->vertices;
       encoded.triangles = counts->triangles;
       const std::uint64_t items = encoded.triangles > 0 ? encoded.triangles : encoded.vertices;

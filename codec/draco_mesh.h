@@ -19,6 +19,10 @@ struct EncodedGeometry {
   std::uint32_t triangles = 0;      //
   Volume volume;                    // used for quantisation
   std::vector<std::uint32_t> sent;  // indices of the vertices that are in it, rising
+  // What Draco calls the attributes ("unique ids"); -1: not there.
+  int position_id = -1;
+  int coordinate_id = -1;
+  int normal_id = -1;
 };
 
 /// Left out: vertices outside the volume and the triangles on them, triangles that use a vertex twice, and,

@@ -19,13 +19,22 @@ namespace relievo {
 /// interpolated (uchar, 0 or 1), faces as uchar-counted ints.
 Status write_ply(const std::filesystem::path& path, const Surface& surface, View8 texture);
 
+struct GlbOptions {
+  int jpeg_quality = 90;  // 1..100
+  // Surfaces of triangles by KHR_draco_mesh_compression: positions on multiples of 1, 2, 4, 8 .. micrometres,
+  // the same grid for frames of about a size, so that what stands still does; at most half a step off,
+  // 1/16,000 of the surface's longest edge or half a micrometre. Vertices of no triangle, _SIGMA and
+  // _INTERPOLATED stay out. Surfaces of points alone, for which the extension has no place, stay as they are.
+  bool draco = false;
+};
+
 /// glTF 2.0 binary: uncompressed attributes, the texture as an embedded JPEG, an unlit material (the light is
 /// in the texture), _SIGMA and _INTERPOLATED of each vertex where known (floats). Metres, turned by half a
 /// turn about x into glTF's axes: x right, y up, z backward.
-Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jpeg_quality = 90);
+Status write_glb(const std::filesystem::path& path, const Frame3D& frame, const GlbOptions& options = {});
 
 /// The bytes of that file.
-Result<Bytes> encode_glb(const Frame3D& frame, int jpeg_quality = 90);
+Result<Bytes> encode_glb(const Frame3D& frame, const GlbOptions& options = {});
 
 /// Frames one after the other in one GLB, which any player of glTF animations plays: a node a frame, as
 /// write_glb() makes it, there from the frame's time to the next one's, the last one as long as the one
@@ -37,7 +46,7 @@ class GlbAnimation {
 
   /// Each later than the one before. Fails beyond 4 GiB, which is all that a GLB holds; memory grows with the
   /// file.
-  Status add(const Frame3D& frame, int jpeg_quality = 90);
+  Status add(const Frame3D& frame, const GlbOptions& options = {});
   /// The bytes of the file; nothing can be added any more. The last frame stays.
   Result<Bytes> finish();
 

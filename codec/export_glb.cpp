@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // glTF 2.0 binary: a JSON chunk that describes the places in a binary chunk.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/whole_file.h"
 #include "codec/byte_io.h"
+#include "codec/draco_mesh.h"
 #include "codec/export.h"
 #include "codec/jpeg_texture.h"
 #include "codec/surface_check.h"
@@ -24,6 +27,9 @@ constexpr int kArrayBuffer = 34962;
 constexpr int kElementBuffer = 34963;
 constexpr int kPoints = 0;
 constexpr int kTriangles = 4;
+constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+constexpr int kDracoPositionBits = 14;
+constexpr int kDracoNormalBits = 10;
 constexpr const char* kTooLarge = "that is too large for a GLB (4 GiB)";
 
 /// Times as text: a JSON number in a browser holds 53 bits.
@@ -46,6 +52,11 @@ struct Document {
   int add(const char* list, json entry) {
     root[list].push_back(std::move(entry));
     return static_cast<int>(root[list].size()) - 1;
+  }
+  /// An extension, once.
+  void use(const char* list, const char* extension) {
+    json& names = root[list];
+    if (std::ranges::find(names, extension) == names.end()) names.push_back(extension);
   }
   int add_accessor(json accessor) { return add("accessors", std::move(accessor)); }
 
@@ -102,7 +113,7 @@ std::vector<Vec3f> unit_normals(const Surface& surface) {
   return normals;
 }
 
-void add_bounds(json& accessor, const std::vector<Vec3f>& positions) {
+std::pair<Vec3f, Vec3f> bounds(const std::vector<Vec3f>& positions) {
   Vec3f low = positions[0];
   Vec3f high = positions[0];
   for (const Vec3f& p : positions)
@@ -110,6 +121,11 @@ void add_bounds(json& accessor, const std::vector<Vec3f>& positions) {
       low[i] = std::min(low[i], p[i]);
       high[i] = std::max(high[i], p[i]);
     }
+  return {low, high};
+}
+
+void add_bounds(json& accessor, const std::vector<Vec3f>& positions) {
+  const auto [low, high] = bounds(positions);
   accessor["min"] = {double{low[0]}, double{low[1]}, double{low[2]}};
   accessor["max"] = {double{high[0]}, double{high[1]}, double{high[2]}};
 }
@@ -124,7 +140,7 @@ Result<int> add_material(Document& document, const Image8& texture, int jpeg_qua
   document.root["samplers"] =
       json::array({{{"magFilter", 9729}, {"minFilter", 9729}, {"wrapS", 33071}, {"wrapT", 33071}}});
   const int shown = document.add("textures", {{"sampler", 0}, {"source", image}});
-  document.root["extensionsUsed"] = {"KHR_materials_unlit"};
+  document.use("extensionsUsed", "KHR_materials_unlit");
   return document.add(
       "materials",
       {{"pbrMetallicRoughness",
@@ -133,32 +149,119 @@ Result<int> add_material(Document& document, const Image8& texture, int jpeg_qua
        {"extensions", {{"KHR_materials_unlit", json::object()}}}});
 }
 
-/// The node that shows the frame; its index.
-Result<int> add_node(Document& document, const Frame3D& frame, int jpeg_quality) {
+/// What glTF shows of a frame, in its axes: unit normals, and coordinates where there is a picture for them.
+Surface to_gltf(const Frame3D& frame) {
   const Surface& surface = frame.surface;
-  const std::vector<Vec3f> positions = turned(surface.positions);
+  Surface out;
+  out.positions = turned(surface.positions);
+  out.normals = turned(unit_normals(surface));
+  if (!frame.texture.empty()) out.texture_coordinates = surface.texture_coordinates;
+  out.triangles = surface.triangles;
+  out.sigmas_m = surface.sigmas_m;
+  out.interpolated = surface.interpolated;
+  return out;
+}
+
+json plain_primitive(Document& document, const Surface& surface) {
   json attributes;
-  attributes["POSITION"] = document.add_floats(positions);
-  add_bounds(document.root["accessors"].back(), positions);
-  attributes["NORMAL"] = document.add_floats(turned(unit_normals(surface)));
+  attributes["POSITION"] = document.add_floats(surface.positions);
+  add_bounds(document.root["accessors"].back(), surface.positions);
+  attributes["NORMAL"] = document.add_floats(surface.normals);
   json primitive = {{"mode", surface.triangles.empty() ? kPoints : kTriangles}};
   if (!surface.triangles.empty()) primitive["indices"] = document.add_indices(surface.triangles);
-  if (!surface.texture_coordinates.empty() && !frame.texture.empty()) {
+  if (!surface.texture_coordinates.empty())
     attributes["TEXCOORD_0"] = document.add_floats(surface.texture_coordinates);
-    const auto material = add_material(document, frame.texture, jpeg_quality);
-    if (!material) return material.error();
-    primitive["material"] = *material;
-  }
   // Attributes of an application's own start with an underscore (glTF 2.0, 3.7.2.1).
   if (!surface.sigmas_m.empty()) attributes["_SIGMA"] = document.add_scalars(surface.sigmas_m);
   if (!surface.interpolated.empty())
     attributes["_INTERPOLATED"] =
         document.add_scalars({surface.interpolated.begin(), surface.interpolated.end()});
   primitive["attributes"] = std::move(attributes);
-  const int mesh = document.add("meshes", {{"primitives", json::array({std::move(primitive)})}});
+  return primitive;
+}
+
+/// The box on a grid that does not depend on the frame: multiples of 1, 2, 4, 8 .. micrometres, as few as the
+/// positions fit with into kDracoPositionBits. Whole micrometres, since Draco's encoder is told of the box as
+/// text with six decimals.
+Volume snapped_volume(const std::vector<Vec3f>& positions) {
+  constexpr int kSteps = (1 << kDracoPositionBits) - 1;
+  const auto [low, high] = bounds(positions);
+  double edge_um = 0;
+  for (std::size_t i = 0; i < 3; ++i) edge_um = std::max(edge_um, 1e6 * (double{high[i]} - double{low[i]}));
+  int exponent = 0;
+  // Fewer steps than there are: the low end goes down to a multiple, and numbers are rounded.
+  std::frexp(edge_um / (kSteps - 2), &exponent);
+  const double step_m = std::ldexp(1e-6, std::max(exponent, 0));
+  Volume volume{.min = {}, .size_m = static_cast<float>(step_m * kSteps)};
+  for (std::size_t i = 0; i < 3; ++i)
+    volume.min[i] = static_cast<float>(step_m * std::floor(low[i] / step_m));
+  return volume;
+}
+
+/// Nothing where no triangle has three corners.
+Result<std::optional<json>> draco_primitive(Document& document, const Surface& surface) {
+  const Volume volume = snapped_volume(surface.positions);
+  if (!std::isfinite(volume.size_m)) return Error{"the surface is too large for Draco"};
+  const auto coded = encode_draco(
+      surface, {.position_bits = kDracoPositionBits, .normal_bits = kDracoNormalBits, .volume = volume});
+  if (!coded) return coded.error();
+  if (coded->triangles == 0) return std::optional<json>();
+  // Accessors tell what comes out, the exact bounds among it.
+  const auto decoded = decode_draco(coded->bytes, coded->vertices, coded->triangles);
+  if (!decoded) return decoded.error();
+  const std::size_t start = document.binary.size();
+  append_bytes(document.binary, coded->bytes);
+  json ids, attributes;
+  const auto add = [&](const char* name, int id, const char* type) {
+    if (id < 0) return;
+    ids[name] = id;
+    attributes[name] =
+        document.add_accessor({{"componentType", kFloat}, {"count", coded->vertices}, {"type", type}});
+  };
+  const int view = document.end_view(start, 0);
+  add("POSITION", coded->position_id, "VEC3");
+  add_bounds(document.root["accessors"].back(), decoded->positions);
+  add("NORMAL", coded->normal_id, "VEC3");
+  add("TEXCOORD_0", coded->coordinate_id, "VEC2");
+  const int indices = document.add_accessor(
+      {{"componentType", kUint32}, {"count", 3 * std::size_t{coded->triangles}}, {"type", "SCALAR"}});
+  for (const char* list : {"extensionsUsed", "extensionsRequired"}) document.use(list, kDracoExtension);
+  return std::optional<json>(
+      {{"mode", kTriangles},
+       {"attributes", std::move(attributes)},
+       {"indices", indices},
+       {"extensions", {{kDracoExtension, {{"bufferView", view}, {"attributes", std::move(ids)}}}}}});
+}
+
+/// Of a surface with at least one vertex.
+Result<json> add_primitive(Document& document, const Surface& surface, bool draco) {
+  if (draco && !surface.triangles.empty()) {
+    auto primitive = draco_primitive(document, surface);
+    if (!primitive) return primitive.error();
+    if (*primitive) return **std::move(primitive);
+  }
+  return plain_primitive(document, surface);
+}
+
+/// The node that shows the frame; its index.
+Result<int> add_node(Document& document, const Frame3D& frame, const GlbOptions& options) {
+  const Surface surface = to_gltf(frame);
+  auto primitive = add_primitive(document, surface, options.draco);
+  if (!primitive) return primitive.error();
+  if (!surface.texture_coordinates.empty()) {
+    const auto material = add_material(document, frame.texture, options.jpeg_quality);
+    if (!material) return material.error();
+    (*primitive)["material"] = *material;
+  }
+  const int mesh = document.add("meshes", {{"primitives", json::array({*std::move(primitive)})}});
   const int node = document.add("nodes", {{"mesh", mesh}, {"name", "surface"}});
   document.root["scenes"][0]["nodes"].push_back(node);
   return node;
+}
+
+Status check(const Frame3D& frame, const GlbOptions& options) {
+  if (options.jpeg_quality < 1 || options.jpeg_quality > 100) return Error{"jpeg_quality is not 1 to 100"};
+  return check_surface(frame.surface);
 }
 
 Document start_document() {
@@ -196,18 +299,17 @@ Result<Bytes> to_glb(Document& document) {
 
 }  // namespace
 
-Result<Bytes> encode_glb(const Frame3D& frame, int jpeg_quality) {
-  if (jpeg_quality < 1 || jpeg_quality > 100) return Error{"jpeg_quality is not 1 to 100"};
-  if (auto status = check_surface(frame.surface); !status) return status.error();
+Result<Bytes> encode_glb(const Frame3D& frame, const GlbOptions& options) {
+  if (auto status = check(frame, options); !status) return status.error();
   Document document = start_document();
   document.root["scenes"][0]["extras"] = moment_of(frame);
   if (!frame.surface.positions.empty())
-    if (auto node = add_node(document, frame, jpeg_quality); !node) return node.error();
+    if (auto node = add_node(document, frame, options); !node) return node.error();
   return to_glb(document);
 }
 
-Status write_glb(const std::filesystem::path& path, const Frame3D& frame, int jpeg_quality) {
-  const auto bytes = encode_glb(frame, jpeg_quality);
+Status write_glb(const std::filesystem::path& path, const Frame3D& frame, const GlbOptions& options) {
+  const auto bytes = encode_glb(frame, options);
   return bytes ? write_whole_file(path, *bytes) : Status(bytes.error().in("cannot write " + path.string()));
 }
 
@@ -244,17 +346,16 @@ struct GlbAnimation::State {
 GlbAnimation::GlbAnimation() : state_(std::make_unique<State>()) {}
 GlbAnimation::~GlbAnimation() = default;
 
-Status GlbAnimation::add(const Frame3D& frame, int jpeg_quality) {
+Status GlbAnimation::add(const Frame3D& frame, const GlbOptions& options) {
   State& s = *state_;
-  if (jpeg_quality < 1 || jpeg_quality > 100) return Error{"jpeg_quality is not 1 to 100"};
-  if (auto status = check_surface(frame.surface); !status) return status;
+  if (auto status = check(frame, options); !status) return status;
   if (s.shown.empty()) s.first_ns = frame.time_ns;
   const double time_s = 1e-9 * static_cast<double>(frame.time_ns - s.first_ns);
   if (!s.shown.empty() && !(time_s > s.shown.back().time_s))
     return Error{"frame " + std::to_string(frame.number) + " is not later than the one before it"};
   State::Shown shown{{}, time_s};
   if (!frame.surface.positions.empty()) {
-    const auto node = add_node(s.document, frame, jpeg_quality);
+    const auto node = add_node(s.document, frame, options);
     if (!node) return node.error();
     s.document.root["nodes"].back()["extras"] = moment_of(frame);
     shown.node = *node;

@@ -112,7 +112,7 @@ Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std
 }
 
 Result<Bytes> scene_message(const Frame3D& frame, const std::string& stream, std::int64_t time_ns) {
-  const auto glb = encode_glb(frame, kJpegQuality);
+  const auto glb = encode_glb(frame, {.jpeg_quality = kJpegQuality});
   if (!glb) return glb.error();
   Cdr cdr;
   cdr.empty_sequences(1);  // deletions

@@ -14,45 +14,6 @@ namespace {
 
 #define RELIEVO_INLINE [[gnu::always_inline]] inline
 
-/// The difference of two places, none where it is out of bounds. Absent places are far from all others.
-RELIEVO_INLINE std::int32_t within(std::int32_t a, std::int32_t b, std::int32_t limit) {
-  const std::int32_t d = a - b;
-  return d <= limit && d >= -limit ? d : 0;
-}
-
-RELIEVO_INLINE void predict_body(const GridRows& rows, const GridModel& model, int count,
-                                 std::int32_t* __restrict expected) {
-  const std::int32_t limit = model.limit;
-  const int places = (count + 7) / 8 * 8;
-  for (int b = 0; b < places; ++b) {
-    const std::int32_t up = rows.up1[b];
-    const std::int32_t d1 = within(up, rows.up2[b], limit);
-    const std::int32_t d2 = within(rows.up2[b], rows.up3[b], limit);
-    const std::int32_t d3 = within(rows.up3[b], rows.up4[b], limit);
-    expected[b] = up + ((model.slope1 * d1 + model.slope2 * d2 + model.slope3 * d3 + 128) >> 8);
-  }
-  if (rows.key == nullptr) return;
-  for (int b = 0; b < places; ++b) {
-    const std::int32_t change = rows.up1[b] - rows.key_up[b];
-    const std::int32_t d = rows.key[b] - expected[b];
-    const bool near = change <= limit && change >= -limit && d <= limit && d >= -limit;
-    // Of absent places the products would overflow.
-    const std::int32_t more =
-        (model.key * (near ? d : 0) + model.key_change * (near ? change : 0) + 128) >> 8;
-    expected[b] += near ? more : 0;
-  }
-}
-
-RELIEVO_INLINE void contexts_body(const std::uint8_t* sizes, const std::int32_t* up1, int count,
-                                  std::uint8_t* __restrict out) {
-  const int places = (count + 7) / 8 * 8;
-  for (int b = 0; b < places; ++b) {
-    const auto t = static_cast<std::uint8_t>(sizes[b - 1] + 2 * sizes[b] + sizes[b + 1]);
-    out[b] = static_cast<std::uint8_t>((t >= 1) + (t >= 2) + (t >= 4) + (t >= 8) + (t >= 16) + (t >= 32));
-  }
-  for (int b = 0; b < places; ++b) out[b] = up1[b] == StripeGrid::kAbsent ? kAloneTable : out[b];
-}
-
 // Eight places at once; a processor with narrower registers takes several for them.
 using Ints = std::int32_t __attribute__((vector_size(32)));  // as a mask: 0 or -1
 using Unsigned = std::uint32_t __attribute__((vector_size(32)));
@@ -74,6 +35,49 @@ RELIEVO_INLINE void load_octets(const std::uint8_t* from, Ints& to) {
 }
 RELIEVO_INLINE void store_octets(const Ints& from, std::uint8_t* to) {
   store(__builtin_convertvector(from, Octets), to);
+}
+
+/// The difference of two places, none where it is out of bounds. Absent places are far from all others.
+RELIEVO_INLINE std::int32_t within(std::int32_t a, std::int32_t b, std::int32_t limit) {
+  const std::int32_t d = a - b;
+  return d <= limit && d >= -limit ? d : 0;
+}
+
+RELIEVO_INLINE void predict_body(const GridRows& rows, const GridModel& model, int count,
+                                 std::int32_t* __restrict expected) {
+  const std::int32_t limit = model.limit;
+  const int places = (count + 7) / 8 * 8;
+  for (int b = 0; b < places; ++b) {
+    const std::int32_t up = rows.up1[b];
+    const std::int32_t d1 = within(up, rows.up2[b], limit);
+    const std::int32_t d2 = within(rows.up2[b], rows.up3[b], limit);
+    const std::int32_t d3 = within(rows.up3[b], rows.up4[b], limit);
+    expected[b] = up + ((model.slope1 * d1 + model.slope2 * d2 + model.slope3 * d3 + 128) >> 8);
+  }
+  if (rows.key == nullptr) return;
+  for (int b = 0; b < places; b += 8) {
+    Ints up, key_up, key, alone;
+    load(rows.up1 + b, up);
+    load(rows.key_up + b, key_up);
+    load(rows.key + b, key);
+    load(expected + b, alone);
+    const Ints change = up - key_up;
+    const Ints d = key - alone;
+    const Ints near = (change <= limit) & (change >= -limit) & (d <= limit) & (d >= -limit);
+    // Of absent places the products would overflow.
+    const Ints more = (model.key * (near & d) + model.key_change * (near & change) + 128) >> 8;
+    store(alone + (near & more), expected + b);
+  }
+}
+
+RELIEVO_INLINE void contexts_body(const std::uint8_t* sizes, const std::int32_t* up1, int count,
+                                  std::uint8_t* __restrict out) {
+  const int places = (count + 7) / 8 * 8;
+  for (int b = 0; b < places; ++b) {
+    const auto t = static_cast<std::uint8_t>(sizes[b - 1] + 2 * sizes[b] + sizes[b + 1]);
+    out[b] = static_cast<std::uint8_t>((t >= 1) + (t >= 2) + (t >= 4) + (t >= 8) + (t >= 16) + (t >= 32));
+  }
+  for (int b = 0; b < places; ++b) out[b] = up1[b] == StripeGrid::kAbsent ? kAloneTable : out[b];
 }
 
 RELIEVO_INLINE void residuals_body(const GridResiduals& line, int count) {

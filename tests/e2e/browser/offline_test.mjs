@@ -24,10 +24,12 @@ execFileSync(
     '--domain', domain, '--interface', 'lo'],
   { stdio: 'ignore' },
 );
-for (const format of ['ply', 'glb']) {
-  execFileSync(relievoPath, ['export', recorded, '--out', join(scratch, format), '--format', format], { stdio: 'ignore' });
+const surfaces = { ply: ['ply'], glb: ['glb'], draco: ['glb', '--draco'] };
+for (const [name, format] of Object.entries(surfaces)) {
+  execFileSync(relievoPath, ['export', recorded, '--out', join(scratch, name), '--format', ...format], { stdio: 'ignore' });
 }
-const exported = (format) => join(scratch, format, readdirSync(join(scratch, format)).filter((f) => f.endsWith(format)).sort()[2]);
+const exported = (name) =>
+  join(scratch, name, readdirSync(join(scratch, name)).filter((file) => file.endsWith(surfaces[name][0])).sort()[2]);
 const tokens = join(scratch, 'tokens');
 writeFileSync(tokens, `${kToken}\n`, { mode: 0o600 });
 
@@ -151,7 +153,7 @@ const checks = {
     await page.waitForFunction(() => window.relievo !== undefined);
   },
 
-  async 'a recording, a PLY and a GLB of the device are shown without a server'(page) {
+  async 'a recording, a PLY and GLBs of the device, with Draco too, are shown without a server'(page) {
     await drop(page, recorded, 'object.mcap');
     await shownPast(page, 1);
     await inState(page, 'file');
@@ -159,12 +161,12 @@ const checks = {
     await still(page);
     assert.equal((await look(page)).errors, 0);
     assert.ok((await look(page)).pixels.covered > 0.1);
-    for (const format of ['ply', 'glb']) {
-      await drop(page, exported(format), `surface.${format}`);
-      await page.waitForFunction((name) => window.relievo.diagnostics().file === name, `surface.${format}`);
+    for (const [name, [ending]] of Object.entries(surfaces)) {
+      await drop(page, exported(name), `${name}.${ending}`);
+      await page.waitForFunction((file) => window.relievo.diagnostics().file === file, `${name}.${ending}`);
       await still(page);
       const { pixels, vertices } = await look(page);
-      assert.ok(pixels.covered > 0.1 && pixels.deviation > 5, `${format}: ${JSON.stringify(pixels)}, ${vertices}`);
+      assert.ok(pixels.covered > 0.1 && pixels.deviation > 5, `${name}: ${JSON.stringify(pixels)}, ${vertices}`);
     }
   },
 

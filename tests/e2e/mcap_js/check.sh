@@ -31,5 +31,6 @@ if node "$here/validate.mjs" "$folder/c.mcap" > /dev/null 2>&1; then
   echo "a cut was not noticed"; exit 1
 fi
 "$1" "$folder/a.glb"
-node "$here/validate_glb.mjs" "$folder/a.glb"
+"$1" "$folder/a.draco.glb"
+node "$here/validate_glb.mjs" "$folder/a.glb" "$folder/a.draco.glb"
 echo "60 messages read and decoded by @mcap/core"

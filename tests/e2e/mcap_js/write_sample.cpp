@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_sample FILE.mcap|FILE.glb: a recording of known CDR messages, for validate.mjs to read; or a surface,
-// for validate_glb.mjs.
+// write_sample FILE.mcap|FILE.glb|FILE.draco.glb: a recording of known CDR messages, for validate.mjs to
+// read; or a surface, the last compressed, for validate_glb.mjs.
 #include <cstdio>
 #include <string_view>
 
@@ -51,7 +51,8 @@ Status write(const char* file) {
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const std::string_view name(argv[1]);
-  const auto status = name.ends_with(".glb") ? relievo::write_glb(name, relievo::test::frame(40, 30))
+  const relievo::GlbOptions options{.draco = name.ends_with(".draco.glb")};
+  const auto status = name.ends_with(".glb") ? relievo::write_glb(name, relievo::test::frame(40, 30), options)
                                              : relievo::write(argv[1]);
   if (!status) std::fprintf(stderr, "%s\n", status.error().message.c_str());
   return status.ok() ? 0 : 1;

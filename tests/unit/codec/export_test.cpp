@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstring>
@@ -13,8 +14,10 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/lens.h"
+#include "codec/draco_mesh.h"
 #include "codec/jpeg_texture.h"
 #include "codec/surface_check.h"
 #include "tests/support/make_surface.h"
@@ -147,7 +150,134 @@ TEST(Export, GlbOfPointsAndOfNothing) {
   frame.surface.triangles.clear();
   EXPECT_TRUE(write_glb(folder / "points.glb", frame).ok());
   EXPECT_TRUE(write_glb(folder / "nothing.glb", Frame3D()).ok());
-  EXPECT_FALSE(write_glb(folder / "bad.glb", frame, 101).ok());
+  EXPECT_FALSE(write_glb(folder / "bad.glb", frame, {.jpeg_quality = 101}).ok());
+}
+
+nlohmann::json json_of(const std::string& glb) {
+  return nlohmann::json::parse(glb.substr(20, at<std::uint32_t>(glb, 12)));
+}
+
+/// The surface of the only mesh of a GLB with KHR_draco_mesh_compression, which its accessors must describe.
+Surface draco_surface(const std::string& glb) {
+  const auto root = json_of(glb);
+  const auto& primitive = root["meshes"][0]["primitives"][0];
+  const auto& extension = primitive["extensions"]["KHR_draco_mesh_compression"];
+  const auto& view = root["bufferViews"][extension["bufferView"].get<std::size_t>()];
+  const auto accessor = [&](const nlohmann::json& index) {
+    return root["accessors"][index.get<std::size_t>()];
+  };
+  const auto positions = accessor(primitive["attributes"]["POSITION"]);
+  const std::size_t vertices = positions["count"];
+  for (const auto& [name, index] : primitive["attributes"].items()) {
+    EXPECT_EQ(accessor(index)["count"], vertices) << name;
+    EXPECT_FALSE(accessor(index).contains("bufferView")) << name;
+    EXPECT_TRUE(extension["attributes"].contains(name)) << name;
+  }
+  const std::size_t start = 28 + at<std::uint32_t>(glb, 12) + view["byteOffset"].get<std::size_t>();
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(glb.data()) + start;
+  auto surface = decode_draco({bytes, view["byteLength"].get<std::size_t>()}, vertices,
+                              accessor(primitive["indices"])["count"].get<std::uint32_t>() / 3);
+  EXPECT_TRUE(surface) << surface.error().message;
+  if (!surface) return {};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto less = [i](const Vec3f& a, const Vec3f& b) { return a[i] < b[i]; };
+    const auto [low, high] = std::ranges::minmax_element(surface->positions, less);
+    EXPECT_EQ(positions["min"][i], (*low)[i]);
+    EXPECT_EQ(positions["max"][i], (*high)[i]);
+  }
+  return *std::move(surface);
+}
+
+std::string glb_of(const Frame3D& frame, const GlbOptions& options) {
+  const auto bytes = encode_glb(frame, options);
+  EXPECT_TRUE(bytes) << bytes.error().message;
+  return bytes ? std::string(bytes->begin(), bytes->end()) : std::string();
+}
+
+TEST(Export, DracoGlbHoldsTheSurface) {
+  Frame3D frame = test::frame(60, 45);
+  Surface& surface = frame.surface;
+  surface.positions.push_back({0, 0, 1});  // of no triangle
+  surface.texture_coordinates.push_back({0, 0});
+  surface.sigmas_m.assign(surface.positions.size(), 0.001f);
+  const std::string glb = glb_of(frame, {.draco = true});
+  const auto root = json_of(glb);
+  EXPECT_EQ(root["extensionsRequired"], nlohmann::json({"KHR_draco_mesh_compression"}));
+  EXPECT_EQ(root["extensionsUsed"].size(), 2U) << "and the unlit material";
+  EXPECT_LT(glb.size(), glb_of(frame, {}).size() / 3);
+
+  const Surface decoded = draco_surface(glb);
+  EXPECT_EQ(decoded.triangles.size(), surface.triangles.size());
+  EXPECT_EQ(decoded.normals.size(), decoded.positions.size());
+  std::vector<std::uint8_t> used(surface.positions.size(), 0);
+  for (const Triangle& corners : surface.triangles)
+    for (const std::uint32_t corner : corners) used[corner] = 1;
+  ASSERT_EQ(decoded.positions.size(), static_cast<std::size_t>(std::ranges::count(used, 1)));
+  const auto normals = surface_normals(surface);
+  for (std::size_t i = 0; i < decoded.positions.size(); ++i) {
+    // Which vertex it was is told by its place in the picture.
+    const Vec2f& uv = decoded.texture_coordinates[i];
+    const auto column = std::lround(60 * uv[0] - 0.5f), row = std::lround(45 * uv[1] - 0.5f);
+    const auto from = static_cast<std::size_t>(60 * row + column);
+    ASSERT_EQ(used.at(from), 1);
+    used[from] = 0;
+    const Vec3f &p = surface.positions[from], &n = normals[from];
+    const float half_step_m = 1.1f / 16'000;  // 1.1 m is its longest edge
+    EXPECT_NEAR(decoded.positions[i][0], p[0], half_step_m);
+    EXPECT_NEAR(decoded.positions[i][1], -p[1], half_step_m) << "y up";
+    EXPECT_NEAR(decoded.positions[i][2], -p[2], half_step_m) << "z backward";
+    const Vec3f& d = decoded.normals[i];
+    EXPECT_GT(d[0] * n[0] - d[1] * n[1] - d[2] * n[2], 0.99996f);  // half a degree
+  }
+}
+
+/// So that what stands still does, whatever else moves.
+TEST(Export, DracoGlbHasPositionsOnTheSameGridInEachFrame) {
+  Frame3D frame = test::frame(20, 15);
+  for (const float moved_m : {0.0f, 0.0137f}) {
+    for (std::size_t i = 0; i < 40; ++i) frame.surface.positions[i][0] -= moved_m;
+    const Surface decoded = draco_surface(glb_of(frame, {.draco = true}));
+    ASSERT_FALSE(decoded.positions.empty());
+    for (const Vec3f& p : decoded.positions)
+      for (const float x : p) {
+        const double steps = x / 64e-6;  // 1.0 m of at most 16,381 steps
+        EXPECT_NEAR(steps, std::round(steps), 0.01);
+      }
+  }
+}
+
+TEST(Export, DracoGlbOfOddSurfaces) {
+  Frame3D frame = test::frame(5, 5);
+  frame.surface.triangles = {{0, 0, 1}};
+  EXPECT_FALSE(json_of(glb_of(frame, {.draco = true})).contains("extensionsRequired")) << "nothing left";
+  frame.surface.triangles.clear();
+  EXPECT_EQ(glb_of(frame, {.draco = true}), glb_of(frame, {})) << "Draco is of triangles alone";
+  EXPECT_EQ(glb_of({}, {.draco = true}), glb_of({}, {}));
+
+  frame.texture = {};
+  frame.surface.triangles = {{0, 1, 2}};
+  frame.surface.positions[0] = frame.surface.positions[1] = frame.surface.positions[2] = {3, 3, 3};
+  const Surface at_one_place = draco_surface(glb_of(frame, {.draco = true}));
+  ASSERT_EQ(at_one_place.positions.size(), 3U);
+  EXPECT_NEAR(at_one_place.positions[0][0], 3, 1e-4);
+  frame.surface.positions[0][0] = std::numeric_limits<float>::max();
+  EXPECT_FALSE(encode_glb(frame, {.draco = true}));
+}
+
+TEST(Export, DracoAnimationHasAStreamAFrame) {
+  GlbAnimation animation;
+  Frame3D frame = test::frame(8, 6);
+  for (int i = 0; i < 2; ++i, frame.time_ns += 100'000'000)
+    ASSERT_TRUE(animation.add(frame, {.draco = true}).ok());
+  const auto bytes = animation.finish();
+  ASSERT_TRUE(bytes);
+  const auto root = json_of({bytes->begin(), bytes->end()});
+  EXPECT_EQ(root["extensionsUsed"].size(), 2U) << "each once";
+  EXPECT_EQ(root["animations"][0]["channels"].size(), 2U);
+  const auto stream = [&](int mesh) {
+    return root["meshes"][mesh]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["bufferView"];
+  };
+  EXPECT_NE(stream(0), stream(1));
 }
 
 /// Frames of one triangle each, the middle one empty, at 0, 0.1 and 0.25 s.
@@ -165,10 +295,6 @@ Result<Bytes> small_animation() {
     if (auto status = animation.add(frame); !status) return status.error();
   }
   return animation.finish();
-}
-
-nlohmann::json json_of(const std::string& glb) {
-  return nlohmann::json::parse(glb.substr(20, at<std::uint32_t>(glb, 12)));
 }
 
 /// The viewer's tests play the same file with three.js's loader.

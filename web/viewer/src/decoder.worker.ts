@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Decodes frames off the main thread, one after the other.
-import wasmUrl from 'draco3d/draco_decoder.wasm?url';
 import type { DracoDecoder, Geometry } from './draco';
 import { kGeometryDraco, kGeometryDracoGrid, kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
 import { GridFrames } from './grid';
 import gridWasmUrl from './grid.wasm?url';
+import { loadDraco } from './loadDraco';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
 import { kNoVideoHere, VideoTextures } from './videoTexture';
@@ -49,9 +49,7 @@ async function theDraco(): Promise<DracoDecoder> {
   if (performance.now() - draco.failedAt < kDracoAgainMs) throw new Error(draco.failure);
   post({ type: 'loading' });
   try {
-    const [{ DracoDecoder }, response] = await Promise.all([import('./draco'), fetch(wasmUrl)]);
-    if (!response.ok) throw new Error(`HTTP ${response.status}`);
-    draco.loaded = await DracoDecoder.create(await response.arrayBuffer());
+    draco.loaded = await loadDraco();
     return draco.loaded;
   } catch (error) {
     draco.failure = `the Draco decoder cannot be loaded: ${error instanceof Error ? error.message : String(error)}`;

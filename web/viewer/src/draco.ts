@@ -2,7 +2,7 @@
 // Geometry codec 1 of codec/FORMAT.md, and the lists of numbers of codec 3, with Google's decoder compiled to WebAssembly.
 // Runs in the worker.
 import createDecoder from 'draco3d/draco_decoder_nodejs.js';
-import { kGeometryDraco, type Frame } from './frame';
+import { kGeometryDraco, kLimits, type Frame } from './frame';
 import type { Attribute, DataType, Decoder, DecoderModule, Mesh, PointCloud } from 'draco3d';
 
 export interface Geometry {
@@ -51,6 +51,17 @@ export class DracoDecoder {
     if (declared.vertices !== vertices || declared.triangles !== triangles) {
       throw new Error('geometry is not of the size that the frame declares');
     }
+    return this.read(bytes, vertices, triangles);
+  }
+
+  /** Of another file than a frame's: as large as it says itself, within the limits of frames. Throws otherwise. Any input. */
+  mesh(bytes: Uint8Array): Geometry {
+    const { vertices, triangles } = declaredCounts(bytes);
+    if (vertices > kLimits.vertices || triangles > kLimits.triangles) throw new Error('geometry is too large');
+    return this.read(bytes, vertices, triangles);
+  }
+
+  private read(bytes: Uint8Array, vertices: number, triangles: number): Geometry {
     const m = this.module;
     const decoder = new m.Decoder() as DecoderWithArrays;
     const mesh = triangles > 0 ? new m.Mesh() : (new m.PointCloud() as Mesh);
@@ -61,7 +72,7 @@ export class DracoDecoder {
           : decoder.DecodeArrayToPointCloud(bytes, bytes.length, mesh);
       if (!status.ok()) throw new Error(`geometry cannot be decoded: ${status.error_msg()}`);
       if (mesh.num_points() !== vertices || (triangles > 0 && mesh.num_faces() !== triangles)) {
-        throw new Error('geometry decoded to another size than the frame declares');
+        throw new Error('geometry decoded to another size than was declared');
       }
       const positions = this.attribute(decoder, mesh, m.POSITION, 3);
       if (positions === null) throw new Error('geometry has no positions');

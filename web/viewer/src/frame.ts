@@ -36,7 +36,7 @@ const kQualityCodec = 1;
 const kFixedBytes = 64;
 const kEntryBytes = 8;
 const kMaxSections = 16;
-const kLimits = { vertices: 4_000_000, triangles: 8_000_000, pixels: 64_000_000 };
+export const kLimits = { vertices: 4_000_000, triangles: 8_000_000, pixels: 64_000_000 };
 
 /** Throws an Error that says what is wrong; any input. */
 export function parseFrame(bytes: Uint8Array): Frame {

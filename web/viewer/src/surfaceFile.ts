@@ -3,6 +3,7 @@
 import * as THREE from 'three';
 import { GLTFLoader, type GLTFParser } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
+import { glbDraco } from './glbDraco';
 import type { DecodedFrame } from './messages';
 import { robustExtent, type Extent } from './surface';
 
@@ -34,7 +35,7 @@ function readPly(bytes: ArrayBuffer): DecodedFrame {
 
 async function readGlb(bytes: ArrayBuffer): Promise<DecodedFrame> {
   let picture: ImageBitmap | null = null;
-  const loader = new GLTFLoader();
+  const loader = new GLTFLoader().setDRACOLoader(glbDraco());
   // The loader's own way goes through blob: addresses, which the page's content policy forbids.
   loader.register((parser) => ({
     name: 'pictures',
