@@ -23,7 +23,7 @@ constexpr OrderRules kOrder{
     .max_missing = 3,
 };
 constexpr float kJump = -1.6F;       // a depth step: anything may follow
-constexpr float kUnexpected = 2.0F;  // less for a boundary where no depth seen before would put it
+constexpr float kUnexpected = 1.0F;  // less for a boundary where no depth seen before would put it
 constexpr int kMaxSkipped = 3;       // false edges between two that follow each other
 constexpr float kClear = 0.5F;       // of a channel's evidence: leaves no doubt about its sign
 constexpr float kNoStripe = -100;    // agreement with what no stripe is
