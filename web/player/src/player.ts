@@ -182,8 +182,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     overlay.setAttribute('aria-hidden', 'true');
     this.box.replaceChildren(canvas, overlay, this.messageLine, this.timelineBox);
     try {
-      const drawn = (): void => this.parts?.session.drawn();
-      const view = new View(canvas, overlay, { beforeDraw: () => this.draw(), drawn, contextLost: () => undefined, way: () => undefined }, this.box);
+      const view = new View(canvas, overlay, { beforeDraw: () => this.draw(), contextLost: () => undefined, way: () => undefined }, this.box);
       const session = this.makeSession(view);
       this.timelineBox.replaceChildren();
       const timeline = new Timeline(this.timelineBox);

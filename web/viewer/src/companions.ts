@@ -78,11 +78,6 @@ export class Companions {
     }
   }
 
-  /** What draw() showed is seen. */
-  drawn(): void {
-    for (const { session } of this.shown.values()) session.drawn();
-  }
-
   /** How much detail is to come of all of them. */
   want(quality: Quality): void {
     this.quality = quality;

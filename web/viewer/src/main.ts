@@ -151,8 +151,7 @@ class Viewer {
       way: this.view?.navigator.way,
       drawn: this.view?.drawn,
       busy: this.view?.isBusy,
-      scale: this.view?.moving.scale,
-      drawingMs: this.view?.moving.ms,
+      scale: this.view?.movingScale,
       depthRange: this.view?.depthRange,
       gridStep: this.view?.gridStep,
       besides: this.companions?.report(),
@@ -168,10 +167,6 @@ class Viewer {
     try {
       return new View(this.ui.canvas, element<HTMLCanvasElement>('overlay'), {
         beforeDraw: () => this.draw(),
-        drawn: () => {
-          this.session.drawn();
-          this.companions?.drawn();
-        },
         contextLost: (lost) => (this.problem = lost ? text.contextLost : null),
         way: (way) => this.change({ way }),
       });
@@ -231,7 +226,6 @@ class Viewer {
       this.session.meter,
       () => this.session.status,
       () => this.session.source?.kept ?? null,
-      () => this.view?.moving ?? null,
       () => (this.offered === null ? null : whyText(this.offered)),
     );
   }

@@ -216,19 +216,13 @@ export class Navigator {
     return { origin: [ox, -oy, -oz], direction: [far.x, -far.y, -far.z] };
   }
 
-  /** Where points of the rig camera's frame are on the page as it is seen now, wherever it is seen from later; null behind the viewer. */
-  projection(): (point: Vec3) => { x: number; y: number } | null {
-    const lens = this.isRigView ? lensOf(this.rig!) : null;
-    const view = this.camera.matrixWorldInverse.clone();
-    const projection = this.camera.projectionMatrix.clone();
-    const { width, height } = this.size;
-    return ([x, y, z]) => {
-      const at = lens === null ? [x, y, z] : distortPoint(lens, [x, y, z]);
-      const point = new THREE.Vector3(at[0], -at[1]!, -at[2]!).applyMatrix4(view);
-      if (point.z > -1e-6) return null;
-      point.applyMatrix4(projection);
-      return { x: ((point.x + 1) / 2) * width, y: ((1 - point.y) / 2) * height };
-    };
+  /** Where a point of the rig camera's frame is on the page; null behind the viewer. */
+  toPage([x, y, z]: Vec3): { x: number; y: number } | null {
+    const at = this.isRigView ? distortPoint(lensOf(this.rig!), [x, y, z]) : [x, y, z];
+    const point = new THREE.Vector3(at[0], -at[1]!, -at[2]!).applyMatrix4(this.camera.matrixWorldInverse);
+    if (point.z > -1e-6) return null;
+    point.applyMatrix4(this.camera.projectionMatrix);
+    return { x: ((point.x + 1) / 2) * this.size.width, y: ((1 - point.y) / 2) * this.size.height };
   }
 
   private enterRig(): void {

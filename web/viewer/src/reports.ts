@@ -43,7 +43,7 @@ export function report(viewer: Reporting): void {
       return [...rgba.slice((row * width + column) * 4, (row * width + column) * 4 + 4)];
     },
     pick: (x, y) => viewer.view?.pick({ x, y }) ?? null,
-    toPage: (point) => viewer.view?.navigator.projection()(point) ?? null,
+    toPage: (point) => viewer.view?.navigator.toPage(point) ?? null,
     extent: () => viewer.view?.shown?.extent ?? null,
     surface: () => {
       const frame = viewer.view?.shown ?? null;

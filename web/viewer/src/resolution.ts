@@ -16,11 +16,6 @@ export class Resolution {
   private mean_ms = 0;
   private count = 0;
 
-  /** What the last drawings took, of which the newest weighs most; null: not known yet. */
-  get drawing_ms(): number | null {
-    return this.mean_ms === 0 ? null : this.mean_ms;
-  }
-
   /** One drawing of a moving picture took `ms`. True where the scale has changed. */
   took(ms: number): boolean {
     if (++this.count <= kIgnored) return false;

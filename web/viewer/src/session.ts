@@ -12,7 +12,7 @@ export interface SessionEvents {
   changed(): void;
   /** The description of a stream came; `seen`: a frame of it was shown before. */
   described(info: StreamInfo, seen: boolean): void;
-  /** A frame waits to be drawn: take() it, then say that it is drawn(). */
+  /** A frame waits to be drawn: take() it. */
   ready(): void;
   hint(text: string): void;
   unusable(message: string): void;
@@ -36,7 +36,6 @@ export class Session {
   private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
   private waiting: Waiting | null = null; // decoded, not drawn
   private taken: DecodedFrame | null = null; // drawn now
-  private drawing: Waiting | null = null; // the same, until drawn() says that it is seen
   private live = false; // the frame that came last
   private readonly pause = (): void => this.meter.pause();
 
@@ -87,22 +86,14 @@ export class Session {
   /** The frame to draw now instead of the one before, whose memory is used again, if there is one. Its credit goes back only here, so a hidden page receives nothing. */
   take(): DecodedFrame | null {
     if (this.waiting === null) return null;
-    const { frame } = this.waiting;
-    this.drawing = this.waiting;
+    const { frame, prefix } = this.waiting;
     this.waiting = null;
+    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.live === true);
     this.source?.credit();
     this.seen = true;
     if (this.taken !== null) this.decoder.giveBack(this.taken); // the one that is returned takes its place
     this.taken = frame;
     return frame;
-  }
-
-  /** What was taken is seen from here on. */
-  drawn(): void {
-    if (this.drawing === null) return;
-    const { frame, prefix } = this.drawing;
-    this.drawing = null;
-    this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.live === true);
   }
 
   private onMessage(message: ServerMessage): void {
@@ -155,7 +146,6 @@ export class Session {
 
   private forget(): void {
     this.underway.clear();
-    this.drawing = null;
     this.discard();
   }
 

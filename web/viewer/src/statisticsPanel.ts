@@ -21,7 +21,6 @@ export class StatisticsPanel {
     private readonly meter: Meter,
     private readonly status: () => StreamStatus | null,
     private readonly kept: () => Kept | null,
-    private readonly drawing: () => { scale: number; ms: number | null } | null,
     private readonly detail: () => string | null,
   ) {
     this.plot.setAttribute('role', 'img');
@@ -31,7 +30,7 @@ export class StatisticsPanel {
     this.section(say.latency, ['total', ...kStages]);
     body.append(this.plot);
     this.section(say.drops, ['serverDrops', 'link', 'viewer', 'gaps']);
-    this.section(say.machines, ['reconstruct', 'encode', 'decodeTime', 'drawTime', 'clock']);
+    this.section(say.machines, ['reconstruct', 'encode', 'decodeTime', 'clock']);
     this.section(say.kept, ['keptTime', 'keptBytes']);
   }
 
@@ -84,8 +83,6 @@ export class StatisticsPanel {
     this.set('reconstruct', ms(status?.reconstruct_ms));
     this.set('encode', ms(status?.encode_ms));
     this.set('decodeTime', ms(figures.decodeMs));
-    const drawing = this.drawing();
-    this.set('drawTime', drawing?.ms ? say.drawn(ms(drawing.ms)!, Math.round(100 * drawing.scale)) : null);
     const [offset, trip] = [clock.get(), clock.roundTrip()];
     this.set('clock', offset === null || trip === null ? null : `${offset.toFixed(1)} ± ${(trip / 2).toFixed(1)} ms`);
     this.showKept();

@@ -143,12 +143,10 @@ export const text = {
       reconstruct: 'server: reconstructs in',
       encode: 'server: encodes in',
       decodeTime: 'this page: decodes in',
-      drawTime: 'this page: draws in',
       clock: "server's clock ahead by",
       keptTime: 'the last',
       keptBytes: 'memory',
     },
-    drawn: (time: string, percent: number) => (percent === 100 ? time : `${time}, at ${percent} % of the screen's resolution`),
     keptOf: (now: string, most: string) => `${now} of at most ${most}`,
     serverDrops: (s: StreamStatus) =>
       `${s.drops_capture} capture, ${s.drops_reconstruct} reconstruct, ${s.drops_encode} encode, ${s.drops_publish} publish`,

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture: scene, surface, what is drawn over it. Draws only when something changed.
 import * as THREE from 'three';
-import { BackBuffer } from './backBuffer';
-import { Beat } from './beat';
 import type { Display, Mode, Way } from './display';
 import { Ground, type Label } from './ground';
 import { SurfaceMesh } from './mesh';
@@ -18,6 +16,7 @@ import { Resolution, drawnInSoftware } from './resolution';
 import type { Extent } from './surface';
 
 const kStill_ms = 1000; // without a drawing: the picture stands still and can be as fine as the screen
+const kPoll_ms = 2;
 
 /** A surface beside the first one, in a frame of its own camera. */
 export interface Beside {
@@ -36,8 +35,6 @@ export interface Hit extends Picked {
 export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
   beforeDraw(): void;
-  /** What was drawn is on the canvas. */
-  drawn(): void;
   contextLost(lost: boolean): void;
   /** A person's hand left the rig's camera. */
   way(way: Way): void;
@@ -60,13 +57,11 @@ export class View {
   private offsets: number[] = [0]; // of the first surface and those beside it, metres to the right
   /** Of the first surface, where there are others beside it. */
   name = '';
-  private readonly back: BackBuffer | null; // drawn into first, where the page would wait for the canvas
-  private readonly beat: Beat;
+  private scheduled = false;
   private readonly resolution = new Resolution();
   private scale = 0; // drawn at
+  private fence: WebGLSync | null = null; // of a drawing that is being timed
   private stillTimer = 0;
-  private fine = false; // the next drawing is as fine as the screen
-  private drawOver: () => void = () => undefined; // what was drawn
   private range: Range | null = null;
   private grid = false;
   private readonly head = new THREE.PerspectiveCamera(); // of a person with a headset, who moves it
@@ -83,14 +78,6 @@ export class View {
     // Four samples a pixel cost a processor that draws more than all the rest.
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.inSoftware, alpha: true });
     this.renderer.setClearAlpha(0);
-    this.back = this.inSoftware ? new BackBuffer(this.renderer) : null;
-    this.beat = new Beat(this.renderer.getContext() as WebGL2RenderingContext, this.inSoftware, {
-      draw: (now) => this.drawAt(now),
-      show: () => this.showDrawn(),
-      took: (ms) => {
-        if (this.scale === this.resolution.scale) this.resolution.took(ms);
-      },
-    });
     this.overlay = new Overlay(overlay);
     const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
     this.navigator = new Navigator(canvas, navigated, keys);
@@ -243,12 +230,10 @@ export class View {
   /** For good: gives back what it holds of the card. */
   end(): void {
     this.ended = true;
-    this.beat.stop();
     this.sizes.disconnect();
     window.clearTimeout(this.stillTimer);
     this.navigator.end();
     for (const mesh of this.meshes) mesh.dispose();
-    this.back?.dispose();
     this.renderer.dispose();
   }
 
@@ -272,23 +257,32 @@ export class View {
       this.events.beforeDraw();
       this.draw();
       ++this.drawn;
-      this.events.drawn();
     });
   }
 
   invalidate(): void {
     // A headset draws at its own beat, and the page's stands still.
-    if (!this.renderer.xr.isPresenting) this.beat.ask();
+    if (this.scheduled || this.ended || this.renderer.xr.isPresenting) return;
+    this.scheduled = true;
+    requestAnimationFrame((now) => {
+      if (!this.ended) this.events.beforeDraw();
+      this.scheduled = false; // what changed until here is drawn now, not once more
+      if (this.ended) return;
+      this.navigator.update(now);
+      this.setScale(this.resolution.scale);
+      this.render();
+      this.time();
+    });
   }
 
   /** Whether something will be drawn without anything happening before: motion that dies away, a finer picture. */
   get isBusy(): boolean {
-    return this.beat.isBusy || this.stillTimer !== 0;
+    return this.scheduled || this.fence !== null || this.stillTimer !== 0;
   }
 
-  /** While the picture moves: of the screen's resolution, and how long a drawing takes; null: not known yet. */
-  get moving(): { scale: number; ms: number | null } {
-    return { scale: this.resolution.scale, ms: this.resolution.drawing_ms };
+  /** Of the screen's pixels that are drawn while the picture moves. */
+  get movingScale(): number {
+    return this.resolution.scale;
   }
 
   /** What is on the screen, for tests and for reports of people whose picture is wrong. */
@@ -299,7 +293,6 @@ export class View {
   /** Drawn now, as fine as the screen; to be read before anything else happens. */
   still(): WebGL2RenderingContext {
     this.setScale(1); // what is seen does not depend on how quickly it was drawn
-    this.fitCanvas(this.pixelRatio);
     this.draw();
     return this.renderer.getContext() as WebGL2RenderingContext;
   }
@@ -320,50 +313,24 @@ export class View {
   }
 
   private draw(): void {
-    this.prepare();
-    this.renderer.render(this.scene, this.renderer.xr.isPresenting ? this.head : this.navigator.camera);
-  }
-
-  private prepare(): void {
     this.ground.object.visible = this.showsGround;
     // Another rig's camera sees something else.
     for (const { mesh } of this.besides) mesh.object.visible = !this.isRigView;
     this.surface.setLens(this.isRigView ? this.navigator.rigCamera : null);
+    this.renderer.render(this.scene, this.renderer.xr.isPresenting ? this.head : this.navigator.camera);
   }
 
-  private drawAt(now: number): void {
-    this.events.beforeDraw();
-    this.navigator.update(now);
-    this.setScale(this.fine ? 1 : this.resolution.scale);
-    this.fine = false;
+  private render(): void {
+    this.draw();
+    ++this.drawn;
+    this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
     window.clearTimeout(this.stillTimer);
     this.stillTimer = 0;
-    if (this.back === null) {
-      this.fitCanvas(this.pixelRatio);
-      this.draw();
-    } else {
-      this.prepare();
-      this.back.render(this.scene, this.navigator.camera, this.pixelRatio);
-    }
-    const { labels } = this;
-    const project = this.navigator.projection();
-    this.drawOver = () => this.overlay.draw(project, labels);
-  }
-
-  private showDrawn(): void {
-    if (this.renderer.xr.isPresenting) return;
-    if (this.back !== null) {
-      this.fitCanvas(this.back.ratio);
-      this.back.copy();
-    }
-    ++this.drawn;
-    this.drawOver();
-    this.events.drawn();
     if (this.scale === 1) return;
     this.stillTimer = window.setTimeout(() => {
       this.stillTimer = 0;
-      this.fine = true;
-      this.invalidate();
+      this.setScale(1);
+      this.render();
     }, kStill_ms);
   }
 
@@ -387,12 +354,30 @@ export class View {
   private setScale(scale: number): void {
     if (scale === this.scale) return;
     this.scale = scale;
+    this.renderer.setPixelRatio(this.pixelRatio);
     for (const mesh of this.meshes) mesh.setPixelRatio(this.pixelRatio);
   }
 
-  // Its pixels, which clears it.
-  private fitCanvas(ratio: number): void {
-    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+  // How long the graphics card, or the processor in its place, takes for what was just asked of it.
+  private time(): void {
+    if (this.fence !== null || document.hidden) return;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (this.fence === null) return; // the context is lost
+    gl.flush();
+    const start = performance.now();
+    const poll = (): void => {
+      if (this.fence === null) return;
+      const status = gl.getSyncParameter(this.fence, gl.SYNC_STATUS) as number | null;
+      if (status === gl.UNSIGNALED) {
+        window.setTimeout(poll, kPoll_ms);
+        return;
+      }
+      gl.deleteSync(this.fence);
+      this.fence = null;
+      if (status === gl.SIGNALED) this.resolution.took(performance.now() - start);
+    };
+    window.setTimeout(poll, kPoll_ms);
   }
 
   private light(): void {
@@ -408,8 +393,7 @@ export class View {
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || clientHeight === 0 || this.renderer.xr.isPresenting) return;
-    this.renderer.setSize(clientWidth, clientHeight, false); // clears it
-    this.back?.copy();
+    this.renderer.setSize(clientWidth, clientHeight, false);
     this.navigator.resize({ width: clientWidth, height: clientHeight });
   }
 }
