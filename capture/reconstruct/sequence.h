@@ -115,8 +115,9 @@ class SequenceDecoder {
                    int boundary) const;
   bool moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
                          int boundary) const;
-  bool was_near(int line, int lines, const SequenceContext& context, int boundary, float was_px,
-                float off_px) const;
+  template <class AsAsked>
+  bool was_seen(int line, const SequenceContext& context, int boundary, AsAsked as_asked) const;
+  static float moved_px(int line, float column_px, const SequenceContext& context);
   void expect_moved(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
                     const std::int32_t* boundary, int count, float* gains) const;
   std::int32_t& cell(int line, int boundary);

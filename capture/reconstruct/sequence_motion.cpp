@@ -11,7 +11,6 @@
 namespace relievo {
 namespace {
 
-constexpr float kAnywhere = std::numeric_limits<float>::infinity();
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kOff_px = 2;                // between where a boundary was and where its edge's motion says,
 constexpr float kOffShare = 0.2F;           // and of that motion more
@@ -23,34 +22,34 @@ constexpr int kLines = 2;         // above and below, on which that is looked fo
 
 }  // namespace
 
+/// Whether the frame before had a boundary, on a line about one, at a column `as_asked(line, column)`.
+template <class AsAsked>
+bool SequenceDecoder::was_seen(int line, const SequenceContext& context, int boundary,
+                               AsAsked as_asked) const {
+  const int lines = static_cast<int>(context.before_px->size()) / boundaries_;
+  for (int l = std::max(0, line - kLines); l <= std::min(lines - 1, line + kLines); ++l) {
+    const float before_px = (*context.before_px)[static_cast<std::size_t>(l * boundaries_ + boundary)];
+    if (!std::isnan(before_px) && as_asked(l, before_px)) return true;
+  }
+  return false;
+}
+
+/// How far what is at a place came since the frame before.
+float SequenceDecoder::moved_px(int line, float column_px, const SequenceContext& context) {
+  return context.motion->between_frames(*context.before_motion, line, column_px, context.before_fields);
+}
+
 /// Whether a boundary was, in the frame before, where the motion of an edge puts it then.
 bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::uint32_t e,
                                         const SequenceContext& context, int boundary) const {
   const float column = edges.edges[e].column_px;
   const float motion = context.motion->at(line, column);
-  const float moved =
-      context.motion->between_frames(*context.before_motion, line, column, context.before_fields);
-  const float was = column - moved;
+  const float moved = moved_px(line, column, context);
   const float off = kOff_px * context.motion->scale + kOffShare * std::fabs(moved);
-  for (int l = std::max(0, line - kLines); l <= std::min(edges.lines - 1, line + kLines); ++l) {
-    const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
-                              static_cast<std::size_t>(boundary);
-    const float before_px = (*context.before_px)[place];
-    if (!(std::fabs(before_px - was) < off)) continue;
-    if (std::fabs(context.before_motion->at(l, before_px) - motion) < FieldMotion::kSurface_px) return true;
-  }
-  return false;
-}
-
-/// Whether the frame before had a boundary near a column on the lines about one.
-bool SequenceDecoder::was_near(int line, int lines, const SequenceContext& context, int boundary,
-                               float was_px, float off_px) const {
-  for (int l = std::max(0, line - kLines); l <= std::min(lines - 1, line + kLines); ++l) {
-    const std::size_t place = static_cast<std::size_t>(l) * static_cast<std::size_t>(boundaries_) +
-                              static_cast<std::size_t>(boundary);
-    if (std::fabs((*context.before_px)[place] - was_px) < off_px) return true;
-  }
-  return false;
+  return was_seen(line, context, boundary, [&](int l, float before_px) {
+    return std::fabs(before_px - (column - moved)) < off &&
+           std::fabs(context.before_motion->at(l, before_px) - motion) < FieldMotion::kSurface_px;
+  });
 }
 
 /// Of an edge's candidates, what the frame before speaks for gains: where the scene moved, the other slide's
@@ -59,12 +58,12 @@ void SequenceDecoder::expect_moved(const EdgeImage& edges, int line, std::uint32
                                    const SequenceContext& context, const std::int32_t* boundary, int count,
                                    float* gains) const {
   if (context.before_px == nullptr || context.motion == nullptr || beside_[e].tracked) return;
-  const FieldMotion& motion = *context.motion;
   const float column = edges.edges[e].column_px;
-  const float was =
-      column - motion.between_frames(*context.before_motion, line, column, context.before_fields);
+  const float was = column - moved_px(line, column, context);
+  const float near = kNear_px * context.motion->scale;
   for (int i = 0; i < count; ++i)
-    if (was_near(line, edges.lines, context, boundary[i], was, kNear_px * motion.scale)) gains[i] += kWasNear;
+    if (was_seen(line, context, boundary[i], [&](int, float px) { return std::fabs(px - was) < near; }))
+      gains[i] += kWasNear;
 }
 
 /// Whether an edge that moves cannot be a boundary by where that was before.
@@ -99,8 +98,8 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
       const int boundary = out.boundary[e];
       const bool is_confirmed = boundary >= 0 && !unconfirmed(edges, line, e, context, boundary);
       confirmed += is_confirmed;
-      contradicted +=
-          boundary >= 0 && !is_confirmed && was_near(line, edges.lines, context, boundary, 0, kAnywhere);
+      contradicted += boundary >= 0 && !is_confirmed &&
+                      was_seen(line, context, boundary, [](int, float) { return true; });
       in_a_row = is_confirmed ? in_a_row + 1 : 0;
       most_in_a_row = std::max(most_in_a_row, in_a_row);
       if (++e == end) break;
