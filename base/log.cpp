@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <cstdio>
-#include <ctime>
 #include <string>
 
 #include "base/log_format.h"
@@ -29,15 +28,11 @@ std::string name_of(LogLevel level) {
   return "unknown";
 }
 
-std::string utc_text(std::int64_t now_ns) {
-  const std::time_t now_s = now_ns / kNanosecondsPerSecond;
-  std::tm utc{};
-  gmtime_r(&now_s, &utc);
-  char text[32], millis[8];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+std::string precise_utc_text(std::int64_t now_ns) {
+  char millis[8];
   std::snprintf(millis, sizeof millis, ".%03dZ",
                 static_cast<int>(now_ns % kNanosecondsPerSecond / 1'000'000));
-  return std::string(text) + millis;
+  return utc_text(now_ns, "%Y-%m-%dT%H:%M:%S") + millis;
 }
 
 std::string quoted(std::string_view text) {
@@ -74,7 +69,7 @@ LogFormat log_format() {
 std::string log_line(LogFormat format, LogLevel level, std::string_view message, std::int64_t now_ns) {
   if (format == LogFormat::kText)
     return (level == LogLevel::kInfo ? std::string() : name_of(level) + ": ") + std::string(message);
-  return "{\"time\":\"" + utc_text(now_ns) + "\",\"level\":\"" + name_of(level) +
+  return "{\"time\":\"" + precise_utc_text(now_ns) + "\",\"level\":\"" + name_of(level) +
          "\",\"message\":" + quoted(message) + "}";
 }
 

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 
 namespace relievo {
 
@@ -21,6 +22,9 @@ inline std::int64_t steady_now_ns() {
   using namespace std::chrono;
   return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count();
 }
+
+/// UTC as strftime() writes it; by default "2026-01-02T03:04:05Z". `format` yields less than 64 characters.
+std::string utc_text(std::int64_t ns, const char* format = "%Y-%m-%dT%H:%M:%SZ");
 
 inline double seconds(std::int64_t ns) {
   return static_cast<double>(ns) * 1e-9;

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
+#include "base/time.h"
 #include "client/commands.h"
 #include "client/options.h"
 #include "idl/authority.h"

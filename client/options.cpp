@@ -3,9 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <ctime>
-
-#include "base/time.h"
 
 namespace relievo {
 
@@ -46,15 +43,6 @@ std::string duration_text(double s) {
     const auto whole = static_cast<long long>(s);
     std::snprintf(text, sizeof text, "%lld min %lld s", whole / 60, whole % 60);
   }
-  return text;
-}
-
-std::string utc_text(std::int64_t ns) {
-  const auto s = static_cast<std::time_t>(ns / kNanosecondsPerSecond);
-  std::tm parts{};
-  gmtime_r(&s, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
   return text;
 }
 

@@ -17,9 +17,8 @@ namespace relievo {
 /// --domain, --interface and --keys, filled while parsing.
 std::shared_ptr<DomainOptions> add_domain_options(CLI::App& app);
 
-/// "12.3 MB", "2 min 5 s", and UTC as "2026-01-02T03:04:05Z".
+/// "12.3 MB", "2 min 5 s".
 std::string bytes_text(std::uint64_t bytes);
 std::string duration_text(double s);
-std::string utc_text(std::int64_t ns);
 
 }  // namespace relievo

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
+#include "base/time.h"
 #include "cli/checks.h"
 #include "client/commands.h"
 #include "client/options.h"

@@ -10,10 +10,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <ctime>
 #include <string_view>
 
 #include "base/stream.h"
+#include "base/time.h"
 #include "base/whole_file.h"
 #include "idl/keys.h"
 #include "idl/openssl.h"
@@ -146,18 +146,13 @@ std::string topics(const char* verb, std::initializer_list<const char*> names) {
 }
 
 std::string permissions(const std::string& name, KeyRole role) {
-  const std::time_t now = std::time(nullptr);
-  const auto date = [](std::time_t time) {
-    std::tm parts{};
-    gmtime_r(&time, &parts);
-    char text[32];
-    std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
-    return std::string(text);
+  const auto in = [now_ns = utc_now_ns()](std::int64_t seconds) {
+    return utc_text(now_ns + seconds * kNanosecondsPerSecond, "%Y-%m-%dT%H:%M:%S");
   };
   const bool publisher = role == KeyRole::kPublisher;
   return std::string(kXmlHead) + "<dds><permissions><grant name=\"" + (publisher ? "publisher" : "watcher") +
-         "\"><subject_name>CN=" + name + "</subject_name><validity><not_before>" + date(now - 24 * 3600) +
-         "</not_before><not_after>" + date(now + kIdentityYears * kSecondsOfAYear) +
+         "\"><subject_name>CN=" + name + "</subject_name><validity><not_before>" + in(-24L * 3600) +
+         "</not_before><not_after>" + in(kIdentityYears * kSecondsOfAYear) +
          "</not_after></validity><allow_rule>" + std::string(kAllDomains) +
          (publisher ? topics("publish", {"info", "frame", "status", "key_frame_request", "clock_question",
                                          "clock_answer"})

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 #include <utility>
 #include <vector>
 
@@ -24,12 +23,7 @@ constexpr std::size_t kAtOnce = 32;  // samples, before who asks for the state m
 /// "face-2026-11-22T07-05-00Z.mcap", in the folder.
 std::filesystem::path new_target(const std::filesystem::path& folder, const std::string& stream,
                                  std::int64_t now_ns) {
-  const std::time_t now = now_ns / kNanosecondsPerSecond;
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[40];
-  std::strftime(text, sizeof text, "-%Y-%m-%dT%H-%M-%SZ", &utc);
-  return unused_name(folder / (stream + text + ".mcap"));
+  return unused_name(folder / (stream + utc_text(now_ns, "-%Y-%m-%dT%H-%M-%SZ") + ".mcap"));
 }
 
 /// What is written first of it.

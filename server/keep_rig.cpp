@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/keep_rig.h"
 
-#include <ctime>
-
 #include "base/time.h"
 #include "base/whole_file.h"
 
@@ -13,12 +11,7 @@ namespace fs = std::filesystem;
 
 /// "rig.before-20260131T120000.yaml", or with a number where that is there already.
 fs::path name_of_old(const fs::path& file, std::int64_t utc_ns) {
-  const std::time_t seconds = utc_ns / kNanosecondsPerSecond;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  char stamp[32];
-  std::strftime(stamp, sizeof stamp, "%Y%m%dT%H%M%S", &utc);
-  const std::string begin = file.stem().string() + ".before-" + stamp;
+  const std::string begin = file.stem().string() + ".before-" + utc_text(utc_ns, "%Y%m%dT%H%M%S");
   fs::path out = fs::path(file).replace_filename(begin + file.extension().string());
   std::error_code ignored;
   for (int n = 2; fs::exists(out, ignored); ++n)
