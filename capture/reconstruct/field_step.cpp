@@ -2,6 +2,7 @@
 #include "capture/reconstruct/field_step.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace relievo {
@@ -33,9 +34,23 @@ constexpr float kEndOff = -0.9F;      // less, -1..1, and a primary is off,
 constexpr float kEndMoved_px = 0.7F;  // no farther from the prediction,
 constexpr float kEndFound_px = 2.F;   // whose place is the better one: sigma of the step's
 
+// The share of the right colour in the light.
+constexpr int kBalanceReach_px = 6;          // columns to each side at which it is read
+constexpr float kBalanceFarthest_px = 1.5F;  // from the place
+constexpr float kLeastLight = 0.08F;         // of the brightest there; less has no share
+constexpr std::array kPlateau_px{2.F, 3.F};  // from the place each side's own share is read,
+constexpr float kPlateauRoom = 0.5F;         // or so much of the way to the next boundary
+constexpr float kPlateauOff = 0.3F;          // from none, or all, that it may be
+constexpr float kApartFromStep_px = 1.2F;    // no farther from the step
+
 // Standard deviations, measured on simulated scenes.
-constexpr float kFound_px = 0.4F;    // of where the field shows the step
-constexpr float kApartShare = 0.3F;  // of the distance from the prediction
+constexpr float kFound_px = 0.4F;        // of where the field shows the step,
+constexpr float kLeastFound_px = 0.15F;  // or of where its colours balance at least,
+constexpr float kFoundNearly = 2.F;      // and times that of the balance, for it may be another step
+constexpr float kOfNoise_px = 6.F;       // of a balance: of the noise, of the brightest light;
+constexpr float kOfPlateau_px = 0.8F;    // of how far off the shares of the sides are;
+constexpr float kOfLight_px = 0.25F;     // and of the logarithm of how much brighter one side is
+constexpr float kApartShare = 0.3F;      // of the distance from the prediction
 
 }  // namespace
 
@@ -43,6 +58,7 @@ struct StepFinder::Light {
   static constexpr int kColumns = 2 * kReach_px + 1;
   std::array<std::array<float, kColumns>, 3> primary;
   std::array<float, 3> full;
+  float brightest;
   int first;
 
   float at(std::size_t c, float column_px) const {
@@ -85,6 +101,9 @@ struct StepFinder::Light {
             agreement(colours[1], column_px + 0.5F * r, column_px + r)};
   }
 
+  std::optional<FieldPlace> balance(const std::array<Primary, 2>& colours, float column_px, float left_px,
+                                    float right_px, float noise) const;
+
   /// Whether what is next to it on one side may be of that side's colour.
   bool end_agrees(const std::array<Primary, 2>& colours, float column_px, bool of_left) const {
     const Primary colour = colours[of_left ? 0 : 1];
@@ -121,8 +140,8 @@ void StepFinder::read(const std::uint8_t* pixels, int centre, Light& out) const 
       out.full[c] = std::max(out.full[c], value);
     }
   }
-  const float brightest = std::max({out.full[0], out.full[1], out.full[2], 2 * kDark});
-  for (float& full : out.full) full = std::max(full, kFull * brightest);
+  out.brightest = std::max({out.full[0], out.full[1], out.full[2], 2 * kDark});
+  for (float& full : out.full) full = std::max(full, kFull * out.brightest);
 }
 
 /// Nothing where the step belongs to a boundary farther away.
@@ -159,6 +178,66 @@ std::optional<StepFinder::Rise> StepFinder::steepest(const Light& light,
   return Rise{predicted_px + kStep_px * (middle - kSteps), steps[best]};
 }
 
+/// `column_px` kBalanceReach_px or more inside of what was read.
+std::optional<FieldPlace> StepFinder::Light::balance(const std::array<Primary, 2>& colours, float column_px,
+                                                     float left_px, float right_px, float noise) const {
+  const auto [a, b] = colours;
+  // The amounts of the two colours whose sum comes nearest to the light of a column.
+  const auto channels = [](int colour) {
+    return static_cast<float>(std::popcount(static_cast<unsigned>(colour)));
+  };
+  const float of_a = channels(a);
+  const float of_b = channels(b);
+  const float of_both = channels(a & b);
+  const float scale = 1 / (of_a * of_b - of_both * of_both);
+  constexpr std::size_t kColumnsRead = 2 * kBalanceReach_px + 1;
+  std::array<float, kColumnsRead> amounts, shares;
+  const int first_column = static_cast<int>(column_px + 0.5F) - kBalanceReach_px;
+  for (std::size_t i = 0; i < kColumnsRead; ++i) {
+    const auto x = static_cast<std::size_t>(first_column - first) + i;
+    float in_a = 0;
+    float in_b = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float value = primary[c][x] / full[c];
+      if ((a >> c & 1) != 0) in_a += value;
+      if ((b >> c & 1) != 0) in_b += value;
+    }
+    const float amount_b = scale * (of_a * in_b - of_both * in_a);
+    amounts[i] = std::max(kLeastLight, scale * (of_b * in_a - of_both * in_b) + amount_b);
+    shares[i] = std::clamp(amount_b / amounts[i], -0.5F, 1.5F);
+  }
+  const auto mean_beside = [&](const std::array<float, kColumnsRead>& of, float direction, float room_px) {
+    float sum = 0;
+    for (const float away : kPlateau_px) {
+      const float off =
+          column_px + direction * std::min(away, kPlateauRoom * room_px) - static_cast<float>(first_column);
+      const auto i = static_cast<std::size_t>(off);
+      sum += of[i] + (off - static_cast<float>(i)) * (of[i + 1] - of[i]);
+    }
+    return sum / static_cast<float>(kPlateau_px.size());
+  };
+  const float left = mean_beside(shares, -1, left_px);
+  const float right = mean_beside(shares, 1, right_px);
+  const float half = 0.5F * (std::clamp(left, -kPlateauOff, kPlateauOff) +
+                             std::clamp(right, 1 - kPlateauOff, 1 + kPlateauOff));
+  std::optional<float> found;
+  float nearest = kBalanceFarthest_px;
+  for (std::size_t i = 0; i + 1 < kColumnsRead; ++i) {
+    if (shares[i] > half || shares[i + 1] <= half) continue;
+    const float px = static_cast<float>(first_column) + static_cast<float>(i) +
+                     (half - shares[i]) / (shares[i + 1] - shares[i]);
+    if (std::fabs(px - column_px) >= nearest) continue;
+    nearest = std::fabs(px - column_px);
+    found = px;
+  }
+  if (!found) return std::nullopt;
+  const float by_noise = kOfNoise_px * noise / brightest;
+  const float by_plateau = kOfPlateau_px * std::max(std::fabs(left), std::fabs(1 - right));
+  const float by_light =
+      kOfLight_px * std::log(mean_beside(amounts, -1, left_px) / mean_beside(amounts, 1, right_px));
+  return FieldPlace{*found, std::sqrt(by_noise * by_noise + by_plateau * by_plateau + by_light * by_light)};
+}
+
 std::optional<FoundStep> StepFinder::find(const SlideFieldView& view, int line, int boundary,
                                           const StepPrediction& p) const {
   const int centre = static_cast<int>(p.column_px + 0.5F);
@@ -168,7 +247,7 @@ std::optional<FoundStep> StepFinder::find(const SlideFieldView& view, int line, 
   const std::array<Primary, 2>& colours = view.colours[static_cast<std::size_t>(boundary)];
   const auto rise = steepest(light, colours, p.column_px);
   if (!rise) return std::nullopt;
-  const float column = rise->column_px;
+  float column = rise->column_px;
   const float moved = column - p.column_px;
   const float free_left = p.left_px + moved;
   const float free_right = p.right_px - moved;
@@ -176,15 +255,29 @@ std::optional<FoundStep> StepFinder::find(const SlideFieldView& view, int line, 
   if (rise->height < kLeastStep * light.level(column)) return std::nullopt;
   const auto [left, right] = light.agreement(colours, column, free_left, free_right);
   float found_px = kFound_px;
+  const auto place = light.balance(colours, column, free_left, free_right, view.noise);
   if (std::min(left, right) < kLeastAgree) {
     if (std::max(left, right) < kLeastAgree || std::fabs(moved) > kEndMoved_px) return std::nullopt;
     if (!light.end_agrees(colours, column, left < right)) return std::nullopt;
     found_px = kEndFound_px;
+  } else if (place && std::fabs(place->column_px - column) < kApartFromStep_px) {
+    column = place->column_px;
+    found_px = std::max(kLeastFound_px, kFoundNearly * place->sigma_px);
   }
   const float own = 1 / (found_px * found_px);
   const float predicted = 1 / (p.sigma_px * p.sigma_px);
   return FoundStep{(own * column + predicted * p.column_px) / (own + predicted),
                    std::hypot(1 / std::sqrt(own + predicted), kApartShare * moved), moved};
+}
+
+std::optional<FieldPlace> StepFinder::balance(const SlideFieldView& view, int line, int boundary,
+                                              float column_px, float left_px, float right_px) const {
+  const int centre = static_cast<int>(column_px + 0.5F);
+  if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) return std::nullopt;
+  Light light;
+  read(view.field.row(line), centre, light);
+  return light.balance(view.colours[static_cast<std::size_t>(boundary)], column_px, left_px, right_px,
+                       view.noise);
 }
 
 bool StepFinder::shows_another(const SlideFieldView& view, int line, int boundary, float column_px,

@@ -22,6 +22,11 @@ struct FoundStep {
   float moved_px;  // from the prediction
 };
 
+/// Where a field has a boundary by itself.
+struct FieldPlace {
+  float column_px, sigma_px;
+};
+
 /// Immutable.
 class StepFinder {
  public:
@@ -38,6 +43,11 @@ class StepFinder {
   /// surface ends beside the boundary, what is seen of that side next to it suffices.
   std::optional<FoundStep> find(const SlideFieldView& view, int line, int boundary,
                                 const StepPrediction& p) const;
+
+  /// Where near a place the light is as much of the boundary's left colour as of its right one, however
+  /// bright the surface is on either side. `left_px` and `right_px` as of StepPrediction.
+  std::optional<FieldPlace> balance(const SlideFieldView& view, int line, int boundary, float column_px,
+                                    float left_px, float right_px) const;
 
   /// True where the sides of a place are of other colours than the boundary's; false where that cannot be
   /// told. `left_px` and `right_px` as of StepPrediction.

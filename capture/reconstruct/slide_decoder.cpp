@@ -9,6 +9,7 @@
 #include "capture/reconstruct/detect.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/field_place.h"
 #include "capture/reconstruct/front_edge.h"
 #include "capture/reconstruct/grow.h"
 #include "capture/reconstruct/instant.h"
@@ -55,6 +56,7 @@ struct SlideDecoder::State {
         instant(p.boundaries(),
                 rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height,
                 1e9 / rig.frame_rate),
+        field_placer(rig.colour_matrix, p.boundaries()),
         growth(rig.colour_matrix, p.boundaries(),
                rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height) {}
 
@@ -75,6 +77,7 @@ struct SlideDecoder::State {
   Continuity continuity;
   Readmission readmission;
   InstantFilter instant;
+  FieldPlacer field_placer;
   Growth growth;
 
   Observation newer;
@@ -278,10 +281,11 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
-      const std::size_t grown =
-          s.growth.grow({pair.slide_field(), s.sequence.shown_colours(s.order), &s.newer.difference.motion,
-                         s.order == SlideOrder::kNewerIsFirst ? 0 : 1},
-                        s.edges, s.result, s.recovered);
+      const SlideFieldView field{pair.slide_field(), s.sequence.shown_colours(s.order),
+                                 &s.newer.difference.motion, s.order == SlideOrder::kNewerIsFirst ? 0 : 1,
+                                 s.newer.difference.noise};
+      s.field_placer.place(field, s.result, pool, s.edges);
+      const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
       report.filters.recovered += grown;
       report.matched += grown;
     }
