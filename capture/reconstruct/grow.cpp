@@ -41,7 +41,10 @@ constexpr int kLooksEvery = 8;        // lines: it takes time, and what stands s
 // Standard deviations, measured on simulated scenes.
 constexpr float kBetween_px = 0.12F;  // between the lines above and below,
 constexpr float kLeanShare = 0.2F;    // and of their difference more
-constexpr float kOneSide_px = 1.F;    // from one line
+constexpr float kOneSide_px = 1.F;    // from one line,
+constexpr float kDoubted_px = 1.F;    // and of a place that was given up
+
+constexpr float kGoesOn_px = 2.F;  // from one line to the next a boundary leans less
 
 // What tells where a boundary is.
 constexpr unsigned kAbove = 1, kBelow = 2, kLeft = 4, kRight = 8;
@@ -238,7 +241,6 @@ std::optional<Growth::Prediction> Growth::predict_beside(int line, int boundary)
     const float apart = static_cast<float>(-side) * pitch;
     if (!(apart > kLeastPitch * pitch_px_ && apart < kMostPitch * pitch_px_)) continue;
     const float column = from + pitch;
-    if (!moves(line, column)) continue;
     const Neighbours near = neighbours(line, column);
     if (!near.in_order(boundary, column)) continue;
     if (side < 0 ? near.left != boundary - 1 : near.right != boundary + 1) continue;
@@ -338,6 +340,31 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
   return added;
 }
 
+/// What was given up for a weakness of its place, and both the field and a line beside show.
+std::size_t Growth::confirm_line(const SlideFieldView& view, int line, const EdgeImage& edges,
+                                 const SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
+  float* here = row(now_, line);
+  std::size_t confirmed = 0;
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int b = result.doubted[e];
+    const float column = edges.edges[e].column_px;
+    if (b < 0 || result.boundary[e] >= 0 || known(here[b]) || !moves(line, column)) continue;
+    const Neighbours near = neighbours(line, column);
+    if (!near.in_order(b, column)) continue;
+    const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
+    if (!found || std::fabs(found->moved_px) > kMostMoved_px) continue;
+    const auto goes_on = [&](int other) {
+      return std::fabs(row(now_, other)[b] - found->column_px) < kGoesOn_px;
+    };
+    if (!goes_on(line - 1) && !goes_on(line + 1)) continue;
+    here[b] = found->column_px;
+    recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
+    ++confirmed;
+  }
+  return confirmed;
+}
+
 /// Gives up moving boundaries that the field does not show: a silhouette came over their place between the
 /// fields, or their code is another's.
 void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result) {
@@ -347,7 +374,8 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
     const int b = result.boundary[e];
     if (b < 0) continue;
     const float column = here[b];
-    if (view.motion->at(line, column) == 0) continue;
+    const bool measured = view.motion != nullptr && view.motion->at(line, column) != 0;
+    if (!measured && result.still[e] != 0) continue;
     const auto room = [](float px) {
       return known(px) ? std::clamp(px, StepFinder::kLeastRoom_px, StepFinder::kOpen_px)
                        : StepFinder::kOpen_px;
@@ -369,8 +397,9 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Seq
     if (frame_ < 2 * kLooksEvery || line % kLooksEvery == frame_ / 2 % kLooksEvery)
       remember_line(view, line, edges, result);
   for (int line = 0; line < lines; ++line) added += restore_line(view, line, edges, result, recovered);
-  for (int line = 0; line < lines; ++line)
-    if (view.motion != nullptr && view.motion->line_moves(line)) drop_line(view, line, edges, result);
+  for (int line = 0; line < lines; ++line) drop_line(view, line, edges, result);
+  for (int line = 0; line < lines; ++line) added += confirm_line(view, line, edges, result, recovered);
+  for (int line = lines - 1; line >= 0; --line) added += confirm_line(view, line, edges, result, recovered);
   for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
   for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);
   std::swap(now_, before_);

@@ -61,6 +61,8 @@ class Growth {
   bool fits_before(const SlideFieldView& view, int line, int boundary, const FoundStep& found, bool beside);
   std::optional<FoundStep> look(const SlideFieldView& view, int line, int boundary,
                                 const std::optional<Prediction>& p);
+  std::size_t confirm_line(const SlideFieldView& view, int line, const EdgeImage& edges,
+                           const SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
   std::size_t grow_line(const SlideFieldView& view, int line, std::vector<RecoveredBoundary>& recovered);
 
   StepFinder steps_;

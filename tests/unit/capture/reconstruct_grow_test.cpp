@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -39,6 +40,7 @@ struct Frame {
         edges.edges.push_back(edge);
         result.boundary.push_back(static_cast<std::int16_t>(b));
         result.still.push_back(1);
+        result.doubted.push_back(-1);
       }
       edges.line_start.push_back(static_cast<std::uint32_t>(edges.edges.size()));
     }
@@ -98,6 +100,24 @@ TEST(Growth, TheFieldSaysWhereItIsMoreThanOneLineDoes) {
   const RecoveredBoundary disagreed = grown(1);
   EXPECT_NEAR(disagreed.column_px, Frame::place(kBoundaries - 1), 0.15F);
   EXPECT_GT(disagreed.sigma_px, 1.8F * agreed.sigma_px);
+}
+
+TEST(Growth, WhatWasDoubtedComesBackWhereTheFieldAndALineBesideShowIt) {
+  constexpr int kLast = kBoundaries - 1;
+  const auto grown = [](bool line_above, Primary right) {
+    Frame f;
+    for (int line = 5; line < 10; ++line) f.move(line);
+    for (int line = line_above ? 7 : 5; line < 10; ++line)
+      for (int b = 0; b < kBoundaries; ++b) f.lose(line, b);
+    f.result.doubted[Frame::at(7, kLast)] = kLast;
+    for (int x = static_cast<int>(Frame::place(kLast)) + 1; x < kWidth; ++x) f.paint(7, x, right);
+    f.grow();
+    return std::count_if(f.recovered.begin(), f.recovered.end(),
+                         [](const RecoveredBoundary& r) { return r.line == 7 && r.boundary == kLast; });
+  };
+  EXPECT_EQ(grown(true, 2), 1);
+  EXPECT_EQ(grown(false, 2), 0) << "alone";
+  EXPECT_EQ(grown(true, 5), 0) << "of another colour";
 }
 
 TEST(Growth, FarFromWhereItIsExpectedItIsAnothers) {
