@@ -107,7 +107,7 @@ TEST(Growth, WhatWasDoubtedComesBackWhereTheFieldAndALineBesideShowIt) {
   const auto grown = [](bool line_above, Primary right) {
     Frame f;
     for (int line = 5; line < 10; ++line) f.move(line);
-    for (int line = line_above ? 7 : 5; line < 10; ++line)
+    for (int line = line_above ? 7 : 5; line < kLines; ++line)
       for (int b = 0; b < kBoundaries; ++b) f.lose(line, b);
     f.result.doubted[Frame::at(7, kLast)] = kLast;
     for (int x = static_cast<int>(Frame::place(kLast)) + 1; x < kWidth; ++x) f.paint(7, x, right);
