@@ -8,12 +8,13 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
+#include "tests/support/metric.h"
 #include "tests/support/noise.h"
 #include "tests/support/own_domain.h"
 #include "tests/support/patience.h"
 #include "tests/support/process.h"
+#include "tests/support/recorder_counts.h"
 #include "tests/support/replace_in.h"
 #include "tests/support/socket_client.h"
 #include "tests/support/temp_folder.h"
@@ -40,10 +41,8 @@ class Hostile : public ::testing::Test {
     server_ = start({program("relievo-server"), "serve", "--source",
                      "sim:plane,width=160,height=120,stripes=30,rate=4", "--web", "127.0.0.1:0",
                      "--token-file", tokens_, "--max-clients", "1000", "--keys", authority_});
-    const std::string before = "viewer http://127.0.0.1:";
-    ASSERT_TRUE(server_->wait_for_text(before)) << server_->err();
-    const std::string out = server_->out();
-    port_ = static_cast<std::uint16_t>(std::stoi(out.substr(out.find(before) + before.size())));
+    port_ = viewer_port(*server_);
+    ASSERT_NE(port_, 0) << server_->err();
 
     recorder_ = start({program("relievo"), "record", kStream, "--out", file_, "--json", "--keys", viewer_});
     browser_ = std::make_unique<WebWatch>(std::vector<std::string>{
@@ -82,10 +81,7 @@ class Hostile : public ::testing::Test {
   }
 
   double refused(const std::string& kind) const {
-    const std::string text = request(port_, "GET", "/metrics", kWithToken).body;
-    const std::string line = "relievo_gateway_refused_total{reason=\"" + kind + "\"} ";
-    const auto at = text.find(line);
-    return at == std::string::npos ? -1 : std::stod(text.substr(at + line.size()));
+    return metric_in(request(port_, "GET", "/metrics", kWithToken).body, refused_for(kind));
   }
 
   /// That a recorder and a browser have had every frame since they watch, on the connection they began with.
@@ -96,12 +92,9 @@ class Hostile : public ::testing::Test {
       EXPECT_EQ(frames[i].connection, frames[0].connection);
       EXPECT_EQ(frames[i].sequence, frames[i - 1].sequence + 1);
     }
-    recorder_->signal(SIGINT);
-    EXPECT_EQ(recorder_->wait(), 0) << recorder_->err();
-    const auto said = nlohmann::json::parse(recorder_->out(), nullptr, false);
-    ASSERT_FALSE(said.is_discarded()) << recorder_->out();
-    EXPECT_GT(said["frames"], 0);
-    EXPECT_EQ(said["lost"], 0);
+    const RecorderCounts recorded = stop_recorder(*recorder_);
+    EXPECT_GT(recorded.frames, 0);
+    EXPECT_EQ(recorded.lost, 0);
     EXPECT_EQ(server_->wait(0ms), std::nullopt) << server_->err();
   }
 
