@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::size_t kQueueFrames = 3;
 constexpr std::int64_t kStatusInterval_ns = kNanosecondsPerSecond;
-constexpr std::int64_t kKeyInterval_ns = 250'000'000;  // between key frames that readers wish for
+// Between key frames that readers wish for: who joins is to have a picture within 0.2 s.
+constexpr std::int64_t kKeyInterval_ns = 100'000'000;
 constexpr std::int64_t kMaxLate_ns =
     100'000'000;                      // behind its own time stamps before a source's clock is set back
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
