@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "web/gateway/access.h"
 #include "web/gateway/connection.h"
@@ -199,6 +200,7 @@ Status Server::apply(const WebOptions& web) {
 void Server::run() {
   listener_->accept([this](std::shared_ptr<Transport> transport) { on_accept(std::move(transport)); });
   thread_ = std::thread([this] {
+    name_this_thread("gateway");
     for (;;) {
       try {
         io_.run();
