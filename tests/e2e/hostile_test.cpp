@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -80,8 +81,13 @@ class Hostile : public ::testing::Test {
     return eventually([&] { return browser_frames() >= enough; });
   }
 
-  double refused(const std::string& kind) const {
-    return metric_in(request(port_, "GET", "/metrics", kWithToken).body, refused_for(kind));
+  double metric(const std::string& name) const {
+    return metric_in(request(port_, "GET", "/metrics", kWithToken).body, name);
+  }
+  double refused(const std::string& kind) const { return metric(refused_for(kind)); }
+  /// Of DDS.
+  double refused_peers(const std::string& reason) const {
+    return metric("relievo_dds_refused_total{reason=\"" + reason + "\"}");
   }
 
   /// That a recorder and a browser have had every frame since they watch, on the connection they began with.
@@ -108,10 +114,25 @@ class Hostile : public ::testing::Test {
   std::size_t frames_before_ = 0;
 };
 
-// On DDS each is told on its own side; nothing of them reaches the gateway, which therefore counts none.
+// On DDS each is told on its own side. The server counts handshakes that failed and who reads in plain; with
+// changed permissions nobody comes so far.
 TEST_F(Hostile, PeersWithoutTheRightKeysDisturbNobody) {
+  EXPECT_EQ(refused_peers("handshake"), 0);
+  EXPECT_EQ(refused_peers("plain"), 0);
   expect_told("none", "has no keys");
-  expect_told(foreign_, "another authority");
+  const auto plain =
+      start({program("relievo"), "record", kStream, "--out", folder_ / "none.mcap", "--keys", "none"});
+  EXPECT_TRUE(eventually([&] { return refused_peers("plain") == 1; })) << plain->err();
+  EXPECT_EQ(refused_peers("handshake"), 0);
+  // Whose number is lower begins the handshake; where that is the server, it hears no more of the peer.
+  const auto tries_in_vain = [&] {
+    expect_told(foreign_, "another authority");
+    return refused_peers("handshake") == 0;
+  };
+  int tries = 1;
+  while (tries < 40 && tries_in_vain()) ++tries;
+  EXPECT_GT(refused_peers("handshake"), 0) << "after " << tries << " tries";
+  std::printf("a handshake was refused after %d tries\n", tries);
   replace_in(tampered_ / "permissions.p7s", "watcher", "wotcher");
   expect_told(tampered_, "not as the authority signed");
   // One who claims to be the stream itself, in plain and with the keys of somebody else.

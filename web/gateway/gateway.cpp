@@ -155,6 +155,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .rigs = options_.rigs,
                                    .calibrations = options_.calibrations,
                                    .stages = options_.stages,
+                                   .refused_peers = options_.refused_peers,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});

@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "base/refused_peers.h"
 #include "base/result.h"
 #include "base/rung.h"
 #include "base/stream.h"
@@ -38,6 +39,7 @@ struct GatewayOptions {
   // A client has to wait for a key frame of the stream; at most once a second a stream, and ten times
   // while clients join, from any thread. Must return at once and not call back.
   std::function<void(const std::string& stream)> key_frame_wanted{};
+  std::function<RefusedPeers()> refused_peers{};   // of DDS; any thread. Empty: there are none
   std::optional<SampleFormat> samples{};           // none: no /foxglove
   RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   RigControl* rigs = nullptr;                      // likewise; null: no camera is here
