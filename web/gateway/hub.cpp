@@ -319,6 +319,13 @@ void Hub::count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t cap
   it->second->facts.sent_after.add(seconds(now_ns - capture_time_ns));
 }
 
+void Hub::count_taken(const Watcher& watcher, std::int64_t capture_time_ns) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(watcher.stream);
+  if (it == streams_.end()) return;
+  it->second->facts.taken_after.add(seconds(it->second->server_now_ns() - capture_time_ns));
+}
+
 std::vector<StreamSnapshot> Hub::snapshot() const {
   const std::lock_guard lock(mutex_);
   std::vector<StreamSnapshot> out;

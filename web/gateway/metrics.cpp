@@ -139,12 +139,14 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
 
   out.family(
       "relievo_gateway_latency_seconds", "histogram",
-      "From a frame's capture until it was published, was here, and was handed to a client's connection.");
+      "From a frame's capture until it was published, was here, was handed to a client's connection, and the "
+      "client had taken it: asked for another in its place, as the viewer does when it draws it.");
   for (const auto& s : streams) {
     const std::string head = "stream=" + label(s.info.stream) + ",until=";
     out.histogram(head + "\"published\"", s.published_after);
     out.histogram(head + "\"here\"", s.here_after);
     out.histogram(head + "\"sent\"", s.sent_after);
+    out.histogram(head + "\"taken\"", s.taken_after);
   }
 
   out.family("relievo_recording_state", "gauge", "1 for what the stream's recording on request is doing.");
