@@ -5,6 +5,8 @@
 #include <atomic>
 #include <thread>
 
+#include "base/thread_name.h"
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -71,6 +73,7 @@ struct WorkerPool::State {
   }
 
   void helper(int worker) {
+    name_this_thread("worker");
     for (std::uint32_t seen = 0;;) {
       wait_for_change(round, seen);
       seen = round.load(std::memory_order_acquire);

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "codec/frame3d_codec.h"
 #include "idl/transport.h"
@@ -27,12 +28,14 @@ std::int64_t thread_cpu_ns() {
 class DdsClient final : public ChainClient {
  public:
   Status start(const DomainOptions& domain, const std::string& stream) {
+    stream_ = stream;
     Subscriber::Callbacks callbacks;
     callbacks.frame = [this](const std::string&, const FrameMessage& frame) { decode(frame); };
     callbacks.lost = [this](const std::string&, std::uint64_t count) { lost_ += count; };
     auto subscriber = Subscriber::create(domain, stream, std::move(callbacks));
     if (!subscriber) return subscriber.error();
     subscriber_ = *std::move(subscriber);
+    asked_ = subscriber_.get();
     return {};
   }
 
@@ -46,21 +49,29 @@ class DdsClient final : public ChainClient {
  private:
   void decode(const FrameMessage& frame) {
     const std::int64_t begin = steady_now_ns();
-    const auto decoded = decoder_.decode(*frame.data);
+    if (!decoder_.can_decode(*frame.data)) {  // it builds on one from before this client was found
+      ++lost_;
+      if (Subscriber* const subscriber = asked_) subscriber->request_key_frame(stream_);
+      return;
+    }
+    const Status done = decoder_.decode(*frame.data, decoded_);
     const std::int64_t end = steady_now_ns();
     const std::int64_t now = utc_now_ns();
-    if (!decoded && status_) status_ = decoded.error();
+    if (!done && status_) status_ = done.error();
     seen_.push_back(
         {frame.sequence, now, milliseconds(now - frame.capture_time_ns), milliseconds(end - begin)});
     cpu_ns_ = thread_cpu_ns();
     ++received_;
   }
 
+  std::string stream_;
   FrameDecoder decoder_;
+  Frame3D decoded_;
   std::vector<Seen> seen_;
   std::atomic<std::uint64_t> received_{0};
   std::atomic<std::uint64_t> lost_{0};
   std::atomic<std::int64_t> cpu_ns_{0};
+  std::atomic<Subscriber*> asked_{nullptr};  // for key frames, by the thread that it ends with
   Status status_;
   std::unique_ptr<Subscriber> subscriber_;  // last: its thread uses the others
 };
@@ -90,6 +101,7 @@ class WebClient final : public ChainClient {
 
  private:
   void work() {
+    name_this_thread("web client");
     while (!ending_) {
       const auto message = socket_.next_of("frame", kWait);
       cpu_ns_ = thread_cpu_ns();

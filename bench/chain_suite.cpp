@@ -6,8 +6,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "base/time.h"
 #include "bench/chain_clients.h"
@@ -16,13 +18,14 @@
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
-#include "codec/geometry_profile.h"
+#include "codec/texture_codec.h"
 #include "idl/transport.h"
 #include "server/config.h"
 #include "server/options.h"
 #include "server/pipeline.h"
 #include "server/sinks.h"
 #include "web/gateway/gateway.h"
+#include "web/gateway/key_frame_wishes.h"
 
 namespace relievo::bench {
 namespace {
@@ -43,6 +46,7 @@ struct Options {
   DomainOptions domain{.domain = 1 + static_cast<int>(getpid() % 200), .interface = ""};
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
+  std::string geometry = "grid", texture = "jpeg";
   bool json = false;
 };
 
@@ -50,15 +54,25 @@ ReconstructOptions reconstruct_options(const Options& options) {
   return {.decoder = options.decoder, .threads = options.threads};
 }
 
+/// As `serve` makes of them.
+EncodeOptions coded_as(const Options& options) {
+  StreamConfig config;
+  config.geometry = options.geometry;
+  config.texture = texture_codec_named(options.texture).value_or(config.texture);
+  return encode_options(config);
+}
+
 /// The reference: the same frames through the same stages on one thread, nothing waiting for anything. No
 /// latency can be less.
 struct Serial {
-  std::vector<double> reconstruct_ms, encode_ms, decode_ms, total_ms, bytes;
+  std::vector<double> reconstruct_ms, encode_ms, geometry_ms, texture_ms, decode_ms, total_ms, bytes;
 };
 
 Result<Serial> run_serially(const FrameLoop& frames, const Options& options, StopSignal& stop) {
   FrameEncoder encoder(frames.info().rig, frames.info().pattern);
   FrameDecoder decoder;
+  Frame3D decoded;
+  const EncodeOptions encode = coded_as(options);
   Serial serial;
   auto reconstructor =
       Reconstructor::create(frames.info().rig, frames.info().pattern, reconstruct_options(options));
@@ -70,15 +84,19 @@ Result<Serial> run_serially(const FrameLoop& frames, const Options& options, Sto
     const std::int64_t reconstructed = steady_now_ns();
     if (!frame) return frame.error();
     if (!*frame) continue;
-    const auto bytes = encoder.encode(**frame, encode_options(ServeConfig{}));  // as `serve` by default
+    std::int64_t surface_coded = reconstructed;
+    const auto bytes = encoder.encode(**frame, encode, [&] { surface_coded = steady_now_ns(); });
     const std::int64_t encoded = steady_now_ns();
     if (!bytes) return bytes.error();
-    const auto decoded = decoder.decode(*bytes);
+    const Status done = decoder.decode(*bytes, decoded);
     const std::int64_t end = steady_now_ns();
-    if (!decoded) return decoded.error();
-    if (n < 4) continue;  // memory is being allocated
+    if (!done) return done.error();
+    reconstructor->recycle(*std::move(*frame));  // as the pipeline does
+    if (n < 4) continue;                         // memory is being allocated
     serial.reconstruct_ms.push_back(milliseconds(reconstructed - begin));
     serial.encode_ms.push_back(milliseconds(encoded - reconstructed));
+    serial.geometry_ms.push_back(milliseconds(surface_coded - reconstructed));
+    serial.texture_ms.push_back(milliseconds(encoded - surface_coded));
     serial.decode_ms.push_back(milliseconds(end - encoded));
     serial.total_ms.push_back(milliseconds(end - begin));
     serial.bytes.push_back(static_cast<double>(bytes->size()));
@@ -131,6 +149,20 @@ struct Outcome {
 
 using Clients = std::vector<std::unique_ptr<ChainClient>>;
 
+/// A pipeline gives the key frames that are wished for, while this is there.
+class AnswersWishes {
+ public:
+  AnswersWishes(KeyFrameWishes& wishes, Pipeline& pipeline) : wishes_(wishes) {
+    wishes_.answer_with([&pipeline](const std::string&) { pipeline.request_key_frame(); });
+  }
+  AnswersWishes(const AnswersWishes&) = delete;
+  AnswersWishes& operator=(const AnswersWishes&) = delete;
+  ~AnswersWishes() { wishes_.answer_with({}); }
+
+ private:
+  KeyFrameWishes& wishes_;
+};
+
 template <typename Condition>
 void wait_for(const Condition& condition) {
   for (int waited = 0; waited < kPatience_ms && !condition(); waited += 10)
@@ -145,9 +177,11 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
                         .started_ns = utc_now_ns(),
                         .rig = frames.info().rig,
                         .pattern = frames.info().pattern};
-  auto gateway = Gateway::start({.port = 0});
+  KeyFrameWishes wishes;  // outlives who wishes
+  auto gateway =
+      Gateway::start({.port = 0, .key_frame_wanted = [&](const std::string& name) { wishes.wish(name); }});
   if (!gateway) return gateway.error();
-  auto publisher = Publisher::create(options.domain, info);
+  auto publisher = Publisher::create(options.domain, info, [&] { wishes.wish(kStream); });
   if (!publisher) return publisher.error();
   (*gateway)->announce(info);
 
@@ -161,9 +195,10 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
   pipeline_options.frames =
       options.frames > 0 ? options.frames : static_cast<std::uint64_t>(std::ceil(options.seconds * rate));
   pipeline_options.reconstruct = reconstruct_options(options);
-  pipeline_options.encode = encode_options(ServeConfig{});
+  pipeline_options.encode = coded_as(options);
   auto pipeline = Pipeline::create(*source, {&noting, dds.get(), web.get()}, pipeline_options);
   if (!pipeline) return pipeline.error();
+  const AnswersWishes answers(wishes, **pipeline);
 
   Clients dds_clients, web_clients;  // after what they read from: they end first
   for (int i = 0; i < options.clients; ++i) {
@@ -216,15 +251,44 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
   return out;
 }
 
+/// Processor time of a frame by the threads that it goes through, milliseconds.
+std::vector<Figure> times_by_thread(const Outcome& o, double source_rate) {
+  struct Part {
+    const char* name;
+    std::vector<std::string> threads;
+  };
+  const Part parts[] = {{"reconstruct", {"reconstruct", "worker"}},
+                        {"encode", {"encode"}},
+                        {"publish", {"publish"}},
+                        {"gateway", {"gateway"}},
+                        {"dds_clients", {"subscriber"}},
+                        {"web_clients", {"web client"}}};
+  std::map<std::string, double> cores = o.usage.thread_cores;
+  const double rate = spread_of(o.published.frames_per_s).median;
+  std::vector<Figure> out{{"cpu_ms.capture", cores["relievo-bench"] / source_rate * 1e3}};
+  cores.erase("relievo-bench");
+  for (const Part& part : parts) {
+    double sum = 0;
+    for (const std::string& thread : part.threads) sum += std::exchange(cores[thread], 0);
+    out.push_back({std::string("cpu_ms.") + part.name, sum / rate * 1e3});
+  }
+  double rest = 0;
+  for (const auto& [name, of] : cores) rest += of;
+  out.push_back({"cpu_ms.rest", rest / rate * 1e3});
+  return out;
+}
+
 Report report_of(const Options& options, const FrameLoop& frames, const Serial& serial, const Outcome& o) {
   const auto count = [](auto n) { return static_cast<double>(n); };
-  return {
+  Report report{
       .suite = "chain",
       .settings = {{"source", options.source},
                    {"clients", count(options.clients)},
                    {"web_clients", count(options.web_clients)},
                    {"threads", count(options.threads)},
                    {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")},
+                   {"geometry", options.geometry},
+                   {"texture", options.texture},
                    {"domain", count(options.domain.domain)},
                    {"distinct_frames", count(frames.size())},
                    {"warm_up_frames", count(o.warm_up)}},
@@ -240,6 +304,8 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
                   {"latency_ms.decode", spread_of(o.decoded.decode_ms)},
                   {"serial_ms.reconstruct", spread_of(serial.reconstruct_ms)},
                   {"serial_ms.encode", spread_of(serial.encode_ms)},
+                  {"serial_ms.encode_geometry", spread_of(serial.geometry_ms)},
+                  {"serial_ms.encode_texture", spread_of(serial.texture_ms)},
                   {"serial_ms.decode", spread_of(serial.decode_ms)},
                   {"serial_ms.total", spread_of(serial.total_ms)},
                   {"frame_bytes", spread_of(serial.bytes)},
@@ -260,7 +326,13 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
           "process, so the network is not in the figures; WebSocket clients come by TCP and do not decode.\n"
           "Reference: serial_ms, the same frames through the same stages on one thread; memory_mb.before, "
           "which\n"
-          "holds the camera's frames. drops.dds and drops.web are sums over the clients."}};
+          "holds the camera's frames. drops.dds and drops.web are sums over the clients. cpu_ms: processor "
+          "time of a captured frame, and of a "
+          "published one.\n"
+          "rest: DDS's own threads."}};
+  const std::vector<Figure> times = times_by_thread(o, frames.info().rig.frame_rate);
+  report.figures.insert(report.figures.end(), times.begin(), times.end());
+  return report;
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -304,6 +376,7 @@ Command chain_suite() {
                 ->type_name("NAME");
             add_threads_option(app, options->threads);
             add_decoder_option(app, options->decoder);
+            add_codec_options(app, options->geometry, options->texture);
             add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};

@@ -4,6 +4,8 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/checks.h"
+#include "codec/geometry_profile.h"
+#include "codec/texture_codec.h"
 
 namespace relievo::bench {
 
@@ -13,6 +15,20 @@ void add_source_option(CLI::App& app, std::string& source) {
 
 void add_threads_option(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "That reconstruct")->check(whole_number(1, 64))->capture_default_str();
+}
+
+void add_codec_options(CLI::App& app, std::string& geometry, std::string& texture) {
+  app.add_option("--geometry", geometry, "As of serve")
+      ->check([](const std::string& name) {
+        EncodeOptions unused;
+        return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
+      })
+      ->capture_default_str();
+  app.add_option("--texture", texture, "As of serve")
+      ->check([](const std::string& name) {
+        return texture_codec_named(name) ? "" : "give " + texture_codec_names();
+      })
+      ->capture_default_str();
 }
 
 void add_json_option(CLI::App& app, bool& json) {

@@ -12,6 +12,8 @@ namespace relievo::bench {
 
 void add_source_option(CLI::App& app, std::string& source);
 void add_threads_option(CLI::App& app, int& threads);
+/// How surface and texture are sent, as of serve.
+void add_codec_options(CLI::App& app, std::string& geometry, std::string& texture);
 void add_json_option(CLI::App& app, bool& json);
 
 /// Of suites that code the same frames again and again.

@@ -123,17 +123,7 @@ Command rate_suite() {
   return {"rate", "Levels of the rate control: bytes, time and PSNR", [](CLI::App& app) {
             auto options = std::make_shared<Options>();
             add_source_option(app, options->source);
-            app.add_option("--geometry", options->geometry, "As of serve")
-                ->check([](const std::string& name) {
-                  EncodeOptions unused;
-                  return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
-                })
-                ->capture_default_str();
-            app.add_option("--texture", options->texture, "As of serve")
-                ->check([](const std::string& name) {
-                  return texture_codec_named(name) ? "" : "give " + texture_codec_names();
-                })
-                ->capture_default_str();
+            add_codec_options(app, options->geometry, options->texture);
             add_repeat_options(app, options->repeats, 2);
             add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };

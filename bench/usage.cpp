@@ -6,8 +6,12 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <filesystem>
 #include <fstream>
+#include <map>
 #include <mutex>
+#include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -18,6 +22,20 @@ namespace {
 
 using namespace std::chrono_literals;
 constexpr auto kWindow = 500ms;
+
+/// Processor time so far, nanoseconds, of each thread that there is, by its number.
+struct ThreadTime {
+  std::string name;
+  double cpu_ns = 0;
+};
+void read_threads(std::map<std::string, ThreadTime>& threads) {
+  std::error_code gone;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", gone)) {
+    std::ifstream comm(task.path() / "comm"), schedstat(task.path() / "schedstat");
+    ThreadTime now;
+    if (std::getline(comm, now.name) && schedstat >> now.cpu_ns) threads[task.path().filename()] = now;
+  }
+}
 
 }  // namespace
 
@@ -47,6 +65,10 @@ struct UsageMeter::State {
     std::int64_t wall = steady_now_ns();
     std::int64_t total = process_cpu_ns();
     std::int64_t clients = client_cpu_ns();
+    std::map<std::string, ThreadTime> threads_before;
+    read_threads(threads_before);
+    std::map<std::string, ThreadTime> threads = threads_before;
+    const std::int64_t begin = wall;
     std::unique_lock lock(mutex);
     for (bool last = false; !last;) {
       last = wake.wait_for(lock, kWindow, [&] { return ending; });
@@ -57,8 +79,14 @@ struct UsageMeter::State {
       const double total_cores = static_cast<double>(total_now - std::exchange(total, total_now)) / elapsed;
       const double client_cores =
           static_cast<double>(clients_now - std::exchange(clients, clients_now)) / elapsed;
-      // What is left of a window at the end is too short to say much, unless it is all there is.
+      // What is left of a window at the end is too short to say much, unless it is all there is; and threads
+      // of what was measured have ended in it.
       if (last && !usage.total_cores.empty()) return;
+      read_threads(threads);
+      usage.thread_cores.clear();
+      for (const auto& [number, now] : threads)
+        usage.thread_cores[now.name] +=
+            (now.cpu_ns - threads_before[number].cpu_ns) / static_cast<double>(wall_now - begin);
       usage.total_cores.push_back(total_cores);
       usage.client_cores.push_back(client_cores);
       usage.server_cores.push_back(total_cores - client_cores);

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace relievo::bench {
@@ -17,6 +19,7 @@ struct Usage {
   std::vector<double> client_cores;  // of which the clients'
   std::vector<double> server_cores;  // and all else
   std::vector<double> resident_mb;
+  std::map<std::string, double> thread_cores;  // on average, by the threads' names
 };
 
 /// Samples from creation to finish(), on a thread of its own.

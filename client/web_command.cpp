@@ -144,6 +144,7 @@ Status run(const Options& options, StopSignal& stop) {
        .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
                      " yet: start relievo-server serve there.",
        .key_frame_wanted = [&](const std::string& stream) { wishes.wish(stream); },
+       .refused_peers = refused_peers,
        .samples = SampleFormat{.type_name = topic_type(Topic::kFrame).type_name,
                                .idl = topic_type(Topic::kFrame).idl,
                                .encode = [](const std::string& name, const FrameMessage& frame) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "idl/dds_log.h"
 #include "idl/interface.h"
 #include "idl/security.h"
 
@@ -75,6 +76,7 @@ Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
 }
 
 Result<std::unique_ptr<Domain>> Domain::make(const DomainOptions& options) {
+  take_over_dds_log();
   std::unique_ptr<Domain> domain(new Domain);
   domain->interface_ = options.interface;
   if (const auto folder = find_keys(options.keys)) {

@@ -4,18 +4,41 @@
 #include <dds/dds.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <mutex>
+#include <set>
 #include <utility>
 #include <vector>
 
 #include "base/log.h"
 #include "base/stream.h"
+#include "idl/dds_log.h"
 #include "idl/topics.h"
+#include "idl/transport.h"
 #include "relievo.h"
 
 namespace relievo {
 namespace {
 
-constexpr std::size_t kMaxSaid = 256;  // what a hostile peer can make us say
+constexpr std::size_t kMaxSaid = 256;      // what a hostile peer can make us say,
+constexpr std::size_t kMaxCounted = 4096;  // and remember
+
+std::atomic<std::uint64_t> g_plain_readers{0};
+
+bool is_in(const dds_qos_t* qos, const std::string& stream) {
+  std::uint32_t count = 0;
+  char** names = nullptr;
+  if (!dds_qget_partition(qos, &count, &names)) return false;
+  bool found = count == 0;  // the same as one without a name: all streams
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::string name = names[i];
+    found = found || name.empty() || name == stream || name.find_first_of("*?[") != std::string::npos;
+    dds_free(names[i]);
+  }
+  dds_free(names);
+  return found;
+}
 
 }  // namespace
 
@@ -58,6 +81,53 @@ Status check_may_publish(const Domain& domain) {
                "NAME --publish)"};
 }
 
+/// Readers of a stream's frames in the plain domain, each counted when it is first seen.
+class SecuredNotice::PlainReaders {
+ public:
+  explicit PlainReaders(std::string stream) : stream_(std::move(stream)) {}
+  PlainReaders(const PlainReaders&) = delete;
+  PlainReaders& operator=(const PlainReaders&) = delete;
+  ~PlainReaders() {
+    if (reader_.get() != 0) dds_set_listener(reader_.get(), nullptr);  // waits for a call in progress
+  }
+
+  Status listen(std::int32_t participant) {
+    auto reader =
+        take_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr),
+                    "reader of discovered readers");
+    if (!reader) return reader.error();
+    reader_ = std::move(reader).value();
+    const Listener listener(dds_create_listener(this));
+    dds_lset_data_available(listener.get(),
+                            [](dds_entity_t, void* self) { static_cast<PlainReaders*>(self)->take(); });
+    dds_set_listener(reader_.get(), listener.get());
+    take();  // who was there before
+    return {};
+  }
+
+ private:
+  void take() {
+    const std::lock_guard lock(mutex_);
+    take_all(reader_.get(), [this](const void* sample) {
+      const auto& endpoint = *static_cast<const dds_builtintopic_endpoint_t*>(sample);
+      if (endpoint.topic_name != topic_type(Topic::kFrame).topic_name || !is_in(endpoint.qos, stream_))
+        return;
+      std::array<std::uint8_t, sizeof endpoint.key.v> key{};
+      std::copy(std::begin(endpoint.key.v), std::end(endpoint.key.v), key.begin());
+      if (seen_.size() < kMaxCounted && seen_.insert(key).second) ++g_plain_readers;
+    });
+  }
+
+  const std::string stream_;
+  std::mutex mutex_;
+  std::set<std::array<std::uint8_t, sizeof(dds_guid_t::v)>> seen_;
+  Entity reader_;
+};
+
+RefusedPeers refused_peers() {
+  return {.handshakes = refused_handshakes(), .plain = g_plain_readers};
+}
+
 Result<SecuredNotice> SecuredNotice::create(const Domain& domain, const std::string& stream) {
   SecuredNotice notice;
   const Keys* keys = domain.keys();
@@ -78,6 +148,8 @@ Result<SecuredNotice> SecuredNotice::create(const Domain& domain, const std::str
   sample.revoked._buffer = revoked.data();
   if (const auto code = dds_write(notice.writer_.get(), &sample); code < 0)
     return dds_error(code, "cannot say that the stream is secured");
+  notice.plain_readers_ = std::make_shared<PlainReaders>(stream);
+  if (const Status listens = notice.plain_readers_->listen(participant); !listens) return listens.error();
   return notice;
 }
 

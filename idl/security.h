@@ -19,13 +19,17 @@ Result<Entity> create_secured_participant(int domain, const Keys& keys);
 /// Fails with keys that let their holder watch only.
 Status check_may_publish(const Domain& domain);
 
-/// Says in plain, while it lives, that `stream` is secured and by whom. Does nothing in a plain domain.
+/// Says in plain, while it lives, that `stream` is secured and by whom, and counts who would read its frames
+/// in plain nevertheless. Does nothing in a plain domain.
 class SecuredNotice {
  public:
   static Result<SecuredNotice> create(const Domain& domain, const std::string& stream);
 
  private:
+  class PlainReaders;
+
   Entity group_, writer_;
+  std::shared_ptr<PlainReaders> plain_readers_;
 };
 
 /// Listens in plain, and logs once a stream why this process cannot read it: no keys, those of another

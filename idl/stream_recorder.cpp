@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "idl/cdr.h"
 
@@ -130,6 +131,7 @@ bool StreamRecorder::has_work() const {
 }
 
 void StreamRecorder::run() {
+  name_this_thread("recorder");
   std::unique_lock lock(mutex_);
   for (;;) {
     look_at_disk(lock);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
@@ -134,6 +135,7 @@ class DdsSubscriber final : public Subscriber {
   }
 
   void run() {
+    name_this_thread("subscriber");
     for (;;) {
       dds_attach_t triggered[4];
       const bool in_time = next_ || waits_with_frames() || frames_.asker;

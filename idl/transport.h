@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/clock_offset.h"
+#include "base/refused_peers.h"
 #include "base/result.h"
 #include "base/stream.h"
 
@@ -43,6 +44,9 @@ struct TopicType {
   std::string idl;
 };
 const TopicType& topic_type(Topic topic);
+
+/// By all that this process does over DDS. Any thread.
+RefusedPeers refused_peers();
 
 /// Writes one stream. Any thread, one call at a time.
 class Publisher {

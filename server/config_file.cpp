@@ -112,21 +112,16 @@ class Reader {
     for (const std::string& name : names) all += (all.empty() ? "" : ",") + name;
     out = parse_ladder(all.empty() ? "none" : all).value();
   }
-  void texture(std::string_view key, TextureCodec& out) {
+  /// One of the values that `named` finds by the names of `names`, such as "\"a\" or \"b\"".
+  template <typename Value>
+  void one_of(std::string_view key, std::optional<Value> (*named)(std::string_view), const std::string& names,
+              Value& out) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
-    const auto value = node->value_exact<std::string>();
-    const auto codec = value ? texture_codec_named(*value) : std::nullopt;
-    if (!codec) return refuse(*node, key, "must be " + texture_codec_names() + " in quotes");
-    out = *codec;
-  }
-  void texture_encoder(std::string_view key, VideoEncoderKind& out) {
-    const toml::node* node = take(key);
-    if (node == nullptr) return;
-    const auto value = node->value_exact<std::string>();
-    const auto kind = value ? video_encoder_named(*value) : std::nullopt;
-    if (!kind) return refuse(*node, key, "must be " + video_encoder_names() + " in quotes");
-    out = *kind;
+    const auto text = node->value_exact<std::string>();
+    const auto value = text ? named(*text) : std::nullopt;
+    if (!value) return refuse(*node, key, "must be " + names + " in quotes");
+    out = *value;
   }
   void flag(std::string_view key, bool& out) {
     if (const toml::node* node = take(key)) {
@@ -310,8 +305,8 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.decoder("decoder", config.decoder);
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
-  reader.texture("texture", config.texture);
-  reader.texture_encoder("texture_encoder", config.texture_encoder);
+  reader.one_of("texture", texture_codec_named, texture_codec_names(), config.texture);
+  reader.one_of("texture_encoder", video_encoder_named, video_encoder_names(), config.texture_encoder);
   if (const auto quality = reader.integer("texture_quality", 1, 100))
     config.texture_quality = static_cast<int>(*quality);
   if (const auto bits = reader.integer("bitrate", kLeastBitRate, kMostBitRate))

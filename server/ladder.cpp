@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "codec/reduce.h"
 
@@ -15,7 +16,6 @@ namespace {
 constexpr int kStepBits = 4;         // a sixteenth of a pixel: below the noise of what is measured
 constexpr int kTextureQuality = 70;  // of half the size
 constexpr float kBound_px = 1;
-constexpr std::int64_t kKeyInterval_ns = 250'000'000;  // between key frames that readers wish for
 
 }  // namespace
 
@@ -83,11 +83,12 @@ void Ladder::end() {
 }
 
 void Ladder::run() {
-  std::int64_t key_ns = steady_now_ns() - kKeyInterval_ns;
+  name_this_thread("ladder");
+  std::int64_t key_ns = steady_now_ns() - kWishedKeyInterval_ns;
   while (auto item = queue_.pop()) {
     if (ending_) continue;
     const std::int64_t now_ns = steady_now_ns();
-    const bool key = now_ns - key_ns >= kKeyInterval_ns && key_wanted_.exchange(false);
+    const bool key = now_ns - key_ns >= kWishedKeyInterval_ns && key_wanted_.exchange(false);
     if (key) key_ns = now_ns;
     halve(item->frame.texture, half_);
     for (const auto& step : steps_) {

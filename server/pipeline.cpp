@@ -11,6 +11,7 @@
 
 #include "base/bounded_queue.h"
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
@@ -22,7 +23,6 @@ namespace {
 
 constexpr std::size_t kQueueFrames = 3;
 constexpr std::int64_t kStatusInterval_ns = kNanosecondsPerSecond;
-constexpr std::int64_t kKeyInterval_ns = 250'000'000;  // between key frames that readers wish for
 constexpr std::int64_t kMaxLate_ns =
     100'000'000;                      // behind its own time stamps before a source's clock is set back
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
@@ -213,6 +213,7 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   void reconstruct_stage() {
+    name_this_thread("reconstruct");
     std::optional<std::uint64_t> previous;
     std::uint64_t without_surface = 0;  // frames, before the first surface
     bool any_surface = false;
@@ -277,13 +278,15 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   void encode_stage() {
-    std::int64_t key_ns = steady_now_ns() - kKeyInterval_ns;  // of the last key frame
-    std::int64_t look_ns = steady_now_ns();                   // when the texture's error is measured next
+    name_this_thread("encode");
+    std::int64_t key_ns = steady_now_ns() - kWishedKeyInterval_ns;  // of the last key frame
+    std::int64_t look_ns = steady_now_ns();  // when the texture's error is measured next
     std::optional<RateControl> rate;
     if (options_.rate.any()) rate.emplace(options_.rate, source_.info().rig.frame_rate, options_.encode);
     while (auto item = to_encode_.pop()) {
       const std::int64_t begin = steady_now_ns();
-      if (begin - key_ns >= kKeyInterval_ns && key_wanted_.exchange(false)) encoder_.request_key_frame();
+      if (begin - key_ns >= kWishedKeyInterval_ns && key_wanted_.exchange(false))
+        encoder_.request_key_frame();
       EncodeOptions encode = options_.encode;
       encode.volume = volume_.fit(item->frame.surface.positions);
       if (const int bits = volume_.bits(options_.depth_resolution); bits > 0) encode.position_bits = bits;
@@ -327,6 +330,7 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   void publish_stage() {
+    name_this_thread("publish");
     std::uint64_t sequence = 0;
     std::int64_t status_due_ns = steady_now_ns();
     while (!to_publish_.finished()) {

@@ -64,6 +64,9 @@ struct PipelineOptions {
   LowerRungs* rungs = nullptr;  // must outlive the pipeline; null: there is the full quality only
 };
 
+/// Between key frames that readers wish for: who joins is to have a picture within 0.2 s.
+inline constexpr std::int64_t kWishedKeyInterval_ns = 100'000'000;
+
 class Pipeline {
  public:
   /// `source` and `sinks` must outlive the pipeline. Fails where rig and pattern do not fit.

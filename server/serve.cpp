@@ -35,6 +35,7 @@ Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFra
                          .port = address->port,
                          .web = config.gateway,
                          .key_frame_wanted = [&wishes](const std::string& name) { wishes.wish(name); },
+                         .refused_peers = refused_peers,
                          .samples = SampleFormat{.type_name = topic_type(Topic::kFrame).type_name,
                                                  .idl = topic_type(Topic::kFrame).idl,
                                                  .encode =

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "idl/recording_segments.h"
 
 namespace relievo {
@@ -69,7 +70,10 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
     entry->paused = paused_.count(name) != 0;
     entry->again = was_applied_;
     entry->stopping = stopping_;
-    entry->thread = std::thread([this, e = entry.get()] { run(*e); });
+    entry->thread = std::thread([this, e = entry.get()] {
+      name_this_thread("capture");  // whose stages have threads of their own
+      run(*e);
+    });
   }
   applying_ = false;
   was_applied_ = true;

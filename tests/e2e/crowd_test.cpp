@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "tests/e2e/server/server_process.h"
+#include "tests/support/recorder_counts.h"
 #include "tests/support/socket_client.h"
 
 namespace relievo::test {
@@ -51,10 +51,8 @@ TEST(Crowd, NobodyLosesAFrameForAnother) {
   scene.rig.frame_rate = kRate_Hz;
   ASSERT_TRUE(write_striped_take(scene, take, 12));
   Process server(serve("take:" + take.string(), {"--loop", "--web", "127.0.0.1:0"}));
-  const std::string before = "viewer http://127.0.0.1:";
-  ASSERT_TRUE(server.wait_for_text(before)) << server.err();
-  const std::string out = server.out();
-  const auto port = static_cast<std::uint16_t>(std::stoi(out.substr(out.find(before) + before.size())));
+  const std::uint16_t port = viewer_port(server);
+  ASSERT_NE(port, 0) << server.err();
 
   const auto file = [&](int i) { return folder / (std::to_string(i) + ".mcap"); };
   std::vector<std::unique_ptr<Process>> recorders;
@@ -86,12 +84,9 @@ TEST(Crowd, NobodyLosesAFrameForAnother) {
   EXPECT_GT(slow.dropped, 0);
   EXPECT_EQ(slow.frames + slow.dropped, slow.published());
   for (const auto& recorder : recorders) {
-    recorder->signal(SIGINT);
-    EXPECT_EQ(recorder->wait(), 0) << recorder->err();
-    const auto said = nlohmann::json::parse(recorder->out(), nullptr, false);
-    ASSERT_FALSE(said.is_discarded()) << recorder->out();
-    EXPECT_GT(said["frames"], 0);
-    EXPECT_EQ(said["lost"], 0);
+    const RecorderCounts recorded = stop_recorder(*recorder);
+    EXPECT_GT(recorded.frames, 0);
+    EXPECT_EQ(recorded.lost, 0);
   }
 }
 

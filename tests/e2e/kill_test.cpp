@@ -10,6 +10,7 @@
 
 #include "codec/recording.h"
 #include "idl/transport.h"
+#include "tests/support/metric.h"
 #include "tests/support/own_domain.h"
 #include "tests/support/patience.h"
 #include "tests/support/process.h"
@@ -47,16 +48,6 @@ Process serve(const std::string& web, std::vector<std::string> more = {}) {
 
 Process gateway(const std::string& listen) {
   return Process(on_loopback({program("relievo"), "web", "--listen", listen}));
-}
-
-std::uint16_t port_of(Process& process) {
-  if (!process.wait_for_text("viewer http://127.0.0.1:")) {
-    ADD_FAILURE() << process.err();
-    return 0;
-  }
-  const std::string out = process.out();
-  const std::string before = "127.0.0.1:";
-  return static_cast<std::uint16_t>(std::stoi(out.substr(out.find(before) + before.size())));
 }
 
 /// Descriptors that a process has open.
@@ -128,8 +119,8 @@ TEST_F(Kill, OfAGatewayTheServerDoesNotNoticeAndBrowsersComeBack) {
   std::string listen = "127.0.0.1:0";
   for (int i = 0; i < kills(); ++i) {
     Process web = gateway(listen);
-    const std::uint16_t port = port_of(web);
-    ASSERT_NE(port, 0);
+    const std::uint16_t port = viewer_port(web);
+    ASSERT_NE(port, 0) << web.err();
     listen = "127.0.0.1:" + std::to_string(port);  // the next one takes the same
     ASSERT_TRUE(eventually([&] {
       return request(port, "GET", "/api/streams").body.find('"' + kStream + '"') != std::string::npos;
@@ -148,14 +139,12 @@ TEST_F(Kill, OfAGatewayTheServerDoesNotNoticeAndBrowsersComeBack) {
 TEST_F(Kill, OfClientsTheServerKeepsNothing) {
   const TempFolder folder;
   Process server = serve("127.0.0.1:0");
-  const std::uint16_t port = port_of(server);
+  const std::uint16_t port = viewer_port(server);
+  ASSERT_NE(port, 0) << server.err();
   const Watcher watcher;
   ASSERT_TRUE(watcher.sees(1)) << server.err();
   const auto clients = [&] {
-    const std::string metrics = request(port, "GET", "/metrics").body;
-    const std::string name = "\nrelievo_gateway_clients ";
-    const auto at = metrics.find(name);
-    return at == std::string::npos ? -1 : std::stoi(metrics.substr(at + name.size()));
+    return metric_in(request(port, "GET", "/metrics").body, "relievo_gateway_clients");
   };
   ASSERT_EQ(clients(), 0);
   const std::size_t before = descriptors(server);

@@ -6,23 +6,16 @@
 
 #include <algorithm>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
-#include "codec/recording.h"
-#include "idl/cdr.h"
-#include "tests/support/own_domain.h"
+#include "tests/e2e/record_play.h"
 #include "tests/support/patience.h"
-#include "tests/support/process.h"
 #include "tests/support/temp_folder.h"
 
-namespace relievo {
+namespace relievo::test {
 namespace {
 
 namespace fs = std::filesystem;
-using test::program;
 using testing::HasSubstr;
-
-const std::string kDomain = std::to_string(test::own_domain());
 
 std::vector<std::string> record(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {program("relievo"), "record", "face"});
@@ -37,23 +30,11 @@ std::vector<fs::path> files_in(const fs::path& folder) {
   return out;
 }
 
-nlohmann::json info(const fs::path& file) {
-  const auto done = test::run({program("relievo"), "info", file, "--json"});
-  EXPECT_EQ(done.status, 0) << done.err;
-  return nlohmann::json::parse(done.out, nullptr, false);
-}
-
 /// Of the frames in a file.
 std::vector<std::uint64_t> sequence_numbers(const fs::path& file) {
-  auto reader = RecordingReader::open(file);
-  EXPECT_TRUE(reader.ok()) << (reader ? "" : reader.error().message);
   std::vector<std::uint64_t> out;
-  while (reader) {
-    const auto message = (*reader)->next();
-    EXPECT_TRUE(message.ok()) << (message ? "" : message.error().message);
-    if (!message || !*message) break;
-    if ((*reader)->summary().channels[(**message).channel].topic != "relievo/frame") continue;
-    const auto frame = read_frame_cdr((**message).data);
+  for (const Bytes& cdr : recorded_frames(file)) {
+    const auto frame = read_frame_cdr(cdr);
     EXPECT_TRUE(frame.ok());
     if (frame) out.push_back(frame->sequence);
   }
@@ -61,12 +42,12 @@ std::vector<std::uint64_t> sequence_numbers(const fs::path& file) {
 }
 
 TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
-  const test::TempFolder folder;
-  test::Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
+  const TempFolder folder;
+  Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
   const auto command = record({"--out", folder / "face.mcap", "--split-size", "60kB", "--frames", "100"});
   std::size_t before = 0;
-  for (int run = 1; run <= 2; ++run) {
-    const auto done = test::run(command);
+  for (int pass = 1; pass <= 2; ++pass) {
+    const auto done = run(command);
     ASSERT_EQ(done.status, 0) << done.err;
     const auto result = nlohmann::json::parse(done.out);
     EXPECT_EQ(result["frames"], 100);
@@ -93,9 +74,9 @@ TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
 /// Among frames that say of themselves that they need others, or are of an unknown version, as these are,
 /// files end at twice their size.
 TEST(RecordFiles, OldSegmentsGo) {
-  const test::TempFolder folder;
-  test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
-  const auto done = test::run(record(
+  const TempFolder folder;
+  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  const auto done = run(record(
       {"--out", folder / "face.mcap", "--split-size", "100kB", "--keep-size", "700kB", "--frames", "100"}));
   ASSERT_EQ(done.status, 0) << done.err;
   const int written = nlohmann::json::parse(done.out)["files"];
@@ -112,16 +93,16 @@ TEST(RecordFiles, OldSegmentsGo) {
   EXPECT_GE(files.size(), 3u);
   EXPECT_LE(bytes, 700'000u + 250'000u) << "the one being written comes on top";
 
-  const auto refused = test::run(record({"--out", folder / "face.mcap", "--keep-size", "1MB"}));
+  const auto refused = run(record({"--out", folder / "face.mcap", "--keep-size", "1MB"}));
   EXPECT_EQ(refused.status, 2);
   EXPECT_THAT(refused.err, HasSubstr("--split-size"));
 }
 
 TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
-  const test::TempFolder folder;
+  const TempFolder folder;
   {
-    test::Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
-    const auto done = test::run(record({"--out", folder / "face.mcap", "--frames", "120"}));
+    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    const auto done = run(record({"--out", folder / "face.mcap", "--frames", "120"}));
     ASSERT_EQ(done.status, 0) << done.err;
   }
   const std::size_t whole = sequence_numbers(folder / "face.mcap").size();
@@ -133,7 +114,7 @@ TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
   }
   fs::resize_file(folder / "face.mcap", fs::file_size(folder / "face.mcap") - 500);
 
-  const auto done = test::run({program("relievo"), "recover", folder / "face.mcap", "--json"});
+  const auto done = run({program("relievo"), "recover", folder / "face.mcap", "--json"});
   ASSERT_EQ(done.status, 0) << done.err;
   const auto result = nlohmann::json::parse(done.out);
   const fs::path copy = folder / "face-recovered.mcap";
@@ -147,10 +128,10 @@ TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
   EXPECT_EQ(description["frames"], kept);
   EXPECT_EQ(description["damaged_parts"], 0);
 
-  const auto again = test::run({program("relievo"), "recover", folder / "face.mcap"});
+  const auto again = run({program("relievo"), "recover", folder / "face.mcap"});
   EXPECT_EQ(again.status, 1);
   EXPECT_THAT(again.err, HasSubstr("exists already"));
 }
 
 }  // namespace
-}  // namespace relievo
+}  // namespace relievo::test

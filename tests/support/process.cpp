@@ -112,6 +112,13 @@ Finished run(const std::vector<std::string>& command, std::chrono::milliseconds 
   return {status.value_or(-1), process.out(), process.err()};
 }
 
+std::uint16_t viewer_port(Process& process) {
+  if (!process.wait_for_text("viewer http")) return 0;
+  const std::string out = process.out();
+  const std::string place = "127.0.0.1:";
+  return static_cast<std::uint16_t>(std::stoi(out.substr(out.find(place) + place.size())));
+}
+
 std::filesystem::path program(const std::string& name) {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
 }

@@ -5,6 +5,7 @@
 #include <sys/types.h>
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -48,6 +49,9 @@ struct Finished {
 };
 Finished run(const std::vector<std::string>& command, std::chrono::milliseconds timeout = kPatience,
              const std::vector<std::string>& environment = {});
+
+/// The port of a program's gateway on 127.0.0.1, once it says where its viewer is; 0 where it ends without.
+std::uint16_t viewer_port(Process& process);
 
 /// The folder of the built programs.
 std::filesystem::path program(const std::string& name);

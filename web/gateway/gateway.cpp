@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "web/gateway/access.h"
 #include "web/gateway/connection.h"
@@ -154,6 +155,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .rigs = options_.rigs,
                                    .calibrations = options_.calibrations,
                                    .stages = options_.stages,
+                                   .refused_peers = options_.refused_peers,
                                    .foxglove = options_.samples.has_value(),
                                    .port = listener_->port(),
                                    .loopback = listener_->loopback()});
@@ -199,6 +201,7 @@ Status Server::apply(const WebOptions& web) {
 void Server::run() {
   listener_->accept([this](std::shared_ptr<Transport> transport) { on_accept(std::move(transport)); });
   thread_ = std::thread([this] {
+    name_this_thread("gateway");
     for (;;) {
       try {
         io_.run();

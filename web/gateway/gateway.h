@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "base/refused_peers.h"
 #include "base/result.h"
 #include "base/rung.h"
 #include "base/stream.h"
@@ -35,9 +36,10 @@ struct GatewayOptions {
   std::uint16_t port = 8080;  // 0: any free one, see Gateway::port()
   WebOptions web{};
   std::string empty_hint{};  // what the viewer says while there are no streams
-  // A client has to wait for a key frame of the stream; at most once a second a stream, from any thread. Must
-  // return at once and not call back.
+  // A client has to wait for a key frame of the stream; at most once a second a stream, and ten times
+  // while clients join, from any thread. Must return at once and not call back.
   std::function<void(const std::string& stream)> key_frame_wanted{};
+  std::function<RefusedPeers()> refused_peers{};   // of DDS; any thread. Empty: there are none
   std::optional<SampleFormat> samples{};           // none: no /foxglove
   RecordingControl* recordings = nullptr;          // must outlive the gateway; null: nothing is recorded here
   RigControl* rigs = nullptr;                      // likewise; null: no camera is here

@@ -11,7 +11,9 @@
 namespace relievo {
 namespace {
 
+// A connection that loses frames is not helped by many large ones; who joins has no picture until the first.
 constexpr std::int64_t kKeyRequestInterval_ns = kNanosecondsPerSecond;
+constexpr std::int64_t kJoinInterval_ns = 100'000'000;
 
 BuildsOn builds_on(const FrameMessage& frame) {
   return what_it_builds_on(*frame.data);
@@ -25,6 +27,7 @@ struct Hub::Watcher {
   bool woken = false;                  // since it last found nothing
   std::optional<FrameMessage> latest;  // the slot
   bool needs_key = false;              // it lacks a frame that others build on
+  bool joins = true;                   // no key frame was asked for since it is there
   std::uint64_t drops = 0;
   Rung rung = Rung::kFull;          // it is on,
   Rung wished = Rung::kFull;        // and is to be on
@@ -152,8 +155,11 @@ void Hub::offer(Entry& entry, Watcher& watcher, const FrameMessage& frame) {
 
 void Hub::ask_for_key_frame(Entry& entry) {
   const std::int64_t now_ns = steady_now_ns();
-  if (!key_frame_wanted_ || (entry.key_asked_ns && now_ns - *entry.key_asked_ns < kKeyRequestInterval_ns))
-    return;
+  const auto waits = [](const auto& watcher) { return watcher->needs_key && watcher->joins; };
+  const std::int64_t interval_ns =
+      std::ranges::any_of(entry.watchers, waits) ? kJoinInterval_ns : kKeyRequestInterval_ns;
+  if (!key_frame_wanted_ || (entry.key_asked_ns && now_ns - *entry.key_asked_ns < interval_ns)) return;
+  for (const auto& watcher : entry.watchers) watcher->joins = false;
   entry.key_asked_ns = now_ns;
   ++entry.facts.key_requests;
   key_frame_wanted_(entry.facts.info.stream);
@@ -221,8 +227,8 @@ std::shared_ptr<Hub::Watcher> Hub::watch(const std::string& stream, std::functio
   watcher->latest = needed == BuildsOn::kNothing ? entry->latest : entry->latest_key;
   if (watcher->latest) watcher->last_sequence = watcher->latest->sequence;
   watcher->needs_key = !watcher->latest || needed == BuildsOn::kFrameBefore;
-  if (watcher->needs_key && entry->latest) ask_for_key_frame(*entry);
   entry->watchers.push_back(watcher);
+  if (watcher->needs_key && entry->latest) ask_for_key_frame(*entry);
   return watcher;
 }
 
@@ -311,6 +317,13 @@ void Hub::count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t cap
   ++it->second->facts.sent;
   it->second->facts.sent_bytes += bytes;
   it->second->facts.sent_after.add(seconds(now_ns - capture_time_ns));
+}
+
+void Hub::count_taken(const Watcher& watcher, std::int64_t capture_time_ns) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(watcher.stream);
+  if (it == streams_.end()) return;
+  it->second->facts.taken_after.add(seconds(it->second->server_now_ns() - capture_time_ns));
 }
 
 std::vector<StreamSnapshot> Hub::snapshot() const {

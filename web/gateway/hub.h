@@ -39,8 +39,9 @@ struct StreamSnapshot {
   std::optional<RecordingState> recorded;       // on request; not the hub's to know, filled in by who asks
   std::optional<StageTimes> stages;             // likewise, of a stream that is made in this process
   bool looked_at = false;                       // likewise: its camera's frames can be (/api/rig)
-  // From the capture of each frame until it was published, was here, and was handed to a client's connection.
-  Histogram published_after, here_after, sent_after;
+  // From the capture of each frame until it was published, was here, was handed to a client's connection, and
+  // the client asked for another in its place.
+  Histogram published_after, here_after, sent_after, taken_after;
 };
 
 /// Every function may be called from any thread and returns without waiting for a client.
@@ -92,6 +93,7 @@ class Hub {
   /// none, and then the watcher will be woken.
   std::optional<Delivery> take(Watcher& watcher, bool want_frame);
   void count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t capture_time_ns);
+  void count_taken(const Watcher& watcher, std::int64_t capture_time_ns);
 
   std::vector<StreamSnapshot> snapshot() const;  // announced streams, by name
   const std::string& empty_hint() const { return empty_hint_; }

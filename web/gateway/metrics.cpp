@@ -95,7 +95,8 @@ void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
 
 }  // namespace
 
-std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts) {
+std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts,
+                         const RefusedPeers& peers) {
   Exposition out;
   out.family("relievo_gateway_clients", "gauge", "WebSocket clients connected.");
   out.sample("", counts.clients);
@@ -108,6 +109,13 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
     out.sample("{reason=\"" + std::string(to_string(static_cast<Refusal>(i))) + "\"}",
                static_cast<double>(counts.refused[i]));
   }
+
+  out.family(
+      "relievo_dds_refused_total", "counter",
+      "DDS peers turned away: handshakes that failed (a peer tries again and again), and readers without "
+      "keys of a secured stream.");
+  out.sample("{reason=\"handshake\"}", static_cast<double>(peers.handshakes));
+  out.sample("{reason=\"plain\"}", static_cast<double>(peers.plain));
 
   const auto per_stream = [&](const char* name, const char* type, const char* help, auto value) {
     out.family(name, type, help);
@@ -131,12 +139,14 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
 
   out.family(
       "relievo_gateway_latency_seconds", "histogram",
-      "From a frame's capture until it was published, was here, and was handed to a client's connection.");
+      "From a frame's capture until it was published, was here, was handed to a client's connection, and the "
+      "client had taken it: asked for another in its place, as the viewer does when it draws it.");
   for (const auto& s : streams) {
     const std::string head = "stream=" + label(s.info.stream) + ",until=";
     out.histogram(head + "\"published\"", s.published_after);
     out.histogram(head + "\"here\"", s.here_after);
     out.histogram(head + "\"sent\"", s.sent_after);
+    out.histogram(head + "\"taken\"", s.taken_after);
   }
 
   out.family("relievo_recording_state", "gauge", "1 for what the stream's recording on request is doing.");

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/refused_peers.h"
 #include "base/result.h"
 #include "base/rung.h"
 #include "base/stream.h"
@@ -76,6 +77,7 @@ struct GatewayCounts {
 std::string recording_message(const RecordingState& state);
 
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint);
-std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts);
+std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts,
+                         const RefusedPeers& peers);
 
 }  // namespace relievo

@@ -209,7 +209,8 @@ std::vector<StreamSnapshot> all_streams(const RouteContext& context) {
 HttpReply metrics(const RouteContext& context) {
   HttpReply reply = text_reply(200, "");
   reply.content_type = "text/plain; version=0.0.4; charset=utf-8";
-  reply.body = metrics_text(all_streams(context), context.counts);
+  reply.body = metrics_text(all_streams(context), context.counts,
+                            context.refused_peers ? context.refused_peers() : RefusedPeers());
   return reply;
 }
 

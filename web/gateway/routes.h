@@ -72,11 +72,12 @@ struct RouteContext {
   const GatewayCounts& counts;
   const Tokens& tokens;
   const WebOptions& options;
-  RecordingControl* recordings = nullptr;      // none: nothing is recorded here
-  RigControl* rigs = nullptr;                  // none: no camera is here
-  CalibrationControl* calibrations = nullptr;  // likewise
-  const StageReport* stages = nullptr;         // none: no stream is made here
-  bool foxglove = false;                       // there is an encoder for it
+  RecordingControl* recordings = nullptr;         // none: nothing is recorded here
+  RigControl* rigs = nullptr;                     // none: no camera is here
+  CalibrationControl* calibrations = nullptr;     // likewise
+  const StageReport* stages = nullptr;            // none: no stream is made here
+  std::function<RefusedPeers()> refused_peers{};  // empty: none come here
+  bool foxglove = false;                          // there is an encoder for it
   std::uint16_t port = 0;
   bool loopback = true;  // bound to a loopback address only
 };

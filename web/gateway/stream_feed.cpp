@@ -30,6 +30,7 @@ class StreamFeed : public WsFeed {
   }
   std::optional<WsOutgoing> next() override;
   void look_at(const Hub::Delivery& delivery);
+  void count_taken(int credit);
   void on_sent(const WsOutgoing& message) override {
     if (message.data) hub_.count_sent(*watcher_, message.data->size(), capture_time_ns_);
   }
@@ -48,13 +49,23 @@ class StreamFeed : public WsFeed {
   std::int64_t seen_ns_ = 0;
   int credit_ = 0;
   std::int64_t capture_time_ns_ = 0;  // of the frame that is being sent
+  std::deque<std::int64_t> untaken_;  // of those for which no credit has come back
 };
+
+/// What credit comes back for, oldest first.
+void StreamFeed::count_taken(int credit) {
+  for (; credit > 0 && !untaken_.empty(); --credit) {
+    hub_.count_taken(*watcher_, untaken_.front());
+    untaken_.pop_front();
+  }
+}
 
 std::optional<WsClose> StreamFeed::on_text(std::string_view text) {
   const auto message = parse_client_message(text);
   if (!message.ok()) return WsClose{1008, message.error().message};
   if (message->type == ClientMessage::Type::kCredit) {
     credit_ = std::min(credit_ + message->credit, kMaxCredit);
+    count_taken(message->credit);
   } else if (message->type == ClientMessage::Type::kTime) {
     if (replies_.size() >= kReplyLimit) return WsClose{1008, "too many questions"};
     const std::int64_t server_ns = utc_now_ns() + hub_.clock_offset_ns(stream_);
@@ -87,6 +98,7 @@ std::optional<WsOutgoing> StreamFeed::next() {
   if (automatic_) look_at(*delivery);
   --credit_;
   capture_time_ns_ = delivery->frame->capture_time_ns;
+  untaken_.push_back(capture_time_ns_);
   const auto prefix = frame_prefix(*delivery->frame, delivery->drops, utc_now_ns());
   return WsOutgoing{.head = {prefix.begin(), prefix.end()}, .data = delivery->frame->data};
 }

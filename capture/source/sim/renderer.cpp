@@ -305,9 +305,11 @@ Vec3 Renderer::shade(const std::vector<Placed>& shapes, const Placed& seen, cons
     if (placed.projector.contains(px, py) && placed.shape->blocks(point, projector_centre_)) return value;
   }
 
+  constexpr float kGrazing = 1e-6f;  // below it the footprint is wider than kWidest, or has no end at all
   // The pixel's footprint on the tangent plane, as an interval of projector columns.
   const float along = dot(material.normal, direction);
-  const float slope = dot(material.normal, direction_step) / along;
+  const float slope =
+      dot(material.normal, direction_step) / std::copysign(std::max(std::abs(along), kGrazing), along);
   const Vec3 half_step = (direction_step - direction * slope) * (0.5f * hit.depth);
   const Vec3 half_q = projector_from_camera_ * half_step;
   const auto column = [&](Vec3 p) {

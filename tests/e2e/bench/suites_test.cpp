@@ -186,10 +186,12 @@ TEST(Bench, Texture) {
 }
 
 TEST(Bench, Chain) {
-  const Json report =
-      report_of({"chain", "--source", kSource, "--clients", "2", "--web-clients", "1", "--frames", "20",
-                 "--domain", std::to_string(own_domain()), "--interface", "lo"});
+  const Json report = report_of({"chain", "--source", kSource, "--clients", "2", "--web-clients", "1",
+                                 "--frames", "20", "--geometry", "metric", "--texture", "webp", "--domain",
+                                 std::to_string(own_domain()), "--interface", "lo"});
   ASSERT_TRUE(report.is_object());
+  EXPECT_EQ(report["settings"]["geometry"], "metric");
+  EXPECT_EQ(report["settings"]["texture"], "webp");
   EXPECT_EQ(report["frames"]["captured"], 20);
   const int published = report["frames"]["published"];
   EXPECT_GT(published, 0);
@@ -211,12 +213,15 @@ TEST(Bench, Chain) {
   if (drops["dds"] == 0) {  // else not of the same frames
     EXPECT_GT(latency["capture_to_decoded"]["median"], latency["capture_to_publish"]["median"]);
   }
-  expect_spread(report["serial_ms"]["total"], 20, "serial_ms");
+  for (const char* part : {"total", "encode_geometry", "encode_texture"})
+    expect_spread(report["serial_ms"][part], 20, part);
   for (const std::string key : {"publish", "decoded", "web"}) {
     if (latency["capture_to_" + key]["n"] < 4) continue;  // a starved client need not see two frames
     const Json& rate = report["frames_per_s"][key == "publish" ? "published" : key];
     EXPECT_GT(rate["median"], 0.0) << key;
   }
+  for (const char* thread : {"capture", "reconstruct", "encode"})
+    EXPECT_GE(report["cpu_ms"][thread], 0.0) << thread;
   for (const char* key : {"server", "clients", "total"})
     EXPECT_GT(report["cpu_cores"][key]["max"], 0.0) << key;
   EXPECT_GT(report["memory_mb"]["resident"]["median"], report["memory_mb"]["before"].get<double>() / 2);

@@ -99,7 +99,7 @@ class NetworkCrowd : public OnANetwork {
 
   /// Checks a recorder's counts against the numbers in its file; what it lost.
   std::uint64_t recorder_lost(int host) {
-    const Counts counts = stop(recorder_on(host));
+    const RecorderCounts counts = stop_recorder(recorder_on(host));
     std::uint64_t first = 0, last = 0, frames = 0;
     each_frame(host, [&](const RecordedMessage& frame) {
       first = frames++ == 0 ? frame.sequence : first;

@@ -77,7 +77,7 @@ TEST_F(NetworkTest, OfLostPacketsFramesAreWhole) {
   const auto server = publisher(200'000, kRate_Hz, kFrames, 2);
   ASSERT_TRUE(server->wait_for_text("done")) << server->err();
   std::this_thread::sleep_for(kLastOnesArrive);
-  const Counts at_one = stop(*one_percent), at_five = stop(*five_percent);
+  const RecorderCounts at_one = stop_recorder(*one_percent), at_five = stop_recorder(*five_percent);
   EXPECT_EQ(at_one.frames, kFrames);
   EXPECT_EQ(at_one.lost, 0);
   EXPECT_EQ(at_five.frames + at_five.lost, kFrames);
@@ -171,7 +171,7 @@ TEST_F(NetworkTest, OfEightOneIsStoppedOneCutOffAndOneLosesPacketsAndTheOthersLo
   std::this_thread::sleep_for(kLastOnesArrive);
 
   for (const auto& [host, one] : recorders) {
-    const Counts counts = stop(*one);
+    const RecorderCounts counts = stop_recorder(*one);
     EXPECT_EQ(counts.frames + counts.lost, kFrames) << "host " << host;
     if (host == kLossy) {
       EXPECT_GE(counts.frames, kFrames * 99 / 100);

@@ -6,7 +6,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
@@ -14,6 +13,7 @@
 #include "codec/recording.h"
 #include "tests/e2e/network/network.h"
 #include "tests/support/process.h"
+#include "tests/support/recorder_counts.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo::test {
@@ -30,21 +30,6 @@ class OnANetwork : public ::testing::Test {
                                                         Network::kInterface, "--out", file(host), "--json"}));
   }
   std::filesystem::path file(int host) const { return folder_ / (std::to_string(host) + ".mcap"); }
-
-  struct Counts {
-    std::uint64_t frames = 0, lost = 0;
-  };
-  /// What a recorder says at its end.
-  Counts stop(Process& recorder) {
-    recorder.signal(SIGINT);
-    EXPECT_EQ(recorder.wait(), 0) << recorder.err();
-    const auto said = nlohmann::json::parse(recorder.out(), nullptr, false);
-    if (said.is_discarded()) {
-      ADD_FAILURE() << recorder.out() << recorder.err();
-      return {};
-    }
-    return {said["frames"], said["lost"]};
-  }
 
   /// Calls `look` with each frame that is in a host's file so far, until it returns false.
   template <typename Look>

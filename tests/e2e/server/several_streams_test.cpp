@@ -7,6 +7,7 @@
 
 #include "idl/transport.h"
 #include "tests/e2e/server/web_server.h"
+#include "tests/support/metric.h"
 
 namespace relievo::test {
 namespace {
@@ -184,10 +185,7 @@ TEST_F(SeveralStreams, MetricsSayWhatEachStageTakes) {
   ASSERT_TRUE(server.goes_on("left", 3)) << server.process().err();
   ASSERT_TRUE(server.goes_on("right", 3)) << server.process().err();
   const std::string metrics = request(server.port(), "GET", "/metrics").body;
-  const auto value = [&](const std::string& name) {
-    const auto at = metrics.find("\n" + name + " ");
-    return at == std::string::npos ? -1 : std::stod(metrics.substr(at + name.size() + 2));
-  };
+  const auto value = [&](const std::string& name) { return metric_in(metrics, name); };
   for (const std::string stream : {"left", "right"}) {
     for (const std::string stage : {"reconstruct", "encode_geometry", "encode_texture", "publish"}) {
       const std::string labels = "{stream=\"" + stream + "\",stage=\"" + stage + "\"}";

@@ -19,10 +19,7 @@ class WebServer {
   using Json = nlohmann::json;
 
   explicit WebServer(const std::vector<std::string>& command) : process_(command) {
-    if (!process_.wait_for_text("viewer http")) return;
-    const std::string out = process_.out();
-    const std::string place = "127.0.0.1:";
-    port_ = static_cast<std::uint16_t>(std::stoi(out.substr(out.find(place) + place.size())));
+    port_ = viewer_port(process_);
   }
   Process& process() { return process_; }
   std::uint16_t port() const { return port_; }  // 0: it did not come so far

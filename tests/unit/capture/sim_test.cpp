@@ -44,6 +44,12 @@ TEST(SimOptions, DefaultsAreThePapersSystem) {
   EXPECT_EQ(info.pattern.slides, 2);
 }
 
+// Proves: a surface that the camera's ray grazes exactly, as one pixel of these frames does, is drawn.
+TEST(SimSource, ARayAlongTheSurfaceIsNoCrash) {
+  const auto source = open("walk,width=1920,height=1080,stripes=300,rate=60,frames=16", {});
+  for (int i = 0; i < 16; ++i) EXPECT_EQ(take(*source).picture.width(), 1920);
+}
+
 TEST(SimOptions, EveryRefusalSaysWhatIsValid) {
   const std::pair<const char*, const char*> refusals[] = {
       {"cave", "unknown scene \"cave\": give one of plane, object, face, walk, mesh:FILE"},

@@ -13,9 +13,7 @@ namespace {
 
 class GatewayCrowd : public GatewayTest {
  protected:
-  double refused(const std::string& reason) const {
-    return metric("relievo_gateway_refused_total{reason=\"" + reason + "\"}");
-  }
+  double refused(const std::string& reason) const { return metric(refused_for(reason)); }
   /// The next frame reaches a client that watches.
   void expect_frame(WsClient& client) {
     gateway->publish("face", make_frame(sequence_, 20'000));

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "tests/support/metric.h"
 #include "tests/support/patience.h"
 #include "tests/support/socket_client.h"
 #include "web/gateway/gateway.h"
@@ -47,9 +48,7 @@ class GatewayTest : public testing::Test {
   }
   /// The value of a line of /metrics, -1 where there is none.
   double metric(const std::string& name) const {
-    const std::string text = "\n" + request(port, "GET", "/metrics").body;
-    const auto at = text.find("\n" + name + " ");
-    return at == std::string::npos ? -1 : std::stod(text.substr(at + name.size() + 2));
+    return metric_in(request(port, "GET", "/metrics").body, name);
   }
 
   std::unique_ptr<Gateway> gateway;

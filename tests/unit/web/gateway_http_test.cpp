@@ -113,6 +113,10 @@ TEST_F(GatewayHttp, LatenciesAreHistograms) {
   EXPECT_GE(value("sum", "here", ""), 3.5);
   EXPECT_TRUE(eventually([&] { return value("count", "sent", "") == 1; }));
   EXPECT_GE(value("sum", "sent", ""), value("sum", "here", ""));
+  EXPECT_EQ(value("count", "taken", ""), 0) << "the credit that it began with is for no frame";
+  client.credit(2);
+  EXPECT_TRUE(eventually([&] { return value("count", "taken", "") == 1; }));
+  EXPECT_GE(value("sum", "taken", ""), value("sum", "sent", ""));
 }
 
 TEST_F(GatewayHttp, UnknownPathsAndTraversalAreNotFound) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: the gateway's texts are well formed whatever a stream is called or says.
 #include "web/gateway/protocol.h"
+#include "tests/support/metric.h"
 
 #include <gtest/gtest.h>
 
@@ -36,8 +37,10 @@ TEST(Protocol, HostileNamesCannotForgeMetrics) {
   StreamSnapshot snapshot;
   snapshot.info.stream = "a\"} 1\nrelievo_forged 1\\";
   snapshot.published = 1;
-  const std::string text = metrics_text({snapshot}, {});
+  const std::string text = metrics_text({snapshot}, {}, {.handshakes = 2, .plain = 1});
   EXPECT_EQ(text.find("\nrelievo_forged"), std::string::npos);
+  EXPECT_EQ(metric_in(text, R"(relievo_dds_refused_total{reason="handshake"})"), 2);
+  EXPECT_EQ(metric_in(text, R"(relievo_dds_refused_total{reason="plain"})"), 1);
   EXPECT_NE(text.find(R"({stream="a\"} 1\nrelievo_forged 1\\"} 1)"), std::string::npos);
 }
 

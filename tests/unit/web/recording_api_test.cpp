@@ -98,7 +98,7 @@ TEST_F(RecordingApi, RefusesWhatItMust) {
     EXPECT_EQ(post_json(port, kFace, body).status, 400) << body;
   EXPECT_EQ(post_json(port, kFace, std::string(5000, ' ')).status, 413);
   EXPECT_EQ(post_json(port, kFace, kStart, "Origin: https://evil.example\r\n").status, 403);
-  EXPECT_EQ(metric("relievo_gateway_refused_total{reason=\"origin\"}"), 1);
+  EXPECT_EQ(metric(refused_for("origin")), 1);
   const std::string own = "Origin: http://127.0.0.1:" + std::to_string(port) + "\r\n";
   TcpClient client(port);
   const auto plain =

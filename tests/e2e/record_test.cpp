@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// `relievo record` of a live stream: what ends a recording, and what its file then holds. Real processes on
+// the loopback.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "tests/e2e/record_play.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo::test {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Record, InterruptedRecorderCompletesItsFile) {
+  const TempFolder folder;
+  const auto file = folder / "whole.mcap";
+  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  Process recorder(on_loopback({"record", "face", "--out", file, "--json"}));
+  ASSERT_TRUE(wait_for_size(file, 500'000)) << recorder.err();
+  recorder.signal(SIGINT);
+  ASSERT_EQ(recorder.wait(), 0) << recorder.err();
+  const auto result = nlohmann::json::parse(recorder.out());
+  const auto description = info(file);
+  EXPECT_EQ(description["recovered"], false);
+  EXPECT_EQ(description["frames"], result["frames"]);
+  EXPECT_THAT(description["attachments"].dump(),
+              HasSubstr(R"(["rig.yaml","pattern.yaml","stream_info.cdr"])"));
+  const Arrived there = arrived(recorded_frames(file));
+  EXPECT_EQ(result["lost"], there.lost);
+  EXPECT_EQ(description["lost"], there.lost);
+  EXPECT_NEAR(description["frame_rate"], there.rate, 1e-6 * there.rate);
+}
+
+TEST(Record, RecorderKeepsToItsLimitAndSurvivesARestartOfTheServer) {
+  const TempFolder folder;
+  const auto file = folder / "limit.mcap";
+  Process recorder(on_loopback({"record", "face", "--out", file, "--frames", "60", "--json"}));
+  {
+    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "40", "1"});
+    ASSERT_TRUE(wait_for_size(file, 60'000)) << server.err() << recorder.err();
+    ASSERT_TRUE(server.wait_for_text("done")) << server.err();
+  }
+  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  ASSERT_EQ(recorder.wait(), 0) << recorder.err();
+  EXPECT_EQ(nlohmann::json::parse(recorder.out())["frames"], 60);
+  EXPECT_EQ(info(file)["frames"], 60);
+  std::vector<std::uint64_t> sequence;
+  for (const Bytes& cdr : recorded_frames(file)) sequence.push_back(read_frame_cdr(cdr)->sequence);
+  EXPECT_EQ(sequence.size(), 60u);
+  int restarts = 0;
+  for (std::size_t i = 1; i < sequence.size(); ++i) restarts += sequence[i] < sequence[i - 1];
+  EXPECT_EQ(restarts, 1) << testing::PrintToString(sequence);
+}
+
+TEST(Record, FullDiskEndsTheRecordingWithAReadableFile) {
+  const TempFolder folder;
+  const auto file = folder / "full.mcap";
+  Process server({program("test_publisher"), "face", kDomain, "50000", "60", "100000", "1"});
+  std::string command = "trap '' XFSZ; ulimit -f 3000; exec";  // 3,072,000 bytes
+  for (const auto& argument : on_loopback({"record", "face", "--out", file}))
+    command += " '" + argument + "'";
+  const auto done = run({"/bin/bash", "-c", command});
+  EXPECT_EQ(done.status, 1) << done.err;
+  EXPECT_THAT(done.err, HasSubstr("error: recording stopped after "));
+  EXPECT_THAT(done.err, HasSubstr(file.string()));
+  EXPECT_GT(info(file)["frames"], 20);
+}
+
+}  // namespace
+}  // namespace relievo::test

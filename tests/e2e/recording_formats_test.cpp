@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording made into something else: exported, coded anew, and read by others' MCAP readers and viewers.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/e2e/record_play.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo::test {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(RecordingFormats, FramesAreDescribedAndExported) {
+  const TempFolder folder;
+  const auto file = folder / "real.mcap";
+  {
+    Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
+    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "12"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  const auto description = info(file);
+  EXPECT_EQ(description["geometry_codecs"], nlohmann::json({"draco-mesh"}));
+  EXPECT_EQ(description["texture_codecs"], nlohmann::json({"jpeg"}));
+  EXPECT_EQ(description["texture_size"], nlohmann::json({64, 48}));
+  EXPECT_GT(description["mean_vertices"], 200);
+  EXPECT_EQ(description["unreadable"], 0);
+  EXPECT_GT(description["bytes"]["geometry"], 0);
+  EXPECT_GT(description["bytes"]["texture"], 0);
+
+  std::vector<std::string> numbers;  // of the camera's frames, which files are named after
+  const std::vector<Bytes> frames = recorded_frames(file);
+  ASSERT_EQ(frames.size(), 12u);
+  for (int i = 2; i <= 4; ++i) {
+    const std::string number = std::to_string(read_frame_cdr(frames[static_cast<std::size_t>(i)])->number);
+    numbers.push_back(std::string(6 - number.size(), '0') + number);
+  }
+  const std::vector<std::pair<std::string, std::string>> magic = {
+      {"ply", "ply\n"}, {"glb", "glTF"}, {"obj", ""}, {"png", "\x89PNG"}};
+  for (const auto& [format, start] : magic) {
+    const auto out = folder / format;
+    const auto done = run(
+        {program("relievo"), "export", file, "--out", out, "--format", format, "--frames", "2:4", "--json"});
+    ASSERT_EQ(done.status, 0) << done.err;
+    EXPECT_EQ(nlohmann::json::parse(done.out)["frames"], 3);
+    for (const std::string& number : numbers) {
+      std::ifstream exported(out / (number + "." + format), std::ios::binary);
+      std::string head(start.size(), '\0');
+      EXPECT_TRUE(exported.read(head.data(), static_cast<std::streamsize>(head.size()))) << format << number;
+      EXPECT_EQ(head, start);
+    }
+  }
+  const auto played = run(on_loopback({"play", file, "--frames", "2:4", "--speed", "10", "--json"}));
+  ASSERT_EQ(played.status, 0) << played.err;
+  EXPECT_EQ(nlohmann::json::parse(played.out)["frames"], 3);
+  const auto later = run(on_loopback({"play", file, "--from", "2030-01-01T00:00:00Z"}));
+  EXPECT_EQ(later.status, 1);
+  EXPECT_THAT(later.err, HasSubstr("it holds 12 frames in"));
+  const auto late = run({program("relievo"), "export", file, "--out", folder / "x", "--from", "99"});
+  EXPECT_EQ(late.status, 1);
+  EXPECT_THAT(late.err, HasSubstr("no frame in that range"));
+}
+
+TEST(RecordingFormats, ARecordingIsCodedAnew) {
+  const TempFolder folder;
+  const std::string original = folder / "fine.mcap";
+  const auto served = run({program("relievo-server"), "serve", "--source",
+                           "sim:plane,width=160,height=120,stripes=30", "--web", "none", "--domain", kDomain,
+                           "--interface", "lo", "--fast", "--frames", "12", "--record", original});
+  ASSERT_EQ(served.status, 0) << served.err;
+  const auto frames = info(original)["frames"].get<int>();
+  ASSERT_GT(frames, 8);
+  const auto convert = [&](const std::string& from, const std::string& to, std::vector<std::string> more) {
+    more.insert(more.begin(), {program("relievo"), "convert", from, "--out", folder / to, "--json"});
+    return run(more);
+  };
+  const auto coarse =
+      convert(original, "coarse.mcap", {"--step-bits", "2", "--key-interval", "4", "--from", "0"});
+  ASSERT_EQ(coarse.status, 0) << coarse.err;
+  const auto result = nlohmann::json::parse(coarse.out);
+  EXPECT_EQ(result["frames"], frames);
+  EXPECT_LT(result["bytes_after"], result["bytes_before"]);
+  EXPECT_EQ(info(folder / "coarse.mcap")["geometry_codecs"], nlohmann::json({"grid"}));
+  EXPECT_EQ(info(folder / "coarse.mcap")["mean_vertices"], info(original)["mean_vertices"]);
+  const auto exported = run({program("relievo"), "export", folder / "coarse.mcap", "--out", folder / "ply",
+                             "--frames", "6:7", "--json"});
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  EXPECT_EQ(nlohmann::json::parse(exported.out)["frames"], 2);
+
+  const auto in_draco = convert(original, "draco.mcap", {"--geometry", "draco-grid", "--step-bits", "4"});
+  ASSERT_EQ(in_draco.status, 0) << in_draco.err;
+  EXPECT_EQ(info(folder / "draco.mcap")["geometry_codecs"], nlohmann::json({"draco-grid"}));
+  EXPECT_EQ(info(folder / "draco.mcap")["mean_vertices"], info(original)["mean_vertices"]);
+  const auto grid = convert(folder / "draco.mcap", "grid.mcap", {"--geometry", "grid", "--step-bits", "4"});
+  EXPECT_EQ(grid.status, 0) << "it has the places: " << grid.err;
+
+  const auto mesh = convert(original, "mesh.mcap", {"--geometry", "draco-mesh"});
+  ASSERT_EQ(mesh.status, 0) << mesh.err;
+  EXPECT_EQ(info(folder / "mesh.mcap")["geometry_codecs"], nlohmann::json({"draco-mesh"}));
+  const auto back = convert(folder / "mesh.mcap", "back.mcap", {"--geometry", "grid"});
+  EXPECT_EQ(back.status, 1);
+  EXPECT_THAT(back.err, HasSubstr("can only be coded as draco-mesh"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "back.mcap"));
+}
+
+/// From the live stream, and from a recording of it.
+TEST(RecordingFormats, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@foxglove/schemas")) {
+    GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
+  }
+  const TempFolder folder;
+  {
+    Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
+    const auto done =
+        run(on_loopback({"record", "face", "--out", folder / "live.mcap", "--frames", "9", "--foxglove"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  const auto done = run({program("relievo"), "convert", folder / "live.mcap", "--out", folder / "part.mcap",
+                         "--frames", "3:6", "--foxglove", "--json"});
+  ASSERT_EQ(done.status, 0) << done.err;
+  EXPECT_EQ(nlohmann::json::parse(done.out)["frames"], 4);
+  const auto live = recorded_frames(folder / "live.mcap");
+  const auto part = recorded_frames(folder / "part.mcap");
+  ASSERT_EQ(live.size(), 9u);
+  EXPECT_EQ(part, (std::vector<Bytes>{live.begin() + 3, live.begin() + 7})) << "as they were";
+  for (const auto& [file, count] : {std::pair{"live.mcap", 9}, std::pair{"part.mcap", 4}}) {
+    const auto checked =
+        run({"/usr/bin/env", "node", js / "check_foxglove.mjs", folder / file, folder.path().string()});
+    ASSERT_EQ(checked.status, 0) << checked.err;
+    const auto counts = nlohmann::json::parse(checked.out);
+    EXPECT_EQ(counts["foxglove::CompressedImage"], count);
+    EXPECT_EQ(counts["foxglove::SceneUpdate"], count);
+    const auto glb = run({"/usr/bin/env", "node", js / "validate_glb.mjs", folder / "last.glb"});
+    EXPECT_EQ(glb.status, 0) << glb.err;
+    const auto whole = run({"/usr/bin/env", "node", js / "validate.mjs", folder / file});
+    EXPECT_EQ(whole.status, 0) << whole.err;
+  }
+}
+
+TEST(RecordingFormats, OtherMcapReadersDecodeEverySample) {
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@mcap/core")) {
+    GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
+  }
+  const TempFolder folder;
+  const auto file = folder / "a.mcap";
+  {
+    Process server({program("test_publisher"), "face", kDomain, "3000", "60", "100000", "1"});
+    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "20"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  const auto done = run({"/usr/bin/env", "node", js / "validate.mjs", file});
+  ASSERT_EQ(done.status, 0) << done.err;
+  const auto json = nlohmann::json::parse(done.out);
+  for (const auto& topic : json["topics"]) {
+    const auto& first = topic["first"]["message"];
+    EXPECT_EQ(first["stream"], "face");
+    if (topic["topic"] == "relievo/frame") {
+      EXPECT_EQ(topic["count"], 20);
+      EXPECT_EQ(first["frame_number"],
+                std::to_string(2 * std::stoull(first["sequence_number"].get<std::string>()) + 1));
+      EXPECT_EQ(first["data"]["bytes"], 3000);
+    }
+    if (topic["topic"] == "relievo/info") {
+      EXPECT_EQ(first["source"], "test");
+      EXPECT_EQ(first["rig"]["camera"]["width"], 640);
+      EXPECT_EQ(first["pattern"]["colours"], 6);
+    }
+  }
+  EXPECT_EQ(json["topics"].size(), 3u);
+}
+
+}  // namespace
+}  // namespace relievo::test
