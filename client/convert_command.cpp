@@ -16,6 +16,7 @@
 #include "codec/foxglove.h"
 #include "codec/frame3d_codec.h"
 #include "codec/geometry_profile.h"
+#include "codec/texture_codec.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -25,19 +26,27 @@ struct Options {
   std::string file, stream;
   std::filesystem::path out;
   std::shared_ptr<RangeOptions> range;
-  std::optional<std::string> geometry;
+  std::optional<std::string> geometry, texture;
   std::optional<int> step_bits, key_interval, draco_speed, texture_quality;
+  std::optional<float> bound_px;
   bool foxglove = false;
   bool json = false;
 
   /// Else frames stay as they are.
-  bool encode() const { return geometry || step_bits || key_interval || draco_speed || texture_quality; }
+  bool encode() const {
+    return geometry || texture || step_bits || key_interval || draco_speed || texture_quality || bound_px;
+  }
 };
 
-EncodeOptions encode_options(const Options& options) {
-  EncodeOptions out{.geometry = GeometryCodec::kGrid, .step_bits = 6};  // as serve has them
+/// `recorded`: the texture's codec, which it keeps unless another one is wanted.
+EncodeOptions encode_options(const Options& options, TextureCodec recorded) {
+  constexpr int kVideoInterval = 30;                                    // as serve has it
+  EncodeOptions out{.geometry = GeometryCodec::kGrid, .step_bits = 6};  // likewise
   if (options.geometry) set_geometry_profile(*options.geometry, out);
+  out.texture = options.texture ? texture_codec_named(*options.texture).value_or(recorded) : recorded;
+  if (out.texture == TextureCodec::kH264) out.key_interval = std::max(out.key_interval, kVideoInterval);
   const auto set = [](const auto& given, auto& field) { field = given.value_or(field); };
+  if (out.bound_px > 0) set(options.bound_px, out.bound_px);
   set(options.step_bits, out.step_bits);
   set(options.key_interval, out.key_interval);
   set(options.draco_speed, out.draco_speed);
@@ -58,6 +67,9 @@ class Conversion {
 
   Status begin() {
     if (options_.encode()) {
+      if (options_.texture)
+        if (auto usable = check_texture_codec(*texture_codec_named(*options_.texture)); !usable)
+          return usable;
       const auto info = recorded_.read_info();
       if (!info)
         return Error{options_.file + ": frames cannot be coded anew without the stream's description: " +
@@ -115,7 +127,10 @@ class Conversion {
     return write(sample);
   }
   Status encode(const RawSample& sample, FrameView view, const Frame3D& frame) {
-    const EncodeOptions wanted = encode_options(options_);
+    const auto before = read_frame_header(view.data);
+    if (!before) return before.error();
+    if (before->texture != TextureCodec::kNone) texture_ = before->texture;
+    const EncodeOptions wanted = encode_options(options_, texture_);
     const auto bytes = encoder_->encode(frame, wanted);
     if (!bytes) return bytes.error();
     const auto header = read_frame_header(*bytes);
@@ -146,6 +161,7 @@ class Conversion {
   std::optional<FrameEncoder> encoder_;
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;
+  TextureCodec texture_ = TextureCodec::kNone;  // the last one recorded
   Converted converted_;
 };
 
@@ -209,17 +225,30 @@ Command convert_command() {
             ->type_name("NAME");
         options->range = add_range_options(app);
         app.add_option("--geometry", options->geometry,
-                       "Code surfaces anew, as " + geometry_profile_names() + "; and textures, as JPEG")
+                       "Code frames anew, surfaces as " + geometry_profile_names() + " (default grid)")
             ->check([](const std::string& name) {
               EncodeOptions unused;
               return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
             })
             ->type_name("NAME");
+        app.add_option("--texture", options->texture,
+                       "Code frames anew, textures as " + texture_codec_names() + " (default as recorded)")
+            ->check([](const std::string& name) {
+              return texture_codec_named(name).value_or(TextureCodec::kNone) != TextureCodec::kNone
+                         ? ""
+                         : "give " + texture_codec_names();
+            })
+            ->type_name("NAME");
+        app.add_option("--bound", options->bound_px,
+                       "Of visual: how far a vertex may be off in the camera's picture, pixels (default 0.5)")
+            ->check(CLI::Range(0.01, 8.0))
+            ->type_name("PX");
         app.add_option("--step-bits", options->step_bits,
                        "Of grid and draco-grid: steps of 1/2^N pixel (default 6)")
             ->check(CLI::Range(0, 8));
-        app.add_option("--key-interval", options->key_interval,
-                       "Of grid: every Nth frame decodes alone (default 1)")
+        app.add_option(
+               "--key-interval", options->key_interval,
+               "Of grids and h264: every Nth frame decodes alone (default 1; with metric, visual or h264 30)")
             ->check(CLI::Range(1, 1000));
         app.add_option("--draco-speed", options->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest")
             ->check(CLI::Range(0, 9));
@@ -233,6 +262,7 @@ Command convert_command() {
             "Examples:\n"
             "  relievo convert face.mcap --out part.mcap --from 10 --to 20\n"
             "  relievo convert face.mcap --out small.mcap --geometry grid --step-bits 4 --key-interval 15\n"
+            "  relievo convert face.mcap --out thin.mcap --geometry visual --texture h264\n"
             "  relievo convert face.mcap --out shown.mcap --foxglove");
         return [options](StopSignal& stop) { return run(*options, stop); };
       }};

@@ -7,6 +7,8 @@
 
 #include <immintrin.h>
 
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <cstring>
 
@@ -87,6 +89,47 @@ RELIEVO_AVX2 inline void residuals(const GridResiduals& line, int count) {
     const __m128i first = _mm_mullo_epi16(_mm_cvtepu8_epi16(tables), _mm_set1_epi16(rans::kMostSymbols));
     _mm_storeu_si128(reinterpret_cast<__m128i*>(line.codes + b), _mm_add_epi16(first, symbols));
   }
+}
+
+/// By which of eight are kept: their numbers, one after the other.
+inline constexpr auto kKept = [] {
+  std::array<std::array<std::uint8_t, 8>, 256> out{};
+  for (unsigned kept = 0; kept < 256; ++kept) {
+    std::size_t next = 0;
+    for (unsigned i = 0; i < 8; ++i)
+      if ((kept >> i & 1U) != 0) out[kept][next++] = static_cast<std::uint8_t>(i);
+  }
+  return out;
+}();
+
+RELIEVO_AVX2 inline std::uint16_t* pack(const std::uint16_t* codes, const std::uint8_t* kinds, int count,
+                                        std::uint16_t* to) {
+  for (int b = 0; b < count; b += 8) {
+    const __m128i done = _mm_cmpeq_epi8(load_octets(kinds + b), _mm_set1_epi8(kDone));
+    const unsigned kept = static_cast<unsigned>(_mm_movemask_epi8(done)) & 255U;
+    const __m128i number = load_octets(kKept[kept].data());
+    const __m128i twice = _mm_unpacklo_epi8(number, number);  // each code's two bytes
+    const __m128i bytes = _mm_add_epi8(_mm_add_epi8(twice, twice), _mm_set1_epi16(0x0100));
+    const __m128i all = _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes + b));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_shuffle_epi8(all, bytes));
+    to += std::popcount(kept);
+  }
+  return to;
+}
+
+RELIEVO_AVX2 inline std::uint16_t* pack_cells(const GridCellBlock* blocks, int count, std::uint16_t first,
+                                              std::uint16_t* to) {
+  const __m128i base = _mm_set1_epi16(static_cast<std::int16_t>(first));
+  for (const GridCellBlock* block = blocks; block != blocks + count; ++block) {
+    *to = block->whole;
+    to += block->says_whole;
+    const __m128i both = _mm_loadu_si128(reinterpret_cast<const __m128i*>(block));
+    const unsigned kept = static_cast<unsigned>(_mm_movemask_epi8(_mm_slli_epi16(both, 7))) >> 8;
+    const __m128i codes = _mm_shuffle_epi8(both, load_octets(kKept[kept].data()));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_add_epi16(_mm_cvtepu8_epi16(codes), base));
+    to += std::popcount(kept);
+  }
+  return to;
 }
 
 RELIEVO_AVX2 inline bool columns(const GridColumns& line, std::int32_t most, int count) {

@@ -40,6 +40,7 @@ struct GridEncoder::Slice {
   Counts<kSigmaTables> sigma_counts;
   std::vector<std::uint8_t> there[2], there_after, key_there, good[2], sizes, contexts, kinds;
   std::vector<std::uint16_t> line_codes;
+  std::vector<GridCellBlock> blocks;
   rans::Words words;
   std::vector<std::int32_t> expected, absent;
   Bytes bytes;
@@ -59,46 +60,36 @@ struct GridEncoder::Slice {
              const rans::EncoderTables* sigma_tables);
 
  private:
-  void put(int table, int symbol) { *to_++ = rans::code_of(table, symbol, kControlSymbols); }
+  static void put(int table, int symbol, std::uint16_t*& to) {
+    *to++ = rans::code_of(table, symbol, kControlSymbols);
+  }
   /// Eight, by their codes from a table's first one on, a byte each.
-  void put_eight(int table, std::uint64_t codes) {
+  static void put_eight(int table, std::uint64_t codes, std::uint16_t* to) {
     using Octets = std::uint8_t __attribute__((vector_size(8)));
     using Codes = std::uint16_t __attribute__((vector_size(16)));
     Octets octets;
     std::memcpy(&octets, &codes, sizeof octets);
     const Codes all = __builtin_convertvector(octets, Codes) + rans::code_of(table, 0, kControlSymbols);
-    std::memcpy(to_, &all, sizeof all);
-    to_ += 8;
-  }
-  /// Those of them that `put` has a 1 for.
-  void put_some(int table, std::uint64_t codes, std::uint64_t put) {
-    if (put == kOnes) {
-      put_eight(table, codes);
-      return;
-    }
-    const std::uint16_t first = rans::code_of(table, 0, kControlSymbols);
-    for (int i = 0; i < 8; ++i) {
-      *to_ = static_cast<std::uint16_t>(first + (codes >> 8 * i & 255));
-      to_ += put >> 8 * i & 1;
-    }
+    std::memcpy(to, &all, sizeof all);
   }
   void fill_there(const StripeGrid& grid, int line, std::vector<std::uint8_t>& out) const;
-  void read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here);
-  void read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below);
-  void read_marks(const Input& in, int line, const std::uint8_t* here);
+  // Where the control stream goes on, which begins at `to`.
+  std::uint16_t* read_places(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* here,
+                             std::uint16_t* to);
+  std::uint16_t* read_cells(const Input& in, int line, const std::uint8_t* above, const std::uint8_t* below,
+                            std::uint16_t* to);
+  std::uint16_t* read_marks(const Input& in, int line, const std::uint8_t* here, std::uint16_t* to) const;
   void read_columns(const Input& in, int line);
-  void read_alone(const Input& in, int line, const GridRows& rows, int b, std::uint16_t*& to);
+  void read_alone(const Input& in, int line, const GridRows& rows, int b);
   void read_sigmas(const Input& in, int line);
   /// What `write` puts into the control stream; at most `most` symbols.
   template <typename Write>
   void put_at_most(std::size_t most, const Write& write) {
     const std::size_t start = control.codes.size();
     control.codes.resize(start + most);
-    to_ = control.codes.data() + start;
-    write();
-    control.codes.resize(static_cast<std::size_t>(to_ - control.codes.data()));
+    const std::uint16_t* behind = write(control.codes.data() + start);
+    control.codes.resize(static_cast<std::size_t>(behind - control.codes.data()));
   }
-  std::uint16_t* to_ = nullptr;  // of put()
   const std::int32_t* row(const StripeGrid& grid, int line) const {
     return line < begin ? absent.data() + StripeGrid::kMargin : grid.columns.data() + grid.at(line, 0);
   }
@@ -122,6 +113,7 @@ void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
   contexts.assign(size, 0);
   kinds.assign(size, 0);
   line_codes.assign(size, 0);
+  blocks.resize(size / 8);
   expected.assign(size, 0);
   absent.assign(size, StripeGrid::kAbsent);
 }
@@ -131,8 +123,8 @@ void GridEncoder::Slice::fill_there(const StripeGrid& grid, int line, std::vecto
                        out.data() + StripeGrid::kMargin);
 }
 
-void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8_t* above,
-                                     const std::uint8_t* here) {
+std::uint16_t* GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8_t* above,
+                                               const std::uint8_t* here, std::uint16_t* to) {
   const std::uint8_t* key = nullptr;
   if (in.key != nullptr) {
     fill_there(*in.key, line, key_there);
@@ -144,33 +136,38 @@ void GridEncoder::Slice::read_places(const Input& in, int line, const std::uint8
     const int uniform = last - b == 8 ? uniform_places(here, above, key, b) : -1;
     if (uniform >= 0) {
       const bool all = load8(here + b) == static_cast<std::uint64_t>(uniform) * kOnes;
-      put(kBlockTable + uniform, all ? 0 : 1);
+      put(kBlockTable + uniform, all ? 0 : 1, to);
       if (all) continue;
     }
     const std::uint64_t contexts_of = load8(here + b - 1) | place_contexts_around(above, key, b);
     static_assert(kPlaceTables * kControlSymbols <= 256);
-    put_eight(0, contexts_of * kControlSymbols + load8(here + b));
-    to_ += last - b - 8;
+    put_eight(0, contexts_of * kControlSymbols + load8(here + b), to);
+    to += last - b;
   }
+  return to;
 }
 
 /// Below `line`.
-void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_t* above,
-                                    const std::uint8_t* below) {
+std::uint16_t* GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_t* above,
+                                              const std::uint8_t* below, std::uint16_t* to) {
   const std::uint8_t* cells = in.grid.cells.data() + in.grid.at(line, 0);
   const std::uint8_t* good_above = good[0].data() + StripeGrid::kMargin;
   std::uint8_t* good_here = good[1].data() + StripeGrid::kMargin;
   good_here[-1] = 1;
   const int count = in.grid.boundaries - 1;
-  for (int b = 0; b < count; b += 8) {
+  GridCellBlock* block = blocks.data();
+  std::uint32_t filled = 0;
+  for (int b = 0; b < count; b += 8, ++block) {
     const int last = std::min(b + 8, count);
+    *block = {};
     if (last - b == 8 && uniform_cells(good_here, good_above, above, below, b)) {
       // All are straight or turned: four bits a byte, every other one.
       const std::uint64_t unlike = load8(cells + b) ^ grid_cell::kTurned * kOnes;
       const bool both = unlike == (unlike & kOnes) * 15;
-      put(kCellBlockTable, both ? 0 : 1);
+      block->whole = rans::code_of(kCellBlockTable, both ? 0 : 1, kControlSymbols);
+      block->says_whole = 1;
       if (both) {
-        triangles += 16;
+        filled += 16;
         std::fill_n(good_here + b, 8, std::uint8_t{1});
         continue;
       }
@@ -178,18 +175,24 @@ void GridEncoder::Slice::read_cells(const Input& in, int line, const std::uint8_
     const std::uint64_t asked = last - b == 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * (last - b)) - 1;
     const EightCells eight =
         eight_cells(cells + b, above + b, below + b, asked, load8(good_above + b), good_here[b - 1]);
-    triangles += eight.triangles;
+    filled += eight.triangles;
     std::memcpy(good_here + b, &eight.good, sizeof eight.good);
-    put_some(kCellTable, eight.codes, eight.coded);
+    block->codes = eight.codes;
+    block->coded = eight.coded;
   }
   std::swap(good[0], good[1]);
+  triangles += filled;
+  return grid_kernels().pack_cells(blocks.data(), static_cast<int>(block - blocks.data()),
+                                   rans::code_of(kCellTable, 0, kControlSymbols), to);
 }
 
-void GridEncoder::Slice::read_marks(const Input& in, int line, const std::uint8_t* here) {
+std::uint16_t* GridEncoder::Slice::read_marks(const Input& in, int line, const std::uint8_t* here,
+                                              std::uint16_t* to) const {
   const std::uint8_t* marks = in.grid.interpolated.data() + in.grid.at(line, 0);
   const std::uint8_t* above = line > begin ? marks - in.grid.stride() : nullptr;
   for (int b = 0; b < in.grid.boundaries; ++b)
-    if (here[b] != 0) put(kMarkTable + (above != nullptr ? above[b] << 1 : 0) + marks[b - 1], marks[b]);
+    if (here[b] != 0) put(kMarkTable + (above != nullptr ? above[b] << 1 : 0) + marks[b - 1], marks[b], to);
+  return to;
 }
 
 void GridEncoder::Slice::read_columns(const Input& in, int line) {
@@ -219,31 +222,23 @@ void GridEncoder::Slice::read_columns(const Input& in, int line) {
   const std::size_t start = residuals.codes.size();
   residuals.starts.push_back(static_cast<std::uint32_t>(start));
   residuals.codes.resize(start + contexts.size());
-  std::uint16_t* to = residuals.codes.data() + start;
   for (int b = 0; b < boundaries; b += 8) {
-    if (load8(kinds.data() + b) == 0) {
-      std::memcpy(to, line_codes.data() + b, 8 * sizeof *to);
-      to += 8;
-      continue;
-    }
-    const bool some_alone = (load8(kinds.data() + b) & kByItself * kOnes) != 0;
-    for (int i = b; i < b + 8; ++i) {  // behind the last boundary there are no vertices
-      const auto at = static_cast<std::size_t>(i);
-      *to = line_codes[at];
-      to += kinds[at] == kDone ? 1 : 0;
-      if (some_alone && kinds[at] == kByItself) read_alone(in, line, rows, i, to);
-    }
+    if ((load8(kinds.data() + b) & kByItself * kOnes) == 0) continue;
+    for (int i = b; i < b + 8; ++i)  // behind the last boundary there are no vertices
+      if (kinds[static_cast<std::size_t>(i)] == kByItself) read_alone(in, line, rows, i);
   }
-  const auto count = static_cast<std::size_t>(to - residuals.codes.data());
-  vertices += static_cast<std::uint32_t>(count - start);
-  residuals.codes.resize(count);
+  std::uint16_t* const to = residuals.codes.data() + start;
+  const auto count =
+      static_cast<std::size_t>(kernels.pack(line_codes.data(), kinds.data(), boundaries, to) - to);
+  vertices += static_cast<std::uint32_t>(count);
+  residuals.codes.resize(start + count);
 }
 
 /// A vertex that the kernel leaves.
-void GridEncoder::Slice::read_alone(const Input& in, int line, const GridRows& rows, int b,
-                                    std::uint16_t*& to) {
+void GridEncoder::Slice::read_alone(const Input& in, int line, const GridRows& rows, int b) {
   std::int32_t* here = in.grid.columns.data() + in.grid.at(line, 0);
-  const int table = contexts[static_cast<std::size_t>(b)];
+  const auto i = static_cast<std::size_t>(b);
+  const int table = contexts[i];
   const auto at = static_cast<std::size_t>(b + StripeGrid::kMargin);
   const std::int32_t p = table == kAloneTable ? expected_alone(here, rows.up1, rows.key, b,
                                                                last_before(here, b), in.model.spacing)
@@ -257,7 +252,8 @@ void GridEncoder::Slice::read_alone(const Input& in, int line, const GridRows& r
   sizes[at] = static_cast<std::uint8_t>(std::min(d < 0 ? -d : d, kLargestSize));
   const Symbol symbol = symbol_of(zigzag(d));
   if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
-  *to++ = rans::code_of(table, symbol.symbol);
+  line_codes[i] = rans::code_of(table, symbol.symbol);
+  kinds[i] = kDone;
 }
 
 void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
@@ -289,13 +285,15 @@ void GridEncoder::Slice::read(const Input& in) {
   fill_there(in.grid, begin, there[1]);
   // A line's marks, the places below it and its cells, each with what is said of blocks.
   const auto most = static_cast<std::size_t>(4 * in.grid.stride());
-  put_at_most(most, [&] {
-    read_places(in, begin, there[0].data() + StripeGrid::kMargin, there[1].data() + StripeGrid::kMargin);
+  put_at_most(most, [&](std::uint16_t* to) {
+    return read_places(in, begin, there[0].data() + StripeGrid::kMargin,
+                       there[1].data() + StripeGrid::kMargin, to);
   });
   for (int line = begin; line < end; ++line) {
     std::swap(there[0], there[1]);
     const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
-    if (!in.grid.interpolated.empty()) put_at_most(most, [&] { read_marks(in, line, here); });
+    if (!in.grid.interpolated.empty())
+      put_at_most(most, [&](std::uint16_t* to) { return read_marks(in, line, here, to); });
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
       if (line + 1 < end) {
@@ -304,9 +302,8 @@ void GridEncoder::Slice::read(const Input& in) {
         there[1].swap(there_after);
       }
       const std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
-      put_at_most(most, [&] {
-        read_places(in, line + 1, here, below);
-        read_cells(in, line, here, below);
+      put_at_most(most, [&](std::uint16_t* to) {
+        return read_cells(in, line, here, below, read_places(in, line + 1, here, below, to));
       });
     }
     read_columns(in, line);

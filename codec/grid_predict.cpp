@@ -112,6 +112,29 @@ RELIEVO_INLINE void residuals_body(const GridResiduals& line, int count) {
   }
 }
 
+// Each is written, and kept by what comes behind it.
+RELIEVO_INLINE std::uint16_t* pack_body(const std::uint16_t* codes, const std::uint8_t* kinds, int count,
+                                        std::uint16_t* to) {
+  for (int b = 0; b < (count + 7) / 8 * 8; ++b) {
+    *to = codes[b];
+    to += kinds[b] == kDone ? 1 : 0;
+  }
+  return to;
+}
+
+RELIEVO_INLINE std::uint16_t* pack_cells_body(const GridCellBlock* blocks, int count, std::uint16_t first,
+                                              std::uint16_t* to) {
+  for (const GridCellBlock* block = blocks; block != blocks + count; ++block) {
+    *to = block->whole;
+    to += block->says_whole;
+    for (int i = 0; i < 8; ++i) {
+      *to = static_cast<std::uint16_t>(first + (block->codes >> 8 * i & 255));
+      to += block->coded >> 8 * i & 1;
+    }
+  }
+  return to;
+}
+
 RELIEVO_INLINE bool columns_body(const GridColumns& line, std::int32_t most, int count) {
   Ints unfair{};
   for (int b = 0; b < count; b += 8) {
@@ -194,39 +217,48 @@ RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const s
   }
 }
 
-#define RELIEVO_KERNELS(set, attributes, residuals_of, columns_of, there_of)                              \
-  struct set {                                                                                            \
-    attributes static void predict(const GridRows& rows, const GridModel& model, int count,               \
-                                   std::int32_t* expected) {                                              \
-      predict_body(rows, model, count, expected);                                                         \
-    }                                                                                                     \
-    attributes static void contexts(const std::uint8_t* sizes, const std::int32_t* up1, int count,        \
-                                    std::uint8_t* out) {                                                  \
-      contexts_body(sizes, up1, count, out);                                                              \
-    }                                                                                                     \
-    attributes static void residuals(const GridResiduals& line, int count) { residuals_of(line, count); } \
-    attributes static bool columns(const GridColumns& line, std::int32_t most, int count) {               \
-      return columns_of(line, most, count);                                                               \
-    }                                                                                                     \
-    attributes static void there(const std::int32_t* columns, int count, std::uint8_t* out) {             \
-      there_of(columns, count, out);                                                                      \
-    }                                                                                                     \
-    attributes static void slopes(const std::int32_t* here, const GridRows& rows, std::int32_t limit,     \
-                                  int count, GridSlopes& sums) {                                          \
-      slopes_body(here, rows, limit, count, sums);                                                        \
-    }                                                                                                     \
-    attributes static void diagonals(const std::int32_t* above, const std::int32_t* below,                \
-                                     std::int32_t spacing, int count, std::uint8_t* cells) {              \
-      diagonals_body(above, below, spacing, count, cells);                                                \
-    }                                                                                                     \
-    static GridKernels table(const char* name) {                                                          \
-      return {name, predict, contexts, residuals, columns, there, slopes, diagonals};                     \
-    }                                                                                                     \
+#define RELIEVO_KERNELS(set, attributes, residuals_of, pack_of, pack_cells_of, columns_of, there_of)         \
+  struct set {                                                                                               \
+    attributes static void predict(const GridRows& rows, const GridModel& model, int count,                  \
+                                   std::int32_t* expected) {                                                 \
+      predict_body(rows, model, count, expected);                                                            \
+    }                                                                                                        \
+    attributes static void contexts(const std::uint8_t* sizes, const std::int32_t* up1, int count,           \
+                                    std::uint8_t* out) {                                                     \
+      contexts_body(sizes, up1, count, out);                                                                 \
+    }                                                                                                        \
+    attributes static void residuals(const GridResiduals& line, int count) { residuals_of(line, count); }    \
+    attributes static std::uint16_t* pack(const std::uint16_t* codes, const std::uint8_t* kinds, int count,  \
+                                          std::uint16_t* to) {                                               \
+      return pack_of(codes, kinds, count, to);                                                               \
+    }                                                                                                        \
+    attributes static std::uint16_t* pack_cells(const GridCellBlock* blocks, int count, std::uint16_t first, \
+                                                std::uint16_t* to) {                                         \
+      return pack_cells_of(blocks, count, first, to);                                                        \
+    }                                                                                                        \
+    attributes static bool columns(const GridColumns& line, std::int32_t most, int count) {                  \
+      return columns_of(line, most, count);                                                                  \
+    }                                                                                                        \
+    attributes static void there(const std::int32_t* columns, int count, std::uint8_t* out) {                \
+      there_of(columns, count, out);                                                                         \
+    }                                                                                                        \
+    attributes static void slopes(const std::int32_t* here, const GridRows& rows, std::int32_t limit,        \
+                                  int count, GridSlopes& sums) {                                             \
+      slopes_body(here, rows, limit, count, sums);                                                           \
+    }                                                                                                        \
+    attributes static void diagonals(const std::int32_t* above, const std::int32_t* below,                   \
+                                     std::int32_t spacing, int count, std::uint8_t* cells) {                 \
+      diagonals_body(above, below, spacing, count, cells);                                                   \
+    }                                                                                                        \
+    static GridKernels table(const char* name) {                                                             \
+      return {name, predict, contexts, residuals, pack, pack_cells, columns, there, slopes, diagonals};      \
+    }                                                                                                        \
   }
 
-RELIEVO_KERNELS(Portable, , residuals_body, columns_body, there_body);
+RELIEVO_KERNELS(Portable, , residuals_body, pack_body, pack_cells_body, columns_body, there_body);
 #if defined(__x86_64__)
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], avx2::residuals, avx2::columns, avx2::there);
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], avx2::residuals, avx2::pack, avx2::pack_cells, avx2::columns,
+                avx2::there);
 #endif
 
 }  // namespace

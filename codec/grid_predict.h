@@ -59,6 +59,13 @@ struct GridColumns {
   std::uint8_t* kinds;
 };
 
+/// Eight cells on their way to symbols, a byte each; see grid::EightCells.
+struct GridCellBlock {
+  std::uint64_t codes = 0, coded = 0;  // from `first` on; a 1 for those that say something
+  std::uint16_t whole = 0;             // what is said of all eight before: its code
+  std::uint16_t says_whole = 0;        // 0 or 1
+};
+
 /// Sums of products of x0, x1, x2, the differences of the lines above, nearest first, and y, that of the line
 /// itself, over places where none is beyond the limit.
 struct GridSlopes {
@@ -80,7 +87,16 @@ struct GridKernels {
   /// A line's residuals as symbols. `count` rounded up to 8 places.
   void (*residuals)(const GridResiduals& line, int count);
 
-  /// The reverse. False where a column is out of [-most, most]. `count` rounded up to 8 places.
+  /// The codes of places that are done, one after the other; behind the last one. `count` rounded up to 8
+  /// places, for which there must be room in `to`.
+  std::uint16_t* (*pack)(const std::uint16_t* codes, const std::uint8_t* kinds, int count, std::uint16_t* to);
+
+  /// The same of cells; room for nine a block.
+  std::uint16_t* (*pack_cells)(const GridCellBlock* blocks, int count, std::uint16_t first,
+                               std::uint16_t* to);
+
+  /// The reverse of residuals(). False where a column is out of [-most, most]. `count` rounded up to 8
+  /// places.
   bool (*columns)(const GridColumns& line, std::int32_t most, int count);
 
   /// 1 where there is a vertex, else 0. `count` rounded up to 8 places.

@@ -118,7 +118,9 @@ Levels read_levels(BitReader& in) {
 std::array<std::uint16_t, kMostSymbols> frequencies_of(const Levels& levels) {
   std::array<std::uint32_t, kMostSymbols> weights{};
   std::uint32_t sum = 0;
-  for (std::size_t s = 0; s < levels.size(); ++s) {
+  std::size_t used = levels.size();
+  while (used > 0 && levels[used - 1] == 0) --used;
+  for (std::size_t s = 0; s < used; ++s) {
     if (levels[s] == 0) continue;
     weights[s] = ((levels[s] & 1) != 0 ? 16U : 23U) << ((levels[s] - 1) / 2);
     sum += weights[s];
@@ -126,7 +128,7 @@ std::array<std::uint16_t, kMostSymbols> frequencies_of(const Levels& levels) {
   std::array<std::uint16_t, kMostSymbols> frequencies{};
   if (sum == 0) return frequencies;
   int left = kScale;
-  for (std::size_t s = 0; s < levels.size(); ++s) {
+  for (std::size_t s = 0; s < used; ++s) {
     if (weights[s] == 0) continue;
     // 72 weights of at most 2^15 times 2^11 stay below 2^32.
     frequencies[s] = static_cast<std::uint16_t>(std::max(weights[s] * kScale / sum, 1U));
@@ -134,7 +136,8 @@ std::array<std::uint16_t, kMostSymbols> frequencies_of(const Levels& levels) {
   }
   // What rounding left over or took too much goes to or comes from the most frequent, the first of equals.
   while (left != 0) {
-    auto& most = *std::max_element(frequencies.begin(), frequencies.end());
+    auto& most =
+        *std::max_element(frequencies.begin(), frequencies.begin() + static_cast<std::ptrdiff_t>(used));
     const int change = left > 0 ? left : -std::min(-left, most / 2);
     most = static_cast<std::uint16_t>(most + change);
     left -= change;
@@ -192,9 +195,10 @@ EncoderSymbol encoder_symbol(std::uint32_t start, std::uint32_t f) {
   } else {
     const int shift = std::bit_width(f - 1);
     e.reciprocal = static_cast<std::uint32_t>(((std::uint64_t{1} << (shift + 31)) + f - 1) / f);
-    e.shift = static_cast<std::uint16_t>(shift - 1);
+    e.shift = static_cast<std::uint8_t>(shift - 1);
     e.bias = start;
   }
+  e.wide_shift = static_cast<std::uint8_t>(32 + e.shift);
   return e;
 }
 

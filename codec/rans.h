@@ -81,7 +81,8 @@ std::uint16_t first_frequency(const BinaryLevel& level);
 struct EncoderSymbol {
   std::uint32_t limit = 0;
   std::uint32_t reciprocal = 0, bias = 0;
-  std::uint16_t complement = 0, shift = 0;
+  std::uint16_t complement = 0;
+  std::uint8_t wide_shift = 32, shift = 0;  // of the whole product with the reciprocal, and of its upper half
 };
 
 /// All tables of a stream, with alphabets of up to so many symbols. A symbol of a table is one number, its

@@ -43,13 +43,17 @@ class SingleLane {
     symbol_ = symbols_ + *--code_;
     divide();
   }
-  /// The next symbols, at most so many; the row's first one is left to finish().
-  RELIEVO_INLINE void put(std::size_t most) {
-    for (auto n = std::min(most, static_cast<std::size_t>(code_ - begin_)); n > 0; --n)
-      put_before(symbols_ + *--code_);
+  /// The next kAtOnce symbols, if so many are left; all others, and the row's first one, are left to
+  /// finish().
+  static constexpr int kAtOnce = 4;
+  RELIEVO_INLINE void put() {
+    if (code_ - begin_ < kAtOnce) return;
+    code_ -= kAtOnce;
+#pragma GCC unroll kAtOnce
+    for (int i = kAtOnce; i-- > 0;) put_before(symbols_ + code_[i]);
   }
   RELIEVO_INLINE void finish(StreamJob& job) {
-    put(static_cast<std::size_t>(code_ - begin_));
+    while (code_ != begin_) put_before(symbols_ + *--code_);
     if (symbol_ != nullptr) x_ += symbol_->bias + quotient_ * symbol_->complement;
     job.states[0] = static_cast<std::uint32_t>(x_);
     job.to = to_;
@@ -62,7 +66,7 @@ class SingleLane {
       *--to_ = static_cast<std::uint16_t>(x_);
       x_ >>= 16;
     }
-    quotient_ = x_ * symbol_->reciprocal >> (32 + symbol_->shift);
+    quotient_ = x_ * symbol_->reciprocal >> symbol_->wide_shift;
   }
   RELIEVO_INLINE void put_before(const EncoderSymbol* next) {
     const std::uint64_t complement = symbol_->complement, reciprocal = next->reciprocal;
@@ -71,7 +75,7 @@ class SingleLane {
     asm("" : "+r"(ahead));  // or else compilers make one product of both
     const std::uint64_t divided = sum * reciprocal + quotient_ * ahead;
     x_ = sum + quotient_ * complement;
-    quotient_ = divided >> (32 + next->shift);
+    quotient_ = divided >> next->wide_shift;
     symbol_ = next;
     if (x_ >= next->limit) [[unlikely]]
       divide();
@@ -137,7 +141,7 @@ RELIEVO_AVX2 __m128i load(const void* from) {
 
 /// put() of four lanes: a symbol each.
 RELIEVO_AVX2 __m128i put_four(__m128i x, const EncoderSymbol* const* symbols, std::uint16_t*& to) {
-  static_assert(offsetof(EncoderSymbol, limit) == 0 && offsetof(EncoderSymbol, shift) == 14);
+  static_assert(offsetof(EncoderSymbol, limit) == 0 && offsetof(EncoderSymbol, shift) == 15);
   const __m128i a = load(symbols[0]), b = load(symbols[1]), c = load(symbols[2]), d = load(symbols[3]);
   const __m128i ab = _mm_unpacklo_epi32(a, b), cd = _mm_unpacklo_epi32(c, d);
   const __m128i limit = _mm_unpacklo_epi64(ab, cd), reciprocal = _mm_unpackhi_epi64(ab, cd);
@@ -152,7 +156,7 @@ RELIEVO_AVX2 __m128i put_four(__m128i x, const EncoderSymbol* const* symbols, st
   const __m128i even = _mm_srli_epi64(_mm_mul_epu32(x, reciprocal), 32);
   const __m128i odd = _mm_mul_epu32(_mm_srli_epi64(x, 32), _mm_srli_epi64(reciprocal, 32));
   const __m128i product = _mm_blend_epi16(even, odd, 0b11001100);
-  const __m128i q = _mm_srlv_epi32(product, _mm_srli_epi32(both, 16));
+  const __m128i q = _mm_srlv_epi32(product, _mm_srli_epi32(both, 24));
   const __m128i complement = _mm_and_si128(both, _mm_set1_epi32(0xffff));
   return _mm_add_epi32(_mm_add_epi32(x, bias), _mm_mullo_epi32(q, complement));
 }
@@ -164,8 +168,6 @@ constexpr EncoderSymbol kNothing{.limit = 1U << 31};
   __m128i states = load(lanes.states.data());
   std::uint16_t* to = lanes.to;
   SingleLane beside(single);
-  const std::size_t steps = lanes.rows.codes.size() / kLanes + 1;
-  const std::size_t at_once = (single.rows.codes.size() + steps - 1) / steps;
   const EncoderSymbol* const symbols = lanes.symbols;
   const std::uint16_t* end = lanes.rows.codes.data() + lanes.rows.codes.size();
   for (std::size_t r = lanes.rows.starts.size(); r-- > 0;) {
@@ -181,7 +183,7 @@ constexpr EncoderSymbol kNothing{.limit = 1U << 31};
       const EncoderSymbol* const four[kLanes] = {symbols + end[0], symbols + end[1], symbols + end[2],
                                                  symbols + end[3]};
       states = put_four(states, four, to);
-      beside.put(at_once);
+      beside.put();
     }
   }
   _mm_storeu_si128(reinterpret_cast<__m128i*>(lanes.states.data()), states);
@@ -204,88 +206,125 @@ const std::array<float, kLargestLevel + 1>& share_costs() {
   return costs;
 }
 
-// A table each.
-using Floats = float __attribute__((vector_size(32)));
+// A table each. Bits are counted in whole parts of one, since each step waits for the one before and those of
+// floats take twice as long. Of more than kMostCounted symbols all are counted as fewer: no sum is kNever
+// then.
 using Ints = std::int32_t __attribute__((vector_size(32)));
+using Floats = float __attribute__((vector_size(32)));
+constexpr std::int32_t kBit = 64;
+constexpr std::uint32_t kMostCounted = 1U << 19;
 constexpr std::size_t kLevels = kLargestLevel + 1;
-constexpr float kNever = 1e30F;
+constexpr std::int32_t kNever = 1 << 30;
 
-/// From which level the way to each leads, four levels to a number.
-using Steps = std::array<Ints, kLevels / 4>;
+/// How the cheapest ways lead to a symbol's levels, a bit a level.
+struct Ways {
+  Ints up;             // the way from below begins at this level
+  Ints down;           // that from above does
+  Ints is_from_above;  // which of the two it is
+};
 
-/// The cheapest ways from one symbol's levels to the next one's: as write_levels() has it a level up takes
-/// two bits, a level down too, and none takes one.
-RELIEVO_INLINE void step(const std::array<Floats, kLevels>& best, std::array<Floats, kLevels>& next,
-                         Steps& from) {
-  std::array<Ints, kLevels> at_level;
-  // From below or the same, then from above.
-  Floats least = Floats{} + kNever;
-  Ints at{};
-  for (std::size_t l = 0; l < kLevels; ++l) {
-    const Ints less = best[l] < least;
-    least = less ? best[l] : least;
-    at = less ? Ints{} + static_cast<std::int32_t>(l) : at;
-    next[l] = least + 1;
-    at_level[l] = at;
-    least += 2;
+/// What each level of a symbol takes with all symbols before it, from the same of the symbol before: as
+/// write_levels() has it a level up takes two bits, a level down too, and none takes one. The symbol's own
+/// bits are a level's share of all others less half a bit a level each time that it comes.
+RELIEVO_INLINE void step(const std::array<Ints, kLevels>& shares, const Ints& count,
+                         std::array<Ints, kLevels>& best, Ways& ways) {
+  constexpr int kHighest = kLargestLevel;
+  std::array<Ints, kLevels> from_below;
+  Ints up = Ints{} + 1, down{}, is_from_above{};
+  Ints least = Ints{} + kNever;
+#pragma GCC unroll 24
+  for (int l = 0; l <= kHighest; ++l) {
+    const auto at = static_cast<std::size_t>(l);
+    const Ints less = best[at] < least;
+    up |= less & (1 << l);
+    least = less ? best[at] : least;
+    from_below[at] = least + kBit;
+    least += 2 * kBit;
   }
-  least = Floats{} + kNever;
-  for (std::size_t l = kLevels; l-- > 0;) {
-    const Ints better = least < next[l];
-    next[l] = better ? least : next[l];
-    at_level[l] = better ? at : at_level[l];
-    const Ints less = best[l] < least;
-    least = less ? best[l] : least;
-    at = less ? Ints{} + static_cast<std::int32_t>(l) : at;
-    least += 2;
+  least = Ints{} + kNever;
+  const Ints half = count * (kBit / 2);
+  Ints gain = half * (kHighest - 1);
+#pragma GCC unroll 24
+  for (int l = kHighest; l >= 0; --l) {
+    const auto at = static_cast<std::size_t>(l);
+    const Ints better = least < from_below[at];
+    is_from_above |= better & (1 << l);
+    const Ints way = better ? least : from_below[at];
+    const Ints less = best[at] < least;
+    down |= less & (1 << l);
+    least = (less ? best[at] : least) + 2 * kBit;
+    best[at] = way + (l > 0 ? shares[at] - gain : Ints{});
+    gain -= half;
   }
-  for (std::size_t i = 0; i < from.size(); ++i)
-    from[i] =
-        at_level[4 * i] | at_level[4 * i + 1] << 8 | at_level[4 * i + 2] << 16 | at_level[4 * i + 3] << 24;
+  best[0] = count > 0 ? Ints{} + kNever : best[0];
+  ways = {up, down, is_from_above};
+}
+
+/// The level before `level` on a table's way.
+std::int32_t level_before(const Ways& ways, int table, std::int32_t level) {
+  const auto up = static_cast<std::uint32_t>(ways.up[table]);
+  const auto down = static_cast<std::uint32_t>(ways.down[table]);
+  if ((ways.is_from_above[table] >> level & 1) != 0) return level + 1 + std::countr_zero(down >> (level + 1));
+  return std::bit_width(up & ((2U << level) - 1)) - 1;
+}
+
+/// What is counted of some tables.
+struct Counted {
+  std::array<Ints, kMostSymbols> counts;
+  Ints totals{};
+  Ints used{};  // symbols up to the last one that comes
+  std::int32_t most_used = 0;
+};
+
+RELIEVO_INLINE void count_tables(const std::uint32_t* counts, std::size_t symbols, Counted& out) {
+  for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) {
+    const std::uint32_t* of = counts + static_cast<std::size_t>(t) * symbols;
+    std::uint64_t total = 0;
+    for (std::size_t s = 0; s < symbols; ++s) total += of[s];
+    int shift = 0;
+    while (total >> shift > kMostCounted) ++shift;
+    std::int32_t used = 0;
+    for (std::size_t s = 0; s < symbols; ++s) {
+      out.counts[s][t] = static_cast<std::int32_t>(of[s] > 0 ? std::max(of[s] >> shift, 1U) : 0U);
+      used = of[s] > 0 ? static_cast<std::int32_t>(s) + 1 : used;
+    }
+    out.totals[t] = static_cast<std::int32_t>(total >> shift);
+    out.used[t] = used;
+    out.most_used = std::max(out.most_used, used);
+  }
 }
 
 /// The way through the levels on which they and the symbols together take the fewest bits.
 RELIEVO_INLINE void levels_body(const std::uint32_t* counts, std::size_t symbols, Levels* out) {
-  Floats total{};
-  Ints used{};
-  for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) {
-    const std::uint32_t* of = counts + static_cast<std::size_t>(t) * symbols;
-    std::uint64_t sum = 0;
-    for (std::size_t s = 0; s < symbols; ++s) {
-      sum += of[s];
-      if (of[s] > 0) used[t] = static_cast<std::int32_t>(s) + 1;
-    }
-    total[t] = static_cast<float>(sum);
-  }
-  std::int32_t most_used = 0;
-  for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) most_used = std::max(most_used, used[t]);
-  const auto& shares = share_costs();
-  std::array<Steps, kMostSymbols> from;
-  std::array<Floats, kLevels> best{}, next;
-  for (std::int32_t s = 0; s < most_used; ++s) {
-    const Ints goes_on = used > s;
-    if (s > 0) {
-      step(best, next, from[static_cast<std::size_t>(s)]);
-      for (std::size_t l = 0; l < kLevels; ++l) best[l] = goes_on ? next[l] : best[l];
-    }
-    Floats count;
-    for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t)
-      count[t] =
-          static_cast<float>(counts[static_cast<std::size_t>(t) * symbols + static_cast<std::size_t>(s)]);
+  Counted counted;
+  count_tables(counts, symbols, counted);
+  std::array<Ints, kLevels> shares, best{};
+  const Floats totals = __builtin_convertvector(counted.totals, Floats) * kBit;
+  for (std::size_t l = 0; l < kLevels; ++l)
+    shares[l] = __builtin_convertvector(totals * share_costs()[l], Ints);
+  std::array<Ways, kMostSymbols> ways;
+  Ints level{};  // of each table's last symbol
+  for (std::int32_t s = 0; s < counted.most_used; ++s) {
+    const auto at = static_cast<std::size_t>(s);
+    step(shares, counted.counts[at], best, ways[at]);
+    const Ints ends = counted.used == s + 1;
+    std::int32_t any = 0;
+    for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) any |= ends[t];
+    if (any == 0) continue;
+    Ints least = best[0];
     for (std::size_t l = 1; l < kLevels; ++l) {
-      const Floats cost = total * shares[l] - 0.5F * count * static_cast<float>(l - 1);
-      best[l] = goes_on ? best[l] + cost : best[l];
+      const Ints less = ends & (best[l] < least);
+      least = less ? best[l] : least;
+      level = less ? Ints{} + static_cast<std::int32_t>(l) : level;
     }
-    best[0] = (count > 0) & goes_on ? Floats{} + kNever : best[0];
   }
-  for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) {
-    Levels& levels = out[t] = {};
-    std::size_t level = 0;
-    for (std::size_t l = 1; l < kLevels; ++l)
-      if (best[l][t] < best[level][t]) level = l;
-    for (auto s = static_cast<std::size_t>(used[t]); s-- > 0;) {
-      levels[s] = static_cast<std::uint8_t>(level);
-      if (s > 0) level = static_cast<std::size_t>(from[s][level / 4][t] >> 8 * (level % 4) & 255);
+  for (std::size_t t = 0; t < kTablesAtOnce; ++t) out[t] = {};
+  // Table by table each step would wait for the one before.
+  for (std::int32_t s = counted.most_used; s-- > 0;) {
+    for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) {
+      if (counted.used[t] <= s) continue;
+      out[t][static_cast<std::size_t>(s)] = static_cast<std::uint8_t>(level[t]);
+      if (s > 0) level[t] = level_before(ways[static_cast<std::size_t>(s)], t, level[t]);
     }
   }
 }

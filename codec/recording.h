@@ -73,6 +73,8 @@ class RecordingWriter {
   virtual Status flush_if_due(std::int64_t now_ns) = 0;
   /// Bytes so far, those of the open chunk among them.
   virtual std::uint64_t size() const = 0;
+  /// How many of a channel's messages are in the file, whatever comes: those of the open chunk are not.
+  virtual std::uint64_t written(std::uint16_t channel) const = 0;
   /// Writes the index and closes.
   virtual Status finish() = 0;
 };

@@ -114,6 +114,10 @@ class Writer final : public RecordingWriter {
 
   std::uint64_t size() const override { return offset_ + chunk_.size(); }
 
+  std::uint64_t written(std::uint16_t channel) const override {
+    return channel < channels_.size() ? statistics_.channel_messages[channel].second : 0;
+  }
+
   Status finish() override {
     if (!failure_.empty()) return Error{failure_};
     if (file_ < 0) return {};

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // fuzz_seeds SOURCE_DIR OUT [TARGET]: sound inputs of every fuzz target, or of that one, OUT/TARGET/*, from
 // the conformance vectors and the writers.
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -24,16 +27,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
+[[noreturn]] void fail(const char* what, const fs::path& file) {
+  const std::string why = std::strerror(errno);
+  std::fprintf(stderr, "seeds: cannot %s %s: %s\n", what, file.c_str(), why.c_str());
+  std::exit(1);
+}
+
 Bytes read(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
+  if (!in) fail("read", file);
   return Bytes(std::istreambuf_iterator<char>(in), {});
 }
 void write(const fs::path& file, const Bytes& bytes) {
   fs::create_directories(file.parent_path());
   std::ofstream out(file, std::ios::binary);
-  out.exceptions(std::ios::failbit | std::ios::badbit);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   out.close();
+  if (!out) fail("write", file);
 }
 
 /// Each vector, those to be refused too, and each sequence of frames that build on one another.

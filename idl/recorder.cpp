@@ -106,7 +106,10 @@ void Recorder::add(const RawSample& sample) {
   if (!error_) fail(write(sample));
   if (!error_ && is_frame && foxglove_) fail(write_for_viewers(sample));
   if (sample.topic == Topic::kInfo) info_sample_ = sample;
-  if (error_) return;
+  if (error_) {
+    counts_.missed += is_frame;
+    return;
+  }
   counts_.bytes += sample.cdr.size();
   counts_.live = true;
   if (!is_frame) return;
@@ -140,6 +143,7 @@ Status Recorder::open_file() {
       RecordingWriter::create(open_, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
+  frames_before_ = counts_.frames;
   ++counts_.files;
   for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
     const TopicType& type = topic_type(topic);
@@ -203,8 +207,15 @@ Status Recorder::write_for_viewers(const RawSample& frame) {
                           {frame.receive_time_ns, frame.source_time_ns, view->capture_time_ns});
 }
 
+/// What was still in memory is not in the file either.
 void Recorder::fail(const Status& status) {
-  if (!status && !error_) error_ = status.error();
+  if (status || error_) return;
+  error_ = status.error();
+  if (!writer_) return;
+  const std::uint64_t frames =
+      frames_before_ + writer_->written(channels_[static_cast<std::size_t>(Topic::kFrame)]);
+  counts_.missed += counts_.frames - frames;
+  counts_.frames = frames;
 }
 
 }  // namespace relievo

@@ -37,9 +37,9 @@ class Recorder {
     RecordingOptions recording;    // where it splits, `file` names the files: see RecordingSegments
   };
   struct Counts {
-    std::uint64_t frames = 0;
+    std::uint64_t frames = 0;  // in the files; while all is well, those on their way there among them
     std::uint64_t lost = 0;    // on the way here
-    std::uint64_t missed = 0;  // that came after writing had failed
+    std::uint64_t missed = 0;  // that could not be written, or came after that
     std::uint64_t bytes = 0;   // of samples
     std::uint64_t files = 0;   // begun
     double duration_s = 0;     // first to last frame
@@ -83,6 +83,7 @@ class Recorder {
   const RecordingSegments segments_;
   std::filesystem::path open_;            // the file being written
   std::int64_t segment_ns_ = 0;           // when its first sample was received
+  std::uint64_t frames_before_ = 0;       // in the files before it
   std::optional<StreamInfo> info_;        // as received last,
   std::optional<RawSample> info_sample_;  // and as it came
   std::string rig_yaml_, pattern_yaml_;   // as attached last

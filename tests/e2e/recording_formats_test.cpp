@@ -96,6 +96,24 @@ TEST(RecordingFormats, ARecordingIsCodedAnew) {
   const auto grid = convert(folder / "draco.mcap", "grid.mcap", {"--geometry", "grid", "--step-bits", "4"});
   EXPECT_EQ(grid.status, 0) << "it has the places: " << grid.err;
 
+  // Textures stay what they are, unless another codec is wanted.
+  EXPECT_EQ(info(folder / "coarse.mcap")["texture_codecs"], nlohmann::json({"jpeg"}));
+  const auto lossless = convert(original, "png.mcap", {"--texture", "png"});
+  ASSERT_EQ(lossless.status, 0) << lossless.err;
+  EXPECT_EQ(info(folder / "png.mcap")["texture_codecs"], nlohmann::json({"png"}));
+  const auto again = convert(folder / "png.mcap", "bound.mcap", {"--geometry", "visual", "--bound", "2"});
+  ASSERT_EQ(again.status, 0) << again.err;
+  EXPECT_EQ(info(folder / "bound.mcap")["texture_codecs"], nlohmann::json({"png"}));
+  const auto exact = convert(folder / "png.mcap", "exact.mcap", {"--geometry", "visual", "--bound", "0.1"});
+  ASSERT_EQ(exact.status, 0) << exact.err;
+  const auto geometry_bytes = [&](const char* file) {
+    return info(folder / file)["bytes"]["geometry"].get<int>();
+  };
+  EXPECT_LT(geometry_bytes("bound.mcap"), 0.8 * geometry_bytes("exact.mcap"));
+  const auto unknown = convert(original, "gif.mcap", {"--texture", "gif"});
+  EXPECT_EQ(unknown.status, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("give jpeg, webp, png or h264"));
+
   const auto mesh = convert(original, "mesh.mcap", {"--geometry", "draco-mesh"});
   ASSERT_EQ(mesh.status, 0) << mesh.err;
   EXPECT_EQ(info(folder / "mesh.mcap")["geometry_codecs"], nlohmann::json({"draco-mesh"}));

@@ -325,6 +325,52 @@ TEST(GridKernels, OnePositionThatIsFarOrNotFiniteIsFoundAnywhere) {
   }
 }
 
+/// Codes of any places are kept in order, and nothing is written behind the room that there must be.
+TEST(GridKernels, PackingKeepsWhatIsDone) {
+  test::Random random(10);
+  constexpr std::uint16_t kUntouched = 0xffff;
+  for (int round = 0; round < 400; ++round) {
+    const std::uint32_t blocks = random.below(9), gaps = 1 + random.below(4);
+    const std::size_t places = 8 * std::size_t{blocks};
+    std::vector<std::uint16_t> codes, kept;
+    std::vector<std::uint8_t> kinds;
+    for (std::size_t i = 0; i < places; ++i) {
+      codes.push_back(static_cast<std::uint16_t>(random.below(600)));
+      kinds.push_back(static_cast<std::uint8_t>(random.below(gaps) == 0 ? 0 : 1 + random.below(2)));
+      if (kinds.back() == kDone) kept.push_back(codes.back());
+    }
+    const int count = static_cast<int>(places) - (places > 0 ? static_cast<int>(random.below(8)) : 0);
+
+    std::vector<GridCellBlock> cells(blocks);
+    std::vector<std::uint16_t> said;
+    for (GridCellBlock& block : cells) {
+      block.whole = static_cast<std::uint16_t>(300 + random.below(2));
+      block.says_whole = random.below(2) == 0 ? 1 : 0;
+      if (block.says_whole != 0) said.push_back(block.whole);
+      for (int i = 0; i < 8; ++i) {
+        const std::uint64_t code = random.below(256), coded = random.below(gaps) == 0 ? 1 : 0;
+        block.codes |= code << 8 * i;
+        block.coded |= coded << 8 * i;
+        if (coded != 0) said.push_back(static_cast<std::uint16_t>(272 + code));
+      }
+    }
+
+    for (const GridKernels& kernels : all_grid_kernels()) {
+      std::vector<std::uint16_t> out(places + 1, kUntouched);
+      const std::uint16_t* end = kernels.pack(codes.data(), kinds.data(), count, out.data());
+      EXPECT_EQ(out.back(), kUntouched) << kernels.name;
+      out.resize(static_cast<std::size_t>(end - out.data()));
+      ASSERT_EQ(out, kept) << kernels.name;
+
+      out.assign(9 * std::size_t{blocks} + 1, kUntouched);
+      end = kernels.pack_cells(cells.data(), static_cast<int>(blocks), 272, out.data());
+      EXPECT_EQ(out.back(), kUntouched) << kernels.name;
+      out.resize(static_cast<std::size_t>(end - out.data()));
+      ASSERT_EQ(out, said) << kernels.name;
+    }
+  }
+}
+
 /// Cells of a line by themselves and eight at once: the same symbols in the same tables.
 TEST(GridSymbols, EightCellsAreAsEachByItself) {
   test::Random random(9);

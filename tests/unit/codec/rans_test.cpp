@@ -226,6 +226,16 @@ TEST(Rans, LevelsOfAllKernelsAgreeTableByTable) {
   }
 }
 
+/// So many symbols that their bits fit no 32: the same odds, the same levels.
+TEST(Rans, LevelsOfVeryManySymbolsAreThoseOfFewer) {
+  std::vector<std::uint32_t> counts{3'000'000, 1'500'000, 700'000, 90'000, 8'000, 512};
+  const Levels levels = levels_of(counts);
+  for (std::uint32_t& count : counts) count *= 256;
+  EXPECT_EQ(levels_of(counts), levels);
+  counts.push_back(1);
+  EXPECT_EQ(levels_of(counts).at(6), 1) << "the rarest, but it comes";
+}
+
 /// Streams of any lengths, the single one's the longer or the shorter; symbols so rare that most fill the
 /// state and so common that none does.
 TEST(Rans, StreamsOfAllKernelsAgree) {
