@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says, in one place.
-import type { Background, Mode, Theme, Way } from './display';
+import type { Background, Mode, Split, Theme, Way } from './display';
 import type { Placement } from './placement';
 import type { Quality, StreamStatus } from './protocol';
 
@@ -22,6 +22,7 @@ const ways: Record<Way, readonly [string, string]> = {
 
 const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
+const splits: Record<Split, string> = { none: 'Nothing', picture: "The camera's picture", stripes: 'The stripes', both: 'Both' };
 const themes: Record<Theme, string> = { auto: 'As the system', dark: 'Dark', light: 'Light' };
 
 const qualities: Record<Quality, string> = { auto: 'As it can follow', full: 'Full', reduced: 'Reduced', texture: 'Picture alone' };
@@ -30,6 +31,7 @@ export const text = {
   modes,
   ways,
   backgrounds,
+  splits,
   themes,
   rail: {
     streams: 'Streams and recordings, with pictures (N)',
@@ -67,7 +69,7 @@ export const text = {
     background: 'Background',
     theme: 'Theme',
     grid: 'Grid and axes, metres',
-    split: "The camera's picture beside it",
+    split: 'Beside the surface',
     fov: 'Field of view',
     fovOfRig: "as the rig's camera",
   },
@@ -108,8 +110,13 @@ export const text = {
     cursorOf: (stream: string, read: string) => `${stream} · ${read}`,
     cursor: (depth: string, x: string, y: string) => `depth ${depth} · right ${x} · up ${y}`,
   },
-  picture: "The camera's picture, as it lies on the surface",
+  picture: "The camera's picture",
   noPicture: 'This surface has no picture',
+  stripes: {
+    live: 'Stripes as the camera sees them',
+    read: 'Where stripes were read: the picture of them comes live alone, from the server of the camera',
+    waiting: 'Waiting for the camera',
+  },
   statistics: {
     title: 'Statistics',
     stream: 'Stream',
@@ -244,7 +251,7 @@ export const text = {
     showKeys: [
       ['1 … 7', 'textured, shaded, wire, points, normals, depth, confidence'],
       ['G', 'grid and axes'],
-      ['V', 'picture beside the surface'],
+      ['V', 'picture, stripes, both beside the surface'],
       ['F', 'full screen'],
       ['H', 'hide or show everything but the picture'],
     ],
