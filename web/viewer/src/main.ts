@@ -236,7 +236,13 @@ class Viewer {
     let panel: TakePanel | null = null;
     const body = this.panels.panel('take', text.take.title, async () => {
       const { TakePanel } = await import('./takePanel');
-      panel ??= new TakePanel(body, view, () => this.stream ?? this.file, () => this.link());
+      panel ??= new TakePanel(body, {
+        view,
+        name: () => this.stream ?? this.file,
+        link: () => this.link(),
+        playback: () => this.session.source?.playback ?? null,
+        info: () => this.session.info,
+      });
     });
   }
 
