@@ -94,6 +94,8 @@ export const text = {
       section: 'Click two ends of a line: the surface is cut along it, as you see it now.',
     },
     nothingThere: 'There is no surface at that place.',
+    sigmaOf: "±: one standard deviation, of the surface as it was measured. The rig's calibration adds its own error.",
+    noSigma: 'This stream does not say how exact its surface is: there is no ±.',
     plot: 'Height over the straight line of the last section',
     copy: 'Copy',
     copyTitle: 'Copy all as a table',
