@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium against `relievo-server serve`: beside the surface stand the camera's picture, the
 // stripes, or both; of what is live the stripes are the camera's own picture of them, of what was they are drawn where
-// the surface says that they were read. Run as: in_own_domain node split_test.mjs RELIEVO_SERVER [SCREENSHOTS], in
+// the surface says that they were read; tools, panels and time line cover nothing of each other. Run as: in_own_domain node split_test.mjs RELIEVO_SERVER [SCREENSHOTS], in
 // web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
@@ -101,6 +101,19 @@ const checks = {
     await page.keyboard.press('l');
     await inState(page, 'live');
     await note(page, 'as the camera sees them');
+  },
+
+  async 'a panel covers neither tools nor time line, however small the page is'(page) {
+    await page.keyboard.press('?');
+    const [panel, ...others] = await page.evaluate(() =>
+      ['#panel-help', '#rail', '#timeline', '#modes'].map((id) => {
+        const { left, top, right, bottom } = document.querySelector(id).getBoundingClientRect();
+        return { left, top, right, bottom };
+      }),
+    );
+    assert.ok(panel.bottom - panel.top > 150, JSON.stringify(panel));
+    for (const other of others) assert.ok(panel.right <= other.left || panel.bottom <= other.top, JSON.stringify([panel, other]));
+    await page.keyboard.press('Escape');
   },
 
   async 'it is chosen by name too, kept, and part of links'(page) {

@@ -44,7 +44,6 @@ class Viewer {
   private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
   readonly timeline = new Timeline(
     element('timeline'),
-    (shown) => document.body.classList.toggle('with-timeline', shown),
     (name) => {
       this.timed = name;
       this.refresh();
