@@ -22,7 +22,7 @@ import { address, momentOf, readShared, shareLink, type Shared, type Shown } fro
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
-import { StatisticsPanel } from './statisticsPanel';
+import type { StatisticsPanel } from './statisticsPanel';
 import { ServerList } from './streamList';
 import type { StreamsPanel } from './streamsPanel';
 import type { TakePanel } from './takePanel';
@@ -219,14 +219,20 @@ class Viewer {
   }
 
   private makeStatistics(): void {
-    const body = this.panels.panel('statistics', text.statistics.title, (open) => (panel.open = open));
-    const panel = new StatisticsPanel(
-      body,
-      this.session.meter,
-      () => this.session.status,
-      () => this.session.source?.kept ?? null,
-      () => (this.offered === null ? null : whyText(this.offered)),
-    );
+    let panel: StatisticsPanel | null = null;
+    let isOpen = false;
+    const body = this.panels.panel('statistics', text.statistics.title, async (open) => {
+      isOpen = open;
+      const { StatisticsPanel } = await import('./statisticsPanel');
+      panel ??= new StatisticsPanel(
+        body,
+        this.session.meter,
+        () => this.session.status,
+        () => this.session.source?.kept ?? null,
+        () => (this.offered === null ? null : whyText(this.offered)),
+      );
+      panel.open = isOpen; // by now
+    });
   }
 
   private makeTake(): void {
