@@ -53,6 +53,7 @@ const onFeeder = {
     const cosine = a.reduce((sum, _, i) => sum + (a[i] - b[i]) * (c[i] - b[i]), 0) / (away(a, b) * away(c, b));
     near(angle.value, Math.acos(cosine), 0.004, 'angle');
     assert.equal(angle.sigma, null); // the feeder says nothing of it
+    assert.match(await page.textContent('#panel-measure'), /there is no ±/);
   },
 
   async 'a section is the profile of the surface'(page) {
@@ -121,6 +122,7 @@ const onServer = {
     const at = await page.evaluate((p) => window.relievo.toPage(p), onCube(0, 0));
     await page.mouse.move(at.x, at.y);
     await page.waitForFunction(() => /depth [\d.]+ ± [\d.]+ mm/.test(document.querySelector('#cursor').textContent));
+    assert.match(await page.textContent('#panel-measure'), /±: one standard deviation.*calibration adds its own/);
     const depth = Number(/depth ([\d.]+)/.exec(await page.textContent('#cursor'))[1]);
     near(depth, onCube(0, 0)[2] * 1000, 1, 'depth under the cursor');
   },

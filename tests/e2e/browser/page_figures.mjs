@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page costs while it streams, in headless Chromium from `relievo-server serve`: the time to the first live
 // picture, tasks of the main thread, how far behind live a page is that needs 100 ms a frame, and memory over time.
-// Run as: in_own_domain node page_figures.mjs RELIEVO_SERVER [--minutes N] [--check], in web/viewer. Without
-// --minutes memory is watched for half a minute. --check: exit 1 where a figure that does not depend on how loaded
+// Run as: in_own_domain node page_figures.mjs RELIEVO_SERVER [--minutes N] [--memory] [--check], in web/viewer. Memory is
+// told each half minute, of one without --minutes; --memory: nothing else is measured. --check: exit 1 where a figure that does not depend on how loaded
 // the machine is falls short. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
@@ -13,6 +13,7 @@ const options = process.argv.slice(2);
 const [serverPath] = options;
 const minutes = options.includes('--minutes') ? Number(options[options.indexOf('--minutes') + 1]) : 0.5;
 const check = options.includes('--check');
+const memoryAlone = options.includes('--memory');
 
 const kSource = 'sim:object,stripes=120'; // over 20,000 vertices
 const kStarts = 5;
@@ -20,6 +21,7 @@ const kTasksS = 20;
 const kTaskMs = 50;
 const kSlowMs = 100; // a frame
 const kBehindMs = 300;
+const kSayS = 30; // between figures of memory
 const kKeptS = 65; // what is kept to go back to has its full length then
 const kGrowthMB = 2; // a minute, of what is in use after a collection
 
@@ -159,12 +161,15 @@ async function memory() {
   await page.waitForTimeout(warm * 1000);
   const start = await usage();
   console.log(`memory after ${warm} s: ${line(start)}`);
-  await page.waitForTimeout(minutes * 30_000);
-  console.log(`in the middle: ${line(await usage())}`);
-  await page.waitForTimeout(minutes * 30_000);
-  const end = await usage();
-  const { shown } = await report(page);
-  console.log(`after ${minutes} minutes more, ${shown} frames: ${line(end)}`);
+  const heaps = [start.heap];
+  let end = start;
+  for (let s = kSayS; s <= minutes * 60; s += kSayS) {
+    await page.waitForTimeout(kSayS * 1000);
+    end = await usage();
+    heaps.push(end.heap);
+    console.log(`  ${s} s later, ${(await report(page)).shown} frames: ${line(end)}`);
+  }
+  console.log(`  the heap's least and most: ${Math.min(...heaps).toFixed(2)}, ${Math.max(...heaps).toFixed(2)} MB`);
   const growth = (end.heap - start.heap) / minutes;
   console.log(`  the heap grows by ${growth.toFixed(2)} MB a minute`);
   expect(growth < kGrowthMB, `the heap grows by ${growth} MB a minute`);
@@ -172,9 +177,11 @@ async function memory() {
 }
 
 try {
-  await starts();
-  await tasks();
-  await slowPage();
+  if (!memoryAlone) {
+    await starts();
+    await tasks();
+    await slowPage();
+  }
   await memory();
 } finally {
   await browser.close();

@@ -192,7 +192,10 @@ const checks = {
     }
     await page.keyboard.press('v');
     await page.waitForFunction(() => document.querySelector('#picture').width === 320);
-    await page.keyboard.press('v');
+    for (const beside of ['stripes', 'both', 'none']) {
+      await page.keyboard.press('v');
+      assert.equal(await page.evaluate(() => document.body.dataset.split), beside);
+    }
   },
 
   async 'a recording that was cut short shows what is left, and says so'(page) {

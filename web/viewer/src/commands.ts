@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What keys and a double-click do.
-import type { Display } from './display';
+import { kSplits, type Display } from './display';
 import { listenToKeys } from './keys';
 import type { Panels } from './panels';
 import type { View } from './view';
@@ -45,7 +45,7 @@ function command(viewer: Commanded, key: string): boolean {
     f: toggleFullscreen,
     h: () => document.body.classList.toggle('bare'),
     g: () => viewer.change({ grid: !display.grid }),
-    v: () => viewer.change({ split: !display.split }),
+    v: () => viewer.change({ split: kSplits[(kSplits.indexOf(display.split) + 1) % kSplits.length]! }),
     b: () => panels.toggle('display'),
     n: () => panels.toggle('streams'),
     m: () => panels.toggle('measure'),

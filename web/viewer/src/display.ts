@@ -11,6 +11,10 @@ export type Way = (typeof kWays)[number];
 export const kBackgrounds = ['theme', 'black', 'grey', 'white'] as const;
 export type Background = (typeof kBackgrounds)[number];
 
+/** What stands beside the surface. */
+export const kSplits = ['none', 'picture', 'stripes', 'both'] as const;
+export type Split = (typeof kSplits)[number];
+
 export const kThemes = ['auto', 'dark', 'light'] as const;
 export type Theme = (typeof kThemes)[number];
 
@@ -20,7 +24,7 @@ export interface Display {
   background: Background;
   theme: Theme;
   grid: boolean;
-  split: boolean; // the texture's picture beside the surface
+  split: Split;
   fov: number; // degrees, upright, of orbit and fly; 0: the rig camera's
 }
 
@@ -30,7 +34,7 @@ export const kDefaultDisplay: Readonly<Display> = {
   background: 'theme',
   theme: 'auto',
   grid: true,
-  split: false,
+  split: 'none',
   fov: 0,
 };
 
@@ -50,7 +54,7 @@ export function parseDisplay(text: string, fallback: Readonly<Display> = kDefaul
     background: one('background', kBackgrounds, fallback.background),
     theme: one('theme', kThemes, fallback.theme),
     grid: flag('grid', fallback.grid),
-    split: flag('split', fallback.split),
+    split: given.get('split') === '1' ? 'picture' : one('split', kSplits, fallback.split), // 1: of older links
     fov: fov === 0 || (fov >= kFov.least && fov <= kFov.most) ? fov : fallback.fov,
   };
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The choices of how the surface is shown: the panel, the buttons for modes and ways, and the page's look.
-import { kBackgrounds, kFov, kModes, kThemes, kWays, type Display, type Mode, type Way } from './display';
+import { kBackgrounds, kFov, kModes, kSplits, kThemes, kWays, type Display, type Mode, type Way } from './display';
 import { button, chooser, element, make, toggle } from './dom';
 import { text } from './strings';
 
@@ -24,7 +24,7 @@ export class DisplayPanel {
     );
     const theme = chooser(say.theme, kThemes.map((t) => [t, text.themes[t]] as const), (value) => change({ theme: value }));
     const grid = toggle(say.grid, (on) => change({ grid: on }));
-    const split = toggle(say.split, (on) => change({ split: on }));
+    const split = chooser(say.split, kSplits.map((s) => [s, text.splits[s]] as const), (value) => change({ split: value }));
     const fovValue = make('output', {});
     const fov = make('input', {
       type: 'range',
@@ -52,6 +52,6 @@ export class DisplayPanel {
     const root = document.documentElement;
     root.dataset['theme'] = display.theme;
     root.dataset['background'] = display.background;
-    document.body.classList.toggle('split', display.split);
+    document.body.dataset['split'] = display.split;
   }
 }

@@ -7,8 +7,17 @@ export interface StoredFrame {
   message: ArrayBuffer; // the reader's own; the frame begins behind the prefix
 }
 
+/** A message as recordings hold it. */
+export interface Sample {
+  data: Uint8Array; // CDR
+  sequence: number; // 32 bits of it
+  logNs: bigint; // UTC
+  publishNs: bigint;
+}
+
 /** A frame keeps its index: of a live stream the first ones go and others come. */
 export interface FrameStore {
+  readonly stream: string;
   readonly times: Float64Array; // rising, ms from `startMs`; of the frames there are now
   readonly startMs: number; // UTC
   readonly first: number; // index of the frame at times[0]
@@ -21,4 +30,10 @@ export interface FrameStore {
   /** Whether it holds video that builds on the frame before it. */
   buildsOnFrameBefore(index: number): Promise<boolean>;
   read(index: number): Promise<StoredFrame>;
+  /** The same as a recording would hold it. */
+  sample(index: number): Promise<Sample>;
+  /** What describes the stream, likewise; null: the store does not have it. */
+  readonly description: Uint8Array | null;
+  /** These frames, which stay there while others come. */
+  held(): FrameStore;
 }

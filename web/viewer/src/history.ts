@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The last frames of a live stream as they came, so that a person can go back to them. Bounded in time and in bytes.
 import { kTextureH264, parseFrame } from './frame';
-import type { FrameStore, StoredFrame } from './frameStore';
+import type { FrameStore, Sample, StoredFrame } from './frameStore';
 import type { FramePrefix } from './protocol';
 import { videoTextureIsKey } from './videoTexture';
 
@@ -29,7 +29,12 @@ export class History implements FrameStore {
   private kept: Kept[] = [];
   private times_: Float64Array | null = null; // made when asked for
 
-  constructor(readonly limits: Readonly<HistoryLimits> = kHistoryLimits) {}
+  readonly description = null;
+
+  constructor(
+    readonly limits: Readonly<HistoryLimits> = kHistoryLimits,
+    readonly stream = '',
+  ) {}
 
   get times(): Float64Array {
     return (this.times_ ??= Float64Array.from(this.kept, (k) => k.atMs));
@@ -96,6 +101,21 @@ export class History implements FrameStore {
     const kept = this.at(index);
     if (kept === undefined) throw new Error('this frame is no longer kept');
     return { prefix: kept.prefix, message: kept.message.slice(0) };
+  }
+
+  async sample(index: number): Promise<Sample> {
+    const kept = this.at(index);
+    if (kept === undefined) throw new Error('this frame is no longer kept');
+    const { sampleOf } = await import('./sample');
+    return sampleOf(this.stream, kept.message);
+  }
+
+  held(): FrameStore {
+    const held = new History({ ms: Infinity, bytes: Infinity }, this.stream);
+    held.startMs = this.startMs;
+    held.first = this.first;
+    held.kept = [...this.kept];
+    return held;
   }
 
   private at(index: number): Kept | undefined {

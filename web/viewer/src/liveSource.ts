@@ -12,7 +12,7 @@ import { StorePlayer } from './storePlayer';
 
 export class LiveSource implements FrameSource, Playback {
   readonly playback: Playback = this;
-  private readonly history = new History();
+  private readonly history: History;
   private readonly connection: Connection;
   private player: StorePlayer | null = null; // of what was; null: what comes is shown
   private returning = false; // the player catches up
@@ -37,6 +37,7 @@ export class LiveSource implements FrameSource, Playback {
       },
       frame: (prefix, message) => this.onFrame(prefix, message),
     };
+    this.history = new History(undefined, stream);
     this.connection = new Connection(stream, received, server);
   }
 

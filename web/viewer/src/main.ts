@@ -12,7 +12,7 @@ import { LiveSource } from './liveSource';
 import { MeasurePanel } from './measurePanel';
 import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
-import { Picture } from './picture';
+import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
 import { offeredRungs, wantedQuality, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
@@ -22,10 +22,10 @@ import { address, momentOf, readShared, shareLink, type Shared, type Shown } fro
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
-import { StatisticsPanel } from './statisticsPanel';
+import type { StatisticsPanel } from './statisticsPanel';
 import { ServerList } from './streamList';
 import type { StreamsPanel } from './streamsPanel';
-import { TakePanel } from './takePanel';
+import type { TakePanel } from './takePanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
 import { View } from './view';
@@ -36,7 +36,7 @@ class Viewer {
   private readonly ui: Ui;
   readonly panels = new Panels();
   private readonly legend = new Legend();
-  private readonly picture = new Picture();
+  private readonly pictures = new Pictures();
   private readonly displayPanel: DisplayPanel;
   private readonly qualityControl: QualityControl;
   private readonly measure: MeasurePanel | null;
@@ -44,7 +44,6 @@ class Viewer {
   private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
   readonly timeline = new Timeline(
     element('timeline'),
-    (shown) => document.body.classList.toggle('with-timeline', shown),
     (name) => {
       this.timed = name;
       this.refresh();
@@ -136,7 +135,7 @@ class Viewer {
     this.display = { ...this.display, ...part };
     if (this.view !== null) this.view.display = this.display;
     this.wish();
-    this.showPicture();
+    this.pictures.set(this.display.split, this.pictureAlone);
     storeDisplay(this.display);
     this.showDisplay();
   }
@@ -182,7 +181,7 @@ class Viewer {
       this.measure!.open = open;
       this.wish();
     });
-    return new MeasurePanel(body, this.view, (at) => this.picture.point(at));
+    return new MeasurePanel(body, this.view, (at) => this.pictures.point(at));
   }
 
   private makeStreams(): void {
@@ -220,20 +219,36 @@ class Viewer {
   }
 
   private makeStatistics(): void {
-    const body = this.panels.panel('statistics', text.statistics.title, (open) => (panel.open = open));
-    const panel = new StatisticsPanel(
-      body,
-      this.session.meter,
-      () => this.session.status,
-      () => this.session.source?.kept ?? null,
-      () => (this.offered === null ? null : whyText(this.offered)),
-    );
+    let panel: StatisticsPanel | null = null;
+    let isOpen = false;
+    const body = this.panels.panel('statistics', text.statistics.title, async (open) => {
+      isOpen = open;
+      const { StatisticsPanel } = await import('./statisticsPanel');
+      panel ??= new StatisticsPanel(
+        body,
+        this.session.meter,
+        () => this.session.status,
+        () => this.session.source?.kept ?? null,
+        () => (this.offered === null ? null : whyText(this.offered)),
+      );
+      panel.open = isOpen; // by now
+    });
   }
 
   private makeTake(): void {
     if (this.view === null) return;
-    const body = this.panels.panel('take', text.take.title);
-    new TakePanel(body, this.view, () => this.stream ?? this.file, () => this.link());
+    const { view } = this;
+    let panel: TakePanel | null = null;
+    const body = this.panels.panel('take', text.take.title, async () => {
+      const { TakePanel } = await import('./takePanel');
+      panel ??= new TakePanel(body, {
+        view,
+        name: () => this.stream ?? this.file,
+        link: () => this.link(),
+        playback: () => this.session.source?.playback ?? null,
+        info: () => this.session.info,
+      });
+    });
   }
 
   /** To what is seen now. */
@@ -401,17 +416,17 @@ class Viewer {
     if (pose !== null && !this.view.navigator.isRigView) this.view.navigator.pose = pose;
     this.view.invalidate();
     this.pictureAlone = this.session.rung === 'texture' && frame.positions.length === 0 && frame.texture !== null;
-    this.picture.show(frame.texture); // the one before is closed
-    this.showPicture();
+    this.pictures.show(frame); // the one before is closed
+    this.pictures.set(this.display.split, this.pictureAlone);
     this.wish();
     this.measure?.readCursor();
     this.showDisplay();
   }
 
-  // Beside the surface where a person wants it, all over the page where the stream comes as a picture alone.
-  private showPicture(): void {
-    this.picture.on = this.display.split || this.pictureAlone;
-    document.body.classList.toggle('picture-alone', this.pictureAlone);
+  /** The stream whose camera the server has, while what is shown is of now. */
+  private get liveCamera(): string | null {
+    const listed = this.session.source?.live === true ? this.server.find(this.stream) : undefined;
+    return listed?.camera === true ? listed.name : null;
   }
 
   private showDisplay(): void {
@@ -450,6 +465,7 @@ class Viewer {
     this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? []);
     this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note);
     this.qualityControl.show(this.offered);
+    this.pictures.watch(this.liveCamera);
     this.showTimeline();
     this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
   }

@@ -2,6 +2,7 @@
 // Where the messages of an MCAP file (https://mcap.dev/spec) are: by its index, or by going through it where there is
 // none, as after a crash. Only uncompressed chunks, which is what recordings have (codec/FORMAT.md). Any input.
 import { crc32 } from './crc32';
+import type { Sample } from './frameStore';
 
 /** A file, or anything like it. `read` gives fewer bytes only at the end. */
 export interface Bytes {
@@ -49,14 +50,25 @@ export async function openMcap(file: Bytes): Promise<McapFile> {
   return found;
 }
 
-/** The data of a message, whole. */
-export async function readMessage(file: Bytes, { at }: McapMessage): Promise<Uint8Array> {
+/** A message, whole. */
+export async function readSample(file: Bytes, { at }: McapMessage): Promise<Sample> {
   const head = await file.read(at, kRecordHead);
   const length = lengthOf(head);
   if (head[0] !== kOp.message || !(length >= kMessageHead && length <= kMaxChunk)) throw new Error('a message is damaged');
-  const data = await file.read(at + kRecordHead + kMessageHead, length - kMessageHead);
-  if (data.length !== length - kMessageHead) throw new Error('a message is cut short');
-  return data;
+  const content = await file.read(at + kRecordHead, length);
+  if (content.length !== length) throw new Error('a message is cut short');
+  const view = viewOf(content);
+  return {
+    sequence: view.getUint32(2, true),
+    logNs: view.getBigUint64(6, true),
+    publishNs: view.getBigUint64(14, true),
+    data: content.subarray(kMessageHead),
+  };
+}
+
+/** Its data alone. */
+export async function readMessage(file: Bytes, message: McapMessage): Promise<Uint8Array> {
+  return (await readSample(file, message)).data;
 }
 
 /** The first bytes of a message's data; `little`: and nothing around them. */

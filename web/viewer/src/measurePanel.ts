@@ -31,6 +31,7 @@ export class MeasurePanel {
   private pressed: { x: number; y: number } | null = null;
   private readonly tools: Map<Tool, HTMLButtonElement>;
   private readonly hint = make('p', { className: 'quiet' });
+  private readonly sigmas = make('p', { className: 'quiet', hidden: true });
   private readonly list = make('ol', { className: 'measurements' });
   private readonly plot = make('canvas', { className: 'plot', hidden: true });
   private readonly readout = element('cursor');
@@ -53,7 +54,7 @@ export class MeasurePanel {
     const csv = button(say.csv, say.csvTitle, () => this.save('measurements', measurementsCsv(this.measurements)));
     const section = button(say.sectionCsv, say.sectionCsvTitle, () => this.save('section', sectionCsv(this.lastSection?.profile ?? [])));
     const clear = button(say.clear, say.clear, () => this.clear());
-    body.append(group, this.hint, this.list, this.plot, make('div', { className: 'buttons' }, copied, csv, section, clear));
+    body.append(group, this.hint, this.list, this.sigmas, this.plot, make('div', { className: 'buttons' }, copied, csv, section, clear));
     this.listen(view.canvas);
     view.overlay.marks = () => this.marks();
     this.refresh();
@@ -156,6 +157,9 @@ export class MeasurePanel {
         return make('li', {}, make('span', { className: 'quiet' }, say.tools[m.tool]), make('b', {}, valueText(m)), remove);
       }),
     );
+    const { measurements } = this;
+    this.sigmas.hidden = measurements.length === 0;
+    setText(this.sigmas, measurements.some(({ sigma }) => sigma !== null) ? say.sigmaOf : say.noSigma);
     this.drawPlot();
     this.view.invalidate();
   }

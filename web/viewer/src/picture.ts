@@ -1,27 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera's picture beside the surface, and in it the place under the cursor.
+// A picture beside the surface, as the camera saw it, and in it the place under the cursor.
 import { element, setText } from './dom';
-import { text } from './strings';
 
 const kMark = 9; // pixels of the page
 
+export type Drawable = ImageBitmap | OffscreenCanvas;
+
 export class Picture {
-  private readonly canvas = element<HTMLCanvasElement>('picture');
-  private readonly note = element('picture-note');
-  private readonly context = this.canvas.getContext('2d')!;
-  private bitmap: ImageBitmap | null = null;
+  private readonly canvas: HTMLCanvasElement;
+  private readonly note: HTMLElement;
+  private readonly context: CanvasRenderingContext2D;
+  private picture: Drawable | null = null;
   private mark: [number, number] | null = null;
   private wanted = false;
+
+  /** Of the page's elements `id` and `id-note`. */
+  constructor(id: string) {
+    this.canvas = element<HTMLCanvasElement>(id);
+    this.note = element(`${id}-note`);
+    this.context = this.canvas.getContext('2d')!;
+  }
 
   set on(on: boolean) {
     if (on === this.wanted) return;
     this.wanted = on;
     this.draw();
   }
+  get on(): boolean {
+    return this.wanted;
+  }
 
-  /** Open until the next one is shown. */
-  show(bitmap: ImageBitmap | null): void {
-    this.bitmap = bitmap;
+  /** The picture is the caller's, and open until the next one is shown. */
+  show(picture: Drawable | null, note: string): void {
+    this.picture = picture;
+    setText(this.note, note);
     this.draw();
   }
 
@@ -34,17 +46,16 @@ export class Picture {
 
   private draw(): void {
     if (!this.wanted) return;
-    const { bitmap, context: c, canvas } = this;
-    setText(this.note, bitmap === null ? text.noPicture : '');
-    if (bitmap === null) {
+    const { picture, context: c, canvas } = this;
+    if (picture === null) {
       c.clearRect(0, 0, canvas.width, canvas.height);
       return;
     }
-    if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
-      canvas.width = bitmap.width;
-      canvas.height = bitmap.height;
+    if (canvas.width !== picture.width || canvas.height !== picture.height) {
+      canvas.width = picture.width;
+      canvas.height = picture.height;
     }
-    c.drawImage(bitmap, 0, 0);
+    c.drawImage(picture, 0, 0);
     if (this.mark === null) return;
     const scale = canvas.width / Math.max(1, canvas.clientWidth);
     const [x, y] = [this.mark[0] * canvas.width, this.mark[1] * canvas.height];

@@ -141,8 +141,14 @@ export class RecordControl {
     of!.source.tap = null;
     if (taken!.messages.length === 0) return this.say(say.nothing, true);
     try {
-      const { writeRecording } = await import('./recordingFile');
-      const content = await writeRecording(of!.stream, of!.info(), taken!.messages);
+      const [{ writeRecording }, { samplesOf }, { writeStreamInfo }] = await Promise.all([
+        import('./recordingFile'),
+        import('./sample'),
+        import('./cdrWriter'),
+      ]);
+      const info = of!.info();
+      const samples = samplesOf(of!.stream, taken!.messages);
+      const content = await writeRecording(of!.stream, info === null ? null : writeStreamInfo(info), samples);
       const name = `${of!.stream}-${new Date().toISOString().slice(0, 19).replace(/[-:]/g, '').replace('T', '-')}.mcap`;
       download(name, content);
       this.say(say.savedHere(name, taken!.messages.length, content.size));

@@ -2,8 +2,8 @@
 // A recording, of this device or of the server: which frames it has, and each one's bytes.
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
 import { kTextureH264, parseFrame } from './frame';
-import type { FrameStore, StoredFrame } from './frameStore';
-import { openMcap, readMessage, readMessageHead, type Bytes, type McapFile, type McapMessage } from './mcap';
+import type { FrameStore, Sample, StoredFrame } from './frameStore';
+import { openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
 import type { StreamInfo } from './protocol';
 import { videoTextureIsKey } from './videoTexture';
 
@@ -23,7 +23,9 @@ export class Recording implements FrameStore {
   private constructor(
     private readonly file: Bytes,
     private readonly frames: McapMessage[],
+    readonly stream: string,
     readonly info: StreamInfo | null,
+    readonly description: Uint8Array | null,
     readonly damage: string | null,
   ) {
     this.startMs = frames[0]!.timeMs;
@@ -37,11 +39,13 @@ export class Recording implements FrameStore {
     const frames = ofTopic(found, kFrameTopic);
     if (frames.length === 0) throw new Error('there is no frame of 3D video in it');
     const described = ofTopic(found, kInfoTopic)[0];
-    const info = described === undefined ? null : readStreamInfo(await readMessage(file, described));
+    const description = described === undefined ? null : await readMessage(file, described);
+    const info = description === null ? null : readStreamInfo(description);
     const one = readFrameHead(await readMessageHead(file, frames[0]!, kFrameHeadBytes)).stream;
     // A channel is a stream's; a file of several shows the first.
     const own = frames.filter((m) => m.channel === frames[0]!.channel);
-    return new Recording(file, own, info?.stream === one ? info : null, found.damage);
+    const isOf = info?.stream === one; // these frames
+    return new Recording(file, own, one, isOf ? info : null, isOf ? description : null, found.damage);
   }
 
   get count(): number {
@@ -91,6 +95,14 @@ export class Recording implements FrameStore {
     const prefix = { bytes: at, sequence, captureMs, publishMs, sentMs: publishMs, drops: 0 };
     // DDS fills a message up to whole words; a frame has nothing behind its end.
     return { prefix, message: message.slice(0, at + length).buffer };
+  }
+
+  sample(index: number): Promise<Sample> {
+    return readSample(this.file, this.frames[index]!);
+  }
+
+  held(): FrameStore {
+    return this;
   }
 
   /** The message, and where in it the frame begins. */

@@ -80,7 +80,7 @@ export function present(facts: Facts): Presentation {
   if (facts.stream === null) {
     return make('empty', 'No streams', {
       title: 'No streams yet',
-      text: 'The server is running, but nothing is being captured. Start a stream and it appears here:',
+      text: 'The server is running, but nothing is being captured. Drop a recording or a surface of this device here, or start a stream, which then appears by itself:',
       hint: facts.hint || kStartHint,
     });
   }

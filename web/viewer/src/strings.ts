@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says, in one place.
-import type { Background, Mode, Theme, Way } from './display';
+import type { Background, Mode, Split, Theme, Way } from './display';
 import type { Placement } from './placement';
 import type { Quality, StreamStatus } from './protocol';
 
@@ -22,6 +22,7 @@ const ways: Record<Way, readonly [string, string]> = {
 
 const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
+const splits: Record<Split, string> = { none: 'Nothing', picture: "The camera's picture", stripes: 'The stripes', both: 'Both' };
 const themes: Record<Theme, string> = { auto: 'As the system', dark: 'Dark', light: 'Light' };
 
 const qualities: Record<Quality, string> = { auto: 'As it can follow', full: 'Full', reduced: 'Reduced', texture: 'Picture alone' };
@@ -30,6 +31,7 @@ export const text = {
   modes,
   ways,
   backgrounds,
+  splits,
   themes,
   rail: {
     streams: 'Streams and recordings, with pictures (N)',
@@ -67,7 +69,7 @@ export const text = {
     background: 'Background',
     theme: 'Theme',
     grid: 'Grid and axes, metres',
-    split: "The camera's picture beside it",
+    split: 'Beside the surface',
     fov: 'Field of view',
     fovOfRig: "as the rig's camera",
   },
@@ -92,6 +94,8 @@ export const text = {
       section: 'Click two ends of a line: the surface is cut along it, as you see it now.',
     },
     nothingThere: 'There is no surface at that place.',
+    sigmaOf: "±: one standard deviation, of the surface as it was measured. The rig's calibration adds its own error.",
+    noSigma: 'This stream does not say how exact its surface is: there is no ±.',
     plot: 'Height over the straight line of the last section',
     copy: 'Copy',
     copyTitle: 'Copy all as a table',
@@ -108,8 +112,13 @@ export const text = {
     cursorOf: (stream: string, read: string) => `${stream} · ${read}`,
     cursor: (depth: string, x: string, y: string) => `depth ${depth} · right ${x} · up ${y}`,
   },
-  picture: "The camera's picture, as it lies on the surface",
+  picture: "The camera's picture",
   noPicture: 'This surface has no picture',
+  stripes: {
+    live: 'Stripes as the camera sees them',
+    read: 'Where stripes were read: the picture of them comes live alone, from the server of the camera',
+    waiting: 'Waiting for the camera',
+  },
   statistics: {
     title: 'Statistics',
     stream: 'Stream',
@@ -163,6 +172,27 @@ export const text = {
     surface: 'The surface of this frame',
     ply: "PLY: metres, the camera's frame, a colour a vertex",
     glb: 'GLB: glTF 2.0 with its picture',
+    range: 'A range of frames',
+    rangeAll: 'All there is',
+    rangeSet: (from: string, to: string) => `${from} to ${to}`,
+    rangeOf: (words: string, frames: number) => `${words}: ${frames} frames. [ and ] or ⟲ at the time line set the range.`,
+    rangeFormats: { mcap: 'MCAP', ply: 'PLYs', glb: 'GLBs' },
+    rangeTitles: {
+      mcap: 'A recording of these frames, as they were sent',
+      ply: 'A ZIP file with a PLY a frame',
+      glb: 'A ZIP file with a GLB a frame',
+    },
+    rangeEndings: { mcap: 'mcap', ply: 'ply.zip', glb: 'glb.zip' },
+    rangeSaved: (name: string, frames: number, bytes: number, damaged: number) =>
+      `${name}: ${frames} frames, ${(bytes / 1e6).toFixed(1)} MB${damaged === 0 ? '' : `; ${damaged} damaged ones are left out`}`,
+    rangeCancelled: 'Cancelled: nothing is saved.',
+    rangeFailed: (why: string) => `Nothing is saved: ${why}.`,
+    cancel: 'Cancel',
+    cancelTitle: 'Save nothing',
+    noKey: 'the first frame builds on one that is not there: begin later',
+    allDamaged: 'no frame of it can be decoded',
+    tooLarge: (frames: number, bytes: number) =>
+      `the first ${frames} frames are ${(bytes / 1e9).toFixed(0)} GB already: choose a shorter range, or use relievo export`,
     link: 'The same for somebody else',
     copyLink: 'Copy link',
     linkTitle: 'Stream or recording, time, view and display',
@@ -244,7 +274,7 @@ export const text = {
     showKeys: [
       ['1 … 7', 'textured, shaded, wire, points, normals, depth, confidence'],
       ['G', 'grid and axes'],
-      ['V', 'picture beside the surface'],
+      ['V', 'picture, stripes, both beside the surface'],
       ['F', 'full screen'],
       ['H', 'hide or show everything but the picture'],
     ],

@@ -1,38 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
-// Taking away what is seen: a picture, a video, the surface, a link. The writers are loaded when they are needed.
+// Taking away what is seen: a picture, a video, the surface, a range of frames, a link. Loaded when it is opened first,
+// the writers when they are needed.
 import { button, make, setText } from './dom';
 import { copy, download, fileName } from './download';
-import type { Pixels } from './exportPly';
+import type { StreamInfo } from './protocol';
+import { RangeCard } from './rangeCard';
+import type { Playback } from './source';
 import { text } from './strings';
 import type { View } from './view';
 
 const say = text.take;
 const kVideoTypes = ['video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm', 'video/mp4'];
 const kVideoRate = 30;
-const kJpegQuality = 0.92;
+
+/** What there is to take away now. */
+export interface Takeable {
+  readonly view: View;
+  /** Of the stream or file shown. */
+  name(): string | null;
+  /** To what is seen now. */
+  link(): string;
+  playback(): Playback | null;
+  info(): StreamInfo | null;
+}
 
 export class TakePanel {
   private readonly status = make('p', { className: 'quiet' });
   private readonly video = button(say.video, say.videoTitle, () => this.toggleVideo());
   private recorder: MediaRecorder | null = null;
 
-  /** `name`: of the stream or file shown; `link`: to what is seen now. */
   constructor(
     body: HTMLElement,
-    private readonly view: View,
-    private readonly name: () => string | null,
-    private readonly link: () => string,
+    private readonly of: Takeable,
   ) {
     this.status.setAttribute('role', 'status');
     this.video.hidden = typeof MediaRecorder === 'undefined';
     const row = (...buttons: HTMLElement[]): HTMLElement => make('div', { className: 'buttons' }, ...buttons);
     const guarded = (act: () => Promise<void>) => () =>
       void act().catch((error: unknown) => setText(this.status, error instanceof Error ? error.message : String(error)));
+    const range = new RangeCard(of, (words) => setText(this.status, words));
     body.append(
       make('h3', {}, say.picture),
       row(button(say.screenshot, say.screenshotTitle, guarded(() => this.screenshot())), this.video),
       make('h3', {}, say.surface),
       row(button('PLY', say.ply, guarded(() => this.ply())), button('GLB', say.glb, guarded(() => this.glb()))),
+      range.root,
       make('h3', {}, say.link),
       row(button(say.copyLink, say.linkTitle, guarded(() => this.share()))),
       this.status,
@@ -40,23 +52,25 @@ export class TakePanel {
   }
 
   private async screenshot(): Promise<void> {
-    this.view.still();
-    const blob = await new Promise<Blob | null>((resolve) => this.view.canvas.toBlob(resolve)); // of this very drawing
+    const { view } = this.of;
+    view.still();
+    const blob = await new Promise<Blob | null>((resolve) => view.canvas.toBlob(resolve)); // of this very drawing
     if (blob !== null) this.save(blob, 'png');
   }
 
   private toggleVideo(): void {
     if (this.recorder !== null) return this.recorder.stop();
+    const { view } = this.of;
     const type = kVideoTypes.find((t) => MediaRecorder.isTypeSupported(t));
     if (type === undefined) return setText(this.status, say.noVideo);
     // A video has no transparency: it gets the page's ground.
-    this.view.background = getComputedStyle(document.documentElement).getPropertyValue('--ground').trim();
-    const recorder = new MediaRecorder(this.view.canvas.captureStream(kVideoRate), { mimeType: type });
+    view.background = getComputedStyle(document.documentElement).getPropertyValue('--ground').trim();
+    const recorder = new MediaRecorder(view.canvas.captureStream(kVideoRate), { mimeType: type });
     const parts: Blob[] = [];
     recorder.ondataavailable = (event) => parts.push(event.data);
     recorder.onstop = () => {
       this.recorder = null;
-      this.view.background = null;
+      view.background = null;
       setText(this.video, say.video);
       this.video.setAttribute('aria-pressed', 'false');
       this.save(new Blob(parts, { type }), type.includes('mp4') ? 'mp4' : 'webm');
@@ -68,46 +82,30 @@ export class TakePanel {
   }
 
   private async ply(): Promise<void> {
-    const { writePly } = await import('./exportPly');
-    const frame = this.shown();
-    this.save(new Blob([writePly(frame, frame.texture === null ? null : pixelsOf(frame.texture))]), 'ply');
+    const { plyOf } = await import('./surfaceFiles');
+    this.save(new Blob([plyOf(this.shown())]), 'ply');
   }
 
   private async glb(): Promise<void> {
-    const { writeGlb } = await import('./exportGlb');
-    const frame = this.shown();
-    const canvas = frame.texture === null ? null : drawn(frame.texture);
-    const jpeg = await canvas?.convertToBlob({ type: 'image/jpeg', quality: kJpegQuality });
-    this.save(new Blob([writeGlb(frame, jpeg === undefined ? null : new Uint8Array(await jpeg.arrayBuffer()))]), 'glb');
+    const { glbOf } = await import('./surfaceFiles');
+    this.save(new Blob([await glbOf(this.shown())]), 'glb');
   }
 
   private async share(): Promise<void> {
-    const link = this.link();
+    const link = this.of.link();
     setText(this.status, (await copy(link)) ? say.copied : link);
   }
 
   private shown(): NonNullable<View['shown']> {
-    const frame = this.view.shown;
+    const frame = this.of.view.shown;
     if (frame === null) throw new Error(say.nothing);
     frame.kept = true; // it is written while others are shown
     return frame;
   }
 
   private save(content: Blob, extension: string): void {
-    const name = fileName(this.name(), this.view.shown?.number ?? null, extension);
+    const name = fileName(this.of.name(), this.of.view.shown?.number ?? null, extension);
     download(name, content);
     setText(this.status, say.saved(name, content.size));
   }
-}
-
-function drawn(bitmap: ImageBitmap): OffscreenCanvas {
-  const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-  canvas.getContext('2d')!.drawImage(bitmap, 0, 0);
-  return canvas;
-}
-
-function pixelsOf(bitmap: ImageBitmap): Pixels {
-  const { width, height } = bitmap;
-  const { data } = drawn(bitmap).getContext('2d')!.getImageData(0, 0, width, height);
-  return { width, height, rgba: data };
 }

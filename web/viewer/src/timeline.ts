@@ -30,10 +30,8 @@ export class Timeline {
   private preview: Preview | null = null; // loaded when it is first wanted
   private pointedX: number | null = null; // of the cursor, on the page
 
-  /** `shown` is told whether there is anything to go through. */
   constructor(
     private readonly box: HTMLElement,
-    private readonly shown: (shown: boolean) => void = () => undefined,
     /** `chosen` gets the name of one that was offered beside the first; null: the first. */
     chosen: (name: string | null) => void = () => undefined,
   ) {
@@ -165,10 +163,7 @@ export class Timeline {
   private refresh(): void {
     const p = this.playback;
     const hidden = p === null || p.times.length < 2; // a stream that has just begun has nothing to go back to
-    if (hidden !== this.box.hidden) {
-      this.box.hidden = hidden;
-      this.shown(!hidden);
-    }
+    this.box.hidden = hidden;
     if (p === null || hidden || (!this.dirty && !p.playing)) return;
     this.slider.min = String(this.begin);
     this.slider.max = String(this.end);

@@ -32,9 +32,12 @@ export class Ui {
       events.stream((event.target as HTMLSelectElement).value);
       this.canvas.focus();
     };
-    // Its parts stand above each other where the page is narrow.
+    // Their parts stand above and beside each other where the page is small.
     const footer = document.querySelector('footer')!;
-    new ResizeObserver(() => document.body.style.setProperty('--footer', `${footer.offsetHeight}px`)).observe(footer);
+    const rail = element('rail');
+    const say = (name: string, size: number): void => document.body.style.setProperty(name, `${size}px`);
+    new ResizeObserver(() => say('--footer', footer.offsetHeight)).observe(footer);
+    new ResizeObserver(() => say('--rail', rail.offsetWidth)).observe(rail);
   }
 
   showState(state: Presentation, seen: boolean, dismissible: boolean): void {

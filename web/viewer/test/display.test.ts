@@ -11,7 +11,7 @@ describe('display', () => {
       background: 'white',
       theme: 'light',
       grid: false,
-      split: true,
+      split: 'both',
       fov: 55,
     };
     expect(parseDisplay(writeDisplay(chosen).toString())).toEqual(chosen);
@@ -20,6 +20,11 @@ describe('display', () => {
 
   it('writes only what differs', () => {
     expect(writeDisplay({ ...kDefaultDisplay, mode: 'points' }).toString()).toBe('mode=points');
+  });
+
+  it('knows what older links say of a picture beside the surface', () => {
+    expect(parseDisplay('split=1').split).toBe('picture');
+    expect(parseDisplay('split=0').split).toBe('none');
   });
 
   it.each(['', 'mode=', 'mode=none&way=%00&fov=1e9&grid=2', 'fov=NaN', '%%%', 'split=true'])(

@@ -42,6 +42,17 @@ function filled(count: number, limits: { ms: number; bytes: number }): History {
 const kWide = { ms: 1e9, bytes: 1e9 };
 
 describe('History', () => {
+  it('holds what there is now, while it goes on without it', async () => {
+    const history = filled(20, { ms: 1000, bytes: 1e9 });
+    const held = history.held();
+    const [times, first] = [[...held.times], held.first];
+    for (let i = 20; i < 60; ++i) history.add(prefix(i, i * 100), message(i % kKeyEvery === 0));
+    expect(history.first).toBeGreaterThan(first);
+    expect([...held.times]).toEqual(times);
+    expect((await held.read(first)).prefix.sequence).toBe(first);
+    await expect(history.read(first)).rejects.toThrow('no longer kept');
+  });
+
   it('gives back what came, as often as asked', async () => {
     const history = filled(12, kWide);
     expect([...history.times]).toEqual(Array.from({ length: 12 }, (_, i) => i * 100));

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: in each state that is not live (empty, loading, stalled, error, reconnecting) the page
+// says in words what is the matter, on a card that covers no control and is not cut off, on desktops and phones, dark and
+// light; the button on it can be reached by keys. With a folder: makes the pictures of docs/viewer.md there.
+// Run as: node states_test.mjs GATEWAY_FEEDER [SCREENSHOTS], in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { join } from 'node:path';
+import { launchChromium } from './chromium.mjs';
+import { Feeder, inState, pagesOf, runChecks, shownPast } from './feeder.mjs';
+
+const [feederPath, screenshots] = process.argv.slice(2);
+const kLooks = {
+  'desktop-dark': { viewport: { width: 1000, height: 640 }, colorScheme: 'dark' },
+  'desktop-light': { viewport: { width: 1000, height: 640 }, colorScheme: 'light' },
+  'phone-dark': { viewport: { width: 390, height: 780 }, colorScheme: 'dark', hasTouch: true },
+  'phone-light': { viewport: { width: 390, height: 780 }, colorScheme: 'light', hasTouch: true },
+};
+const kJpegQuality = 80;
+const feeder = await Feeder.start(feederPath);
+const origin = `http://127.0.0.1:${feeder.port}`;
+const browser = await launchChromium();
+const complaints = [];
+const { newPage, open } = pagesOf(browser, origin, complaints);
+const taken = new Map(Object.keys(kLooks).map((look) => [look, []])); // name of the state and picture
+
+/** Pages of each look, as `make` opens them; closed by inspect(). */
+const pages = async (make) => {
+  const made = [];
+  for (const [look, options] of Object.entries(kLooks)) made.push({ look, page: await make(options) });
+  return made;
+};
+
+async function inspect(name, made, said) {
+  for (const { look, page } of made) {
+    await page.waitForTimeout(600); // what is dimmed fades
+    const { card, inside, covered, words } = await page.evaluate(() => {
+      const box = (e) => e.getBoundingClientRect();
+      const overlap = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+      const element = document.querySelector('#card');
+      const at = box(element);
+      const controls = [...document.querySelectorAll('header > *, footer > *, #rail')].filter((e) => e.getClientRects().length > 0);
+      return {
+        card: !element.hidden,
+        inside: at.left >= 0 && at.top >= 0 && at.right <= innerWidth && at.bottom <= innerHeight && element.scrollWidth <= element.clientWidth,
+        covered: controls.filter((e) => overlap(box(e), at)).map((e) => e.id || e.className || e.tagName),
+        words: element.textContent,
+      };
+    });
+    assert.ok(card && inside, `${name}, ${look}: the card is cut off`);
+    assert.deepEqual(covered, [], `${name}, ${look}: the card covers controls`);
+    assert.match(words, said, `${name}, ${look}`);
+    if (screenshots) taken.get(look).push({ name, png: (await page.screenshot()).toString('base64') });
+    await page.close();
+  }
+}
+
+const checks = {
+  async 'loading: the server does not answer yet'() {
+    for (const [look, options] of Object.entries(kLooks)) { // each at once: after 5 s it is lost
+      const page = await newPage(options);
+      await page.route('**/api/streams', () => undefined);
+      await page.goto(origin);
+      await inState(page, 'connecting');
+      await inspect('Loading', [{ look, page }], /Asking the server/);
+    }
+  },
+
+  async 'empty: no streams, no recordings'() {
+    const made = await pages(async (options) => {
+      const page = await open('/', options);
+      await inState(page, 'empty');
+      return page;
+    });
+    await inspect('Empty', made, /No streams yet.*relievo-server serve/s);
+  },
+
+  async 'waiting for a stream by its name'() {
+    const made = await pages(async (options) => {
+      const page = await open('/?stream=later', options);
+      await inState(page, 'waiting');
+      return page;
+    });
+    await inspect('Waiting', made, /Waiting for “later”/);
+  },
+
+  async 'starting: announced, without a frame'() {
+    feeder.say('start ball\nstop');
+    const made = await pages(async (options) => {
+      const page = await open('/', options);
+      await inState(page, 'starting');
+      return page;
+    });
+    await inspect('Starting', made, /first frame/);
+  },
+
+  async 'stalled, with the reason'() {
+    feeder.say('start ball');
+    const made = await pages(async (options) => {
+      const page = await open('/', options);
+      await shownPast(page, 1);
+      return page;
+    });
+    feeder.say('stop\nstatus stalled No signal from the camera.');
+    for (const { page } of made) await inState(page, 'stalled');
+    await inspect('Stalled', made, /stalled.*No signal from the camera/s);
+  },
+
+  async 'ended'() {
+    feeder.say('start ball\nstatus running');
+    const made = await pages(async (options) => {
+      const page = await open('/', options);
+      await shownPast(page, 1);
+      return page;
+    });
+    feeder.say('stop\nstatus ended The take is at its end.');
+    for (const { page } of made) await inState(page, 'ended');
+    await inspect('Ended', made, /ended.*at its end/s);
+  },
+
+  async 'error: a file that is none'() {
+    feeder.say('start ball\nstatus running');
+    const made = await pages(async (options) => {
+      const page = await open('/', options);
+      await shownPast(page, 1);
+      await page.setInputFiles('#file', { name: 'notes.mcap', mimeType: 'text/plain', buffer: Buffer.from('some words') });
+      await page.waitForSelector('#dismiss:visible');
+      await page.focus('#dismiss');
+      return page;
+    });
+    await inspect('A file that is none', made, /“notes.mcap” cannot be shown/);
+  },
+
+  async 'error: no WebGL'() {
+    const made = await pages(async (options) => {
+      const page = await newPage(options);
+      await page.addInitScript(() => {
+        const original = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+          return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
+        };
+      });
+      await page.goto(origin);
+      await inState(page, 'unsupported');
+      return page;
+    });
+    await inspect('No WebGL', made, /WebGL 2/);
+  },
+
+  async 'no error in the page until here'() {
+    assert.deepEqual(complaints, []);
+  },
+
+  async 'reconnecting, and found again'() {
+    const made = await pages(async (options) => {
+      const page = await open('/', options);
+      await shownPast(page, 1);
+      return page;
+    });
+    await feeder.kill();
+    for (const { page } of made) {
+      await inState(page, 'lost');
+      await page.waitForSelector('#retry:visible');
+      await page.focus('#retry');
+    }
+    await inspect('Reconnecting', made, /Connection lost.*last picture.*Trying again/s);
+  },
+};
+
+/** All states of one look on one picture. */
+async function makeSheet(look, states) {
+  const isPhone = look.startsWith('phone');
+  const width = isPhone ? 240 : 400;
+  const page = await newPage({ viewport: { width: isPhone ? 1270 : 1240, height: 100 }, colorScheme: look.endsWith('light') ? 'light' : 'dark' });
+  const figures = states.map(({ name, png }) => `<figure><img width=${width} src="data:image/png;base64,${png}"><figcaption>${name}</figcaption></figure>`);
+  await page.setContent(`<meta name="color-scheme" content="dark light"><style>
+    body { margin: 8px; display: flex; flex-wrap: wrap; gap: 8px; font: 13px sans-serif; background: light-dark(#fff, #000); }
+    figure { margin: 0; text-align: center } img { display: block; margin-bottom: 3px; border-radius: 6px; outline: 1px solid #8886 }</style>${figures.join('')}`);
+  await page.waitForTimeout(300);
+  await page.screenshot({ path: join(screenshots, `viewer-states-${look}.jpg`), quality: kJpegQuality, fullPage: true });
+  await page.close();
+}
+
+let failed = 1;
+try {
+  failed = await runChecks(checks, await newPage());
+  if (screenshots) for (const [look, states] of taken) await makeSheet(look, states);
+} finally {
+  await browser.close();
+  await feeder.kill();
+}
+process.exit(failed === 0 ? 0 : 1);
