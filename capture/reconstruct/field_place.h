@@ -24,12 +24,12 @@ class FieldPlacer {
   FieldPlacer(const std::array<double, 9>& colour_matrix, int boundaries)
       : steps_(colour_matrix), boundaries_(boundaries) {}
 
-  /// Weighs columns of `edges`, which must be those of the field's instant, against what the field shows,
-  /// where several boundaries around were elsewhere two frames ago; updates standard deviations.
+  /// Weighs columns of `edges`, which must be those of the field's instant, against what the field shows
+  /// where something moves, by its `moving`; updates standard deviations.
   void place(const SlideFieldView& view, const SequenceResult& result, WorkerPool& pool, EdgeImage& edges);
 
  private:
-  void find_moving(int lines, int width, const SequenceResult& result, const EdgeImage& edges);
+  void fill(const SequenceResult& result, const EdgeImage& edges);
   void look_at_line(const SlideFieldView& view, int line, const SequenceResult& result,
                     const EdgeImage& edges);
   void weigh_line(int line, int lines, const SequenceResult& result, EdgeImage& edges) const;
@@ -39,9 +39,7 @@ class FieldPlacer {
 
   StepFinder steps_;
   int boundaries_;
-  int cells_ = 0;                     // in a line
-  std::vector<std::uint8_t> moving_;  // [line][cell]: boundaries around that were elsewhere
-  std::vector<std::int32_t> edge_;    // [line][boundary]: -1 where it has none
+  std::vector<std::int32_t> edge_;  // [line][boundary]: -1 where it has none
   struct Seen {
     float off_px;    // of the field's place from the edge's column; NaN: none
     float sigma_px;  // of the field's place

@@ -7,12 +7,15 @@
 #include <limits>
 #include <utility>
 
+#include "capture/reconstruct/moving_places.h"
+
 namespace relievo {
 namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMargin = 2;
 
+constexpr int kMoves = 4;        // boundaries around that were elsewhere
 constexpr int kCell_px = 4;      // in which motion is told,
 constexpr int kCellsAround = 3;  // and around an edge that moves
 
@@ -353,7 +356,7 @@ std::size_t Growth::confirm_line(const SlideFieldView& view, int line, const Edg
     const Neighbours near = neighbours(line, column);
     if (!near.in_order(b, column)) continue;
     const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
-    if (!found || std::fabs(found->moved_px) > kMostMoved_px) continue;
+    if (!found || !fits_before(view, line, b, *found, false)) continue;
     const auto goes_on = [&](int other) {
       return std::fabs(row(now_, other)[b] - found->column_px) < kGoesOn_px;
     };
@@ -375,7 +378,9 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
     if (b < 0) continue;
     const float column = here[b];
     const bool measured = view.motion != nullptr && view.motion->at(line, column) != 0;
-    if (!measured && result.still[e] != 0) continue;
+    const bool goes =
+        view.moving != nullptr && result.still[e] == 0 && view.moving->around(line, column) >= kMoves;
+    if (!measured && !goes) continue;
     const auto room = [](float px) {
       return known(px) ? std::clamp(px, StepFinder::kLeastRoom_px, StepFinder::kOpen_px)
                        : StepFinder::kOpen_px;

@@ -14,6 +14,7 @@
 #include "capture/reconstruct/grow.h"
 #include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
+#include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/readmit.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
@@ -77,6 +78,7 @@ struct SlideDecoder::State {
   Continuity continuity;
   Readmission readmission;
   InstantFilter instant;
+  MovingPlaces moving;
   FieldPlacer field_placer;
   Growth growth;
 
@@ -281,9 +283,10 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     if (s.pattern.slides == 2) {
-      const SlideFieldView field{pair.slide_field(), s.sequence.shown_colours(s.order),
+      s.moving.find(s.newer.difference.width, s.result, s.edges);
+      const SlideFieldView field{pair.slide_field(),         s.sequence.shown_colours(s.order),
                                  &s.newer.difference.motion, s.order == SlideOrder::kNewerIsFirst ? 0 : 1,
-                                 s.newer.difference.noise};
+                                 s.newer.difference.noise,   &s.moving};
       s.field_placer.place(field, s.result, pool, s.edges);
       const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
       report.filters.recovered += grown;

@@ -10,15 +10,18 @@
 
 namespace relievo {
 
+class MovingPlaces;
+
 /// A frame's field under the slide itself, a row a line, the colours on both sides of each boundary of that
-/// slide, the motion between the frame's fields, which of the two slides it is, and the standard deviation of
-/// the frame's DifferenceImage.
+/// slide, the motion between the frame's fields, which of the two slides it is, the standard deviation of the
+/// frame's DifferenceImage, and where something moves.
 struct SlideFieldView {
   View8 field;
   const std::vector<std::array<Primary, 2>>& colours;
   const FieldMotion* motion = nullptr;
   int slide = 0;
   float noise = 0;
+  const MovingPlaces* moving = nullptr;
 };
 
 }  // namespace relievo

@@ -33,8 +33,8 @@ TEST(Balance, StaysWhereTheBoundaryIsHoweverBrightTheSidesAre) {
     const std::vector<std::array<Primary, 2>> colours{{left, right}};
     const auto find = [&](float left_light, float right_light) {
       const Image8 field = line_with(left, right, left_light, right_light);
-      return finder.balance({field.view(), colours, nullptr, 0, 1}, 0, 0, kBoundary_px + 0.3F, kRoom_px,
-                            kRoom_px);
+      return finder.balance({.field = field.view(), .colours = colours, .noise = 1}, 0, 0,
+                            kBoundary_px + 0.3F, kRoom_px, kRoom_px);
     };
     const auto even = find(160, 160);
     ASSERT_TRUE(even) << +left << +right;
@@ -50,10 +50,11 @@ TEST(Balance, NothingWhereTheStripesAreOtherwise) {
   const StepFinder finder(kSameColours);
   const std::vector<std::array<Primary, 2>> colours{{2, 1}};
   const Image8 field = line_with(1, 2, 160, 160);
-  EXPECT_FALSE(
-      finder.balance({field.view(), colours, nullptr, 0, 1}, 0, 0, kBoundary_px, kRoom_px, kRoom_px));
+  EXPECT_FALSE(finder.balance({.field = field.view(), .colours = colours, .noise = 1}, 0, 0, kBoundary_px,
+                              kRoom_px, kRoom_px));
   // So near to the picture's side that the light cannot be told.
-  EXPECT_FALSE(finder.balance({field.view(), colours, nullptr, 0, 1}, 0, 0, 5, kRoom_px, kRoom_px));
+  EXPECT_FALSE(
+      finder.balance({.field = field.view(), .colours = colours, .noise = 1}, 0, 0, 5, kRoom_px, kRoom_px));
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "capture/reconstruct/moving_places.h"
+
 namespace relievo {
 namespace {
 
@@ -118,6 +120,22 @@ TEST(Growth, WhatWasDoubtedComesBackWhereTheFieldAndALineBesideShowIt) {
   EXPECT_EQ(grown(true, 2), 1);
   EXPECT_EQ(grown(false, 2), 0) << "alone";
   EXPECT_EQ(grown(true, 5), 0) << "of another colour";
+}
+
+TEST(Growth, WhereMuchMovesTheFieldSaysWhatIsNotThere) {
+  const auto is_kept = [](bool others_move) {
+    Frame f;
+    f.result.still[Frame::at(7, 3)] = 0;
+    if (others_move) f.move(7);
+    for (int x = 55; x < 80; ++x) f.paint(7, x, 6);  // of what is in front by now
+    MovingPlaces moving;
+    moving.find(kWidth, f.result, f.edges);
+    SlideFieldView view{.field = f.picture.view(), .colours = f.colours, .moving = &moving};
+    Growth(kIdentity, kBoundaries, kLines).grow(view, f.edges, f.result, f.recovered);
+    return f.result.boundary[Frame::at(7, 3)] == 3;
+  };
+  EXPECT_FALSE(is_kept(true));
+  EXPECT_TRUE(is_kept(false)) << "alone it may be a track that was lost";
 }
 
 TEST(Growth, FarFromWhereItIsExpectedItIsAnothers) {

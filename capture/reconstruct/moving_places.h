@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where something moves, by boundaries that were elsewhere two frames ago: several around, for one alone may
+// be a track that was lost.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+
+/// Keeps its memory from frame to frame. One thread writes; any may read between.
+class MovingPlaces {
+ public:
+  static constexpr int kMost = 6;
+
+  /// Of a frame `width` columns wide, by the decoded boundaries of `result`.
+  void find(int width, const SequenceResult& result, const EdgeImage& edges);
+
+  /// How many such boundaries are around a place, up to kMost.
+  int around(int line, float column_px) const {
+    const int cell = static_cast<int>(column_px) / kCell_px;
+    return cell >= 0 && cell < cells_ ? around_[static_cast<std::size_t>(line * cells_ + cell)] : 0;
+  }
+
+ private:
+  static constexpr int kCell_px = 4;
+
+  int cells_ = 0;                     // in a line
+  std::vector<std::uint8_t> around_;  // [line][cell]
+};
+
+}  // namespace relievo
