@@ -6,7 +6,7 @@
 namespace relievo {
 namespace {
 
-constexpr int kCellsAround = 4;
+constexpr int kCellsAround = 8;
 constexpr int kLinesAround = 2;
 
 }  // namespace

@@ -198,7 +198,7 @@ TEST(Accuracy, APersonWhoWalksIsDecoded) {
               score.rms_um_per_m);
   EXPECT_GE(score.completeness, 0.968);
   EXPECT_LE(score.outliers, 0.0021);
-  EXPECT_LE(score.rms_um_per_m, 550);
+  EXPECT_LE(score.rms_um_per_m, 540);
 }
 
 class HonestSigma : public ::testing::TestWithParam<const char*> {};
