@@ -106,6 +106,7 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   cells_ = width / kCell_px + 1;
   moving_.assign(static_cast<std::size_t>(lines_ * cells_), 0);
   tried_.assign(static_cast<std::size_t>(lines_ * boundaries_), 0);
+  doubted_.clear();
   std::size_t decoded = 0;
   std::size_t still = 0;
   for (int line = 0; line < lines_; ++line) {
@@ -120,6 +121,7 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
         ++decoded;
         still += result.still[e];
       }
+      if (result.doubted[e] >= 0) doubted_.push_back({line, e});
       if (result.still[e] != 0) continue;
       const int cell = static_cast<int>(column) / kCell_px;
       const int first = std::clamp(cell - kCellsAround, 0, cells_ - 1);
@@ -344,28 +346,25 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
 }
 
 /// What was given up for a weakness of its place, and both the field and a line beside show.
-std::size_t Growth::confirm_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                                 const SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
-  float* here = row(now_, line);
-  std::size_t confirmed = 0;
-  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-    const int b = result.doubted[e];
-    const float column = edges.edges[e].column_px;
-    if (b < 0 || result.boundary[e] >= 0 || known(here[b]) || !moves(line, column)) continue;
-    const Neighbours near = neighbours(line, column);
-    if (!near.in_order(b, column)) continue;
-    const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
-    if (!found || !fits_before(view, line, b, *found, false)) continue;
-    const auto goes_on = [&](int other) {
-      return std::fabs(row(now_, other)[b] - found->column_px) < kGoesOn_px;
-    };
-    if (!goes_on(line - 1) && !goes_on(line + 1)) continue;
-    here[b] = found->column_px;
-    recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
-    ++confirmed;
-  }
-  return confirmed;
+bool Growth::confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
+                     const SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
+  const auto [line, e] = doubted;
+  if (line >= view.field.height) return false;
+  const int b = result.doubted[e];
+  float& here = row(now_, line)[b];
+  const float column = edges.edges[e].column_px;
+  if (result.boundary[e] >= 0 || known(here) || !moves(line, column)) return false;
+  const Neighbours near = neighbours(line, column);
+  if (!near.in_order(b, column)) return false;
+  const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
+  if (!found || !fits_before(view, line, b, *found, false)) return false;
+  const auto goes_on = [&](int other) {
+    return std::fabs(row(now_, other)[b] - found->column_px) < kGoesOn_px;
+  };
+  if (!goes_on(line - 1) && !goes_on(line + 1)) return false;
+  here = found->column_px;
+  recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
+  return true;
 }
 
 /// Gives up moving boundaries that the field does not show: a silhouette came over their place between the
@@ -403,8 +402,9 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Seq
       remember_line(view, line, edges, result);
   for (int line = 0; line < lines; ++line) added += restore_line(view, line, edges, result, recovered);
   for (int line = 0; line < lines; ++line) drop_line(view, line, edges, result);
-  for (int line = 0; line < lines; ++line) added += confirm_line(view, line, edges, result, recovered);
-  for (int line = lines - 1; line >= 0; --line) added += confirm_line(view, line, edges, result, recovered);
+  for (const Doubted& d : doubted_) added += confirm(view, d, edges, result, recovered);
+  for (auto d = doubted_.rbegin(); d != doubted_.rend(); ++d)
+    added += confirm(view, *d, edges, result, recovered);
   for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
   for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);
   std::swap(now_, before_);

@@ -38,6 +38,11 @@ class Growth {
     bool beside;  // from a boundary of the line itself
   };
   struct Neighbours;
+  /// An edge whose boundary was given up.
+  struct Doubted {
+    int line;
+    std::uint32_t edge;
+  };
   struct Around {
     std::array<float, 2> column_px{};
     std::size_t count = 0;
@@ -61,8 +66,8 @@ class Growth {
   bool fits_before(const SlideFieldView& view, int line, int boundary, const FoundStep& found, bool beside);
   std::optional<FoundStep> look(const SlideFieldView& view, int line, int boundary,
                                 const std::optional<Prediction>& p);
-  std::size_t confirm_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                           const SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
+  bool confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
+               const SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
   std::size_t grow_line(const SlideFieldView& view, int line, std::vector<RecoveredBoundary>& recovered);
 
   StepFinder steps_;
@@ -75,7 +80,8 @@ class Growth {
   int cells_ = 0;                     // of a line
   std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
-  std::vector<float> now_, before_;   // [line][boundary] with a margin: column, NaN where there is none
+  std::vector<Doubted> doubted_;
+  std::vector<float> now_, before_;  // [line][boundary] with a margin: column, NaN where there is none
 };
 
 }  // namespace relievo
