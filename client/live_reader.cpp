@@ -81,7 +81,8 @@ class DdsLiveReader final : public LiveReader {
 
   void offer(const ServerStatus& status) {
     std::vector<Rung> rungs;
-    for (const RungStatus& rung : status.rungs) rungs.push_back(rung.rung);
+    for (const RungStatus& rung : status.rungs)
+      if (!is_jpeg(rung.rung)) rungs.push_back(rung.rung);  // video is decoded here
     choice_.offer(rungs);
     if (const std::uint64_t missed = missed_by(status); missed > 0) choose({.lost = missed});
     const std::lock_guard lock(mutex_);

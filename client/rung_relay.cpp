@@ -29,7 +29,8 @@ void RungRelay::update() {
 }
 
 void RungRelay::update(const std::string& name, Stream& stream) {
-  for (const Rung rung : {Rung::kReduced, Rung::kTexture}) relay(name, stream, rung);
+  for (const Rung rung : kRungs)  // full comes anyway, and nobody wishes for slow
+    if (rung != Rung::kFull) relay(name, stream, rung);
   const std::int64_t now_ns = steady_now_ns();
   if (stream.asked_ns != 0 && now_ns - stream.asked_ns < kNanosecondsPerSecond) return;
   if (stream.asked_ns == 0) {

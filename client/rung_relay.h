@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a gateway needs of the servers beside their streams: the lower qualities that its clients wish for,
+// What a gateway needs of the servers beside their streams: the other rungs that its clients wish for,
 // and how far the servers' clocks are from this one's.
 #pragma once
 

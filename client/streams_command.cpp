@@ -68,7 +68,8 @@ nlohmann::json to_json(const Found& found) {
     j["bit_rate"] = found.status->bit_rate;
     j["rate_level"] = found.status->rate_level;
     j["qualities"] = nlohmann::json::array({to_string(Rung::kFull)});
-    for (const RungStatus& rung : found.status->rungs) j["qualities"].push_back(to_string(rung.rung));
+    for (const RungStatus& rung : found.status->rungs)
+      if (!is_jpeg(rung.rung)) j["qualities"].push_back(to_string(rung.rung));
     j["mixed"] = found.status->step.mixed;
   }
   return j;

@@ -70,7 +70,7 @@ Result<std::vector<Rung>> parse_ladder(const std::string& text) {
   std::stringstream names(text);
   for (std::string name; std::getline(names, name, ',');) {
     const auto rung = rung_named(name);
-    if (!rung || *rung == Rung::kFull)
+    if (!rung || *rung == Rung::kFull || is_jpeg(*rung))
       return Error{
           "'" + name +
           "' is no lower quality: there are reduced, texture and slow, with commas between them, and none"};

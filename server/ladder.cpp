@@ -21,7 +21,8 @@ constexpr float kBound_px = 1;
 
 EncodeOptions rung_options(const EncodeOptions& full, Rung rung) {
   EncodeOptions options = full;
-  if (rung == Rung::kFull) return options;
+  if (is_jpeg(rung)) options.texture = TextureCodec::kJpeg;
+  if (detail_of(rung) == Rung::kFull) return options;
   options.step_bits = std::min(options.step_bits, kStepBits);
   if (options.bound_px > 0) options.bound_px = std::max(options.bound_px, kBound_px);
   options.texture_quality = std::min(options.texture_quality, kTextureQuality);
@@ -41,6 +42,7 @@ struct Ladder::Step {
   bool was_read = false;
   bool said = false;  // that it could not be published
 
+  Rung detail() const { return detail_of(output.rung); }
   bool takes_all() const { return !output.due && output.readers() > 0; }
   bool takes() const { return output.readers() > 0 && (!output.due || output.due()); }
 };
@@ -58,9 +60,10 @@ Ladder::~Ladder() {
 
 void Ladder::add(Output output) {
   const Rung rung = output.rung;
-  steps_.emplace_back(new Step{.output = std::move(output),
-                               .options = rung_options(encode_, rung),
-                               .encoder = FrameEncoder(rig_, pattern_, rung == Rung::kReduced ? 2 : 1)});
+  steps_.emplace_back(
+      new Step{.output = std::move(output),
+               .options = rung_options(encode_, rung),
+               .encoder = FrameEncoder(rig_, pattern_, detail_of(rung) == Rung::kReduced ? 2 : 1)});
 }
 
 bool Ladder::wanted() {
@@ -90,12 +93,14 @@ void Ladder::run() {
     const std::int64_t now_ns = steady_now_ns();
     const bool key = now_ns - key_ns >= kWishedKeyInterval_ns && key_wanted_.exchange(false);
     if (key) key_ns = now_ns;
-    halve(item->frame.texture, half_);
+    bool halved = false;
     for (const auto& step : steps_) {
       const bool is_read = step->takes();
       if (key || (is_read && (step->output.due || !step->was_read))) step->encoder.request_key_frame();
       step->was_read = is_read;
-      if (is_read) encode(*step, *item);
+      if (!is_read) continue;
+      if (step->detail() != Rung::kFull && !std::exchange(halved, true)) halve(item->frame.texture, half_);
+      encode(*step, *item);
     }
   }
 }
@@ -105,15 +110,18 @@ void Ladder::encode(Step& step, Item& item) {
   Frame3D& frame = step.frame;
   frame.number = item.frame.number;
   frame.time_ns = item.frame.time_ns;
+  const bool full = step.detail() == Rung::kFull;
   // A surface that lies on no grid goes whole, with the smaller texture.
-  const bool whole = step.output.rung == Rung::kReduced && !halve_lines(item.frame.surface, frame.surface);
+  const bool whole =
+      full || (step.detail() == Rung::kReduced && !halve_lines(item.frame.surface, frame.surface));
   if (whole) std::swap(frame.surface, item.frame.surface);
-  frame.texture = std::move(half_);
+  Image8& texture = full ? item.frame.texture : half_;
+  std::swap(frame.texture, texture);
   EncodeOptions options = step.options;
   options.volume = volume_.fit(frame.surface.positions);
   if (const int bits = volume_.bits(depth_resolution_); bits > 0) options.position_bits = bits;
   auto bytes = step.encoder.encode(frame, options);
-  half_ = std::move(frame.texture);
+  std::swap(frame.texture, texture);
   if (whole) std::swap(frame.surface, item.frame.surface);
   const auto fail = [&](const Error& error) {
     if (!std::exchange(step.said, true))

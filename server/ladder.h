@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The lower rungs of a stream's quality ladder: made of the frames that the stream itself has sent, on a
-// thread of their own, and only while somebody reads them.
+// The lower rungs of a stream's quality ladder, and those with JPEG textures: made of the frames that the
+// stream itself has sent, on a thread of their own, and only while somebody reads them.
 #pragma once
 
 #include <array>
@@ -24,7 +24,8 @@
 
 namespace relievo {
 
-/// What a rung of this stream is encoded with: coarser than `full` where that pays, finer nowhere.
+/// What a rung of this stream is encoded with: coarser than `full` where that pays, finer nowhere. Of the
+/// JPEG rungs the texture is JPEG, whatever it is in `full`.
 EncodeOptions rung_options(const EncodeOptions& full, Rung rung);
 
 class Ladder final : public LowerRungs {

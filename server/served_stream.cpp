@@ -126,6 +126,16 @@ PipelineOptions pipeline_options(const StreamConfig& config, const std::string& 
   return options;
 }
 
+/// The lower rungs, and where textures are H.264 each that a browser may want with JPEG textures instead.
+std::vector<Rung> rungs_of(const StreamConfig& config) {
+  std::vector<Rung> rungs = config.ladder;
+  if (config.texture != TextureCodec::kH264) return rungs;
+  rungs.push_back(Rung::kFullJpeg);
+  for (const Rung rung : config.ladder)
+    if (const auto jpeg = jpeg_of(rung)) rungs.push_back(*jpeg);
+  return rungs;  // those that an older reader does not know last: it looks at no more than it knows
+}
+
 class RunningStream final : public ServedStream {
  public:
   RunningStream(const StreamConfig& config, const Surroundings& around)
@@ -234,7 +244,7 @@ Status RunningStream::raise_ladder(const PipelineOptions& options) {
   if (config_.ladder.empty()) return {};
   ladder_ = std::make_unique<Ladder>(source_->info().rig, source_->info().pattern, options.encode,
                                      options.depth_resolution);
-  for (const Rung rung : config_.ladder) {
+  for (const Rung rung : rungs_of(config_)) {
     auto made = RungPublisher::create(domain_options(around_.config), name_, rung,
                                       [ladder = ladder_.get()] { ladder->request_key_frame(); });
     if (!made) return made.error();

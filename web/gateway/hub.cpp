@@ -30,7 +30,9 @@ struct Hub::Watcher {
   bool joins = true;                   // no key frame was asked for since it is there
   std::uint64_t drops = 0;
   Rung rung = Rung::kFull;          // it is on,
-  Rung wished = Rung::kFull;        // and is to be on
+  Rung wished = Rung::kFull;        // and is to be on:
+  Rung detail = Rung::kFull;        // this, or
+  bool stills = false;              // the same with JPEG textures, where the stream has that
   std::uint64_t renumber = 0;       // to add to its rung's numbers
   std::uint64_t last_sequence = 0;  // with that
   std::uint64_t seen_info = 0;      // versions it has been sent; 0: none
@@ -56,6 +58,20 @@ struct Hub::Entry {
 
 bool Hub::is_on(const Watcher& watcher, Rung rung) {
   return watcher.rung == rung || watcher.wished == rung;
+}
+
+/// Whether that changes where it is to be.
+bool Hub::resolve(const Entry& entry, Watcher& watcher) {
+  const auto has = [&](Rung rung) {
+    const auto& status = entry.facts.status;
+    return status && std::ranges::any_of(status->rungs, [&](const RungStatus& r) { return r.rung == rung; });
+  };
+  Rung wished = watcher.detail;
+  if (watcher.stills) {
+    const Rung jpeg = *jpeg_of(has(wished) ? wished : Rung::kFull);
+    if (has(jpeg)) wished = jpeg;
+  }
+  return std::exchange(watcher.wished, wished) != wished && watcher.rung != wished;
 }
 
 Hub::Hub(std::string empty_hint, std::function<void(const std::string&)> key_frame_wanted)
@@ -173,6 +189,9 @@ void Hub::publish(const ServerStatus& status) {
   it->second->facts.status = status;
   it->second->status_text = std::move(text);
   it->second->status_version = next_version_++;
+  bool any_moves = false;
+  for (const auto& watcher : it->second->watchers) any_moves |= resolve(*it->second, *watcher);
+  if (any_moves) ask_for_key_frame(*it->second);
   wake_all(*it->second);
 }
 
@@ -240,11 +259,13 @@ void Hub::unwatch(const std::shared_ptr<Watcher>& watcher) {
   erase_if_unused(watcher->stream);
 }
 
-void Hub::choose(Watcher& watcher, Rung rung) {
+void Hub::choose(Watcher& watcher, Rung rung, bool stills) {
   const std::lock_guard lock(mutex_);
-  if (std::exchange(watcher.wished, rung) == rung || watcher.rung == rung) return;
+  watcher.detail = rung;
+  watcher.stills = stills;
   const auto it = streams_.find(watcher.stream);
-  if (it != streams_.end() && it->second->live) ask_for_key_frame(*it->second);
+  if (it != streams_.end() && resolve(*it->second, watcher) && it->second->live)
+    ask_for_key_frame(*it->second);
 }
 
 std::vector<Rung> Hub::rungs(const Watcher& watcher) const {
@@ -253,7 +274,7 @@ std::vector<Rung> Hub::rungs(const Watcher& watcher) const {
   const auto it = streams_.find(watcher.stream);
   if (it == streams_.end() || !it->second->facts.status) return out;
   for (const RungStatus& rung : it->second->facts.status->rungs)
-    if (rung.rung != Rung::kSlow) out.push_back(rung.rung);
+    if (rung.rung != Rung::kSlow && !is_jpeg(rung.rung)) out.push_back(rung.rung);
   return out;
 }
 
@@ -335,7 +356,8 @@ std::vector<StreamSnapshot> Hub::snapshot() const {
     out.back().watchers = entry->watchers.size();
     for (const Rung rung : kWebRungs)
       for (const auto& watcher : entry->watchers)
-        out.back().watchers_of[static_cast<std::size_t>(rung)] += is_on(*watcher, rung);
+        out.back().watchers_of[static_cast<std::size_t>(rung)] +=
+            is_on(*watcher, rung) || is_on(*watcher, *jpeg_of(rung));
   }
   return out;
 }

@@ -33,7 +33,7 @@ struct StreamSnapshot {
   std::uint64_t client_drops = 0;  // frames that a client had no credit for, and those that build on them
   std::uint64_t key_requests = 0;  // wishes for a key frame, for clients that wait for one
   std::size_t watchers = 0;
-  std::array<std::size_t, kWebRungs.size()> watchers_of{};  // of each rung, on it or on their way to it
+  std::array<std::size_t, kWebRungs.size()> watchers_of{};  // of each detail, on it or on their way to it
   std::optional<std::int64_t> clock_offset_ns;  // of the server's clock to this one, where it is known
   std::filesystem::path recording;              // that it is played from; empty: none that clients may read
   std::optional<RecordingState> recorded;       // on request; not the hub's to know, filled in by who asks
@@ -82,8 +82,9 @@ class Hub {
   std::shared_ptr<void> watch_list(std::function<void()> wake);
   void unwatch(const std::shared_ptr<Watcher>& watcher);
   /// Its frames are of this rung from the rung's next key frame on, and until then those of before. The
-  /// numbers of its frames go on. Where the stream has no such rung nothing changes.
-  void choose(Watcher& watcher, Rung rung);
+  /// numbers of its frames go on. Where the stream has no such rung nothing changes. `stills`: of that detail
+  /// with JPEG textures, as long as the stream says that it has it.
+  void choose(Watcher& watcher, Rung rung, bool stills);
   /// Lower rungs that the stream says it has.
   std::vector<Rung> rungs(const Watcher& watcher) const;
   /// On that rung of a stream, or on their way to it.
@@ -104,6 +105,7 @@ class Hub {
   void wake_list();
   void offer(Entry& entry, Watcher& watcher, const FrameMessage& frame);
   void ask_for_key_frame(Entry& entry);
+  static bool resolve(const Entry& entry, Watcher& watcher);
   static bool is_on(const Watcher& watcher, Rung rung);
   void erase_if_unused(const std::string& stream);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "web/gateway/protocol.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "base/time.h"
@@ -164,10 +165,14 @@ Result<ClientMessage> parse_client_message(std::string_view text) {
   } else if (*type == "quality") {
     const auto want = json.find("want");
     const std::string name = want != json.end() && want->is_string() ? want->get<std::string>() : "";
-    message.want = rung_named(name);
-    if (message.want == Rung::kSlow) message.want.reset();
+    for (const Rung rung : kWebRungs)
+      if (to_string(rung) == name) message.want = rung;
     if (!message.want && name != "auto")
       return Error{"quality without a \"want\" of auto, full, reduced or texture"};
+    if (const auto textures = json.find("textures"); textures != json.end()) {
+      if (!textures->is_array()) return Error{"quality whose \"textures\" are no list of codecs"};
+      message.video = std::find(textures->begin(), textures->end(), "h264") != textures->end();
+    }
     message.type = ClientMessage::Type::kQuality;
   }
   return message;

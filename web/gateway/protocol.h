@@ -40,6 +40,7 @@ struct ClientMessage {
   int credit = 0;  // 1..kMaxCredit
   double t0 = 0;
   std::optional<Rung> want{};  // nothing: whatever suits it
+  bool video = true;           // it decodes H.264 textures
 };
 constexpr int kMaxCredit = 8;
 

@@ -42,7 +42,8 @@ class StreamFeed : public WsFeed {
   std::deque<std::shared_ptr<const std::string>> replies_;
   std::optional<Hub::Delivery> held_;  // what is said of its quality goes first
   bool chooses_ = false;               // the client has said what quality it wants,
-  bool automatic_ = false;             // namely whatever suits it
+  bool automatic_ = false;             // namely whatever suits it,
+  bool stills_ = false;                // and that it decodes no H.264
   QualityChoice choice_;
   std::optional<Rung> told_;
   std::uint64_t seen_drops_ = 0;
@@ -73,9 +74,10 @@ std::optional<WsClose> StreamFeed::on_text(std::string_view text) {
   } else if (message->type == ClientMessage::Type::kQuality) {
     chooses_ = true;
     automatic_ = !message->want;
+    stills_ = !message->video;
     choice_ = QualityChoice();
     told_.reset();
-    hub_.choose(*watcher_, message->want.value_or(Rung::kFull));
+    hub_.choose(*watcher_, message->want.value_or(Rung::kFull), stills_);
   }
   return std::nullopt;
 }
@@ -89,8 +91,9 @@ std::optional<WsOutgoing> StreamFeed::next() {
   auto delivery = held_ ? std::exchange(held_, std::nullopt) : hub_.take(*watcher_, credit_ > 0);
   if (!delivery) return std::nullopt;
   if (delivery->text) return WsOutgoing{.text = std::move(delivery->text)};
-  if (chooses_ && told_ != delivery->frame->rung) {
-    told_ = delivery->frame->rung;
+  const Rung detail = detail_of(delivery->frame->rung);
+  if (chooses_ && told_ != detail) {
+    told_ = detail;
     held_ = std::move(delivery);
     return WsOutgoing{
         .text = std::make_shared<const std::string>(quality_message(*told_, hub_.rungs(*watcher_)))};
@@ -112,7 +115,7 @@ void StreamFeed::look_at(const Hub::Delivery& delivery) {
   seen_ns_ = now_ns;
   seen_drops_ = delivery.drops;
   choice_.offer(hub_.rungs(*watcher_));
-  hub_.choose(*watcher_, choice_.add(now_ns, {.arrived = 1, .lost = lost}));
+  hub_.choose(*watcher_, choice_.add(now_ns, {.arrived = 1, .lost = lost}), stills_);
 }
 
 }  // namespace

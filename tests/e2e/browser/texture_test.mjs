@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: the texture's own pixels arrive with every codec, H.264 goes on after damage, and a
-// browser without WebCodecs (plain http) shows the surface and says what is missing. Run as: node texture_test.mjs GATEWAY_FEEDER, in
-// web/viewer. Exit 77: no Chromium here.
+// browser without WebCodecs (plain http) shows the surface and says what is missing where there is nothing else, and the same
+// picture in JPEG where the server makes it. Run as: in_own_domain node texture_test.mjs GATEWAY_FEEDER RELIEVO_SERVER, in web/viewer.
+// Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { createInterface } from 'node:readline';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { Server } from './server.mjs';
 
 const feeder = spawn(process.argv[2], ['0', '8'], { stdio: ['pipe', 'pipe', 'inherit'] });
 const say = (line) => feeder.stdin.write(`${line}\n`);
@@ -14,7 +16,7 @@ const port = await new Promise((resolve, reject) => {
   feeder.once('exit', () => reject(new Error('the feeder did not start')));
 });
 
-/** Pixels of the page that are the red and the green of the texture's corners. */
+/** Pixels of the page that are the red and the green of the texture's corners, and those that have a colour at all. */
 async function corners(page) {
   const png = (await page.screenshot()).toString('base64');
   return page.evaluate(async (data) => {
@@ -23,19 +25,21 @@ async function corners(page) {
     const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
     context.drawImage(bitmap, 0, 0);
     const { data: rgba } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-    let [red, green] = [0, 0];
+    let [red, green, coloured] = [0, 0, 0];
     for (let i = 0; i < rgba.length; i += 4) {
       const [r, g, b] = rgba.subarray(i, i + 3);
       if (Math.abs(r - 230) < 16 && Math.abs(g - 20) < 16 && Math.abs(b - 20) < 16) ++red;
       if (Math.abs(r - 20) < 16 && Math.abs(g - 200) < 16 && Math.abs(b - 20) < 16) ++green;
+      if (Math.max(r, g, b) - Math.min(r, g, b) > 30) ++coloured;
     }
-    return { red, green };
+    return { red, green, coloured };
   }, png);
 }
-async function open(browser, host = '127.0.0.1') {
+async function open(browser, address = `http://127.0.0.1:${port}/?stream=ball`, script = '') {
   const page = await browser.newPage({ viewport: { width: 800, height: 500 } });
   page.setDefaultTimeout(kPatienceMs);
-  await page.goto(`http://${host}:${port}/?stream=ball`);
+  await page.addInitScript(script);
+  await page.goto(address);
   return page;
 }
 const look = (page) => page.evaluate(() => window.relievo.diagnostics());
@@ -54,6 +58,18 @@ async function showsTexture(page, what) {
   );
 }
 
+/** What the statistics panel says of the codecs. */
+async function codecs(page) {
+  await page.keyboard.press('i');
+  await page.waitForSelector('dt:text-is("codecs")');
+  await eventually('no codecs are told', async () => (await codecsNow(page)) !== '–');
+  const said = await codecsNow(page);
+  await page.keyboard.press('i');
+  return said;
+}
+const codecsNow = (page) => page.textContent('dt:text-is("codecs") + dd');
+
+let server;
 let browser = await launchChromium();
 try {
   const page = await open(browser);
@@ -77,7 +93,7 @@ try {
 
   // An address of another machine, as far as the browser knows: plain http there is no secure context.
   browser = await launchChromium(['--host-resolver-rules=MAP 192.0.2.1 127.0.0.1']);
-  const plain = await open(browser, '192.0.2.1');
+  const plain = await open(browser, `http://192.0.2.1:${port}/?stream=ball`);
   await more(plain, 3);
   assert.equal(await plain.evaluate(() => typeof VideoDecoder), 'undefined');
   assert.match(await plain.textContent('#notice'), /https/);
@@ -85,7 +101,29 @@ try {
   assert.ok(pixels.covered > 0.2, `the surface covers ${pixels.covered} of the page`);
   assert.equal((await look(plain)).errors, 0, (await look(plain)).lastError);
   console.log('ok: without WebCodecs');
+
+  // From a server that makes JPEG for such a page, beside one that decodes video.
+  server = await Server.start(process.argv[3], ['--source', 'sim:face', '--texture', 'h264', '--stream', 'ball']);
+  const address = `${server.address}/?stream=ball`;
+  const video = await open(browser, address);
+  await more(video, 3);
+  const hidden = await open(browser, address, 'delete window.VideoDecoder;');
+  await more(hidden, 3);
+  await eventually('no JPEG comes to the page without WebCodecs', async () => /JPEG/.test(await codecs(hidden)));
+  assert.match(await codecs(hidden), /no H\.264 here/);
+  assert.match(await codecs(video), /H\.264/);
+  assert.doesNotMatch(await codecs(video), /JPEG|here/);
+  const [there, here] = [await corners(video), await corners(hidden)];
+  console.log(`coloured pixels: ${there.coloured} of H.264, ${here.coloured} of JPEG`);
+  assert.ok(here.coloured > 5000, 'the texture is not on the page');
+  assert.ok(Math.abs(here.coloured / there.coloured - 1) < 0.15, 'not the same picture');
+  for (const page of [video, hidden]) {
+    assert.ok(await page.isHidden('#notice'));
+    assert.equal((await look(page)).errors, 0, (await look(page)).lastError);
+  }
+  console.log('ok: JPEG where WebCodecs are missing');
 } finally {
+  await server?.kill();
   await browser.close();
   feeder.kill('SIGKILL');
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, with the real server: clients of different qualities are served together, the full one loses
 // nothing, the reduced one sees the same surface in fewer bytes; a client that is slow goes down and comes
-// back; a gateway elsewhere relays the quality that its browsers ask for.
+// back; a gateway elsewhere relays the quality that its browsers ask for; and who decodes no H.264 is sent
+// JPEG textures beside those who do, also by that gateway.
 #include <cmath>
 #include <condition_variable>
 #include <map>
@@ -182,6 +183,58 @@ TEST_F(LadderTest, AGatewayElsewhereRelaysWhatItsBrowsersAskFor) {
     return request(gateway.port(), "GET", "/metrics").body.find("clock_offset_seconds{stream=\"take\"}") !=
            std::string::npos;
   }));
+}
+
+/// The next frame's header; of no vertices and no texture where none came.
+FrameHeader next_header(WsClient& client) {
+  client.credit(1);
+  const auto frame = client.next_of("frame");
+  if (!frame) return {};
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(frame->data.data()) + 48;
+  const auto header = read_frame_header({bytes, frame->data.size() - 48});
+  return header ? *header : FrameHeader{};
+}
+
+TEST_F(LadderTest, WhoDecodesNoVideoIsSentJpegTextures) {
+  WebServer server(command({"--texture", "h264"}));
+  if (server.port() == 0 && server.process().err().find("this build has no H.264") != std::string::npos)
+    GTEST_SKIP() << "this build has no H.264";
+  ASSERT_NE(server.port(), 0);
+  WebServer elsewhere({program("relievo").string(), "web", "--domain", std::to_string(own_domain()),
+                       "--interface", "lo", "--listen", "127.0.0.1:0"});
+  ASSERT_NE(elsewhere.port(), 0);
+  ASSERT_TRUE(eventually([&] { return elsewhere.stream("take").is_object(); }));
+  const auto made = [&](const std::string& quality) {
+    const auto stream = server.stream("take");
+    for (const auto& rung : stream["status"]["rungs"])
+      if (rung["quality"] == quality) return rung["frames"].get<int>();
+    return -1;
+  };
+  WsClient with(server.port(), "take");
+  ASSERT_TRUE(eventually([&] { return next_header(with).texture == TextureCodec::kH264; }));
+  EXPECT_EQ(made("full-jpeg"), 0) << "nobody wants it";
+  const auto width = static_cast<std::uint32_t>(striped_scene().rig.camera.width);
+  for (const std::uint16_t port : {server.port(), elsewhere.port()}) {
+    WsClient without(port, "take");
+    for (const auto& [want, across] : {std::pair("full", width), std::pair("reduced", width / 2)}) {
+      const std::string jpeg = std::string(want) + "-jpeg";
+      ASSERT_TRUE(without.send(R"({"type":"quality","want":")" + std::string(want) +
+                               R"(","textures":["jpeg","webp","png"]})"));
+      ASSERT_TRUE(eventually([&, expected = across] {
+        const FrameHeader header = next_header(without);
+        return header.texture == TextureCodec::kJpeg && header.vertices > 0 &&
+               header.texture_width == expected;
+      })) << want;
+      for (int i = 0; i < 3; ++i) EXPECT_EQ(next_header(without).texture, TextureCodec::kJpeg) << want;
+      EXPECT_EQ(next_header(with).texture, TextureCodec::kH264) << "the other client's stays";
+      EXPECT_TRUE(eventually([&] { return made(jpeg) > 0; })) << jpeg;  // its status is a second old at most
+    }
+  }
+  ASSERT_TRUE(
+      eventually([&] { return readers(server, "full-jpeg") == 0 && readers(server, "reduced-jpeg") == 0; }));
+  const int then = made("reduced-jpeg");
+  ASSERT_TRUE(server.goes_on("take", 15));
+  EXPECT_LE(made("reduced-jpeg"), then + 2) << "made on where nobody wants it";
 }
 
 TEST_F(LadderTest, OneThatIsSwitchedOffIsMissedByItsReader) {

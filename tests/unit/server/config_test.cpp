@@ -84,6 +84,7 @@ TEST(Config, TheLadderIsAListOfLowerQualities) {
   EXPECT_TRUE(parse_ladder("none").value().empty());
   EXPECT_FALSE(parse_ladder(""));
   EXPECT_FALSE(parse_ladder("reduced,full"));
+  EXPECT_FALSE(parse_ladder("reduced,reduced-jpeg")) << "those come by themselves";
 }
 
 TEST(Config, EverySetting) {

@@ -93,6 +93,39 @@ TEST_F(LadderTest, RungsAreSmallerFramesOfTheSameMoment) {
   EXPECT_TRUE(picture->surface.positions.empty());
 }
 
+TEST_F(LadderTest, JpegRungsAreTheSameInJpegWhateverTheStreamsTexturesAre) {
+  // PNG instead of H.264, which not every build has.
+  const EncodeOptions encode{.geometry = GeometryCodec::kGrid, .texture = TextureCodec::kPng, .step_bits = 6};
+  Ladder ladder(grid_rig({}), grid_pattern({}), encode, 1e-4);
+  std::atomic<int> readers{1};
+  CollectingSink full, reduced, texture;
+  ladder.add(output(Rung::kReduced, readers, reduced_));
+  ladder.add(output(Rung::kFullJpeg, readers, full));
+  ladder.add(output(Rung::kReducedJpeg, readers, reduced));
+  ladder.add(output(Rung::kTextureJpeg, readers, texture));
+  const std::size_t vertices = grid_frame({}).surface.positions.size();
+  ladder.take(frame_with_picture(42), 5);
+  ASSERT_TRUE(eventually([&] { return texture.frames().size() == 1; }));
+  const auto header = [](CollectingSink& sink) {
+    const auto read = read_frame_header(*sink.frames().at(0).data);
+    EXPECT_TRUE(read);
+    return read ? *read : FrameHeader{};
+  };
+  EXPECT_EQ(header(reduced_).texture, TextureCodec::kPng);
+  for (CollectingSink* sink : {&full, &reduced, &texture})
+    EXPECT_EQ(header(*sink).texture, TextureCodec::kJpeg);
+  EXPECT_EQ(full.frames()[0].rung, Rung::kFullJpeg);
+  EXPECT_EQ(header(full).vertices, vertices);
+  EXPECT_EQ(header(full).texture_width, 640U);
+  EXPECT_EQ(header(reduced).vertices, header(reduced_).vertices);
+  EXPECT_EQ(header(reduced).texture_width, 320U);
+  EXPECT_EQ(header(texture).vertices, 0U);
+  EXPECT_EQ(header(texture).texture_width, 320U);
+  const auto picture = decode_frame(*full.frames()[0].data);
+  ASSERT_TRUE(picture);
+  EXPECT_NEAR(picture->texture.row(240)[960], 90, 2);
+}
+
 TEST_F(LadderTest, ASurfaceOffTheGridGoesWhole) {
   reduced_readers_ = 1;
   Frame3D frame = frame_with_picture();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: a browser gets the quality it asks for, without a gap in its numbers; one that lets the gateway
-// choose goes down while it cannot follow; and the server's clock is the one that is told.
+// choose goes down while it cannot follow; one that decodes no H.264 gets JPEG textures where there are some;
+// and the server's clock is the one that is told.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -127,6 +128,45 @@ TEST_F(GatewayQuality, AClientThatCannotFollowGoesDown) {
   EXPECT_EQ(gateway->watchers("face", Rung::kFull), 1) << "the client beside it stays";
 }
 
+TEST_F(GatewayQuality, WhoDecodesNoVideoGetsJpegWhereThereIsSome) {
+  constexpr const char* kNoVideo = R"({"type":"quality","want":"%s","textures":["jpeg","png"]})";
+  const auto wants = [&](const std::string& want) {
+    std::string text = kNoVideo;
+    return text.replace(text.find("%s"), 2, want);
+  };
+  WsClient without(port, "face"), with(port, "face");
+  ASSERT_TRUE(without.send(wants("reduced")));
+  ASSERT_TRUE(with.send(R"({"type":"quality","want":"reduced","textures":["jpeg","h264"]})"));
+  ASSERT_TRUE(eventually([&] { return gateway->watchers("face", Rung::kReduced) == 2; }))
+      << "a stream without those rungs is sent as it is";
+
+  ServerStatus status;
+  status.stream = "face";
+  status.rungs = {{.rung = Rung::kReduced}, {.rung = Rung::kFullJpeg}, {.rung = Rung::kReducedJpeg}};
+  gateway->publish(status);
+  EXPECT_EQ(gateway->watchers("face", Rung::kReducedJpeg), 1) << "as soon as there is one";
+  std::vector<std::uint64_t> numbers;
+  EXPECT_TRUE(eventually([&] {
+    publish(Rung::kFull);
+    FrameMessage jpeg = make_frame(40 + numbers.size());
+    jpeg.data = data[1];
+    jpeg.rung = Rung::kReducedJpeg;
+    gateway->publish("face", jpeg);
+    without.credit(1);
+    const auto frame = without.next_of("frame");
+    if (frame && rung_of(*frame) == Rung::kReduced) numbers.push_back(u64_at(frame->data, 8));
+    return numbers.size() >= 3;
+  }));
+  for (std::size_t i = 1; i < numbers.size(); ++i) EXPECT_GT(numbers[i], numbers[i - 1]);
+  EXPECT_EQ(gateway->watchers("face", Rung::kReduced), 1) << "the other stays";
+  EXPECT_EQ(metric(R"(relievo_gateway_quality_clients{stream="face",quality="reduced"})"), 2);
+  ASSERT_TRUE(without.send(wants("texture")));  // which the stream has no more
+  EXPECT_TRUE(eventually([&] { return gateway->watchers("face", Rung::kFullJpeg) == 1; }));
+  ASSERT_TRUE(without.send(R"({"type":"quality","want":"full"})"));
+  EXPECT_TRUE(eventually([&] { return gateway->watchers("face", Rung::kFullJpeg) == 0; }))
+      << "who names no codecs decodes all";
+}
+
 TEST_F(GatewayQuality, AStreamThatComesBackBeginsInFull) {
   WsClient client(port, "face");
   ASSERT_TRUE(client.send(R"({"type":"quality","want":"texture"})"));
@@ -150,8 +190,9 @@ TEST_F(GatewayQuality, AStreamThatComesBackBeginsInFull) {
 }
 
 TEST_F(GatewayQuality, AWishThatIsNoneEndsTheConnection) {
-  for (const char* wrong :
-       {R"({"type":"quality"})", R"({"type":"quality","want":"best"})", R"({"type":"quality","want":3})"}) {
+  for (const char* wrong : {R"({"type":"quality"})", R"({"type":"quality","want":"best"})",
+                            R"({"type":"quality","want":3})", R"({"type":"quality","want":"full-jpeg"})",
+                            R"({"type":"quality","want":"full","textures":"jpeg"})"}) {
     WsClient client(port, "face");
     ASSERT_TRUE(client.send(wrong));
     std::optional<WsMessage> last;

@@ -3,6 +3,7 @@
 import { parseFramePrefix, parseServerMessage, type Quality } from './protocol';
 import type { SourceEvents } from './source';
 import { backoffS } from './state';
+import { VideoTextures } from './videoTexture';
 
 const kClockEveryMs = 4000;
 const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
@@ -34,6 +35,10 @@ export class Connection {
     private readonly server: string = document.baseURI,
   ) {
     this.connect();
+    if (VideoTextures.possible)
+      void VideoTextures.probed.then(() => {
+        if (!VideoTextures.possible) this.sayWhatIsWanted();
+      });
     this.timer = window.setInterval(() => this.tick(), 250);
   }
 
@@ -55,7 +60,13 @@ export class Connection {
   /** How much detail is wanted from now on, and after each loss of the connection. */
   want(quality: Quality): void {
     this.wanted = quality;
-    this.send({ type: 'quality', want: quality });
+    this.sayWhatIsWanted();
+  }
+
+  private sayWhatIsWanted(): void {
+    if (this.wanted === null && VideoTextures.possible) return; // what a server sends by itself
+    const textures = VideoTextures.possible ? {} : { textures: ['jpeg', 'webp', 'png'] };
+    this.send({ type: 'quality', want: this.wanted ?? 'full', ...textures });
   }
 
   retryNow(): void {
@@ -82,7 +93,7 @@ export class Connection {
       this.attempt = 0;
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
-      if (this.wanted !== null) this.send({ type: 'quality', want: this.wanted });
+      this.sayWhatIsWanted();
       this.events.open();
       this.tick();
     };

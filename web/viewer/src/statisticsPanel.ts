@@ -7,6 +7,7 @@ import { plot, type Line } from './plot';
 import type { StreamStatus } from './protocol';
 import type { Kept } from './source';
 import { text } from './strings';
+import { VideoTextures } from './videoTexture';
 
 const say = text.statistics;
 const kEveryMs = 500;
@@ -68,7 +69,9 @@ export class StatisticsPanel {
     this.set('rate', `${figures.rate.toFixed(1)} /s`);
     this.set('bits', `${(figures.bits / 1e6).toFixed(2)} Mbit/s`);
     this.set('detail', this.detail());
-    this.set('codecs', journal.codecs === '' ? null : `${journal.codecs}${journal.isKey ? '' : say.delta}`);
+    const chosen = !VideoTextures.possible && status?.rungs?.some(({ quality }) => quality === 'full-jpeg') === true;
+    const codecs = `${journal.codecs}${chosen ? say.insteadOfVideo : ''}${journal.isKey ? '' : say.delta}`;
+    this.set('codecs', journal.codecs === '' ? null : codecs);
     this.set('vertices', `${figures.vertices}, ${figures.triangles}`);
     const total = journal.parts === null ? 0 : kParts.reduce((sum, part) => sum + journal.parts![part], 0);
     for (const part of kParts) {

@@ -129,6 +129,7 @@ export const text = {
     kept: 'Kept here, to go back to',
     plot: 'Latency of the last frames, one stage upon the other, in milliseconds',
     delta: ' (builds on a key frame)',
+    insteadOfVideo: ' (this browser has no H.264 here)',
     names: {
       rate: 'drawn',
       bits: 'received',

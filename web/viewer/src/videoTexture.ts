@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Texture codec 4 of codec/FORMAT.md, picture after picture, by the browser's own decoder. Runs in the worker.
+// Texture codec 4 of codec/FORMAT.md, picture after picture, by the browser's own decoder. Runs in the worker;
+// the page asks whether it can.
 import { gridId } from './gridHead';
 
 const kHeadBytes = 4;
+const kUsualCodec = 'avc1.640028'; // High profile, up to 1920x1080
 const kLeastSide = 16;
 const kPatienceMs = 2000; // a decoder that keeps a picture back for longer is of no use
 
 export const kNoVideoHere =
-  'H.264 textures need WebCodecs, which browsers have on https and localhost alone: the surface is shown without its texture';
+  'H.264 textures need WebCodecs, which browsers have on https and localhost alone, and its H.264: the surface is shown without its texture';
 
 /** Whether the section builds on no other. Any bytes. */
 export function videoTextureIsKey(section: Uint8Array): boolean {
@@ -35,9 +37,14 @@ export class VideoTextures {
   private count = 0;
   private waiting: { resolve(frame: VideoFrame): void; reject(error: Error): void } | null = null;
 
-  /** Whether this browser can, here. */
-  static get possible(): boolean {
-    return typeof VideoDecoder !== 'undefined';
+  /** Whether this browser can, here; where it has WebCodecs but not H.264, that is known when `probed`. */
+  static possible = typeof VideoDecoder !== 'undefined';
+  static readonly probed: Promise<void> = VideoTextures.probe();
+
+  private static async probe(): Promise<void> {
+    if (!VideoTextures.possible) return;
+    const answer = await VideoDecoder.isConfigSupported({ codec: kUsualCodec }).catch(() => null);
+    VideoTextures.possible = answer?.supported === true;
   }
 
   /**
