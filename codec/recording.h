@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "base/growing_recording.h"
 #include "base/result.h"
 #include "base/stream.h"
 
@@ -75,6 +76,8 @@ class RecordingWriter {
   virtual std::uint64_t size() const = 0;
   /// How many of a channel's messages are in the file, whatever comes: those of the open chunk are not.
   virtual std::uint64_t written(std::uint16_t channel) const = 0;
+  /// Never null; what it says stays right when the file is finished, and the writer gone.
+  virtual std::shared_ptr<const GrowingRecording> growing() const = 0;
   /// Writes the index and closes.
   virtual Status finish() = 0;
 };
