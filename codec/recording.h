@@ -112,6 +112,10 @@ class RecordingReader {
   /// The next message in log-time order; nothing at the end. Fails on a chunk whose CRC is wrong, naming its
   /// place; the call after that goes on behind it.
   virtual Result<std::optional<RecordedMessage>> next() = 0;
+  /// When next() came to the end of a file without an index: looks for what was written since, with which it
+  /// then goes on. False where there is nothing new; once summary() says that there is an index, the file is
+  /// finished and nothing will come.
+  virtual Result<bool> read_on() = 0;
   /// The next next() returns the first message at or after this log time.
   virtual Status seek(std::int64_t log_time_ns) = 0;
 

@@ -383,6 +383,54 @@ TEST(Recording, WhatIsWholeOfAFileThatIsWrittenIsARecording) {
   EXPECT_EQ(counts, (std::vector<std::size_t>{5, 10, 15, 20, 23}));
 }
 
+TEST(Recording, AFileThatGrowsIsReadOnUntilItIsFinished) {
+  test::TempFolder folder;
+  auto writer = create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns});
+  ASSERT_TRUE(writer->add_channel(schema(), channel("a")).ok());
+  int written = 0;
+  const auto write_to = [&](int count) {
+    while (written < count) EXPECT_TRUE(writer->write(message(0, written++, 100)).ok());
+  };
+  write_to(12);
+  const auto reader = open(folder / "a.mcap");
+  std::vector<std::uint32_t> got, expected;
+  const auto read_to_end = [&] {
+    for (const auto& m : read_all(*reader).messages) got.push_back(m.sequence);
+    return got.size();
+  };
+  const auto reads_on = [&] {
+    const auto more = reader->read_on();
+    EXPECT_TRUE(more.ok());
+    return more && *more;
+  };
+  EXPECT_EQ(read_to_end(), 10u);
+  EXPECT_FALSE(reads_on());
+  EXPECT_EQ(read_to_end(), 10u);
+  write_to(17);
+  EXPECT_TRUE(reads_on());
+  EXPECT_EQ(read_to_end(), 15u);
+  ASSERT_TRUE(writer->flush_if_due(kStart_ns).ok()) << "the clock was set back";
+  auto earlier = message(0, written++, 100);
+  earlier.log_time_ns = kStart_ns;
+  ASSERT_TRUE(writer->write(earlier).ok());
+  write_to(22);
+  EXPECT_TRUE(reads_on());
+  EXPECT_EQ(read_to_end(), 18u) << "also what is said to be of before";
+  EXPECT_TRUE(reader->summary().recovered);
+  write_to(24);
+  ASSERT_TRUE(writer->finish().ok());
+  EXPECT_TRUE(reads_on());
+  EXPECT_EQ(read_to_end(), 24u);
+  EXPECT_FALSE(reader->summary().recovered);
+  EXPECT_FALSE(reads_on());
+  for (std::uint32_t i = 0; i < 24; ++i) expected.push_back(i);
+  std::ranges::sort(got);  // a chunk's messages come by their times
+  EXPECT_EQ(got, expected) << "each once";
+  got.clear();
+  ASSERT_TRUE(reader->seek(0).ok());
+  EXPECT_EQ(read_to_end(), 24u);
+}
+
 TEST(RecordingFault, KillLosesOnlyTheOpenChunk) {
   test::TempFolder folder;
   int ready[2];
