@@ -218,8 +218,10 @@ Status describe_file(const Options& options, StopSignal& stop) {
   if (summary.recovered) {
     const std::string lost =
         summary.lost_bytes > 0 ? "; " + bytes_text(summary.lost_bytes) + " are no part of a recording" : "";
-    std::printf("recovered   the recording was cut short or damaged, its index was made anew%s\n",
-                lost.c_str());
+    std::printf(
+        "recovered   the recording is being written, or was cut short or damaged: its index was made "
+        "anew%s\n",
+        lost.c_str());
   }
   for (const std::string& line : summary.damage) std::printf("damaged     %s\n", line.c_str());
   if (recorded->damaged() > 0) {

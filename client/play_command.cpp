@@ -70,7 +70,7 @@ Status run(const Options& options, StopSignal& stop) {
   wait_for_readers(options, **publisher, stop);
 
   std::uint64_t frames = 0, refused = 0;
-  Progress progress("play", "frames", options.play.loop ? 0 : range->frames);
+  Progress progress("play", "frames", options.play.loop || options.play.follow ? 0 : range->frames);
   const Status played = play(*recorded, play_options, stop, [&](const RawSample& sample) -> Status {
     if (sample.topic == Topic::kInfo && sample.cdr == current_info) return {};
     if (auto status = (*publisher)->publish(sample); !status) {
@@ -111,6 +111,10 @@ Command play_command() {
                 ->check(number(0.01, 100))
                 ->capture_default_str();
             auto* loop = app.add_flag("--loop", options->play.loop, "Start again at the end, until stopped");
+            app.add_flag("--follow", options->play.follow,
+                         "Where the file is being written, go on at its end with what comes until it is "
+                         "finished")
+                ->excludes(loop);
             app.add_flag("--once", options->once, "Stop at the end (the default)")->excludes(loop);
             app.add_option("--wait-readers", options->readers,
                            "Start when this many readers are there (default: one, but wait a second at most)")
@@ -124,7 +128,8 @@ Command play_command() {
             app.footer(
                 "Examples:\n"
                 "  relievo play face.mcap --loop --speed 0.5\n"
-                "  relievo play face.mcap --from 60 --to 75.5");
+                "  relievo play face.mcap --from 60 --to 75.5\n"
+                "  relievo play face.mcap --follow");
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};
 }

@@ -17,6 +17,9 @@ namespace {
 // A longer pause in a recording (the stream was gone meanwhile) is shortened to this.
 constexpr std::int64_t kLongestPause_ns = 5 * kNanosecondsPerSecond;
 
+// For more of a file that is being written, which comes by chunks of half a second.
+constexpr auto kLookAgain = std::chrono::milliseconds(100);
+
 TimeRange range_of(const PlayOptions& options, const RecordedStream& recorded) {
   return options.range.value_or(
       TimeRange{.from_ns = recorded.summary().start_ns, .to_ns = std::numeric_limits<std::int64_t>::max()});
@@ -50,6 +53,14 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
   for (;;) {
     auto sample = recorded.next();
     if (!sample) return sample.error();
+    if (!*sample && options.follow) {
+      const auto more = recorded.read_on();
+      if (!more) return more.error();
+      if (!*more && !recorded.summary().recovered) return {};
+      if (!*more && stop.wait_for(kLookAgain)) return {};
+      due_ns = std::max(due_ns, steady_now_ns());  // what comes late is not caught up with in a rush
+      continue;
+    }
     if (!*sample || (*sample)->receive_time_ns > range.to_ns) return {};
     if ((*sample)->receive_time_ns < range.from_ns) {
       if (!needed_later(**sample)) continue;

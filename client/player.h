@@ -16,6 +16,8 @@ namespace relievo {
 struct PlayOptions {
   double speed = 1;   // 2: twice as fast
   bool loop = false;  // from the start again at the end, until stopped
+  // At the end, goes on with what is written meanwhile, until the file is finished.
+  bool follow = false;
   // Frames are said to be captured now: in the recorded order, their times apart as recorded, at that speed.
   bool restamp = false;
   std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none

@@ -70,10 +70,21 @@ Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, c
   if (streams.count(recorded.stream_) == 0) {
     return Error{file.string() + " holds no stream '" + stream + "', only " + joined(streams)};
   }
-  for (const RecordingChannel& channel : summary.channels) {
-    recorded.topics_.push_back(stream_of(channel) == recorded.stream_ ? topic_of(channel) : std::nullopt);
-  }
+  recorded.read_channels();
   return recorded;
+}
+
+void RecordedStream::read_channels() {
+  topics_.clear();
+  for (const RecordingChannel& channel : summary().channels) {
+    topics_.push_back(stream_of(channel) == stream_ ? topic_of(channel) : std::nullopt);
+  }
+}
+
+Result<bool> RecordedStream::read_on() {
+  auto more = reader_->read_on();
+  if (more) read_channels();
+  return more;
 }
 
 std::uint64_t RecordedStream::frames() const {

@@ -34,6 +34,8 @@ class RecordedStream {
   /// The next sample in the order they were received (RawSample::receive_time_ns is the log time); nothing at
   /// the end. A damaged part of the file is skipped, counted and logged.
   Result<std::optional<RawSample>> next();
+  /// Whether more was written since, with which next() goes on: of a file that is still without its index.
+  Result<bool> read_on();
   /// The next next() returns the first sample again.
   Status rewind();
   /// The times of all frames, in order, from the file's index; those of damaged parts may be among them.
@@ -52,6 +54,7 @@ class RecordedStream {
 
  private:
   RecordedStream() = default;
+  void read_channels();
 
   std::string stream_;
   std::unique_ptr<RecordingReader> reader_;

@@ -133,7 +133,7 @@ Result<Contents> read_contents(const File& file, ReadContents how) {
   if (how == ReadContents::kByIndex) {
     if (auto contents = read_index(file)) return std::move(*contents);
   }
-  return walk_records(file);
+  return walk_records(file, how == ReadContents::kByIndex ? ReadChunks::kWhereNeeded : ReadChunks::kAll);
 }
 
 Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk) {

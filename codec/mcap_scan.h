@@ -59,7 +59,7 @@ struct Contents {
 };
 
 enum class ReadContents {
-  kByIndex,    // or, where the index is missing or wrong, as below
+  kByIndex,    // or, where the index is missing or wrong, by going through the heads of the file's records
   kByWalking,  // through the whole file: finds all that is whole, wherever it lies
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "codec/byte_io.h"
+#include "codec/mcap_message_index.h"
 
 namespace relievo::mcap {
 namespace {
@@ -27,7 +28,7 @@ struct Extent {
 
 class Walk {
  public:
-  explicit Walk(const File& file) : file_(file), effort_left_(4 * file.size()) {}
+  Walk(const File& file, ReadChunks which) : file_(file), which_(which), effort_left_(4 * file.size()) {}
 
   Result<Contents> run() {
     std::uint64_t at = kMagic.size();
@@ -139,6 +140,10 @@ class Walk {
   bool add_chunk(const Extent& record) {
     auto chunk = chunk_at(record);
     if (!chunk) return false;
+    if (which_ == ReadChunks::kWhereNeeded && count_by_index(*chunk)) {
+      contents_.chunks.push_back(std::move(*chunk));
+      return true;
+    }
     if (const auto records = read_chunk_records(file_, *chunk)) {
       count(*records, *chunk);
     } else if (!goes_on_at(record.end())) {
@@ -146,6 +151,36 @@ class Walk {
     }
     contents_.chunks.push_back(*chunk);
     return true;
+  }
+
+  /// By the message indexes behind the chunk, its own bytes unread. False where they are not all there, or
+  /// the chunk says otherwise of its times: no CRC is over either.
+  bool count_by_index(ChunkIndex& chunk) {
+    ChunkIndex with_index = chunk;
+    const std::uint64_t begin = chunk.offset + chunk.length;
+    std::uint64_t at = begin;
+    auto next = extent(at);
+    for (; next && next->op == Op::kMessageIndex; next = extent(at)) at = next->end();
+    if (!next || next->op > Op::kDataEnd || at == begin) return false;
+    with_index.message_index_length = at - begin;
+    const auto places = read_message_places(file_, with_index);
+    if (!places || places->empty() || places->front().log_time != chunk.start_time ||
+        places->back().log_time != chunk.end_time ||
+        !std::ranges::all_of(*places, [&](const MessagePlace& place) {
+          return contents_.channels.contains(place.channel_id);
+        }))
+      return false;
+    for (const MessagePlace& place : *places) count(place.channel_id, place.log_time);
+    chunk = std::move(with_index);
+    return true;
+  }
+
+  void count(std::uint16_t channel, std::uint64_t log_time) {
+    Statistics& statistics = contents_.statistics;
+    statistics.start_time = statistics.messages == 0 ? log_time : std::min(statistics.start_time, log_time);
+    statistics.end_time = std::max(statistics.end_time, log_time);
+    ++statistics.messages;
+    ++counts_[channel];
   }
 
   bool add_attachment(const Extent& record) {
@@ -174,15 +209,11 @@ class Walk {
       if (record->op != Op::kMessage) continue;
       const auto message = read_message(record->content);
       if (!message) return;
-      Statistics& statistics = contents_.statistics;
       const std::uint64_t time = message->first.log_time;
-      statistics.start_time = statistics.messages == 0 ? time : std::min(statistics.start_time, time);
-      statistics.end_time = std::max(statistics.end_time, time);
       chunk.start_time = is_first ? time : std::min(chunk.start_time, time);
       chunk.end_time = is_first ? time : std::max(chunk.end_time, time);
       is_first = false;
-      ++statistics.messages;
-      ++counts_[message->first.channel_id];
+      count(message->first.channel_id, time);
     }
   }
 
@@ -226,6 +257,7 @@ class Walk {
   }
 
   const File& file_;
+  const ReadChunks which_;
   Contents contents_;
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::uint64_t effort_left_;  // bytes that may yet be read to tell whether a record is whole
@@ -236,8 +268,8 @@ class Walk {
 
 }  // namespace
 
-Result<Contents> walk_records(const File& file) {
-  return Walk(file).run();
+Result<Contents> walk_records(const File& file, ReadChunks which) {
+  return Walk(file, which).run();
 }
 
 }  // namespace relievo::mcap

@@ -7,9 +7,14 @@
 
 namespace relievo::mcap {
 
-/// Reads the whole file once. Where bytes are no records, looks for the next chunk or attachment whose CRC is
+enum class ReadChunks {
+  kAll,          // the whole file is read once
+  kWhereNeeded,  // those whose message indexes, right behind them, do not say what is in them: quick
+};
+
+/// Where bytes are no records, looks for the next chunk or attachment whose CRC is
 /// right, and goes on there; what was passed over is in `gaps`. A chunk whose own bytes are wrong is listed
 /// (whoever reads it meets the error) where what follows it shows that its length is right.
-Result<Contents> walk_records(const File& file);
+Result<Contents> walk_records(const File& file, ReadChunks which);
 
 }  // namespace relievo::mcap

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "base/growing_recording.h"
 #include "base/result.h"
 #include "base/stream.h"
 
@@ -75,6 +76,8 @@ class RecordingWriter {
   virtual std::uint64_t size() const = 0;
   /// How many of a channel's messages are in the file, whatever comes: those of the open chunk are not.
   virtual std::uint64_t written(std::uint16_t channel) const = 0;
+  /// Never null; what it says stays right when the file is finished, and the writer gone.
+  virtual std::shared_ptr<const GrowingRecording> growing() const = 0;
   /// Writes the index and closes.
   virtual Status finish() = 0;
 };
@@ -109,6 +112,10 @@ class RecordingReader {
   /// The next message in log-time order; nothing at the end. Fails on a chunk whose CRC is wrong, naming its
   /// place; the call after that goes on behind it.
   virtual Result<std::optional<RecordedMessage>> next() = 0;
+  /// When next() came to the end of a file without an index: looks for what was written since, with which it
+  /// then goes on. False where there is nothing new; once summary() says that there is an index, the file is
+  /// finished and nothing will come.
+  virtual Result<bool> read_on() = 0;
   /// The next next() returns the first message at or after this log time.
   virtual Status seek(std::int64_t log_time_ns) = 0;
 

@@ -30,6 +30,8 @@ class Reader final : public RecordingReader {
     auto contents = mcap::read_contents(*file_, how);
     if (!contents) return contents.error();
     contents_ = std::move(*contents);
+    summary_ = {};
+    ends_by_.clear();
     std::ranges::stable_sort(contents_.chunks, {}, &mcap::ChunkIndex::start_time);
     for (const mcap::ChunkIndex& chunk : contents_.chunks)
       ends_by_.push_back(std::max(chunk.end_time, ends_by_.empty() ? 0 : ends_by_.back()));
@@ -67,7 +69,7 @@ class Reader final : public RecordingReader {
     while (next_chunk_ < contents_.chunks.size() &&
            (pending_.empty() || contents_.chunks[next_chunk_].start_time <= pending_.top().log_time)) {
       const mcap::ChunkIndex& chunk = contents_.chunks[next_chunk_++];
-      if (chunk.end_time < from_) continue;
+      if (chunk.end_time < from_ || chunk.offset < from_byte_) continue;
       if (auto status = load(chunk); !status) return status.error();
     }
     if (pending_.empty()) return std::optional<RecordedMessage>();
@@ -84,8 +86,25 @@ class Reader final : public RecordingReader {
     return std::optional(std::move(result));
   }
 
+  Result<bool> read_on() override {
+    if (!summary_.recovered) return false;
+    auto now = mcap::File::open(file_->name());
+    if (!now) return now.error();
+    if ((*now)->size() == file_->size()) return false;
+    std::uint64_t known = 0;  // where the chunks that it had end
+    for (const mcap::ChunkIndex& chunk : contents_.chunks)
+      known = std::max(known, chunk.offset + chunk.length);
+    file_ = std::move(*now);
+    const std::size_t chunks = contents_.chunks.size();
+    if (auto status = open(mcap::ReadContents::kByIndex); !status) return status.error();
+    from_byte_ = known;
+    next_chunk_ = 0;
+    return contents_.chunks.size() > chunks;
+  }
+
   Status seek(std::int64_t log_time_ns) override {
     from_ = static_cast<std::uint64_t>(std::max<std::int64_t>(log_time_ns, 0));
+    from_byte_ = 0;
     next_chunk_ = 0;
     pending_ = {};
     order_ = 0;
@@ -229,14 +248,15 @@ class Reader final : public RecordingReader {
     return {};
   }
 
-  const std::unique_ptr<mcap::File> file_;
+  std::unique_ptr<mcap::File> file_;
   mcap::Contents contents_;
   RecordingSummary summary_;
   std::vector<std::uint64_t> ends_by_;    // the latest message of each chunk and all before it
   std::vector<std::int32_t> channel_at_;  // index into summary_.channels of each id in the file
 
-  std::uint64_t from_ = 0;      // log time that was sought
-  std::size_t next_chunk_ = 0;  // of contents_.chunks, in order of their start
+  std::uint64_t from_ = 0;       // log time that was sought
+  std::uint64_t from_byte_ = 0;  // chunks before it were read before the file grew
+  std::size_t next_chunk_ = 0;   // of contents_.chunks, in order of their start
   std::uint64_t order_ = 0;
   std::priority_queue<Pending, std::vector<Pending>, std::greater<>> pending_;
   std::vector<std::weak_ptr<const Bytes>> loaded_;

@@ -15,6 +15,7 @@
 #include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/mcap_records.h"
+#include "codec/mcap_writer_index.h"
 #include "codec/recording.h"
 
 namespace relievo {
@@ -44,7 +45,7 @@ class Writer final : public RecordingWriter {
     if (auto status = check_open(); !status) return status.error();
     if (schema.name != channel.schema)
       return Error{"channel " + channel.topic + " names schema " + channel.schema + ", not " + schema.name};
-    if (channels_.size() >= std::numeric_limits<std::uint16_t>::max())
+    if (written_.size() >= std::numeric_limits<std::uint16_t>::max())
       return Error{"a recording cannot hold more than 65535 channels"};
     Bytes records;
     const auto known = std::ranges::find(schemas_, schema.name, &mcap::Schema::name);
@@ -54,14 +55,17 @@ class Writer final : public RecordingWriter {
     const auto schema_id = is_new ? static_cast<std::uint16_t>(schemas_.size() + 1) : known->id;
     const mcap::Schema new_schema{schema_id, schema.name, schema.encoding, schema.text};
     if (is_new) mcap::append(records, new_schema);
-    const auto id = static_cast<std::uint16_t>(channels_.size());
+    const auto id = static_cast<std::uint16_t>(written_.size());
     const mcap::Channel new_channel{id, schema_id, channel.topic, channel.message_encoding, channel.metadata};
     mcap::append(records, new_channel);
     index_bytes_ += records.size() + kStatisticsOfChannel;
     if (auto status = write_or_close({records}); !status) return status.error();
-    if (is_new) schemas_.push_back(new_schema);
-    channels_.push_back(new_channel);
-    statistics_.channel_messages.emplace_back(id, 0);
+    if (is_new) {
+      schemas_.push_back(new_schema);
+      index_->add(new_schema, offset_);
+    }
+    index_->add(new_channel, offset_);
+    written_.push_back(0);
     return id;
   }
 
@@ -75,13 +79,13 @@ class Writer final : public RecordingWriter {
         offset_, record.size(), time, time, attachment.data.size(), attachment.name, attachment.media_type};
     index_grows_by(index);
     if (auto status = write_or_close({record}); !status) return status;
-    attachments_.push_back(index);
+    index_->add(index);
     return {};
   }
 
   Status write(const RecordedMessage& message) override {
     if (auto status = check_open(); !status) return status;
-    if (message.channel >= channels_.size())
+    if (message.channel >= written_.size())
       return Error{"no channel " + std::to_string(message.channel) + " in the recording"};
     if (message.log_time_ns < 0 || message.publish_time_ns < 0)
       return Error{"a recording cannot hold times before 1970"};
@@ -115,8 +119,10 @@ class Writer final : public RecordingWriter {
   std::uint64_t size() const override { return offset_ + chunk_.size(); }
 
   std::uint64_t written(std::uint16_t channel) const override {
-    return channel < channels_.size() ? statistics_.channel_messages[channel].second : 0;
+    return channel < written_.size() ? written_[channel] : 0;
   }
+
+  std::shared_ptr<const GrowingRecording> growing() const override { return index_; }
 
   Status finish() override {
     if (!failure_.empty()) return Error{failure_};
@@ -232,14 +238,8 @@ class Writer final : public RecordingWriter {
     index_grows_by(index);
     if (auto status = write_or_close({head, chunk_, tail}); !status) return status;
     if (auto status = sync(); !status) return status;
-    for (const auto& [channel, entries] : chunk_index_) {
-      statistics_.channel_messages[channel].second += entries.size();
-      statistics_.messages += entries.size();
-    }
-    if (chunks_.empty()) statistics_.start_time = index.start_time;
-    statistics_.start_time = std::min(statistics_.start_time, index.start_time);
-    statistics_.end_time = std::max(statistics_.end_time, index.end_time);
-    chunks_.push_back(std::move(index));
+    for (const auto& [channel, entries] : chunk_index_) written_[channel] += entries.size();
+    index_->add(std::move(index));
     chunk_.clear();
     chunk_index_.clear();
     return {};
@@ -254,36 +254,7 @@ class Writer final : public RecordingWriter {
     return fail({"cannot write " + path_.string() + ": " + write_failure(errno)});
   }
 
-  /// Data end, summary, footer and closing magic, at once.
-  Status write_index() {
-    Bytes data_end;
-    mcap::append_data_end(data_end, crc_);
-    const std::uint64_t summary_start = offset_ + data_end.size();
-    Bytes summary;
-    Bytes offsets;
-    const auto group = [&](mcap::Op op, const auto& records) {
-      const std::size_t start = summary.size();
-      for (const auto& record : records) mcap::append(summary, record);
-      if (summary.size() > start)
-        mcap::append_summary_offset(offsets, op, summary_start + start, summary.size() - start);
-    };
-    statistics_.schemas = static_cast<std::uint16_t>(schemas_.size());
-    statistics_.channels = static_cast<std::uint32_t>(channels_.size());
-    statistics_.attachments = static_cast<std::uint32_t>(attachments_.size());
-    statistics_.chunks = static_cast<std::uint32_t>(chunks_.size());
-    group(mcap::Op::kSchema, schemas_);
-    group(mcap::Op::kChannel, channels_);
-    group(mcap::Op::kStatistics, std::span(&statistics_, 1));
-    group(mcap::Op::kChunkIndex, chunks_);
-    group(mcap::Op::kAttachmentIndex, attachments_);
-    const std::uint64_t offsets_start = summary_start + summary.size();
-    append_bytes(summary, offsets);
-    Bytes footer;
-    mcap::append_footer(footer, summary,
-                        {.summary_start = summary_start, .summary_offset_start = offsets_start});
-    append_bytes(footer, mcap::kMagic);
-    return write_whole({data_end, summary, footer});
-  }
+  Status write_index() { return write_whole({index_->end(offset_, crc_)}); }
 
   Status close_file() {
     static_cast<void>(::ftruncate(file_, static_cast<off_t>(offset_)));  // gives back what was reserved
@@ -306,10 +277,8 @@ class Writer final : public RecordingWriter {
   std::int64_t synced_ns_ = 0;                    // the end of the last chunk that is on the disk for sure
 
   std::vector<mcap::Schema> schemas_;
-  std::vector<mcap::Channel> channels_;
-  std::vector<mcap::ChunkIndex> chunks_;
-  std::vector<mcap::AttachmentIndex> attachments_;
-  mcap::Statistics statistics_;
+  std::vector<std::uint64_t> written_;  // messages of each channel
+  const std::shared_ptr<mcap::WriterIndex> index_ = std::make_shared<mcap::WriterIndex>();
 
   Bytes chunk_;  // records of the open chunk
   mcap::ChunkHeader chunk_header_;

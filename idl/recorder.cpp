@@ -59,6 +59,11 @@ std::filesystem::path Recorder::file() const {
   return open_;
 }
 
+std::shared_ptr<const GrowingRecording> Recorder::growing() const {
+  const std::lock_guard lock(mutex_);
+  return growing_;
+}
+
 bool Recorder::done() const {
   std::lock_guard lock(mutex_);
   return limit_reached_ || error_.has_value();
@@ -139,10 +144,12 @@ void Recorder::add_attachments() {
 
 Status Recorder::open_file() {
   open_ = options_.recording.segments.split() ? segments_.next() : options_.file;
+  growing_.reset();
   auto writer =
       RecordingWriter::create(open_, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
+  growing_ = writer_->growing();
   frames_before_ = counts_.frames;
   ++counts_.files;
   for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {

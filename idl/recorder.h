@@ -54,6 +54,8 @@ class Recorder {
   Counts counts() const;
   /// The file that is being written, or was last; empty before the first sample.
   std::filesystem::path file() const;
+  /// What is whole of it; null before the first sample.
+  std::shared_ptr<const GrowingRecording> growing() const;
   /// The limit of frames or seconds is reached, or writing has failed.
   bool done() const;
   /// Ok, or why writing has failed.
@@ -81,13 +83,14 @@ class Recorder {
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
-  std::filesystem::path open_;            // the file being written
-  std::int64_t segment_ns_ = 0;           // when its first sample was received
-  std::uint64_t frames_before_ = 0;       // in the files before it
-  std::optional<StreamInfo> info_;        // as received last,
-  std::optional<RawSample> info_sample_;  // and as it came
-  std::string rig_yaml_, pattern_yaml_;   // as attached last
-  Bytes info_cdr_;                        // as attached last
+  std::filesystem::path open_;                       // the file being written
+  std::shared_ptr<const GrowingRecording> growing_;  // of it
+  std::int64_t segment_ns_ = 0;                      // when its first sample was received
+  std::uint64_t frames_before_ = 0;                  // in the files before it
+  std::optional<StreamInfo> info_;                   // as received last,
+  std::optional<RawSample> info_sample_;             // and as it came
+  std::string rig_yaml_, pattern_yaml_;              // as attached last
+  Bytes info_cdr_;                                   // as attached last
   std::optional<Error> error_;
   Counts counts_;
   std::int64_t first_frame_ns_ = 0;

@@ -87,6 +87,7 @@ Status StreamRecorder::start() {
             .started_ns = now_ns,
             .pre_roll_s = options_.pre_roll_s,
             .message = {}};
+  growing_.reset();
   open_ = true;
   next_ = ring_.begin();
   end_.reset();
@@ -115,6 +116,11 @@ bool StreamRecorder::is_open(const std::string& file) const {
   // The next one may have been begun since the state was last told.
   return options_.recording.segments.split() && file > state_.file &&
          file.starts_with(target_.stem().string() + '_');
+}
+
+std::shared_ptr<const GrowingRecording> StreamRecorder::growing(const std::string& file) const {
+  const std::lock_guard lock(mutex_);
+  return state_.file == file ? growing_ : nullptr;
 }
 
 void StreamRecorder::finish(std::uint64_t published) {
@@ -182,12 +188,14 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   Status written;
   Recorder::Counts counts;
   std::filesystem::path file;
+  std::shared_ptr<const GrowingRecording> growing;
   if (recorder_) {
     recorder_->tick(utc_now_ns());
     written = recorder_->status();
     if (is_last && written) written = recorder_->finish();
     counts = recorder_->counts();
     file = recorder_->file();
+    growing = recorder_->growing();
     if (is_last || !written) recorder_.reset();  // which closes the file
   }
   if (!written) log_warning(written.error().message + "; the stream goes on without a recording");
@@ -195,7 +203,10 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   lock.lock();
   state_.frames = counts.frames;
   state_.bytes = counts.bytes;
-  if (!file.empty()) state_.file = file.filename();
+  if (!file.empty()) {
+    state_.file = file.filename();
+    growing_ = std::move(growing);
+  }
   if (!is_last && written) return;
   state_.activity = written ? RecordingActivity::kOff : RecordingActivity::kFailed;
   state_.message = written ? "" : written.error().message;

@@ -54,6 +54,8 @@ class StreamRecorder {
   RecordingState state() const;
   /// This file is being written.
   bool is_open(const std::string& file) const;
+  /// What is whole of this file, where it is being written or was written last; else null.
+  std::shared_ptr<const GrowingRecording> growing(const std::string& file) const;
   /// After the stream's last frame, the `published`th: waits a moment until it is here, and until the file is
   /// whole.
   void finish(std::uint64_t published);
@@ -72,10 +74,11 @@ class StreamRecorder {
   SampleRing ring_;
   std::optional<RawSample> info_;  // as received last
   RecordingState state_;
-  std::filesystem::path target_;      // as Recorder::Options::file
-  bool open_ = false;                 // state_.file is being written
-  std::uint64_t next_ = 0;            // the first of the ring that is not in it
-  std::optional<std::uint64_t> end_;  // where it ends, once that is asked for
+  std::shared_ptr<const GrowingRecording> growing_;  // of state_.file
+  std::filesystem::path target_;                     // as Recorder::Options::file
+  bool open_ = false;                                // state_.file is being written
+  std::uint64_t next_ = 0;                           // the first of the ring that is not in it
+  std::optional<std::uint64_t> end_;                 // where it ends, once that is asked for
   std::uint64_t frames_seen_ = 0;
   bool ending_ = false;
 

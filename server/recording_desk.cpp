@@ -39,4 +39,11 @@ bool RecordingDesk::is_open(const std::string& file) const {
                      [&](const auto& one) { return one.second->is_open(file); });
 }
 
+std::shared_ptr<const GrowingRecording> RecordingDesk::growing(const std::string& file) const {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [stream, recorder] : recorders_)
+    if (auto growing = recorder->growing(file)) return growing;
+  return nullptr;
+}
+
 }  // namespace relievo

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -27,6 +28,7 @@ class RecordingDesk final : public RecordingControl {
   Status stop(const std::string& stream) override;
   std::filesystem::path folder() const override { return folder_; }
   bool is_open(const std::string& file) const override;
+  std::shared_ptr<const GrowingRecording> growing(const std::string& file) const override;
 
  private:
   const std::filesystem::path folder_;

@@ -138,6 +138,39 @@ TEST(Play, KilledRecorderLeavesAFileThatPlaysByteForByte) {
   for (const StreamInfo& i : infos) EXPECT_EQ(i.stream, "face");
 }
 
+TEST(Play, FollowsAFileThatIsBeingWrittenUntilItIsFinished) {
+  const TempFolder folder;
+  const auto whole = folder / "whole.mcap";
+  const auto growing = folder / "growing.mcap";
+  {
+    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    const auto done = run(on_loopback({"record", "face", "--out", whole, "--frames", "200"}));
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  const std::size_t frames = recorded_frames(whole).size();
+  std::ifstream in(whole, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const auto write_to = [&](std::size_t size) {
+    std::ofstream(growing, std::ios::binary | std::ios::app)
+        << bytes.substr(std::filesystem::file_size(growing), size - std::filesystem::file_size(growing));
+  };
+  std::ofstream(growing, std::ios::binary) << bytes.substr(0, bytes.size() / 3);
+  const auto cut = run(on_loopback({"play", growing, "--wait-readers", "0", "--speed", "20", "--json"}));
+  ASSERT_EQ(cut.status, 0) << cut.err;
+  EXPECT_LT(nlohmann::json::parse(cut.out)["frames"], frames);
+
+  Process player(
+      on_loopback({"play", growing, "--wait-readers", "0", "--speed", "20", "--json", "--follow"}));
+  EXPECT_FALSE(player.wait(1s)) << "it ended where the file ends for now";
+  for (std::size_t part = 4; part <= 10; ++part) {
+    write_to(bytes.size() * part / 10);
+    EXPECT_FALSE(part < 10 && player.wait(100ms)) << part;
+  }
+  ASSERT_EQ(player.wait(), 0) << player.err();
+  EXPECT_EQ(nlohmann::json::parse(player.out())["frames"], frames) << "each once";
+  EXPECT_EQ(nlohmann::json::parse(player.out())["damaged"], 0);
+}
+
 TEST(Play, ServerToKilledRecorderToPlayerToSecondRecorder) {
   const TempFolder folder;
   const auto cut = folder / "cut.mcap";

@@ -70,16 +70,24 @@ HttpReply list_recordings(const RecordingControl* control) {
     std::int64_t modified_ns;
     std::string name;
     std::uint64_t bytes;
+    bool recording;
   };
   std::vector<Found> found;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(control->folder(), error)) {
     const std::string name = entry.path().filename().string();
-    if (entry.symlink_status(error).type() != fs::file_type::regular || !finished_recording(name, *control))
+    if (entry.symlink_status(error).type() != fs::file_type::regular || !recording_file(name, *control))
       continue;
-    const std::uint64_t bytes = entry.file_size(error);
+    std::uint64_t bytes = entry.file_size(error);
+    const bool recording = control->is_open(name);
+    if (recording) {
+      const auto growing = control->growing(name);
+      const std::uint64_t whole = growing ? growing->bytes() : 0;
+      if (whole == 0) continue;  // there is nothing to see yet
+      bytes = whole + growing->end_at(whole)->size();
+    }
     const std::int64_t modified_ns = error ? 0 : utc_ns(entry.last_write_time(error));
-    if (!error) found.push_back({modified_ns, name, bytes});  // else it has just gone
+    if (!error) found.push_back({modified_ns, name, bytes, recording});  // else it has just gone
   }
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
     return std::tie(b.modified_ns, b.name) < std::tie(a.modified_ns, a.name);
@@ -87,13 +95,13 @@ HttpReply list_recordings(const RecordingControl* control) {
   if (found.size() > kMostListed) found.resize(kMostListed);
   Json list = Json::array();
   for (const Found& f : found)
-    list.push_back({{"file", f.name}, {"bytes", f.bytes}, {"modified_ns", f.modified_ns}});
+    list.push_back(
+        {{"file", f.name}, {"bytes", f.bytes}, {"modified_ns", f.modified_ns}, {"recording", f.recording}});
   return json({{"recordings", std::move(list)}});
 }
 
-std::optional<fs::path> finished_recording(const std::string& name, const RecordingControl& control) {
-  if (!is_recording_name(name) || control.is_open(name)) return std::nullopt;
-  return control.folder() / name;
+std::optional<fs::path> recording_file(const std::string& name, const RecordingControl& control) {
+  return is_recording_name(name) ? std::optional(control.folder() / name) : std::nullopt;
 }
 
 }  // namespace relievo

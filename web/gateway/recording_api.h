@@ -19,12 +19,10 @@ HttpReply recording_state(std::string_view stream, const RecordingControl* contr
 /// POST of {"action":"start"} or "stop": the same, afterwards.
 HttpReply order_recording(std::string_view stream, const HttpRequest& request, RecordingControl* control);
 
-/// GET: the files that are whole, the newest first, a thousand of them at most.
+/// GET: the files, the newest first, a thousand of them at most; of one that is being written, what is whole.
 HttpReply list_recordings(const RecordingControl* control);
 
-/// The file of that name in the folder, which may not be there; nothing where it is being written, or where
-/// no recording has such a name.
-std::optional<std::filesystem::path> finished_recording(const std::string& name,
-                                                        const RecordingControl& control);
+/// The file of that name in the folder, which may not be there; nothing where no recording has such a name.
+std::optional<std::filesystem::path> recording_file(const std::string& name, const RecordingControl& control);
 
 }  // namespace relievo

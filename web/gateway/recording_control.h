@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "base/growing_recording.h"
 #include "base/recording_state.h"
 #include "base/result.h"
 
@@ -25,6 +27,8 @@ class RecordingControl {
   virtual std::filesystem::path folder() const = 0;
   /// This file of the folder is being written.
   virtual bool is_open(const std::string& file) const = 0;
+  /// What is whole of this file of the folder, where it is being written or was lately; else null.
+  virtual std::shared_ptr<const GrowingRecording> growing(const std::string& file) const = 0;
 };
 
 }  // namespace relievo

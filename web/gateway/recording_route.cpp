@@ -7,7 +7,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
+#include <optional>
+#include <string>
 
 #include "web/gateway/byte_range.h"
 #include "web/gateway/recording_api.h"
@@ -27,6 +30,42 @@ std::string etag_of(const struct stat& file) {
   return text;
 }
 
+/// Of what was whole of a file when it was `bytes` long.
+std::string growing_etag(const struct stat& file, std::uint64_t bytes) {
+  char text[48];
+  std::snprintf(text, sizeof text, "\"growing-%llx-%llx\"", static_cast<unsigned long long>(file.st_ino),
+                static_cast<unsigned long long>(bytes));
+  return text;
+}
+
+/// The `bytes` of growing_etag(); 0 where it is another file's, or none.
+std::uint64_t growing_bytes(std::string_view etag, const struct stat& file) {
+  const std::size_t dash = etag.rfind('-');
+  if (dash == std::string_view::npos) return 0;
+  std::uint64_t bytes = 0;
+  std::from_chars(etag.data() + dash + 1, etag.data() + etag.size(), bytes, 16);
+  return growing_etag(file, bytes) == etag ? bytes : 0;
+}
+
+struct Version {
+  FilePart::Whole whole;
+  std::string etag;
+};
+
+/// What is to be read of a file of the folder; nothing where it has only just been begun.
+std::optional<Version> version_of(const std::string& name, const struct stat& file, std::string_view if_range,
+                                  const RecordingControl& control) {
+  const auto growing = control.growing(name);
+  const auto as_of = [&](std::uint64_t bytes) -> std::optional<Version> {
+    auto end = growing && bytes > 0 ? growing->end_at(bytes) : nullptr;
+    if (!end) return std::nullopt;
+    return Version{{bytes, std::move(end)}, growing_etag(file, bytes)};
+  };
+  if (auto version = as_of(growing_bytes(if_range, file))) return version;
+  if (control.is_open(name)) return as_of(growing ? growing->bytes() : 0);
+  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file)};
+}
+
 }  // namespace
 
 FilePart::~FilePart() {
@@ -34,9 +73,16 @@ FilePart::~FilePart() {
 }
 
 std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) const {
-  const std::size_t wanted = static_cast<std::size_t>(std::min<std::uint64_t>(into.size(), length_ - offset));
+  const std::uint64_t at = part_.at + offset;
+  const std::uint64_t wanted = std::min<std::uint64_t>(into.size(), part_.length - offset);
+  if (at >= whole_.file_bytes) {
+    const auto from = static_cast<std::ptrdiff_t>(at - whole_.file_bytes);
+    if (wanted > 0) std::copy_n(whole_.end->begin() + from, wanted, into.begin());
+    return static_cast<std::size_t>(wanted);
+  }
+  const auto of_file = static_cast<std::size_t>(std::min(wanted, whole_.file_bytes - at));
   ssize_t n = 0;
-  do n = pread(descriptor_, into.data(), wanted, static_cast<off_t>(at_ + offset));
+  do n = pread(descriptor_, into.data(), of_file, static_cast<off_t>(at));
   while (n < 0 && errno == EINTR);
   return n > 0 ? static_cast<std::size_t>(n) : 0;
 }
@@ -46,7 +92,7 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
   auto file = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
   int follow = 0;
   if (!file && context.recordings != nullptr) {
-    file = finished_recording(std::string(name), *context.recordings);
+    file = recording_file(std::string(name), *context.recordings);
     follow = O_NOFOLLOW;  // what somebody links to from there is none of ours
   }
   if (!file) return text_reply(404, "there is no such recording");
@@ -56,8 +102,17 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
     if (descriptor >= 0) close(descriptor);
     return text_reply(404, "the recording is gone");
   }
-  const auto size = static_cast<std::uint64_t>(status.st_size);
-  const std::string etag = etag_of(status);
+  std::optional<Version> version;
+  if (follow == 0)
+    version = Version{{static_cast<std::uint64_t>(status.st_size)}, etag_of(status)};
+  else
+    version = version_of(std::string(name), status, request.if_range, *context.recordings);
+  if (!version) {
+    close(descriptor);
+    return text_reply(404, "the recording has only just begun: ask again in a second");
+  }
+  const std::uint64_t size = version->whole.size();
+  const std::string& etag = version->etag;
   HttpReply reply;
   reply.content_type = "application/octet-stream";
   // A cache may keep it, and asks here whether it still is the same.
@@ -77,7 +132,7 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
     reply.headers.emplace_back("Content-Range", "bytes " + std::to_string(range.at) + "-" +
                                                     std::to_string(range.at + range.length - 1) + of);
   }
-  reply.file = std::make_shared<const FilePart>(descriptor, range.at, range.length);
+  reply.file = std::make_shared<const FilePart>(descriptor, version->whole, range);
   return reply;
 }
 

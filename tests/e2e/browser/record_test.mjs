@@ -91,9 +91,9 @@ const checks = {
     await page.waitForFunction(() => /kept-.*\.mcap/.test(document.querySelector('#recording').textContent));
     assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'false');
     let listed;
-    await eventually('the file is not listed', async () => {
+    await eventually('the file is not listed as finished', async () => {
       listed = await page.evaluate(async () => (await (await fetch('api/recordings')).json()).recordings[0]);
-      return listed !== undefined;
+      return listed?.recording === false;
     });
     assert.deepEqual(readdirSync(folder), [listed.file]);
     const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, listed.file)], { encoding: 'utf8' }));

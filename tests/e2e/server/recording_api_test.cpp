@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <algorithm>
+#include <fstream>
+
 #include "codec/recording.h"
 #include "idl/cdr.h"
 #include "tests/e2e/server/web_server.h"
@@ -23,11 +26,18 @@ class RecordingOnRequest : public TakeTest {
   std::vector<std::string> command() const {
     return serve(source_, {"--loop", "--web", "127.0.0.1:0", "--record-dir", out_, "--pre-roll", "1h"});
   }
+  /// What /api/recordings says of a file.
+  static Json listed(WebServer& server, const std::string& name) {
+    const Json all = Json::parse(request(server.port(), "GET", "/api/recordings").body);
+    for (const Json& one : all["recordings"])
+      if (one["file"] == name) return one;
+    return {{"recording", nullptr}};
+  }
   /// The numbers of the frames in a sound file.
   static std::vector<std::uint64_t> frames_in(const fs::path& file) {
     std::vector<std::uint64_t> out;
     auto reader = RecordingReader::open(file);
-    EXPECT_TRUE(reader) << file;
+    EXPECT_TRUE(reader && !(*reader)->summary().recovered) << file;
     while (reader) {
       const auto message = (*reader)->next();
       EXPECT_TRUE(message) << file;
@@ -51,10 +61,8 @@ TEST_F(RecordingOnRequest, HasWhatCameBeforeAndIsOfferedWhenItIsWhole) {
   const std::string name = Json::parse(started.body)["file"];
   EXPECT_EQ(server.order("take", "start").status, 409);
   ASSERT_TRUE(eventually([&] { return server.recording("take")["frames"] >= 40; }));
-  EXPECT_EQ(request(server.port(), "GET", "/recordings/" + name).status, 404) << "it is being written";
   ASSERT_EQ(server.order("take", "stop").status, 200);
-  ASSERT_TRUE(
-      eventually([&] { return request(server.port(), "HEAD", "/recordings/" + name).status == 200; }));
+  ASSERT_TRUE(eventually([&] { return listed(server, name)["recording"] == false; }));
   const Json state = server.recording("take");
   EXPECT_EQ(state["state"], "off");
   EXPECT_EQ(state["lost"], 0);
@@ -69,6 +77,52 @@ TEST_F(RecordingOnRequest, HasWhatCameBeforeAndIsOfferedWhenItIsWhole) {
   EXPECT_EQ(info.status, 0) << info.err;
   EXPECT_EQ(info.err, "");
   EXPECT_THAT(info.out, HasSubstr("16 stripes"));
+}
+
+TEST_F(RecordingOnRequest, IsReadWhileItIsWritten) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("take", 20)) << server.process().err();
+  ASSERT_EQ(server.order("take", "start").status, 200);
+  const std::string name = server.recording("take")["file"];
+  const std::string at = "/recordings/" + name;
+  ASSERT_TRUE(eventually([&] { return listed(server, name)["recording"] == true; }));
+  const auto read_now = [&](const std::string& into, const std::string& headers = {}) {
+    const Response got = request(server.port(), "GET", at, headers);
+    EXPECT_EQ(got.status, 200);
+    std::ofstream(out_ / into, std::ios::binary) << got.body;
+    return got;
+  };
+  const Response first = read_now("first.mcap");
+  const auto early = frames_in(out_ / "first.mcap");
+  ASSERT_FALSE(early.empty());
+  EXPECT_LT(early.front(), 20U) << "what came before it was asked for can be gone back to";
+  const std::string etag = first.headers.at("etag");
+  ASSERT_TRUE(eventually([&] {
+    return request(server.port(), "HEAD", at, "If-None-Match: " + etag + "\r\n").status == 200;
+  })) << "it grows";
+
+  const Response later = read_now("later.mcap", "If-None-Match: " + etag + "\r\n");
+  const auto frames = frames_in(out_ / "later.mcap");
+  ASSERT_GT(frames.size(), early.size());
+  EXPECT_TRUE(std::equal(early.begin(), early.end(), frames.begin()));
+  EXPECT_EQ(frames.back() - frames.front() + 1, frames.size()) << "without gaps";
+  for (const std::string& file : {(out_ / "later.mcap").string(), (out_ / name).string()}) {
+    const Finished info = run({program("relievo").string(), "info", file, "--json"});
+    EXPECT_EQ(info.status, 0) << info.err;
+    EXPECT_EQ(info.err, "");
+    const Json said = Json::parse(info.out);
+    EXPECT_GE(said["frames"], frames.size()) << file;
+    EXPECT_EQ(said["damaged_parts"], 0) << file;
+    EXPECT_EQ(said["info"]["pattern"]["stripes"], 16) << file;
+  }
+
+  // A page that has the first one open reads on in it, also when the recording has ended.
+  ASSERT_EQ(server.order("take", "stop").status, 200);
+  ASSERT_TRUE(eventually([&] { return listed(server, name)["recording"] == false; }));
+  const Response part = request(server.port(), "GET", at, "Range: bytes=100-\r\nIf-Range: " + etag + "\r\n");
+  EXPECT_EQ(part.status, 206);
+  EXPECT_TRUE(part.body == first.body.substr(100));
+  EXPECT_GT(frames_in(out_ / name).size(), frames.size());
 }
 
 TEST_F(RecordingOnRequest, IsWholeWhereTheServerIsStopped) {

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <fstream>
 #include <numeric>
 
 #include "codec/byte_io.h"
@@ -318,6 +319,116 @@ TEST(RecordingFault, NoRoomAtAllLeavesNoFile) {
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_EQ(WEXITSTATUS(status), 0);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.mcap"));
+}
+
+/// Bytes that this process has read.
+std::uint64_t bytes_read() {
+  std::ifstream io("/proc/self/io");
+  std::string word;
+  std::uint64_t bytes = 0;
+  io >> word >> bytes;
+  EXPECT_EQ(word, "rchar:");
+  return bytes;
+}
+
+TEST(RecordingFault, OfAFileWithoutItsIndexOnlyTheLastChunkIsReadToOpenIt) {
+  test::TempFolder folder;
+  auto writer = create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns});
+  ASSERT_TRUE(writer->add_channel(schema(), channel("t")).ok());
+  for (int i = 0; i < 203; ++i) ASSERT_TRUE(writer->write(message(0, i, 10'000)).ok());
+  const std::uint64_t before = bytes_read();
+  const auto reader = open(folder / "a.mcap");
+  EXPECT_LT(bytes_read() - before, 150'000u) << "of 2 MB";
+  EXPECT_TRUE(reader->summary().recovered);
+  EXPECT_EQ(reader->summary().messages, 200u);
+  EXPECT_EQ(reader->summary().end_ns, message(0, 199, 1).log_time_ns);
+  EXPECT_EQ(reader->summary().lost_bytes, 0u);
+  EXPECT_EQ(read_all(*reader).messages.size(), 200u);
+}
+
+TEST(Recording, WhatIsWholeOfAFileThatIsWrittenIsARecording) {
+  test::TempFolder folder;
+  const auto growing = [&] {
+    auto writer = create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns});
+    EXPECT_EQ(writer->growing()->bytes(), 0u);
+    EXPECT_EQ(writer->growing()->end_at(0), nullptr);
+    EXPECT_TRUE(writer->add_channel(schema(), channel("a")).ok());
+    EXPECT_TRUE(writer->add_attachment({"rig.yaml", "application/yaml", kStart_ns, {'1'}}).ok());
+    for (int i = 0; i < 12; ++i) EXPECT_TRUE(writer->write(message(0, i, 100)).ok());
+    EXPECT_TRUE(writer->add_channel(schema(), channel("b")).ok());
+    EXPECT_TRUE(writer->add_attachment({"late.yaml", "application/yaml", kStart_ns, {'2'}}).ok());
+    for (int i = 12; i < 23; ++i) EXPECT_TRUE(writer->write(message(i % 2 ? 1 : 0, i, 100)).ok());
+    EXPECT_TRUE(writer->finish().ok());
+    return writer->growing();
+  }();
+  const Bytes file = read_file(folder / "a.mcap");
+  std::vector<std::size_t> counts;
+  for (std::size_t bytes = 0; bytes <= file.size(); ++bytes) {
+    const auto end = growing->end_at(bytes);
+    if (!end) continue;
+    Bytes whole(file.begin(), file.begin() + static_cast<std::ptrdiff_t>(bytes));
+    whole.insert(whole.end(), end->begin(), end->end());
+    write_file(folder / "then.mcap", whole);
+    const auto reader = open(folder / "then.mcap");
+    EXPECT_FALSE(reader->summary().recovered) << bytes;
+    const ReadBack back = read_all(*reader);
+    EXPECT_TRUE(back.errors.empty());
+    std::vector<std::uint64_t> of_channels(reader->summary().channels.size());
+    for (const auto& m : back.messages) ++of_channels.at(m.channel);
+    EXPECT_EQ(reader->summary().channel_messages, of_channels);
+    EXPECT_EQ(reader->summary().attachments.size(), of_channels.size()) << "those that were there then";
+    EXPECT_EQ(reader->summary().end_ns, back.messages.back().log_time_ns);
+    counts.push_back(back.messages.size());
+  }
+  EXPECT_EQ(counts, (std::vector<std::size_t>{5, 10, 15, 20, 23}));
+}
+
+TEST(Recording, AFileThatGrowsIsReadOnUntilItIsFinished) {
+  test::TempFolder folder;
+  auto writer = create(folder / "a.mcap", {.chunk_ns = 5 * kStep_ns});
+  ASSERT_TRUE(writer->add_channel(schema(), channel("a")).ok());
+  int written = 0;
+  const auto write_to = [&](int count) {
+    while (written < count) EXPECT_TRUE(writer->write(message(0, written++, 100)).ok());
+  };
+  write_to(12);
+  const auto reader = open(folder / "a.mcap");
+  std::vector<std::uint32_t> got, expected;
+  const auto read_to_end = [&] {
+    for (const auto& m : read_all(*reader).messages) got.push_back(m.sequence);
+    return got.size();
+  };
+  const auto reads_on = [&] {
+    const auto more = reader->read_on();
+    EXPECT_TRUE(more.ok());
+    return more && *more;
+  };
+  EXPECT_EQ(read_to_end(), 10u);
+  EXPECT_FALSE(reads_on());
+  EXPECT_EQ(read_to_end(), 10u);
+  write_to(17);
+  EXPECT_TRUE(reads_on());
+  EXPECT_EQ(read_to_end(), 15u);
+  ASSERT_TRUE(writer->flush_if_due(kStart_ns).ok()) << "the clock was set back";
+  auto earlier = message(0, written++, 100);
+  earlier.log_time_ns = kStart_ns;
+  ASSERT_TRUE(writer->write(earlier).ok());
+  write_to(22);
+  EXPECT_TRUE(reads_on());
+  EXPECT_EQ(read_to_end(), 18u) << "also what is said to be of before";
+  EXPECT_TRUE(reader->summary().recovered);
+  write_to(24);
+  ASSERT_TRUE(writer->finish().ok());
+  EXPECT_TRUE(reads_on());
+  EXPECT_EQ(read_to_end(), 24u);
+  EXPECT_FALSE(reader->summary().recovered);
+  EXPECT_FALSE(reads_on());
+  for (std::uint32_t i = 0; i < 24; ++i) expected.push_back(i);
+  std::ranges::sort(got);  // a chunk's messages come by their times
+  EXPECT_EQ(got, expected) << "each once";
+  got.clear();
+  ASSERT_TRUE(reader->seek(0).ok());
+  EXPECT_EQ(read_to_end(), 24u);
 }
 
 TEST(RecordingFault, KillLosesOnlyTheOpenChunk) {

@@ -5,8 +5,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "codec/recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/web/gateway_fixture.h"
 
@@ -14,13 +16,14 @@ namespace relievo::test {
 namespace {
 
 using Json = nlohmann::json;
+using testing::EndsWith;
 using testing::HasSubstr;
 
 constexpr const char* kFace = "/api/recording/face";
 constexpr const char* kStart = R"({"action":"start"})";
 constexpr const char* kStop = R"({"action":"stop"})";
 
-/// Who records: writes a file at once, and a stream that is called face is all there is.
+/// Who records: a stream that is called face is all there is, and its file holds one chunk at once.
 class OneStream final : public RecordingControl {
  public:
   explicit OneStream(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -35,33 +38,84 @@ class OneStream final : public RecordingControl {
               .frames = 3,
               .bytes = 7,
               .room_bytes = 11};
-    std::ofstream(folder_ / state_.file) << "content";
-    return {};
+    auto writer = RecordingWriter::create(folder_ / state_.file, {.chunk_ns = 0});
+    if (!writer) return writer.error();
+    writer_ = std::move(*writer);
+    growing_ = writer_->growing();
+    if (auto added = writer_->add_channel({"T", "omgidl", "struct T {};"}, {"t", "cdr", "T", {}}); !added)
+      return added.error();
+    return grow();
+  }
+  /// By a chunk of one message, the time of which is its number.
+  Status grow() {
+    const std::lock_guard lock(mutex_);
+    ++messages_;
+    if (auto status = writer_->write({0, messages_, messages_, messages_, Bytes(1000, 7)}); !status)
+      return status;
+    return writer_->flush_if_due(messages_);
   }
   Status stop(const std::string&) override {
     if (state_.activity != RecordingActivity::kRecording) return Error{"is not recorded"};
     state_.activity = RecordingActivity::kOff;
-    return {};
+    const std::lock_guard lock(mutex_);
+    return writer_->finish();
+  }
+  /// As if nothing of it were on the disk.
+  void has_just_begun() {
+    const std::lock_guard lock(mutex_);
+    growing_.reset();
   }
   std::filesystem::path folder() const override { return folder_; }
   bool is_open(const std::string& file) const override {
     return state_.activity == RecordingActivity::kRecording && state_.file == file;
   }
+  std::shared_ptr<const GrowingRecording> growing(const std::string& file) const override {
+    const std::lock_guard lock(mutex_);
+    return state_.file == file ? growing_ : nullptr;
+  }
 
  private:
   const std::filesystem::path folder_;
-  RecordingState state_;  // of the gateway's thread
+  RecordingState state_;      // of the gateway's thread
+  mutable std::mutex mutex_;  // of what follows
+  std::unique_ptr<RecordingWriter> writer_;
+  std::shared_ptr<const GrowingRecording> growing_;
+  std::uint32_t messages_ = 0;
 };
 
 class RecordingApi : public GatewayTest {
  protected:
   void SetUp() override { start({.port = 0, .recordings = &control}); }
   void TearDown() override { gateway.reset(); }
+  Json list() const { return Json::parse(request(port, "GET", "/api/recordings").body); }
   std::vector<std::string> listed() const {
     std::vector<std::string> out;
-    const Json answer = Json::parse(request(port, "GET", "/api/recordings").body);
+    const Json answer = list();
     for (const auto& one : answer["recordings"]) out.push_back(one["file"]);
     return out;
+  }
+  Response get(const std::string& headers = {}) const {
+    return request(port, "GET", "/recordings/face-1.mcap", headers);
+  }
+  static std::string content_of(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  /// Of a recording that has its index.
+  std::uint64_t messages_in(const std::string& content) const {
+    const TempFolder there;
+    std::ofstream(there / "got.mcap", std::ios::binary) << content;
+    auto reader = RecordingReader::open(there / "got.mcap");
+    if (!reader) ADD_FAILURE() << reader.error().message;
+    if (!reader) return 0;
+    EXPECT_FALSE((*reader)->summary().recovered);
+    std::uint64_t read = 0;
+    for (auto message = (*reader)->next(); message && *message; message = (*reader)->next())
+      EXPECT_EQ((**message).log_time_ns, static_cast<std::int64_t>(++read));
+    EXPECT_EQ((*reader)->summary().messages, read);
+    EXPECT_EQ((*reader)->summary().channel_messages, std::vector<std::uint64_t>{read});
+    EXPECT_EQ((*reader)->summary().end_ns, static_cast<std::int64_t>(read));
+    return read;
   }
 
   TempFolder folder;
@@ -81,14 +135,65 @@ TEST_F(RecordingApi, StartsStopsAndSaysWhatThereIs) {
   state = Json::parse(request(port, "GET", kFace).body);
   EXPECT_EQ(state["frames"], 3);
   EXPECT_EQ(state["file"], "face-1.mcap");
-  EXPECT_TRUE(listed().empty()) << "it is being written";
-  EXPECT_EQ(request(port, "GET", "/recordings/face-1.mcap").status, 404);
+  EXPECT_EQ(list()["recordings"][0]["recording"], true);
   EXPECT_EQ(Json::parse(post_json(port, kFace, kStop).body)["state"], "off");
   EXPECT_EQ(listed(), std::vector<std::string>{"face-1.mcap"});
-  EXPECT_EQ(request(port, "GET", "/recordings/face-1.mcap").body, "content");
-  const auto part = request(port, "GET", "/recordings/face-1.mcap", "Range: bytes=1-3\r\n");
+  EXPECT_EQ(list()["recordings"][0]["recording"], false);
+  const std::string content = content_of(folder / "face-1.mcap");
+  EXPECT_EQ(get().body, content);
+  const auto part = get("Range: bytes=1-3\r\n");
   EXPECT_EQ(part.status, 206);
-  EXPECT_EQ(part.body, "ont");
+  EXPECT_EQ(part.body, "MCA");
+}
+
+TEST_F(RecordingApi, AFileThatIsBeingWrittenIsReadUpToItsLastWholeChunk) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  const auto first = get();
+  ASSERT_EQ(first.status, 200) << first.body;
+  EXPECT_EQ(list()["recordings"][0]["bytes"], first.body.size());
+  EXPECT_EQ(messages_in(first.body), 1u);
+  const std::string etag = first.headers.at("etag");
+  EXPECT_EQ(get("If-None-Match: " + etag + "\r\n").status, 304) << "nothing more came";
+
+  ASSERT_TRUE(control.grow());
+  ASSERT_TRUE(control.grow());
+  const auto second = get("If-None-Match: " + etag + "\r\n");
+  EXPECT_EQ(second.status, 200);
+  EXPECT_NE(second.headers.at("etag"), etag);
+  EXPECT_EQ(messages_in(second.body), 3u);
+
+  // Who began before goes on with what there was, in parts of any length, also over where it ended.
+  const auto in_parts = [&](std::size_t step) {
+    std::string got;
+    for (std::size_t at = 0; at < first.body.size(); at += step) {
+      const auto part = get("Range: bytes=" + std::to_string(at) + "-" + std::to_string(at + step - 1) +
+                            "\r\nIf-Range: " + etag + "\r\n");
+      EXPECT_EQ(part.status, 206);
+      EXPECT_THAT(part.headers.at("content-range"), EndsWith("/" + std::to_string(first.body.size())));
+      got += part.body;
+    }
+    return got;
+  };
+  EXPECT_EQ(in_parts(97), first.body);
+  EXPECT_EQ(in_parts(1000), first.body);
+  ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
+  EXPECT_EQ(in_parts(211), first.body) << "although it is finished now";
+  EXPECT_EQ(get().body, content_of(folder / "face-1.mcap"));
+
+  // What was never a state of it is none.
+  const std::string inode = etag.substr(0, etag.rfind('-') + 1);
+  for (const std::string& other : {inode + "1\"", inode + "\"", inode + "ffffffffffffffffff\"",
+                                   std::string("\"growing-1-1\""), std::string("\"growing\"")})
+    EXPECT_EQ(get("Range: bytes=0-9\r\nIf-Range: " + other + "\r\n").status, 200) << other;
+}
+
+TEST_F(RecordingApi, AFileThatHasNoWholeChunkYetIsNotOfferedYet) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  control.has_just_begun();
+  EXPECT_TRUE(listed().empty());
+  const auto early = get();
+  EXPECT_EQ(early.status, 404);
+  EXPECT_THAT(early.body, HasSubstr("ask again"));
 }
 
 TEST_F(RecordingApi, RefusesWhatItMust) {
