@@ -51,6 +51,8 @@ std::string to_yaml(const Rig& rig) {
   out += matrix("projector_from_camera_rotation", 3, 3, rig.projector_from_camera_rotation);
   out += matrix("projector_from_camera_translation", 3, 1, rig.projector_from_camera_translation);
   out += matrix("colour_matrix", 3, 3, rig.colour_matrix);
+  if (rig.stereo_rms_px > 0) out += "stereo_rms_px: " + number(rig.stereo_rms_px) + "\n";
+  if (rig.scale_error > 0) out += "scale_error: " + number(rig.scale_error) + "\n";
   return out;
 }
 

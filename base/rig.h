@@ -43,6 +43,9 @@ struct Rig {
   std::array<double, 9> projector_from_camera_rotation{};     // row-major
   std::array<double, 3> projector_from_camera_translation{};  // metres
   std::array<double, 9> colour_matrix{};  // row-major; M of Eq. 1: projected RGB = M * captured RGB
+  // How good its calibration found it; 0: not said.
+  double stereo_rms_px = 0;  // what the board's corners are off by in either picture
+  double scale_error = 0;    // what sizes are wrong by, relative, RMS over the places of the board
 };
 
 /// "interlaced" or "progressive".

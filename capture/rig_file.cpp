@@ -153,6 +153,8 @@ Rig rig_of(const cv::FileStorage& storage) {
   matrix(storage, "projector_from_camera_rotation", 3, 3, rig.projector_from_camera_rotation);
   matrix(storage, "projector_from_camera_translation", 3, 1, rig.projector_from_camera_translation);
   matrix(storage, "colour_matrix", 3, 3, rig.colour_matrix);
+  if (!storage["stereo_rms_px"].empty()) rig.stereo_rms_px = number(storage, "stereo_rms_px", 0, kMaxPixels);
+  if (!storage["scale_error"].empty()) rig.scale_error = number(storage, "scale_error", 0, 1);
   check_rotation(rig.projector_from_camera_rotation);
   const auto& t = rig.projector_from_camera_translation;
   if (std::hypot(t[0], t[1], t[2]) < 1e-6) {

@@ -106,6 +106,11 @@ nlohmann::json pinhole_json(const PinholeModel& model) {
   return {{"size", {model.width, model.height}}, {"matrix", model.matrix}, {"distortion", model.distortion}};
 }
 
+/// Null where the rig does not say it.
+nlohmann::json known(double quality) {
+  return quality > 0 ? nlohmann::json(quality) : nlohmann::json();
+}
+
 nlohmann::json info_json(const StreamInfo& info) {
   return {
       {"stream", info.stream},
@@ -118,7 +123,9 @@ nlohmann::json info_json(const StreamInfo& info) {
         {"projector", pinhole_json(info.rig.projector)},
         {"projector_from_camera_rotation", info.rig.projector_from_camera_rotation},
         {"projector_from_camera_translation", info.rig.projector_from_camera_translation},
-        {"colour_matrix", info.rig.colour_matrix}}},
+        {"colour_matrix", info.rig.colour_matrix},
+        {"stereo_rms_px", known(info.rig.stereo_rms_px)},
+        {"scale_error", known(info.rig.scale_error)}}},
       {"pattern",
        {{"base", info.pattern.base}, {"slides", info.pattern.slides}, {"stripes", info.pattern.stripes()}}}};
 }

@@ -179,6 +179,10 @@ Rig read_rig(Cursor& in, bool& possible) {
     const auto order = in.get<std::uint32_t>();
     possible = possible && order <= 1;
     rig.field_order = order == 0 ? FieldOrder::kTop : FieldOrder::kBottom;
+    if (!in.more()) return;  // of a server that did not say how good its rig is
+    rig.stereo_rms_px = in.number();
+    rig.scale_error = in.number();
+    possible = possible && rig.stereo_rms_px >= 0 && rig.scale_error >= 0;
   });
   return rig;
 }

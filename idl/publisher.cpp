@@ -50,6 +50,8 @@ relievo_Rig to_dds(const Rig& rig) {
   std::copy(rig.colour_matrix.begin(), rig.colour_matrix.end(), out.colour_matrix);
   out.field_order =
       rig.field_order == FieldOrder::kTop ? relievo_FIELD_ORDER_TOP : relievo_FIELD_ORDER_BOTTOM;
+  out.stereo_rms_px = rig.stereo_rms_px;
+  out.scale_error = rig.scale_error;
   return out;
 }
 

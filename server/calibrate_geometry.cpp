@@ -82,6 +82,7 @@ void print(const Geometry& g, const std::optional<RigDifference>& d, const std::
   std::printf("           %.3f px with the corners left out of these views\n", g.stereo_rms_all);
   std::printf("squares    distances between neighbouring corners are wrong by %.2f mm (RMS)\n",
               1000 * g.square_error_m);
+  std::printf("size       of the board is wrong by %.3f %% (RMS over the views)\n", 100 * g.scale_error);
   print_lens("camera   ", g.camera, g.sigma_px.data());
   print_lens("projector", g.projector, g.sigma_px.data() + 4);
   if (g.projector.cy() < 0 || g.projector.cy() > g.projector.height - 1) {
@@ -156,10 +157,7 @@ Status run(const Options& options, StopSignal& stop) {
   rig.scan = before.scan.value_or(options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive);
   rig.frame_rate = before.frame_rate.value_or(options.frame_rate);
   rig.colour_matrix = before.colour_matrix.value_or(std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
-  rig.camera = geometry->camera;
-  rig.projector = geometry->projector;
-  rig.projector_from_camera_rotation = geometry->projector_from_camera_rotation;
-  rig.projector_from_camera_translation = geometry->projector_from_camera_translation;
+  rig = with_geometry(rig, *geometry);
   if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
   if (!options.pictures.empty()) {
     if (const Status made = make_folder(options.pictures); !made) return made;

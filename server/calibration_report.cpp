@@ -67,6 +67,7 @@ std::string geometry_report(const Geometry& g) {
                          {"projector_rms_px", g.projector_rms},
                          {"plane_rms_mm", 1000 * g.plane_rms_m},
                          {"square_error_mm", 1000 * g.square_error_m},
+                         {"scale_error", g.scale_error},
                          {"views_used", g.views},
                          {"corners_used", g.corners},
                          {"camera", lens_json(g.camera, g.sigma_px.data())},

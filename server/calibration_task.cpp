@@ -147,10 +147,7 @@ class BoardTask final : public CalibrationTask {
     if (!geometry) return geometry.error();
     Rig rig = before_.whole.value_or(rig_);
     rig.colour_matrix = colours_;
-    rig.camera = geometry->camera;
-    rig.projector = geometry->projector;
-    rig.projector_from_camera_rotation = geometry->projector_from_camera_rotation;
-    rig.projector_from_camera_translation = geometry->projector_from_camera_translation;
+    rig = with_geometry(rig, *geometry);
     return CalibrationResult{to_yaml(rig), geometry_report(*geometry)};
   }
   std::optional<Image8> coverage() const override { return coverage_.draw(); }

@@ -321,6 +321,7 @@ class Calibration {
     const PlaneCheck all = together(planes);
     g.plane_rms_m = all.plane_rms_m;
     g.square_error_m = all.length_rms_m;
+    g.scale_error = all.scale_error;
     return std::move(out_);
   }
 
@@ -339,6 +340,16 @@ Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, cons
   } catch (const cv::Exception& e) {
     return Error{"the views do not determine the rig (" + e.err + "): take more, with the board tilted"};
   }
+}
+
+Rig with_geometry(Rig rig, const Geometry& geometry) {
+  rig.camera = geometry.camera;
+  rig.projector = geometry.projector;
+  rig.projector_from_camera_rotation = geometry.projector_from_camera_rotation;
+  rig.projector_from_camera_translation = geometry.projector_from_camera_translation;
+  rig.stereo_rms_px = geometry.stereo_rms;
+  rig.scale_error = geometry.scale_error;
+  return rig;
 }
 
 }  // namespace relievo

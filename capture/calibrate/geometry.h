@@ -56,6 +56,7 @@ struct Geometry {
   double distance_m = 0;      // median depth of the corners
   double plane_rms_m = 0;
   double square_error_m = 0;              // RMS of the distances between neighbouring triangulated corners
+  double scale_error = 0;                 // RMS over the views of the board's size, relative
   std::vector<ViewReport> reports;        // every view, in the order given
   std::vector<CornerResidual> residuals;  // of used corners
 };
@@ -64,6 +65,9 @@ struct Geometry {
 /// determine the rig; the error says which views and why.
 Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, const PinholeModel& camera_size,
                                     const PinholeModel& projector_size, const GeometryOptions& options);
+
+/// `rig` with the devices, their pose and the quality that were found.
+Rig with_geometry(Rig rig, const Geometry& geometry);
 
 /// Residuals as arrows, 200 times as long, over the camera's picture (left) and the projector's (right). RGB.
 Image8 draw_residuals(const Geometry& geometry);

@@ -15,10 +15,28 @@ struct Seen {
   Eigen::Vector3d point;
 };
 
-double plane_rms(const std::vector<Seen>& corners) {
+Eigen::Vector3d centre_of(const std::vector<Seen>& corners) {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const Seen& c : corners) centre += c.point;
-  centre /= static_cast<double>(corners.size());
+  return centre / static_cast<double>(corners.size());
+}
+
+/// Over the whole board, where the corners' own errors hardly count.
+double scale_error(const std::vector<Seen>& corners) {
+  const Eigen::Vector3d centre = centre_of(corners);
+  Eigen::Vector2d board_centre = Eigen::Vector2d::Zero();
+  for (const Seen& c : corners) board_centre += Eigen::Vector2d(c.board_m[0], c.board_m[1]);
+  board_centre /= static_cast<double>(corners.size());
+  double seen = 0, board = 0;
+  for (const Seen& c : corners) {
+    seen += (c.point - centre).squaredNorm();
+    board += (Eigen::Vector2d(c.board_m[0], c.board_m[1]) - board_centre).squaredNorm();
+  }
+  return std::sqrt(seen / board) - 1;
+}
+
+double plane_rms(const std::vector<Seen>& corners) {
+  const Eigen::Vector3d centre = centre_of(corners);
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Seen& c : corners) spread += (c.point - centre) * (c.point - centre).transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
@@ -48,6 +66,7 @@ PlaneCheck check_plane(const PinholeModel& camera, const PinholeModel& projector
   out.corners = seen.size();
   if (seen.size() < 4) return out;
   out.plane_rms_m = plane_rms(seen);
+  out.scale_error = scale_error(seen);
   double squares = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     for (std::size_t j = i + 1; j < seen.size(); ++j) {
@@ -67,10 +86,14 @@ PlaneCheck together(const std::vector<PlaneCheck>& checks) {
   for (const PlaneCheck& c : checks) {
     out.plane_rms_m += static_cast<double>(c.corners) * c.plane_rms_m * c.plane_rms_m;
     out.length_rms_m += static_cast<double>(c.lengths) * c.length_rms_m * c.length_rms_m;
+    out.scale_error += static_cast<double>(c.corners) * c.scale_error * c.scale_error;
     out.corners += c.corners;
     out.lengths += c.lengths;
   }
-  if (out.corners > 0) out.plane_rms_m = std::sqrt(out.plane_rms_m / static_cast<double>(out.corners));
+  if (out.corners > 0) {
+    out.plane_rms_m = std::sqrt(out.plane_rms_m / static_cast<double>(out.corners));
+    out.scale_error = std::sqrt(out.scale_error / static_cast<double>(out.corners));
+  }
   if (out.lengths > 0) out.length_rms_m = std::sqrt(out.length_rms_m / static_cast<double>(out.lengths));
   return out;
 }

@@ -13,12 +13,13 @@ struct PlaneCheck {
   std::size_t corners = 0, lengths = 0;
   double plane_rms_m = 0;   // distance of triangulated corners from the plane fitted to them
   double length_rms_m = 0;  // error of the distance between neighbouring corners
+  double scale_error = 0;   // the board's size against its true one, relative; above 0: too large
 };
 
 PlaneCheck check_plane(const PinholeModel& camera, const PinholeModel& projector,
                        const Pose& projector_from_camera, const BoardView& view);
 
-/// RMS over all corners and lengths of several views.
+/// RMS over all corners, lengths and sizes of several views.
 PlaneCheck together(const std::vector<PlaneCheck>& checks);
 
 }  // namespace relievo

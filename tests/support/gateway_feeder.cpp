@@ -3,7 +3,8 @@
 // codec. Prints "listening PORT" and obeys lines on stdin: start NAME, also NAME (a second stream of the
 // same frames), apart N (its frames are N ahead of the first one's), stop, frame NUMBER (that one, then
 // stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
-// 8th). Ends when stdin does, so that no test leaves it behind.
+// 8th), rig RMS SCALE (how good the first one's is found to be, which it says from then on). Ends when stdin
+// does, so that no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -29,6 +30,7 @@ constexpr int kRows = 120;
 constexpr int kWidth = 640;
 constexpr int kHeight = 480;
 constexpr float kFocal = 800;
+constexpr double kBaseline_m = 0.2;
 
 /// A plane at 1.2 m with a ball's worth of relief that moves and breathes.
 float depth_m(float u, float v, float t) {
@@ -97,6 +99,22 @@ StreamInfo make_info(const std::string& name) {
   return info;
 }
 
+/// What a rig may say of itself.
+struct RigQuality {
+  double stereo_rms_px = 0, scale_error = 0;
+};
+
+/// With a projector to the camera's right, and how good that rig is.
+StreamInfo make_info(const std::string& name, const RigQuality& quality) {
+  StreamInfo info = make_info(name);
+  info.rig.projector = info.rig.camera;
+  info.rig.projector_from_camera_rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.rig.projector_from_camera_translation = {-kBaseline_m, 0, 0};
+  info.rig.stereo_rms_px = quality.stereo_rms_px;
+  info.rig.scale_error = quality.scale_error;
+  return info;
+}
+
 /// What stdin asked for; the feeding loop looks once a frame.
 struct Orders {
   std::mutex mutex;
@@ -106,6 +124,7 @@ struct Orders {
   bool announce = false, withdraw = false, feeding = false, corrupt = false, quit = false;
   std::string state, text;
   std::optional<std::uint64_t> only;  // this frame, then none
+  std::optional<RigQuality> quality;
   TextureCodec texture = TextureCodec::kJpeg;
 };
 
@@ -135,6 +154,10 @@ void read_orders(Orders& orders) {
     } else if (verb == "gone") {
       orders.withdraw = true;
       orders.feeding = false;
+    } else if (verb == "rig") {
+      RigQuality quality;
+      if (words >> quality.stereo_rms_px >> quality.scale_error) orders.quality = quality;
+      orders.announce = true;
     } else if (verb == "texture") {
       words >> name;
       orders.texture = texture_codec_named(name).value_or(TextureCodec::kJpeg);
@@ -179,7 +202,7 @@ int feed(std::uint16_t port, double rate) {
     const std::lock_guard lock(orders.mutex);
     if (orders.quit) return 0;
     if (std::exchange(orders.announce, false)) {
-      gateway.announce(make_info(orders.stream));
+      gateway.announce(orders.quality ? make_info(orders.stream, *orders.quality) : make_info(orders.stream));
       if (!orders.also.empty()) gateway.announce(make_info(orders.also));
     }
     if (std::exchange(orders.withdraw, false)) gateway.withdraw(orders.stream);

@@ -27,14 +27,17 @@ Json pinhole_json(const PinholeModel& model) {
 }
 
 Json rig_json(const StreamInfo& info) {
-  return {{"scan", to_string(info.rig.scan)},
-          {"frame_rate", info.rig.frame_rate},
-          {"stripes", info.pattern.stripes()},
-          {"slides", info.pattern.slides},
-          {"camera", pinhole_json(info.rig.camera)},
-          {"projector", pinhole_json(info.rig.projector)},
-          {"projector_from_camera_rotation", info.rig.projector_from_camera_rotation},
-          {"projector_from_camera_translation", info.rig.projector_from_camera_translation}};
+  Json json = {{"scan", to_string(info.rig.scan)},
+               {"frame_rate", info.rig.frame_rate},
+               {"stripes", info.pattern.stripes()},
+               {"slides", info.pattern.slides},
+               {"camera", pinhole_json(info.rig.camera)},
+               {"projector", pinhole_json(info.rig.projector)},
+               {"projector_from_camera_rotation", info.rig.projector_from_camera_rotation},
+               {"projector_from_camera_translation", info.rig.projector_from_camera_translation}};
+  if (info.rig.stereo_rms_px > 0) json["stereo_rms_px"] = info.rig.stereo_rms_px;
+  if (info.rig.scale_error > 0) json["scale_error"] = info.rig.scale_error;
+  return json;
 }
 
 Json status_json(const ServerStatus& status) {

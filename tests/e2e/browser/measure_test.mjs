@@ -77,6 +77,25 @@ const onFeeder = {
     await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 0);
   },
 
+  async 'what the rig itself is wrong by is in it'(page) {
+    feeder.say('rig 0.4 0.01');
+    const read = () => page.textContent('#cursor');
+    for (let i = 0; i < 100 && !/±/.test(await read()); ++i) {
+      await page.mouse.move(750 + (i % 2), 400); // which reads again
+      await page.waitForTimeout(50);
+    }
+    assert.match(await read(), /depth [\d.]+ ± [\d.]+ mm/);
+    const { frame } = await look(page);
+    const m = await measure(page, 'Distance', [pointOf(0.2, 0.2, frame), pointOf(0.52, 0.55, frame)]);
+    assert.equal(m.surface, null);
+    assert.ok(m.sigma > 0.01 * m.value && m.sigma < 0.02 * m.value, `${m.sigma} of ${m.value}`); // 1 % of it, and depth's
+    const { value: depth, rig } = await measure(page, 'Point', [pointOf(0.5, 0.5, frame)]);
+    // Straight ahead z² rms / (f b), and 1 %: both devices have 800 px, 0.2 m apart.
+    near(rig, Math.hypot((depth * depth * 0.4) / (800 * 0.2), 0.01 * depth), 0.03 * rig, 'of depth');
+    assert.match(await page.textContent('#panel-measure'), /of the rig as its calibration found it/);
+    await page.click('#panel-measure button:text-is("Clear")');
+  },
+
   async 'a drag measures nothing, a miss says so'(page) {
     await choose(page, 'Point');
     await page.mouse.move(700, 400);

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "capture/rig_file.h"
 #include "tests/support/process.h"
 #include "tests/support/temp_folder.h"
 
@@ -51,6 +52,12 @@ TEST(CalibrationExample, FromNothingToAReconstruction) {
   EXPECT_LT(geometry.at("compare").at("baseline_mm").get<double>(), 2);
   EXPECT_LT(geometry.at("compare").at("depth_rms_mm").get<double>(), 1);
   EXPECT_GT(fs::file_size(folder / "pictures/residuals.png"), 10000u);
+  const auto written = read_rig(rig);
+  ASSERT_TRUE(written.ok()) << written.error().message;
+  EXPECT_EQ(written->stereo_rms_px, geometry.at("stereo_rms_px").get<double>());
+  EXPECT_EQ(written->scale_error, geometry.at("scale_error").get<double>());
+  EXPECT_GT(written->scale_error, 0);
+  EXPECT_LT(written->scale_error, 0.001);
 
   // A take of the same rig, reconstructed with what was just calibrated instead of the truth.
   const std::string take = (folder / "take").string();

@@ -11,6 +11,7 @@
 
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/compare_rigs.h"
+#include "capture/calibrate/plane_check.h"
 #include "capture/pattern/gray_code.h"
 #include "tests/unit/calibrate/true_rig.h"
 
@@ -38,18 +39,19 @@ GrayStack stack_of(const Rig& rig, const std::vector<Image8>& pictures) {
   return stack;
 }
 
+Pose pose_between(const Rig& rig) {
+  const auto& r = rig.projector_from_camera_rotation;
+  const double angle = std::acos((r[0] + r[4] + r[8] - 1) / 2);
+  const double scale = angle / (2 * std::sin(angle));
+  const auto& t = rig.projector_from_camera_translation;
+  return {scale * (r[7] - r[5]), scale * (r[2] - r[6]), scale * (r[3] - r[1]), t[0], t[1], t[2]};
+}
+
 /// Corners as ideal devices would see them, with noise: no pictures.
 std::vector<MeasuredView> ideal_views(const Rig& rig, int count, double noise_px) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0, noise_px);
-  Pose between{};
-  {  // rotation vector of truth()'s rotation
-    const auto& r = rig.projector_from_camera_rotation;
-    const double angle = std::acos((r[0] + r[4] + r[8] - 1) / 2);
-    const double scale = angle / (2 * std::sin(angle));
-    between = {scale * (r[7] - r[5]), scale * (r[2] - r[6]), scale * (r[3] - r[1]), 0, 0, 0};
-    for (std::size_t i = 0; i < 3; ++i) between[3 + i] = rig.projector_from_camera_translation[i];
-  }
+  const Pose between = pose_between(rig);
   std::vector<MeasuredView> views;
   for (const Pose& pose : example_poses(rig, kBoard, 1.0, count, 3)) {
     MeasuredView& view = views.emplace_back(MeasuredView{.name = "view " + std::to_string(views.size())});
@@ -106,6 +108,36 @@ TEST(Geometry, IdealCornersGiveTheRigBackWithinItsOwnSigmas) {
     EXPECT_LT(geometry->sigma_px[i], 4) << i;
   }
   EXPECT_LT(compare_rigs(rig_of(*geometry), rig, 1.0)->depth_rms_m, 0.0004);
+}
+
+TEST(Geometry, ABoardThatLooksTooLargeIsAScaleError) {
+  const Rig rig = truth();
+  const auto geometry = calibrate(rig, ideal_views(rig, 12, 0.05));
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  EXPECT_GT(geometry->scale_error, 0);
+  EXPECT_LT(geometry->scale_error, 3e-4);
+  for (const double baseline : {1.01, 0.99}) {  // the depth of all goes with it
+    std::vector<PlaneCheck> checks;
+    for (const MeasuredView& measured : ideal_views(rig, 4, 0)) {
+      Pose pose = pose_between(rig);
+      for (std::size_t i = 3; i < 6; ++i) pose[i] *= baseline;
+      checks.push_back(check_plane(rig.camera, rig.projector, pose,
+                                   {.corners = measured.corners, .camera_from_board = {}}));
+      EXPECT_NEAR(checks.back().scale_error, baseline - 1, 1e-6);
+    }
+    EXPECT_NEAR(together(checks).scale_error, 0.01, 1e-6);
+  }
+}
+
+TEST(Geometry, WhatItFoundGoesIntoTheRig) {
+  const Rig rig = truth();
+  const auto geometry = calibrate(rig, ideal_views(rig, 12, 0.05));
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  const Rig found = with_geometry(rig, *geometry);
+  EXPECT_EQ(found.camera.matrix, geometry->camera.matrix);
+  EXPECT_EQ(found.stereo_rms_px, geometry->stereo_rms);
+  EXPECT_EQ(found.scale_error, geometry->scale_error);
+  EXPECT_EQ(found.colour_matrix, rig.colour_matrix);
 }
 
 TEST(Geometry, ABadViewIsNamedAndLeftOut) {

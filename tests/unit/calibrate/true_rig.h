@@ -43,12 +43,7 @@ inline Result<Geometry> calibrate(const Rig& rig, const std::vector<MeasuredView
 }
 
 inline Rig rig_of(const Geometry& geometry) {
-  Rig rig = truth();
-  rig.camera = geometry.camera;
-  rig.projector = geometry.projector;
-  rig.projector_from_camera_rotation = geometry.projector_from_camera_rotation;
-  rig.projector_from_camera_translation = geometry.projector_from_camera_translation;
-  return rig;
+  return with_geometry(truth(), geometry);
 }
 
 }  // namespace relievo

@@ -169,6 +169,33 @@ TEST(RigFile, FieldOrderIsTopUnlessItSaysOtherwise) {
   EXPECT_THAT(read.error().message, HasSubstr("field_order must be top or bottom"));
 }
 
+TEST(RigFile, SaysHowGoodItsCalibrationFoundItWhereThatIsKnown) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  Rig rig = test::small_rig(Scan::kInterlaced);
+  const std::string without = to_yaml(rig);
+  EXPECT_THAT(without, testing::Not(testing::AnyOf(HasSubstr("stereo_rms_px"), HasSubstr("scale_error"))));
+  test::write_text(file, without);
+  Result<Rig> read = read_rig(file);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(to_yaml(*read), without);
+
+  rig.stereo_rms_px = 1.0 / 7;
+  rig.scale_error = 3e-4;
+  test::write_text(file, to_yaml(rig));
+  read = read_rig(file);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->stereo_rms_px, rig.stereo_rms_px);
+  EXPECT_EQ(read->scale_error, rig.scale_error);
+
+  for (const auto& [key, wrong] : {std::pair("stereo_rms_px", "-0.5"), std::pair("scale_error", "30.0")}) {
+    test::write_text(file, without + key + ": " + wrong + "\n");
+    read = read_rig(file);
+    ASSERT_FALSE(read) << key;
+    EXPECT_THAT(read.error().message, HasSubstr(std::string(key) + " is "));
+  }
+}
+
 TEST(PatternFile, SchemeIsComplementaryUnlessItSaysOtherwise) {
   test::TempFolder folder;
   const auto file = folder.path() / "pattern.yaml";

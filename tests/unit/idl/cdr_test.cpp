@@ -145,8 +145,8 @@ TEST(Cdr, SurvivesRandomDamage) {
 }
 
 // As a server of the first version wrote it, whose rig ends behind the colour matrix and whose pattern behind
-// the stripes; with `appended`, as one of today does.
-CdrWriter description(std::vector<std::uint32_t> appended) {
+// the stripes; with `appended`, as a later one did, and with `quality`, as one of today.
+CdrWriter description(std::vector<std::uint32_t> appended, std::vector<double> quality = {}) {
   const auto pinhole = [](CdrWriter& w) {
     w.put<std::uint32_t>(2 * 4 + 14 * 8).put<std::uint32_t>(640).put<std::uint32_t>(480);
     for (int i = 0; i < 14; ++i) w.put<double>(i);
@@ -154,12 +154,14 @@ CdrWriter description(std::vector<std::uint32_t> appended) {
   CdrWriter w;
   w.text("face").text("sim").put<std::int64_t>(9);
   const std::uint32_t more = appended.empty() ? 0 : 4;
-  w.put<std::uint32_t>(4 + 8 + 2 * (4 + 2 * 4 + 14 * 8) + (9 + 3 + 9) * 8 + more);
+  w.put<std::uint32_t>(4 + 8 + 2 * (4 + 2 * 4 + 14 * 8) + (9 + 3 + 9) * 8 + more +
+                       8 * static_cast<std::uint32_t>(quality.size()));
   w.put<std::uint32_t>(0).put(29.97);
   pinhole(w);
   pinhole(w);
   for (int i = 0; i < 21; ++i) w.put<double>(i);
   if (more > 0) w.put(appended[0]);
+  for (const double value : quality) w.put(value);
   w.put<std::uint32_t>(3 * 4 + 4 + 4 + 2 * 4 + more).put<std::uint32_t>(4).put<std::uint32_t>(2);
   w.octets({1, 2, 4, 7}).put<std::uint32_t>(2).put<std::uint32_t>(0).put<std::uint32_t>(15);
   if (more > 0) w.put(appended[1]);
@@ -181,6 +183,20 @@ TEST(Cdr, ReadsFieldOrderAndScheme) {
   EXPECT_EQ(info->pattern.scheme, Scheme::kWhiteFrame);
   EXPECT_FALSE(read_info_cdr(description({2, 0}).finish()).ok());
   EXPECT_FALSE(read_info_cdr(description({0, 4}).finish()).ok());
+  EXPECT_EQ(info->rig.stereo_rms_px, 0);
+  EXPECT_EQ(info->rig.scale_error, 0);
+}
+
+TEST(Cdr, ReadsHowGoodTheRigIs) {
+  const auto info = read_info_cdr(description({1, 2}, {0.25, 5e-4}).finish());
+  ASSERT_TRUE(info.ok()) << info.error().message;
+  EXPECT_EQ(info->rig.stereo_rms_px, 0.25);
+  EXPECT_EQ(info->rig.scale_error, 5e-4);
+  EXPECT_EQ(info->pattern.scheme, Scheme::kWhiteFrame);
+  EXPECT_FALSE(read_info_cdr(description({1, 2}, {-0.25, 0}).finish()).ok());
+  EXPECT_FALSE(
+      read_info_cdr(description({1, 2}, {0, std::numeric_limits<double>::quiet_NaN()}).finish()).ok());
+  EXPECT_FALSE(read_info_cdr(description({1, 2}, {0.25}).finish()).ok());
 }
 
 TEST(Cdr, SchemaIsTheWholeIdl) {

@@ -111,6 +111,8 @@ bool wait_for_readers(const AnyPublisher& publisher, int count) {
 TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   StreamInfo info = test::example_info("late");
   info.rig.field_order = FieldOrder::kBottom;
+  info.rig.stereo_rms_px = 0.25;
+  info.rig.scale_error = 5e-4;
   info.pattern.scheme = Scheme::kWhiteFrame;
   auto publisher = expect_made(Publisher::create(kDomain, info));
   ASSERT_TRUE(publisher);

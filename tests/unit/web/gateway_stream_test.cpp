@@ -33,6 +33,20 @@ TEST_F(GatewayStream, InfoComesFirstAndDescribesTheRig) {
   EXPECT_EQ(info["frame_rate"], 29.97);
   EXPECT_EQ(info["camera"]["width"], 640);
   EXPECT_EQ(info["camera"]["cx"], 319.5);
+  EXPECT_FALSE(info.contains("stereo_rms_px") || info.contains("scale_error"));
+}
+
+TEST_F(GatewayStream, InfoSaysHowGoodTheRigIs) {
+  StreamInfo described = make_info();
+  described.rig.stereo_rms_px = 0.25;
+  described.rig.scale_error = 5e-4;
+  gateway->announce(described);
+  WsClient client(port, "face");
+  const auto message = client.next();
+  ASSERT_TRUE(message);
+  const auto info = Json::parse(message->data);
+  EXPECT_EQ(info["stereo_rms_px"], 0.25);
+  EXPECT_EQ(info["scale_error"], 5e-4);
 }
 
 TEST_F(GatewayStream, AFrameCarriesItsTimesAndBytes) {

@@ -50,6 +50,12 @@ class Cursor {
   skip(count: number): void {
     this.take(count, 1);
   }
+  /** Whether a struct, of which read() gives the members, holds more than was read. */
+  appendable<T>(read: (more: () => boolean) => T): T {
+    const length = this.u32();
+    const end = this.at + length;
+    return read(() => this.at < end);
+  }
 
   private take(size: number, align: number): number {
     const at = this.base + Math.ceil((this.at - this.base) / align) * align;
@@ -91,19 +97,26 @@ export function readStreamInfo(bytes: Uint8Array): StreamInfo {
   cursor.u32();
   const [stream, source] = [cursor.text(), cursor.text()];
   cursor.time(); // started
-  cursor.u32(); // the rig's length
-  const scan = cursor.u32() === 0 ? 'interlaced' : 'progressive';
-  const frame_rate = cursor.double();
-  const camera = readPinhole(cursor);
-  return { stream, source, frame_rate, scan, stripes: 0, camera };
+  return cursor.appendable((more) => {
+    const scan = cursor.u32() === 0 ? 'interlaced' : 'progressive';
+    const frame_rate = cursor.double();
+    const [camera, projector] = [readPinhole(cursor), readPinhole(cursor)];
+    const { width, height, fx, fy, cx, cy, distortion = [] } = camera;
+    const possible = width > 0 && height > 0 && [fx, fy, cx, cy, ...distortion].every(Number.isFinite) && fx > 0 && fy > 0;
+    if (!possible) throw new Error('a description of an impossible camera');
+    const projector_from_camera_rotation = cursor.doubles(9);
+    const projector_from_camera_translation = cursor.doubles(3);
+    cursor.doubles(9); // colours
+    if (more()) cursor.u32(); // field order
+    const [stereo_rms_px = 0, scale_error = 0] = more() ? cursor.doubles(2) : [];
+    const pose = { projector, projector_from_camera_rotation, projector_from_camera_translation };
+    return { stream, source, frame_rate, scan, stripes: 0, camera, ...pose, stereo_rms_px, scale_error };
+  });
 }
 
 function readPinhole(cursor: Cursor): Pinhole {
   cursor.u32();
   const [width, height] = [cursor.u32(), cursor.u32()];
   const matrix = cursor.doubles(9);
-  const distortion = cursor.doubles(5);
-  const possible = width > 0 && height > 0 && [...matrix, ...distortion].every(Number.isFinite) && matrix[0]! > 0 && matrix[4]! > 0;
-  if (!possible) throw new Error('a description of an impossible camera');
-  return { width, height, fx: matrix[0]!, fy: matrix[4]!, cx: matrix[2]!, cy: matrix[5]!, distortion };
+  return { width, height, fx: matrix[0]!, fy: matrix[4]!, cx: matrix[2]!, cy: matrix[5]!, distortion: cursor.doubles(5) };
 }

@@ -104,6 +104,7 @@ export function writeStreamInfo(info: StreamInfo): Uint8Array | null {
       for (const model of [info.camera, projector]) sample.appendable(() => writePinhole(sample, model));
       sample.doubles([...rotation, ...translation, ...colour]);
       one(kFieldOrders, info.field_order);
+      sample.doubles([info.stereo_rms_px ?? 0, info.scale_error ?? 0]);
     });
     sample.appendable(() => {
       sample.u32(pattern.base);

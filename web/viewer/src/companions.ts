@@ -2,7 +2,7 @@
 // Streams that are shown beside the first one, in the same scene. Each has a decoder and a rate of its own.
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
-import type { ListedStream, Quality } from './protocol';
+import type { ListedStream, Quality, StreamInfo } from './protocol';
 import { Session } from './session';
 import type { Playback, SourceEvents } from './source';
 import type { Beside, View } from './view';
@@ -56,6 +56,10 @@ export class Companions {
   /** What a time line of it drives. */
   playback(name: string): Playback | null {
     return this.shown.get(name)?.session.source?.playback ?? null;
+  }
+
+  info(name: string): StreamInfo | null {
+    return this.shown.get(name)?.session.info ?? null;
   }
 
   remove(name: string): void {

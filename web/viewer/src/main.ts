@@ -14,7 +14,7 @@ import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
-import { offeredRungs, wantedQuality, type Quality } from './protocol';
+import { offeredRungs, wantedQuality, type Quality, type StreamInfo } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
@@ -181,7 +181,9 @@ class Viewer {
       this.measure!.open = open;
       this.wish();
     });
-    return new MeasurePanel(body, this.view, (at) => this.pictures.point(at));
+    const described = (name: string): StreamInfo | null =>
+      name === this.view!.name ? this.session.info : (this.companions?.info(name) ?? null);
+    return new MeasurePanel(body, this.view, (at) => this.pictures.point(at), described);
   }
 
   private makeStreams(): void {

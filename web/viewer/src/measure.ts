@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lengths, angles and cross-sections on a surface, with their standard deviations. Pure; metres, rig camera's frame.
-// An error of depth moves a vertex along its ray from the rig's camera; the errors of two places are independent.
+// An error of depth moves a vertex along its ray from the rig's camera; the errors of two places are independent, but
+// for that of the rig's scale, which all places of a stream share.
 import type { Surface, Vec3 } from './pick';
+import { rigDepthError, type RigError } from './rigError';
 
 export const kTools = ['point', 'distance', 'angle', 'section'] as const;
 export type Tool = (typeof kTools)[number];
@@ -13,13 +15,16 @@ export interface Spot {
   point: Vec3;
   sigma: number | null; // of its depth, metres; null: not known
   stream: string; // whose camera's frame it is in
+  rig: RigError | null; // of that stream; null: not known
 }
 
 export interface Measurement {
   tool: Tool;
   spots: Spot[];
   value: number; // point: depth; distance, section: length; metres. Angle at the second spot: radians
-  sigma: number | null;
+  sigma: number | null; // of both parts, or of the one that is known
+  surface: number | null; // its part from the spots' own sigmas
+  rig: number | null; // its part from the rigs
   profile: Segment[]; // of a section
 }
 
@@ -49,26 +54,39 @@ const values: Record<Tool, (points: Vec3[]) => number> = {
 /** `eye`: from where a section's line was drawn. */
 export function measure(tool: Tool, spots: Spot[], surface: Surface | null, eye: Vec3): Measurement {
   const points = spots.map((s) => s.point);
+  const value = values[tool];
+  const alone = (i: number) => (j: number) => i === j;
+  const own = propagate(value, points, spots.map(({ sigma, point }, i) => [alone(i), sigma === null ? null : sigma / point[2]]));
+  const rig = propagate(value, points, [
+    ...spots.map(({ rig, point }, i): Moving => [alone(i), rig && rigDepthError(rig, point) / point[2]]),
+    ...spots
+      .filter(({ stream }, i) => spots.findIndex((s) => s.stream === stream) === i)
+      .map(({ rig, stream }): Moving => [(j) => spots[j]!.stream === stream, rig && rig.scale]),
+  ]);
   return {
     tool,
     spots,
-    value: values[tool](points),
-    sigma: propagate(values[tool], spots),
-    profile: tool === 'section' && surface !== null ? section(surface, points[0]!, points[1]!, eye) : [],
+    value: value(points),
+    sigma: together(own, rig),
+    surface: own,
+    rig,
+    profile: tool === 'section' && surface !== null ? section(surface, points[0]!, points[1]!, eye, spots[0]!.rig) : [],
   };
 }
 
-// By central differences along each spot's ray.
-function propagate(value: (points: Vec3[]) => number, spots: Spot[]): number | null {
-  const points = spots.map((s) => s.point);
+const together = (surface: number | null, rig: number | null): number | null =>
+  surface === null && rig === null ? null : Math.hypot(surface ?? 0, rig ?? 0);
+
+// An error: the places that it moves together, along their rays, and by what share of their distances; null: not known.
+type Moving = [moves: (i: number) => boolean, sigma: number | null];
+
+// By central differences.
+function propagate(value: (points: Vec3[]) => number, points: Vec3[], errors: Moving[]): number | null {
+  const step = 1e-4;
   let variance = 0;
-  for (const [i, { point, sigma }] of spots.entries()) {
+  for (const [moves, sigma] of errors) {
     if (sigma === null) return null;
-    const step = 1e-4 * Math.abs(point[2]);
-    const moved = (dz: number): number => {
-      const scale = 1 + dz / point[2];
-      return value(points.map((p, j) => (j === i ? (p.map((c) => c * scale) as Vec3) : p)));
-    };
+    const moved = (by: number): number => value(points.map((p, i) => (moves(i) ? (p.map((c) => c * (1 + by)) as Vec3) : p)));
     variance += (((moved(step) - moved(-step)) / (2 * step)) * sigma) ** 2;
   }
   return Math.sqrt(variance);
@@ -83,7 +101,7 @@ export interface ProfilePoint {
 export type Segment = readonly [ProfilePoint, ProfilePoint];
 
 /** Where the plane through `eye` and both places cuts the surface, between the places. */
-export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3): Segment[] {
+export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3, rig: RigError | null): Segment[] {
   const { positions: p, triangles } = surface;
   const along = unit(minus(b, a));
   const normal = unit(cross(minus(a, eye), minus(b, eye)));
@@ -99,8 +117,10 @@ export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3): Segment[
     const point = [0, 1, 2].map((i) => p[3 * v + i]! + t * (p[3 * w + i]! - p[3 * v + i]!)) as Vec3;
     const off = minus(point, a);
     const ray: Vec3 = [point[0] / point[2], point[1] / point[2], 1];
-    const s = sigmaBetween(surface, v, w, t);
-    return { along: dot(off, along), height: dot(off, up), sigma: s === null ? null : Math.abs(dot(ray, up)) * s, point };
+    const height = dot(off, up);
+    const s = together(sigmaBetween(surface, v, w, t), rig && rigDepthError(rig, point));
+    const sigma = s === null ? null : Math.hypot(dot(ray, up) * s, height * (rig?.scale ?? 0));
+    return { along: dot(off, along), height, sigma, point };
   };
   const segments: Segment[] = [];
   for (let t = 0; t < triangles.length; t += 3) {
@@ -144,13 +164,13 @@ const number = (value: number | null | undefined): string => (value === null || 
 /** A line a measurement; metres and radians, each place in the frame of its own stream's camera. */
 export function measurementsCsv(measurements: readonly Measurement[]): string {
   const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`, `stream${i}`].join(',');
-  const lines = [`tool,value,unit,sigma,${[1, 2, 3].map(spot).join(',')}`];
+  const lines = [`tool,value,unit,sigma,sigma_surface,sigma_rig,${[1, 2, 3].map(spot).join(',')}`];
   for (const m of measurements) {
     const spots = [0, 1, 2].flatMap((i) => {
       const s = m.spots[i];
       return s === undefined ? ['', '', '', '', ''] : [...s.point.map(number), number(s.sigma), s.stream];
     });
-    lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), ...spots].join(','));
+    lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), number(m.surface), number(m.rig), ...spots].join(','));
   }
   return `${lines.join('\n')}\n`;
 }

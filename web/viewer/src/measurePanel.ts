@@ -5,7 +5,6 @@ import { copy, download, fileName } from './download';
 import {
   kSpots,
   kTools,
-  lengthText,
   measure,
   measurementsCsv,
   sectionCsv,
@@ -17,11 +16,17 @@ import {
 import type { Mark } from './overlay';
 import { coordinatesAt, sigmaAt, type Vec3 } from './pick';
 import { plot } from './plot';
+import type { StreamInfo } from './protocol';
+import { rigErrorOf } from './rigError';
 import { text } from './strings';
-import type { View } from './view';
+import type { Hit, View } from './view';
 
 const kStill_px = 5; // a click moves no further
 const say = text.measure;
+
+/** What its ± is of. */
+const partsText = ({ surface, rig }: Measurement): string =>
+  surface === null ? (rig === null ? say.noSigma : say.sigmaOfRig) : rig === null ? say.sigmaOfSurface : say.sigmaOfBoth;
 
 export class MeasurePanel {
   private tool: Tool | null = null;
@@ -36,11 +41,12 @@ export class MeasurePanel {
   private readonly plot = make('canvas', { className: 'plot', hidden: true });
   private readonly readout = element('cursor');
 
-  /** `pointed`: where in the camera's picture the cursor is. */
+  /** `pointed`: where in the camera's picture the cursor is; `described`: what is known of a stream. */
   constructor(
     body: HTMLElement,
     private readonly view: View,
     private readonly pointed: (at: [number, number] | null) => void,
+    private readonly described: (stream: string) => StreamInfo | null,
   ) {
     this.tools = new Map(kTools.map((tool) => [tool, button(say.tools[tool], say.hints[tool], () => this.choose(tool))]));
     const group = make('div', { className: 'segments' }, ...this.tools.values());
@@ -75,9 +81,9 @@ export class MeasurePanel {
     this.readout.hidden = hit === null;
     this.pointed(hit !== null && hit.stream === this.view.name ? coordinatesAt(hit.surface, hit) : null);
     if (hit === null) return;
-    const [x, y, z] = hit.point;
+    const [x, y] = hit.point;
     const mm = (v: number): string => (v * 1000).toFixed(1);
-    const read = say.cursor(lengthText(z, sigmaAt(hit.surface, hit)), mm(x), mm(-y));
+    const read = say.cursor(valueText(measure('point', [this.spot(hit)], null, [0, 0, 0])), mm(x), mm(-y));
     setText(this.readout, this.view.isAlone ? read : say.cursorOf(hit.stream, read));
   }
 
@@ -134,7 +140,7 @@ export class MeasurePanel {
     const other = this.spots.some((spot) => spot.stream !== stream);
     // Nothing says where one rig stands to another; and a section is of one surface.
     if (other && (!this.view.isTogether || this.tool === 'section')) return setText(this.hint, say.otherStream);
-    this.spots.push({ point: hit.point, sigma: sigmaAt(surface, hit), stream });
+    this.spots.push(this.spot(hit));
     if (this.spots.length === kSpots[this.tool]) {
       const [x, y, z] = this.view.navigator.ray(at)?.origin ?? [right, 0, 0];
       const eye: Vec3 = [x - right, y, z];
@@ -142,6 +148,11 @@ export class MeasurePanel {
       this.spots = [];
     }
     this.refresh();
+  }
+
+  private spot(hit: Hit): Spot {
+    const { point, surface, stream } = hit;
+    return { point, sigma: sigmaAt(surface, hit), stream, rig: rigErrorOf(this.described(stream)) };
   }
 
   private refresh(): void {
@@ -159,7 +170,7 @@ export class MeasurePanel {
     );
     const { measurements } = this;
     this.sigmas.hidden = measurements.length === 0;
-    setText(this.sigmas, measurements.some(({ sigma }) => sigma !== null) ? say.sigmaOf : say.noSigma);
+    setText(this.sigmas, [...new Set(measurements.map(partsText))].join(' '));
     this.drawPlot();
     this.view.invalidate();
   }

@@ -18,11 +18,15 @@ export interface StreamInfo {
   scan: string;
   stripes: number;
   camera: Pinhole;
-  // What only a recording needs; not said by older servers.
-  started_ns?: number;
+  // Not said by older servers.
   projector?: Pinhole;
   projector_from_camera_rotation?: number[]; // row-major
   projector_from_camera_translation?: number[]; // metres
+  // How good its calibration found the rig, where it says so.
+  stereo_rms_px?: number; // of the board's corners, in either picture
+  scale_error?: number; // relative, of sizes
+  // What only a recording needs; not said by older servers.
+  started_ns?: number;
   field_order?: string;
   colour_matrix?: number[]; // row-major
   pattern?: Pattern;

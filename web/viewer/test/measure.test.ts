@@ -3,8 +3,10 @@
 import { describe, expect, it } from 'vitest';
 import { lengthText, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
 import type { Surface, Vec3 } from '../src/pick';
+import type { StreamInfo } from '../src/protocol';
+import { rigDepthError, rigErrorOf } from '../src/rigError';
 
-const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma, stream: 'face' });
+const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma, stream: 'face', rig: null });
 const eye: Vec3 = [0, 0, 0];
 
 /** A roof: z = 2 + |x| / 2 for x, y in -1..1. */
@@ -50,11 +52,88 @@ describe('measure', () => {
   });
 });
 
+const [s, c] = [Math.sin(0.2), Math.cos(0.2)];
+const described: StreamInfo = {
+  stream: 'face',
+  source: 'sim:face',
+  frame_rate: 30,
+  scan: 'progressive',
+  stripes: 100,
+  camera: { width: 640, height: 480, fx: 800, fy: 800, cx: 319.5, cy: 239.5 },
+  projector: { width: 1024, height: 768, fx: 1200, fy: 1200, cx: 511.5, cy: 383.5 },
+  projector_from_camera_rotation: [c, 0, s, 0, 1, 0, -s, 0, c],
+  projector_from_camera_translation: [-0.25, 0, 0.03],
+  stereo_rms_px: 0.2,
+  scale_error: 0.002,
+};
+
+describe("the rig's part", () => {
+  const rig = rigErrorOf(described)!;
+  const of = (point: Vec3, sigma: number | null = null): Spot => ({ ...spot(point, sigma), rig });
+
+  it('is what wrong rays make of depth', () => {
+    // Both rays in the plane of camera, projector and point (here y = 0), turned at random; where they meet anew.
+    let seed = 7;
+    const random = (): number => (seed = (seed * 48271) % 2147483647) / 2147483647;
+    const normal = (): number => Math.sqrt(-2 * Math.log(random())) * Math.cos(2 * Math.PI * random());
+    const [px, , pz] = rig.centre;
+    const across = 0.2 * Math.SQRT1_2;
+    for (const [x, , z] of [[0, 0, 1], [0.3, 0, 0.8], [-0.4, 0, 2]] as Vec3[]) {
+      let squares = 0;
+      for (let i = 0; i < 20_000; ++i) {
+        const [a, b] = [Math.atan2(x, z) + (normal() * across) / 800, Math.atan2(x - px, z - pz) + (normal() * across) / 1200];
+        // t (sin a, cos a) = (px, pz) + u (sin b, cos b)
+        const t = (px * Math.cos(b) - pz * Math.sin(b)) / Math.sin(a - b);
+        squares += ((t / Math.hypot(x, z) - 1) * z) ** 2; // along the ray; what it moves across is far less
+      }
+      const told = rigDepthError(rig, [x, 0, z]);
+      expect(Math.sqrt(squares / 20_000) / told).toBeGreaterThan(0.95);
+      expect(Math.sqrt(squares / 20_000) / told).toBeLessThan(1.05);
+    }
+  });
+
+  it('is a share of a length', () => {
+    const exact = { ...rig, camera: 0, projector: 0 };
+    const spots = [[0.1, 0, 1], [0.1, 0.3, 1.4]].map((p) => ({ ...spot(p as Vec3, 0), rig: exact }));
+    expect(measure('distance', spots, null, eye)).toMatchObject({ surface: 0, rig: expect.closeTo(0.001, 9), sigma: expect.closeTo(0.001, 9) });
+    expect(measure('angle', [...spots, { ...spot([0.5, 0, 1], 0), rig: exact }], null, eye).rig).toBeCloseTo(0, 9); // of any size
+    // Rigs of two streams are wrong for themselves.
+    const other = measure('distance', [spots[0]!, { ...spots[1]!, stream: 'vase' }], null, eye);
+    expect(other.rig).toBeGreaterThan(0.001);
+  });
+
+  it('adds to that of the surface as independent errors do', () => {
+    const both = measure('distance', [of([0, 0, 1], 3e-4), of([0.2, 0, 1.3], 4e-4)], null, eye);
+    expect(both.surface).toBeCloseTo(measure('distance', [spot([0, 0, 1], 3e-4), spot([0.2, 0, 1.3], 4e-4)], null, eye).sigma!, 12);
+    expect(both.rig).toBeGreaterThan(both.value * 0.002);
+    expect(both.sigma).toBeCloseTo(Math.hypot(both.surface!, both.rig!), 12);
+    expect(measure('distance', [of([0, 0, 1]), of([0.2, 0, 1.3])], null, eye)).toMatchObject({ surface: null, sigma: both.rig });
+    expect(measure('distance', [of([0, 0, 1], 3e-4), spot([0.2, 0, 1.3], 4e-4)], null, eye)).toMatchObject({ rig: null, sigma: both.surface });
+    const depth = measure('point', [of([0, 0, 1], 3e-4)], null, eye);
+    expect(depth.sigma).toBeCloseTo(Math.hypot(3e-4, 0.002, rigDepthError(rig, [0, 0, 1])), 9);
+  });
+
+  it('is in the heights of a section', () => {
+    const [a, b]: [Vec3, Vec3] = [[-0.8, 0, 2.4], [0.8, 0, 2.4]];
+    const [without, withRig] = [section(roof, a, b, eye, null), section(roof, a, b, eye, rig)];
+    for (const [i, [{ height, sigma, point }]] of withRig.entries()) {
+      const part = Math.hypot(rigDepthError(rig, point), 0.002 * height);
+      expect(sigma).toBeCloseTo(Math.hypot(without[i]![0].sigma!, part), 6);
+    }
+  });
+
+  it('is not known where the rig does not say', () => {
+    const { stereo_rms_px: _rms, scale_error: _scale, ...silent } = described;
+    const { projector: _projector, ...without } = described;
+    expect([null, silent, without, { ...described, scale_error: NaN }].map((d) => rigErrorOf(d))).toEqual([null, null, null, null]);
+  });
+});
+
 describe('section', () => {
   const [a, b]: [Vec3, Vec3] = [[-0.8, 0, 2.4], [0.8, 0, 2.4]];
 
   it('is the profile of a roof', () => {
-    const profile = section(roof, a, b, eye);
+    const profile = section(roof, a, b, eye, null);
     for (const [from, to] of profile) {
       for (const p of [from, to]) {
         expect(p.point[1]).toBeCloseTo(0, 6);
@@ -67,12 +146,12 @@ describe('section', () => {
   });
 
   it('ends where the line ends', () => {
-    expect(section(roof, [-0.8, 0, 2.4], [-0.4, 0, 2.2], eye).every(([from]) => from.along < 0.45)).toBe(true);
-    expect(section(roof, [-0.8, 3, 2.4], [0.8, 3, 2.4], eye)).toEqual([]);
+    expect(section(roof, [-0.8, 0, 2.4], [-0.4, 0, 2.2], eye, null).every(([from]) => from.along < 0.45)).toBe(true);
+    expect(section(roof, [-0.8, 3, 2.4], [0.8, 3, 2.4], eye, null)).toEqual([]);
   });
 
   it('is a table with a point a line', () => {
-    const lines = sectionCsv(section(roof, a, b, eye)).trim().split('\n');
+    const lines = sectionCsv(section(roof, a, b, eye, null)).trim().split('\n');
     expect(lines[0]).toBe('along_m,height_m,sigma_m,x_m,y_m,z_m');
     expect(lines.length).toBe(6); // the roof's four triangles meet: five points
   });
