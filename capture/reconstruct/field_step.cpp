@@ -255,12 +255,12 @@ std::optional<FoundStep> StepFinder::find(const SlideFieldView& view, int line, 
   if (rise->height < kLeastStep * light.level(column)) return std::nullopt;
   const auto [left, right] = light.agreement(colours, column, free_left, free_right);
   float found_px = kFound_px;
-  const auto place = light.balance(colours, column, free_left, free_right, view.noise);
   if (std::min(left, right) < kLeastAgree) {
     if (std::max(left, right) < kLeastAgree || std::fabs(moved) > kEndMoved_px) return std::nullopt;
     if (!light.end_agrees(colours, column, left < right)) return std::nullopt;
     found_px = kEndFound_px;
-  } else if (place && std::fabs(place->column_px - column) < kApartFromStep_px) {
+  } else if (const auto place = light.balance(colours, column, free_left, free_right, view.noise);
+             place && std::fabs(place->column_px - column) < kApartFromStep_px) {
     column = place->column_px;
     found_px = std::max(kLeastFound_px, kFoundNearly * place->sigma_px);
   }
