@@ -11,14 +11,14 @@ namespace {
 
 constexpr int kSide_px = 3;       // a look is the mean of so many pixels on either side
 constexpr float kSame_px = 0.5F;  // a boundary so near to where it was has not moved
-constexpr int kDark = 30;         // of a look's six values in all: noise is no difference
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr int kDark = 30;  // of a look's six values in all: noise is no difference
 
 }  // namespace
 
 Backdrop::Backdrop(int boundaries, int lines)
     : boundaries_(static_cast<std::size_t>(boundaries)),
-      seen_(boundaries_ * static_cast<std::size_t>(lines),
-            Seen{std::numeric_limits<float>::quiet_NaN(), {}, {}}) {}
+      seen_(boundaries_ * static_cast<std::size_t>(lines), Seen{kNone, {}, {}}) {}
 
 std::optional<Backdrop::Look> Backdrop::look_at(View8 field, int line, float column_px) {
   const int centre = static_cast<int>(column_px + 0.5F);
@@ -47,6 +47,14 @@ void Backdrop::remember(const SlideFieldView& view, int line, int boundary, floa
   s.column_px = column_px;
   s.has[slide] = true;
   s.look[slide] = *look;
+}
+
+float Backdrop::pitch_px(int line, int boundary) const {
+  const float here = column_px(line, boundary);
+  const float next =
+      boundary + 1 < static_cast<int>(boundaries_) ? column_px(line, boundary + 1) - here : kNone;
+  if (!std::isnan(next)) return std::fabs(next);
+  return boundary > 0 ? std::fabs(here - column_px(line, boundary - 1)) : kNone;
 }
 
 bool Backdrop::stands(int line, int boundary, float column_px) const {

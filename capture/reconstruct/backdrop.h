@@ -25,6 +25,9 @@ class Backdrop {
   /// Where the boundary was last seen to stand still, NaN where it never was.
   float column_px(int line, int boundary) const { return seen(line, boundary).column_px; }
 
+  /// From there to the next boundary, or from the one before; NaN where neither was seen.
+  float pitch_px(int line, int boundary) const;
+
   /// True where it is at that place.
   bool stands(int line, int boundary, float column_px) const;
 

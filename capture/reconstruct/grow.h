@@ -33,6 +33,9 @@ class Growth {
   std::size_t grow(const SlideFieldView& view, const EdgeImage& edges, SequenceResult& result,
                    std::vector<RecoveredBoundary>& recovered);
 
+  /// What stands still, as far as frames told that so far.
+  const Backdrop& backdrop() const { return backdrop_; }
+
  private:
   struct Prediction : StepPrediction {
     bool beside;  // from a boundary of the line itself

@@ -184,6 +184,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
         if (edge.column_px < low || edge.column_px > high) gains[i] -= kUnexpected;
       }
       expect_moved(edges, line, index, context, boundary, used, gains);
+      expect_still(edges, line, index, context, boundary, used, gains);
     }
     const float jump_from = best_so_far + kJump;
     const bool jump = jump_from > 0;  // a path may start anywhere

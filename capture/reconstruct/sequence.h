@@ -12,6 +12,7 @@
 
 #include "base/parallel.h"
 #include "base/pattern.h"
+#include "capture/reconstruct/backdrop.h"
 #include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/line_path.h"
@@ -47,6 +48,7 @@ struct SequenceContext {
   const std::vector<float>* before_px = nullptr;  // SequenceResult::seen_px of the frame decoded before
   const FieldMotion* before_motion = nullptr;     // between that frame's fields
   float before_fields = 2;                        // how many times as long ago that was
+  const Backdrop* backdrop = nullptr;             // where boundaries stand still when nothing hides them
 };
 
 /// Constant after construction but for scratch memory. One thread.
@@ -119,6 +121,8 @@ class SequenceDecoder {
   bool was_seen(int line, const SequenceContext& context, int boundary, AsAsked as_asked) const;
   static float moved_px(int line, float column_px, const SequenceContext& context);
   void expect_moved(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                    const std::int32_t* boundary, int count, float* gains) const;
+  void expect_still(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
                     const std::int32_t* boundary, int count, float* gains) const;
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);

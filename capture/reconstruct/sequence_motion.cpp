@@ -16,9 +16,13 @@ constexpr float kOff_px = 2;                // between where a boundary was and 
 constexpr float kOffShare = 0.2F;           // and of that motion more
 constexpr std::uint32_t kLeastInARow = 3;   // edges that confirm a run, whatever its others do
 constexpr std::uint32_t kContradicted = 4;  // one edge in so many of a run is let pass
-constexpr float kNear_px = 3;     // of where an edge's motion says it was: a boundary that was there
-constexpr float kWasNear = 2.5F;  // gains so much
-constexpr int kLines = 2;         // above and below, on which that is looked for
+constexpr float kNear_px = 3;      // of where an edge's motion says it was: a boundary that was there
+constexpr float kWasNear = 2.5F;   // gains so much
+constexpr float kStands_px = 1;    // of where a boundary stands still: it is that one, and
+constexpr float kStands = 1.F;     // gains so much;
+constexpr float kHovering = 1.1F;  // farther off, but less than this of the way to the next one, it
+constexpr float kHovers = 3.F;     // loses
+constexpr int kLines = 2;          // above and below, on which that is looked for
 
 }  // namespace
 
@@ -64,6 +68,25 @@ void SequenceDecoder::expect_moved(const EdgeImage& edges, int line, std::uint32
   for (int i = 0; i < count; ++i)
     if (was_seen(line, context, boundary[i], [&](int, float px) { return std::fabs(px - was) < near; }))
       gains[i] += kWasNear;
+}
+
+/// Of a moving edge's candidates, what was hidden and is back where it stands gains. One that is near there,
+/// but not there, would be on a surface just before what stands still: more likely the boundary is another,
+/// and its run only seems to go on with what stands beside it.
+void SequenceDecoder::expect_still(const EdgeImage& edges, int line, std::uint32_t e,
+                                   const SequenceContext& context, const std::int32_t* boundary, int count,
+                                   float* gains) const {
+  if (context.backdrop == nullptr || beside_[e].tracked) return;
+  const float column = edges.edges[e].column_px;
+  for (int i = 0; i < count; ++i) {
+    const float stands_px = context.backdrop->column_px(line, boundary[i]);
+    const float off = std::fabs(column - stands_px);
+    if (off < kStands_px) {
+      gains[i] += kStands;
+    } else if (off < kHovering * context.backdrop->pitch_px(line, boundary[i])) {
+      gains[i] -= kHovers;
+    }
+  }
 }
 
 /// Whether an edge that moves cannot be a boundary by where that was before.

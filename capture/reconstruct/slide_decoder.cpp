@@ -128,6 +128,7 @@ bool SlideDecoder::State::match_paper(SlideOrder tried, Match& out) {
 SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
   SequenceContext out{.order = tried};
   out.expected = expected;
+  out.backdrop = &growth.backdrop();
   out.motion = &newer.difference.motion;
   if (before_ns) {
     out.before_px = &before_px;

@@ -95,13 +95,23 @@ DifferenceImage picture_of(const Pattern& pattern, int slide, const std::vector<
   return out;
 }
 
+/// A slide's field in which lines do not differ.
+const Image8& grey_slide() {
+  static const Image8 picture = [] {
+    Image8 out(kWidth, kLines, 3);
+    for (int line = 0; line < kLines; ++line) std::fill_n(out.row(line), 3 * kWidth, std::uint8_t{100});
+    return out;
+  }();
+  return picture;
+}
+
 Pattern sixty_stripes() {
   return *make_pattern(6, 2, 200, 60);
 }
 
 /// Decodes `line`, seen under slide 1, with `other_line` as slide 2's frame saw it.
 SequenceResult decode(const std::vector<Placed>& line, const std::vector<Placed>& other_line,
-                      const std::vector<Placed>& same_line) {
+                      const std::vector<Placed>& same_line, const Backdrop* backdrop = nullptr) {
   const Pattern pattern = sixty_stripes();
   const DifferenceImage other = picture_of(pattern, 1, other_line);
   const DifferenceImage same = picture_of(pattern, 0, same_line);
@@ -109,7 +119,8 @@ SequenceResult decode(const std::vector<Placed>& line, const std::vector<Placed>
   SequenceDecoder decoder(pattern);
   SequenceResult result;
   decoder.decode(edges_of(pattern, 0, line),
-                 {.order = SlideOrder::kNewerIsFirst, .other = &other, .same = &same}, pool, result);
+                 {.order = SlideOrder::kNewerIsFirst, .other = &other, .same = &same, .backdrop = backdrop},
+                 pool, result);
   return result;
 }
 
@@ -167,6 +178,32 @@ TEST(SequenceDecoder, DecodesWhatMovedFromItsOwnColours) {
   EXPECT_GE(right * 10, result.boundary.size() * 9);
 }
 
+TEST(SequenceDecoder, WhatHoversBeforeWhatStandsStillIsNotTakenForIt) {
+  // An arm, 3 px off the stripes of the wall that it hides, has their colours under the slide shown; when the
+  // other slide was, it was elsewhere.
+  const auto wall = run(3, 40, 20);
+  auto line = wall;
+  for (std::size_t k = 16; k < 20; ++k) line[k].column_px += 3;
+  Backdrop backdrop(sixty_stripes().boundaries(), kLines);
+  const std::vector<std::array<Primary, 2>> colours;
+  for (int l = 0; l < kLines; ++l)
+    for (const Placed& p : wall)
+      backdrop.remember({.field = grey_slide().view(), .colours = colours}, l, p.boundary, p.column_px);
+  const SequenceResult unaware = decode(line, wall, wall);
+  const SequenceResult aware = decode(line, wall, wall, &backdrop);
+  std::size_t mistaken = 0;
+  for (std::size_t i = 0; i < aware.boundary.size(); ++i) {
+    const std::size_t k = i % line.size();
+    if (k < 16 || k >= 20) {
+      EXPECT_EQ(aware.boundary[i], wall[k].boundary);
+    } else {
+      mistaken += unaware.boundary[i] == wall[k].boundary;
+      EXPECT_NE(aware.boundary[i], wall[k].boundary) << k;
+    }
+  }
+  EXPECT_GE(mistaken, std::size_t{2 * kLines}) << "there is nothing to mistake";
+}
+
 TEST(SequenceDecoder, OneSlideNeedsNoOtherFrame) {
   const Pattern pattern = *make_pattern(6, 1, 2, 20);
   const auto line = run(1, 17, 20);
@@ -207,16 +244,6 @@ TEST(EdgeFinder, FindsASubPixelPlaceAndSaysHowGood) {
   }
   EXPECT_NEAR(mean / 400, 0, 0.01);
   EXPECT_NEAR(std::sqrt(square / 400), edges.edges[0].sigma_px, 0.5 * edges.edges[0].sigma_px);
-}
-
-/// A slide's field in which lines do not differ.
-const Image8& grey_slide() {
-  static const Image8 picture = [] {
-    Image8 out(kWidth, kLines, 3);
-    for (int line = 0; line < kLines; ++line) std::fill_n(out.row(line), 3 * kWidth, std::uint8_t{100});
-    return out;
-  }();
-  return picture;
 }
 
 TEST(Refiner, TakesASharpLumaStepOverABlurredColour) {
