@@ -29,6 +29,7 @@ constexpr float kDoubtful_px = 0.5F;     // standard deviation beyond which a do
 constexpr float kGoesOn_px = 0.5F;       // from one line to the next
 constexpr float kConfirms_px = 0.4F;     // between its place and luma's under either slide
 constexpr float kLeastRoom_px = 2.F;     // to other boundaries on the line
+constexpr float kSamePlace_px = 1.F;     // and an edge so near is the boundary's own
 
 bool known(float x) {
   return x == x;
@@ -94,9 +95,19 @@ Recovery::Prediction Recovery::predict(View8 slide, int line, int boundary) cons
   return {sum / weights, 1 / std::sqrt(weights)};
 }
 
-void Recovery::recover_line(const RecoveryView& view, const Refiner& refiner, int line,
-                            std::vector<RecoveredBoundary>& out) const {
+/// The decoded edge at a place, if there is one.
+std::optional<std::uint32_t> Recovery::edge_at(const EdgeImage& edges, const SequenceResult& result, int line,
+                                               float column_px) {
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+    if (result.boundary[e] >= 0 && std::fabs(edges.edges[e].column_px - column_px) < kSamePlace_px) return e;
+  return std::nullopt;
+}
+
+void Recovery::recover_line(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges,
+                            int line, SequenceResult& result, std::vector<RecoveredBoundary>& out) const {
   const float* here = row(line);
+  const std::size_t of_line = out.size();
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
     const Prediction p = predict(view.slide, line, b);
@@ -116,10 +127,26 @@ void Recovery::recover_line(const RecoveryView& view, const Refiner& refiner, in
     const float own_variance = place.sigma_px * place.sigma_px;
     const float variance = p.sigma_px * p.sigma_px;
     if (off > std::max(kLeastAgree_px, kAgree * std::sqrt(variance + own_variance))) continue;
+    if (const auto same = edge_at(edges, result, line, place.column_px)) {
+      // It was taken for another boundary, from no surface of which it goes on.
+      const int taken_for = result.boundary[*same];
+      const auto near = [&](int next) { return std::fabs(here[next] - here[taken_for]) < kWidest_px; };
+      if (!near(taken_for - 1) && !near(taken_for + 1)) result.boundary[*same] = static_cast<std::int16_t>(b);
+      continue;
+    }
     const float weight = 1 / own_variance;
     const float weights = weight + 1 / variance;
-    out.push_back(
-        {line, b, (weight * place.column_px + p.column_px / variance) / weights, 1 / std::sqrt(weights), 0});
+    const RecoveredBoundary found{line, b, (weight * place.column_px + p.column_px / variance) / weights,
+                                  1 / std::sqrt(weights), 0};
+    // Two surfaces may both seem to go on there.
+    const auto other = std::find_if(
+        out.begin() + static_cast<std::ptrdiff_t>(of_line), out.end(),
+        [&](const RecoveredBoundary& r) { return std::fabs(r.column_px - found.column_px) < kSamePlace_px; });
+    if (other == out.end()) {
+      out.push_back(found);
+    } else if (found.sigma_px < other->sigma_px) {
+      *other = found;
+    }
   }
 }
 
@@ -196,7 +223,7 @@ void Recovery::recover(const RecoveryView& view, const Refiner& refiner, const E
   for (auto& found : found_) found.clear();
   pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line)
-      recover_line(view, refiner, line, found_[static_cast<std::size_t>(worker)]);
+      recover_line(view, refiner, edges, line, result, found_[static_cast<std::size_t>(worker)]);
   });
   out.clear();
   for (const auto& found : found_) out.insert(out.end(), found.begin(), found.end());

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "base/parallel.h"
@@ -58,8 +59,10 @@ class Recovery {
   Prediction predict(View8 slide, int line, int boundary) const;
   void settle_doubts(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges, int line,
                      SequenceResult& result) const;
-  void recover_line(const RecoveryView& view, const Refiner& refiner, int line,
-                    std::vector<RecoveredBoundary>& out) const;
+  static std::optional<std::uint32_t> edge_at(const EdgeImage& edges, const SequenceResult& result, int line,
+                                              float column_px);
+  void recover_line(const RecoveryView& view, const Refiner& refiner, const EdgeImage& edges, int line,
+                    SequenceResult& result, std::vector<RecoveredBoundary>& out) const;
 
   int boundaries_ = 0;
   std::size_t stride_ = 0;

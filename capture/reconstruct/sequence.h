@@ -30,7 +30,7 @@ struct SequenceCounts {
 struct SequenceResult {
   std::vector<std::int16_t> boundary;  // one an edge: its index in the pattern, or -1
   std::vector<std::int16_t> doubted;   // one an edge: a boundary given up, which others may confirm, or -1
-  std::vector<std::uint8_t> still;  // one an edge: two frames ago, under the same slide, it was where it is
+  std::vector<std::uint8_t> still;  // one an edge: in the last frame under the same slide it was where it is
   std::vector<float> seen_px;  // [line][boundary]: where its line has it, NaN: nowhere. For the next frame
   SequenceCounts counts;
   double score = 0;  // sum over the lines: the greater, the better the slides' order explains the frame
@@ -40,7 +40,8 @@ struct SequenceResult {
 struct SequenceContext {
   SlideOrder order{};
   const DifferenceImage* other = nullptr;  // the last frame under the other slide
-  const DifferenceImage* same = nullptr;   // the last frame before that under the slide that the edges are of
+  const DifferenceImage* same = nullptr;  // the last frame before that under the slide that the edges are of;
+                                          // of one slide, the last frame
   const std::vector<ColumnRange>* expected = nullptr;  // of each boundary, from the depths before
   float other_share = 0.5F;  // where `other` lies in time on the way back to `same`: 0 now, 1 there
   const FieldMotion* motion = nullptr;  // between the fields that the edges are of

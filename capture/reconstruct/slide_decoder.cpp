@@ -85,7 +85,8 @@ struct SlideDecoder::State {
   Observation newer;
   Observation previous;  // the frame before
   Observation older;     // the last frame under the slide that `newer` does not show
-  Observation same;      // the last one before `older` under the slide that `newer` shows
+  Observation same;      // the last one before `older` under the slide that `newer` shows; of one slide, that
+                         // before `newer`
   bool have_previous = false;
   bool have_same = false;
   bool have_older = false;
@@ -228,6 +229,10 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
   // the one before, as in the paper, and is decoded all the same, with the last frame under the other slide.
   const bool have_previous = std::exchange(s.have_previous, true);
   report.same_slide = s.pattern.slides == 2 && have_previous && s.shows_same_slide();
+  if (s.pattern.slides == 1 && have_previous) {
+    std::swap(s.same, s.previous);
+    s.have_same = true;
+  }
   if (s.pattern.slides == 2 && have_previous && !report.same_slide) {
     // previous becomes other, other becomes same; the memory of the oldest serves the next frame.
     std::swap(s.same, s.previous);
@@ -272,27 +277,24 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
                         .other_colours = s.sequence.shown_colours(other(s.order))},
                        s.refiner, s.edges, s.result, pool, s.recovered);
     report.filters.recovered = s.recovered.size();
-    if (s.pattern.slides == 2) {
-      const ContinuityCounts by_before = s.continuity.check(s.recovered, pool, s.result, s.edges);
-      report.filters.rejected += by_before.rejected;
-      report.filters.recovered += by_before.carried;
-    }
+    const ContinuityCounts by_before = s.continuity.check(s.recovered, pool, s.result, s.edges);
+    report.filters.rejected += by_before.rejected;
+    report.filters.recovered += by_before.carried;
     report.filters.recovered += s.readmission.readmit(s.recovered, s.result, s.edges);
     report.matched =
         counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
     // Under white-field the difference is of the slide's own instant already.
     if (s.pattern.scheme != Scheme::kWhiteField)
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
-    if (s.pattern.slides == 2) {
-      s.moving.find(s.newer.difference.width, s.result, s.edges);
-      const SlideFieldView field{pair.slide_field(),         s.sequence.shown_colours(s.order),
-                                 &s.newer.difference.motion, s.order == SlideOrder::kNewerIsFirst ? 0 : 1,
-                                 s.newer.difference.noise,   &s.moving};
-      s.field_placer.place(field, s.result, pool, s.edges);
-      const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
-      report.filters.recovered += grown;
-      report.matched += grown;
-    }
+    s.moving.find(s.newer.difference.width, s.result, s.edges);
+    const bool first_slide = s.pattern.slides == 1 || s.order == SlideOrder::kNewerIsFirst;
+    const SlideFieldView field{pair.slide_field(),         s.sequence.shown_colours(s.order),
+                               &s.newer.difference.motion, first_slide ? 0 : 1,
+                               s.newer.difference.noise,   &s.moving};
+    s.field_placer.place(field, s.result, pool, s.edges);
+    const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
+    report.filters.recovered += grown;
+    report.matched += grown;
   }
   s.list(pool, out);
   return true;
