@@ -183,8 +183,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
         const auto [low, high] = (*context.expected)[static_cast<std::size_t>(boundary[i])];
         if (edge.column_px < low || edge.column_px > high) gains[i] -= kUnexpected;
       }
-      expect_moved(edges, line, index, context, boundary, used, gains);
-      expect_still(edges, line, index, context, boundary, used, gains);
+      expect_moving(edges, line, index, context, boundary, used, gains);
     }
     const float jump_from = best_so_far + kJump;
     const bool jump = jump_from > 0;  // a path may start anywhere
@@ -295,6 +294,9 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
   out.still.resize(edges.edges.size());
   convincing_.resize(edges.edges.size());
   out.seen_px.resize(static_cast<std::size_t>(edges.lines) * static_cast<std::size_t>(boundaries_));
+  depths_.clear();
+  if (context.before_px != nullptr && context.expected != nullptr && context.motion != nullptr)
+    depths_.fill(*context.before_px, *context.expected, *context.motion);
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {

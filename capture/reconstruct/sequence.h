@@ -17,6 +17,7 @@
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/line_path.h"
 #include "capture/reconstruct/match.h"
+#include "capture/reconstruct/seen_depths.h"
 
 namespace relievo {
 
@@ -120,11 +121,11 @@ class SequenceDecoder {
                          int boundary) const;
   template <class AsAsked>
   bool was_seen(int line, const SequenceContext& context, int boundary, AsAsked as_asked) const;
+  bool as_deep(const EdgeImage& edges, int line, std::uint32_t first, std::uint32_t end,
+               const SequenceResult& out) const;
   static float moved_px(int line, float column_px, const SequenceContext& context);
-  void expect_moved(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
-                    const std::int32_t* boundary, int count, float* gains) const;
-  void expect_still(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
-                    const std::int32_t* boundary, int count, float* gains) const;
+  void expect_moving(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                     const std::int32_t* boundary, int count, float* gains) const;
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);
@@ -142,6 +143,7 @@ class SequenceDecoder {
 
   std::array<Slide, 2> slides_;
   int boundaries_;
+  SeenDepths depths_;  // by the frame before
   std::vector<Scratch> scratch_;
   std::vector<Beside> beside_;            // one an edge
   std::vector<std::uint8_t> convincing_;  // one an edge: what it was decoded as by its line is

@@ -15,9 +15,11 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kOff_px = 2;                // between where a boundary was and where its edge's motion says,
 constexpr float kOffShare = 0.2F;           // and of that motion more
 constexpr std::uint32_t kLeastInARow = 3;   // edges that confirm a run, whatever its others do
-constexpr std::uint32_t kContradicted = 4;  // one edge in so many of a run is let pass
+constexpr std::uint32_t kContradicted = 4;  // one edge in so many of a run is let pass,
+constexpr std::uint32_t kLeastAsDeep = 5;   // or three where so many are all as deep as what was there
 constexpr float kNear_px = 3;      // of where an edge's motion says it was: a boundary that was there
 constexpr float kWasNear = 2.5F;   // gains so much
+constexpr float kAsDeep = 1.5F;    // one as deep as what was near there
 constexpr float kStands_px = 1;    // of where a boundary stands still: it is that one, and
 constexpr float kStands = 1.F;     // gains so much;
 constexpr float kHovering = 1.1F;  // farther off, but less than this of the way to the next one, it
@@ -56,31 +58,27 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
   });
 }
 
-/// Of an edge's candidates, what the frame before speaks for gains: where the scene moved, the other slide's
-/// frame often shows another surface, and agrees with a wrong boundary by chance.
-void SequenceDecoder::expect_moved(const EdgeImage& edges, int line, std::uint32_t e,
-                                   const SequenceContext& context, const std::int32_t* boundary, int count,
-                                   float* gains) const {
-  if (context.before_px == nullptr || context.motion == nullptr || beside_[e].tracked) return;
+/// Where the scene moved, the other slide's frame often shows another surface, and agrees with a wrong
+/// boundary by chance. So of a moving edge's candidates those gain that the frame before speaks for: by their
+/// place, by their depth, or for they were hidden and are back where they stand still. One that is near where
+/// it stands still, but not there, would be on a surface just before that: more likely the boundary is
+/// another, and its run only seems to go on with what stands beside it.
+void SequenceDecoder::expect_moving(const EdgeImage& edges, int line, std::uint32_t e,
+                                    const SequenceContext& context, const std::int32_t* boundary, int count,
+                                    float* gains) const {
+  if (beside_[e].tracked) return;
   const float column = edges.edges[e].column_px;
-  const float was = column - moved_px(line, column, context);
-  const float near = kNear_px * context.motion->scale;
-  for (int i = 0; i < count; ++i)
-    if (was_seen(line, context, boundary[i], [&](int, float px) { return std::fabs(px - was) < near; }))
-      gains[i] += kWasNear;
-}
-
-/// Of a moving edge's candidates, what was hidden and is back where it stands gains. One that is near there,
-/// but not there, would be on a surface just before what stands still: more likely the boundary is another,
-/// and its run only seems to go on with what stands beside it.
-void SequenceDecoder::expect_still(const EdgeImage& edges, int line, std::uint32_t e,
-                                   const SequenceContext& context, const std::int32_t* boundary, int count,
-                                   float* gains) const {
-  if (context.backdrop == nullptr || beside_[e].tracked) return;
-  const float column = edges.edges[e].column_px;
-  for (int i = 0; i < count; ++i) {
-    const float stands_px = context.backdrop->column_px(line, boundary[i]);
-    const float off = std::fabs(column - stands_px);
+  if (context.before_px != nullptr && context.motion != nullptr) {
+    const float was = column - moved_px(line, column, context);
+    const float near = kNear_px * context.motion->scale;
+    for (int i = 0; i < count; ++i)
+      if (was_seen(line, context, boundary[i], [&](int, float px) { return std::fabs(px - was) < near; }))
+        gains[i] += kWasNear;
+  }
+  for (int i = 0; i < count && depths_.known(); ++i)
+    if (depths_.has(line, boundary[i], column)) gains[i] += kAsDeep;
+  for (int i = 0; i < count && context.backdrop != nullptr; ++i) {
+    const float off = std::fabs(column - context.backdrop->column_px(line, boundary[i]));
     if (off < kStands_px) {
       gains[i] += kStands;
     } else if (off < kHovering * context.backdrop->pitch_px(line, boundary[i])) {
@@ -95,6 +93,14 @@ bool SequenceDecoder::unconfirmed(const EdgeImage& edges, int line, std::uint32_
   if (context.before_px == nullptr || context.motion == nullptr || !context.motion->line_moves(line))
     return false;
   return !beside_[e].tracked && !moved_as_measured(edges, line, e, context, boundary);
+}
+
+/// Whether all edges of a run are as deep as what the frame before had there.
+bool SequenceDecoder::as_deep(const EdgeImage& edges, int line, std::uint32_t first, std::uint32_t end,
+                              const SequenceResult& out) const {
+  for (std::uint32_t e = first; e < end; ++e)
+    if (!depths_.has(line, out.boundary[e], edges.edges[e].column_px)) return false;
+  return true;
 }
 
 /// Gives up edges on lines where something moves that the frame before contradicts, or does not confirm.
@@ -132,8 +138,12 @@ void SequenceDecoder::check_motion(const EdgeImage& edges, int line, const Seque
                 std::fabs(motion - before) < FieldMotion::kSurface_px;
     }
     if (2 * confirmed >= e - first || most_in_a_row >= kLeastInARow) continue;
-    // What was hidden in the frame before, or not decoded, is no contradiction.
+    // What was hidden in the frame before, or not decoded, is no contradiction; nor is what another surface
+    // showed then, where the run is as deep as what was there.
     if (e - first >= kLeastInARow && contradicted * kContradicted <= e - first) continue;
+    if (confirmed > 0 && e - first >= kLeastAsDeep && contradicted * kContradicted <= 3 * (e - first) &&
+        as_deep(edges, line, first, e, out))
+      continue;
     for (std::uint32_t i = first; i < e; ++i) {
       scratch.in_order -= out.boundary[i] >= 0;
       out.boundary[i] = -1;
