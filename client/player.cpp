@@ -19,6 +19,7 @@ constexpr std::int64_t kLongestPause_ns = 5 * kNanosecondsPerSecond;
 
 // For more of a file that is being written, which comes by chunks of half a second.
 constexpr auto kLookAgain = std::chrono::milliseconds(100);
+constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // a file of which nothing came for so long
 
 TimeRange range_of(const PlayOptions& options, const RecordedStream& recorded) {
   return options.range.value_or(
@@ -50,6 +51,7 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
                                    : std::move(sample));
   };
   std::optional<std::int64_t> last_ns;
+  std::int64_t came_ns = steady_now_ns();
   for (;;) {
     auto sample = recorded.next();
     if (!sample) return sample.error();
@@ -57,11 +59,13 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
       const auto more = recorded.read_on();
       if (!more) return more.error();
       if (!*more && !recorded.summary().recovered) return {};
+      if (!*more && options.loop && steady_now_ns() - came_ns > kLeft_ns) return {};
       if (!*more && stop.wait_for(kLookAgain)) return {};
       due_ns = std::max(due_ns, steady_now_ns());  // what comes late is not caught up with in a rush
       continue;
     }
     if (!*sample || (*sample)->receive_time_ns > range.to_ns) return {};
+    came_ns = steady_now_ns();
     if ((*sample)->receive_time_ns < range.from_ns) {
       if (!needed_later(**sample)) continue;
       if (auto status = give(**std::move(sample)); !status) return status;
@@ -85,6 +89,7 @@ Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& st
     if (auto status = recorded.seek(range_of(options, recorded).from_ns); !status) return status;
     const std::int64_t start_ns = steady_now_ns();
     if (auto status = play_once(recorded, options, stop, publish); !status) return status;
+    if (options.at_end) options.at_end();
     // A recording of a single moment must not loop as fast as the machine can.
     if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + 30'000'000 - steady_now_ns()));
   } while (options.loop && !stop.stopped());

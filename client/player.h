@@ -16,11 +16,13 @@ namespace relievo {
 struct PlayOptions {
   double speed = 1;   // 2: twice as fast
   bool loop = false;  // from the start again at the end, until stopped
-  // At the end, goes on with what is written meanwhile, until the file is finished.
+  // At the end, goes on with what is written meanwhile, until the file is finished; with `loop` until nothing
+  // has come for some seconds, since it may have been left unfinished.
   bool follow = false;
   // Frames are said to be captured now: in the recorded order, their times apart as recorded, at that speed.
   bool restamp = false;
   std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none
+  std::function<void()> at_end = {};    // called at each end of what is played
 };
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or

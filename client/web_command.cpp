@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "base/log.h"
 #include "base/time.h"
@@ -32,6 +33,7 @@ struct Options {
 };
 
 constexpr std::chrono::milliseconds kRelayTick{200};
+constexpr std::chrono::seconds kLeft{5};  // nobody writes a file that was last written to so long ago
 
 Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   Subscriber::Callbacks callbacks;
@@ -50,14 +52,15 @@ Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   return callbacks;
 }
 
-// A recording played in a loop on a thread of its own, straight into the gateway.
+// A recording played in a loop on a thread of its own, straight into the gateway. One that is being written
+// is gone on with at its end.
 class LoopedFile {
  public:
   LoopedFile(std::string file, RecordedStream recorded, Gateway& gateway, StopSignal& stop)
       : file_(std::move(file)), recorded_(std::move(recorded)), gateway_(gateway) {
     // Before anyone is told the address: who follows it at once finds the stream.
     if (auto info = recorded_.find_info(); info && *info) (void)publish(**info).ok();
-    gateway_.offer(recorded_.stream(), file_);
+    if (!is_being_written()) offer();
     thread_ = std::thread([this, &stop] { run(stop); });
   }
   LoopedFile(const LoopedFile&) = delete;
@@ -67,12 +70,23 @@ class LoopedFile {
 
  private:
   void run(StopSignal& stop) {
-    const Status status =
-        play(recorded_, {.loop = true}, stop, [this](const RawSample& sample) { return publish(sample); });
+    const Status status = play(recorded_, {.loop = true, .follow = true, .at_end = [this] { offer(); }}, stop,
+                               [this](const RawSample& sample) { return publish(sample); });
     if (!status) {
       log_error(file_ + ": " + status.error().message);
       gateway_.withdraw(recorded_.stream());
     }
+  }
+
+  bool is_being_written() const {
+    std::error_code ignored;
+    const auto age =
+        std::filesystem::file_time_type::clock::now() - std::filesystem::last_write_time(file_, ignored);
+    return recorded_.summary().recovered && age < kLeft;
+  }
+  // To be read in parts, which what is being written cannot: pages have the stream until then, which grows.
+  void offer() {
+    if (!std::exchange(offered_, true)) gateway_.offer(recorded_.stream(), file_);
   }
 
   // Unreadable samples are skipped: the viewer counts the gap.
@@ -98,6 +112,7 @@ class LoopedFile {
   RecordedStream recorded_;
   Gateway& gateway_;
   std::uint64_t sequence_ = 0;
+  bool offered_ = false;
   std::thread thread_;
 };
 

@@ -107,7 +107,9 @@ Status StreamRecorder::stop() {
 
 RecordingState StreamRecorder::state() const {
   const std::lock_guard lock(mutex_);
-  return state_;
+  RecordingState state = state_;
+  if (growing_) state.whole_bytes = growing_->bytes();
+  return state;
 }
 
 bool StreamRecorder::is_open(const std::string& file) const {

@@ -33,7 +33,10 @@ Status run(const Options& options, StopSignal& stop) {
   auto source = make_sim(spec, {.truth = true});
   if (!source) return source.error();
   std::atomic<bool> stopped = false;
-  stop.on_stop([&] { stopped = true; });
+  stop.on_stop([&] {
+    stopped = true;
+    (*source)->request_stop();  // a frame may take long
+  });
   std::uint64_t written = 0;
   const std::uint64_t total = (*source)->info().frames.value_or(0);
   Progress progress("simulate", "frames", total);

@@ -88,7 +88,7 @@ class Server : public Gateway, private ConnectionHost {
   Status apply(const WebOptions& web) override;
   void announce(const StreamInfo& info) override { hub_.announce(info); }
   void publish(const std::string& stream, const FrameMessage& frame) override { hub_.publish(stream, frame); }
-  void publish(const ServerStatus& status) override { hub_.publish(status); }
+  void publish(const ServerStatus& status) override;
   void offer(const std::string& stream, const std::filesystem::path& recording) override {
     hub_.offer(stream, recording);
   }
@@ -178,6 +178,15 @@ Status Server::listen() {
     log_warning("what is watched at " + place + " can be read on the way" +
                 (tokens.needed() ? ", and so can the token" : "") + ": --tls-cert and --tls-key encrypt it");
   return {};
+}
+
+void Server::publish(const ServerStatus& status) {
+  hub_.publish(status);
+  if (options_.recordings == nullptr) return;
+  net::post(io_, [this, stream = status.stream] {
+    const auto state = options_.recordings->state(stream);
+    if (state && !state->file.empty()) hub_.publish_recording(stream, *state);
+  });
 }
 
 Status Server::apply(const WebOptions& web) {

@@ -37,6 +37,7 @@ struct Hub::Watcher {
   std::uint64_t last_sequence = 0;  // with that
   std::uint64_t seen_info = 0;      // versions it has been sent; 0: none
   std::uint64_t seen_status = 0;
+  std::uint64_t seen_recording = 0;
   bool told_live = false;
   bool told_waiting = false;
 };
@@ -44,8 +45,8 @@ struct Hub::Watcher {
 struct Hub::Entry {
   StreamSnapshot facts;
   bool live = false;  // announced and not withdrawn
-  std::shared_ptr<const std::string> info_text, status_text;
-  std::uint64_t info_version = 0, status_version = 0;
+  std::shared_ptr<const std::string> info_text, status_text, recording_text;
+  std::uint64_t info_version = 0, status_version = 0, recording_version = 0;
   // So that a late joiner sees a stalled stream's last picture: the last frame, and where that builds on
   // others the last one that does not.
   std::optional<FrameMessage> latest, latest_key;
@@ -195,6 +196,18 @@ void Hub::publish(const ServerStatus& status) {
   wake_all(*it->second);
 }
 
+void Hub::publish_recording(const std::string& stream, const RecordingState& state) {
+  auto text = std::make_shared<const std::string>(recording_event(state));
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it == streams_.end() || !it->second->live) return;
+  Entry& entry = *it->second;
+  if (entry.recording_text && *entry.recording_text == *text) return;
+  entry.recording_text = std::move(text);
+  entry.recording_version = next_version_++;
+  wake_all(entry);
+}
+
 void Hub::withdraw(const std::string& stream) {
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(stream);
@@ -207,7 +220,8 @@ void Hub::withdraw(const std::string& stream) {
   entry.facts.recording.clear();
   entry.facts.clock_offset_ns.reset();
   entry.last_sequence = {};
-  entry.status_version = 0;
+  entry.status_version = entry.recording_version = 0;
+  entry.recording_text.reset();
   for (const auto& watcher : entry.watchers) {
     watcher->needs_key = true;  // whatever comes next
     watcher->rung = Rung::kFull;
@@ -322,6 +336,10 @@ std::optional<Hub::Delivery> Hub::take(Watcher& watcher, bool want_frame) {
   if (entry.status_version != 0 &&
       std::exchange(watcher.seen_status, entry.status_version) != entry.status_version) {
     return Delivery{.text = entry.status_text};
+  }
+  if (entry.recording_version != 0 &&
+      std::exchange(watcher.seen_recording, entry.recording_version) != entry.recording_version) {
+    return Delivery{.text = entry.recording_text};
   }
   if (want_frame && watcher.latest) {
     return Delivery{.frame = std::exchange(watcher.latest, std::nullopt), .drops = watcher.drops};

@@ -73,6 +73,8 @@ class Hub {
   void withdraw(const std::string& stream);
   /// A stream that was announced is played from this file, until it is withdrawn.
   void offer(const std::string& stream, const std::filesystem::path& recording);
+  /// To its clients, also to those that come later, where it differs from what they were told last.
+  void publish_recording(const std::string& stream, const RecordingState& state);
   std::optional<std::filesystem::path> recording_of(const std::string& stream) const;
 
   /// `wake` is called, from any thread and with the hub locked, when take() has something; it must not call

@@ -83,6 +83,7 @@ Json recording_json(const RecordingState& state) {
           {"frames", state.frames},
           {"lost", state.lost},
           {"bytes", state.bytes},
+          {"whole_bytes", state.whole_bytes},
           {"started_ns", state.started_ns},
           {"pre_roll_s", state.pre_roll_s},
           {"message", state.message}};
@@ -183,6 +184,12 @@ Result<ClientMessage> parse_client_message(std::string_view text) {
 
 std::string recording_message(const RecordingState& state) {
   return text_of(recording_json(state));
+}
+
+std::string recording_event(const RecordingState& state) {
+  Json json = {{"type", "recording"}};
+  json.update(recording_json(state));
+  return text_of(json);
 }
 
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint) {

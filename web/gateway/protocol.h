@@ -76,6 +76,8 @@ struct GatewayCounts {
 
 /// What /api/recording/STREAM answers.
 std::string recording_message(const RecordingState& state);
+/// The same for those who watch the stream.
+std::string recording_event(const RecordingState& state);
 
 std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::string& hint);
 std::string metrics_text(const std::vector<StreamSnapshot>& streams, const GatewayCounts& counts,

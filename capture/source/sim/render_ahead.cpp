@@ -77,7 +77,9 @@ void RenderAhead::work() {
       polite = true;
     }
     lock.unlock();
-    auto frame = std::make_shared<const RenderedFrame>(renderer_->render(index, options_.truth));
+    auto rendered = renderer_->render(index, options_.truth, stopped_);
+    if (!rendered) return;
+    auto frame = std::make_shared<const RenderedFrame>(*std::move(rendered));
     lock.lock();
     ++done_;
     if (!started_) started_ = may_start();

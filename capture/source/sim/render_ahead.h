@@ -2,6 +2,7 @@
 // Threads that render camera frames before they are asked for.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -29,7 +30,7 @@ class RenderAhead {
   };
 
   RenderAhead(std::shared_ptr<const Renderer> renderer, const Options& options);
-  ~RenderAhead();  // waits for frames in the making
+  ~RenderAhead();  // frames in the making are left
 
   /// Waits for frame `index` < count; null once stopped. Without `keep`, indices must not go back.
   std::shared_ptr<const RenderedFrame> get(std::uint64_t index);
@@ -49,7 +50,8 @@ class RenderAhead {
   std::uint64_t claimed_ = 0;  // next to render
   std::uint64_t done_ = 0;
   std::int64_t started_ns_ = 0;
-  bool started_ = false, stopped_ = false;
+  bool started_ = false;
+  std::atomic<bool> stopped_ = false;  // set with the lock held
   std::vector<std::thread> threads_;
 };
 

@@ -191,6 +191,11 @@ Renderer::Renderer(const SimOptions& options, const Rig& rig, const Pattern& pat
 }
 
 RenderedFrame Renderer::render(std::uint64_t index, bool with_truth) const {
+  return *render(index, with_truth, false);
+}
+
+std::optional<RenderedFrame> Renderer::render(std::uint64_t index, bool with_truth,
+                                              const std::atomic<bool>& stop) const {
   const bool interlaced = rig_.scan == Scan::kInterlaced;
   RenderedFrame frame;
   const int width = rig_.camera.width, height = rig_.camera.height;
@@ -206,11 +211,12 @@ RenderedFrame Renderer::render(std::uint64_t index, bool with_truth) const {
     const bool has_truth = interlaced || half == 0;
     const bool truth_beside = interlaced && field.first_row != half;
     render_field(field, has_truth ? &frame.picture : &frame.complement,
-                 has_truth && !truth_beside ? truth : nullptr);
+                 has_truth && !truth_beside ? truth : nullptr, stop);
     if (truth == nullptr || !truth_beside) continue;
     field.first_row = half;
-    render_field(field, nullptr, truth);
+    render_field(field, nullptr, truth, stop);
   }
+  if (stop) return std::nullopt;
   return frame;
 }
 
@@ -233,7 +239,8 @@ std::array<Renderer::Glow, 2> Renderer::glows(std::uint64_t field) const {
   return {glow(slot, 1 - beyond), glow(slot + 1, beyond)};
 }
 
-void Renderer::render_field(const Field& field, Image8* out, ImageF* truth) const {
+void Renderer::render_field(const Field& field, Image8* out, ImageF* truth,
+                            const std::atomic<bool>& stop) const {
   const double period_s = options_.period / rig_.frame_rate;
   const double turns = field.time_s / period_s;
   std::vector<Placed> shapes;
@@ -244,7 +251,7 @@ void Renderer::render_field(const Field& field, Image8* out, ImageF* truth) cons
         {std::move(shape), window_of(bound.centre, bound.radius), window_of(from_projector, bound.radius)});
   }
   Row row(rig_.camera.width);
-  for (int y = field.first_row; y < rig_.camera.height; y += field.row_step) {
+  for (int y = field.first_row; y < rig_.camera.height && !stop; y += field.row_step) {
     trace_row(shapes, field, y, row);
     if (out != nullptr) {
       if (!chroma_kernel_.empty()) blur_chroma(row);

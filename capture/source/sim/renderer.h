@@ -3,8 +3,10 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/image.h"
@@ -36,7 +38,10 @@ class Renderer {
   /// scheme has for it (capture/pattern/schedule.h). Each field is rendered at its
   /// own time, half a frame apart. The truth is of the first field's time, where lines of geometry lie: on
   /// even rows, whichever field is first; on odd rows of the second's. A progressive truth is of the first
-  /// picture's. The same index gives the same bytes on every thread.
+  /// picture's. The same index gives the same bytes on every thread. Nothing where `stop` is set meanwhile:
+  /// a row later at most, since a frame may take seconds.
+  std::optional<RenderedFrame> render(std::uint64_t index, bool with_truth,
+                                      const std::atomic<bool>& stop) const;
   RenderedFrame render(std::uint64_t index, bool with_truth) const;
 
  private:
@@ -57,7 +62,7 @@ class Renderer {
 
   std::array<Glow, 2> glows(std::uint64_t field) const;
   /// Rows of `out` and `truth`, those of which are not null.
-  void render_field(const Field& field, Image8* out, ImageF* truth) const;
+  void render_field(const Field& field, Image8* out, ImageF* truth, const std::atomic<bool>& stop) const;
   void trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const;
   Vec3 shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,
              Vec3 direction, Vec3 direction_step) const;

@@ -125,6 +125,52 @@ TEST_F(RecordingOnRequest, IsReadWhileItIsWritten) {
   EXPECT_GT(frames_in(out_ / name).size(), frames.size());
 }
 
+// Proves: who plays a recording that is still being written is told when there is more, and reads that alone.
+TEST_F(RecordingOnRequest, GrowsForWhoPlaysIt) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("take", 20)) << server.process().err();
+  WsClient client(server.port(), "take");
+  ASSERT_EQ(client.status(), 101);
+  ASSERT_EQ(server.order("take", "start").status, 200);
+  std::string have, name, etag;
+  const auto end_of_data = [&] { return u64_at(have, have.size() - 8 - 20) - 13; };  // MCAP: footer, data end
+  const auto read_on = [&] {
+    std::string headers;
+    if (!have.empty()) {
+      headers = "Range: bytes=" + std::to_string(end_of_data()) + "-\r\nIf-None-Match: " + etag + "\r\n";
+      have.resize(end_of_data());
+    }
+    const Response got = request(server.port(), "GET", "/recordings/" + name, headers);
+    EXPECT_EQ(got.status, headers.empty() ? 200 : 206);
+    have += got.body;
+    etag = got.headers.at("etag");
+    std::ofstream(out_ / "have.mcap", std::ios::binary) << have;
+    return frames_in(out_ / "have.mcap");
+  };
+  std::vector<std::uint64_t> frames;
+  for (int growths = 0; growths < 3;) {
+    const auto message = client.next_of("recording");
+    ASSERT_TRUE(message);
+    const Json said = Json::parse(message->data);
+    ASSERT_EQ(said["state"], "recording");
+    name = said["file"];
+    if (said["whole_bytes"] <= (have.empty() ? 0 : end_of_data())) continue;
+    const auto now = read_on();
+    EXPECT_GT(now.size(), frames.size());
+    frames = now;
+    ++growths;
+  }
+  ASSERT_EQ(server.order("take", "stop").status, 200);
+  for (Json said; said["state"] != "off" || said["message"] != "";) {
+    const auto message = client.next_of("recording");
+    ASSERT_TRUE(message);
+    said = Json::parse(message->data);
+  }
+  frames = read_on();
+  EXPECT_EQ(frames, frames_in(out_ / name)) << "to its end";
+  EXPECT_EQ(frames.back() - frames.front() + 1, frames.size()) << "without gaps";
+}
+
 TEST_F(RecordingOnRequest, IsWholeWhereTheServerIsStopped) {
   WebServer server(command());
   ASSERT_TRUE(server.goes_on("take", 5)) << server.process().err();

@@ -3,9 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
 #include <vector>
 
+#include "capture/pattern/bcsl.h"
+#include "capture/source/sim/render_ahead.h"
+#include "capture/source/sim/renderer.h"
 #include "capture/source/sim/scene.h"
 #include "capture/source/sim/sim_options.h"
 #include "capture/source/sim/sim_source.h"
@@ -200,6 +207,59 @@ TEST(Simulator, ShadowsFallWhereTheProjectorIsHidden) {
   }
   EXPECT_GT(dark_wall, 500);
   EXPECT_GT(lit_wall, 500);
+}
+
+/// A wall that lets nobody past its first ray until it is opened, and counts the rays.
+class Barrier : public sim::Shape, public sim::Scene {
+ public:
+  bool hit(sim::Vec3, sim::Hit&) const override {
+    std::unique_lock lock(mutex_);
+    ++rays_;
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return open_; });
+    return false;
+  }
+  sim::Material material(sim::Vec3, const sim::Hit&) const override { return {}; }
+  bool blocks(sim::Vec3, sim::Vec3) const override { return false; }
+  sim::Shapes at(double, double) const override { return {{std::shared_ptr<void>(), this}}; }
+
+  void wait_for_a_ray() const {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return rays_ > 0; });
+  }
+  void open() const {
+    std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+  int rays() const {
+    std::lock_guard lock(mutex_);
+    return rays_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  mutable int rays_ = 0;
+  mutable bool open_ = false;
+};
+
+// Proves: a stop does not wait for the frame in the making, which takes seconds on a slow machine.
+TEST(RenderAhead, AStopLeavesTheFrameInTheMaking) {
+  auto options = sim::parse_sim_options("plane,frames=2");
+  ASSERT_TRUE(options);
+  const auto barrier = std::make_shared<const Barrier>();
+  const Rig rig = sim::make_rig(*options, barrier->view());
+  auto pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
+  ASSERT_TRUE(pattern);
+  {
+    sim::RenderAhead frames(std::make_shared<const sim::Renderer>(*options, rig, *pattern, barrier),
+                            {.count = 2, .ahead = 2});
+    barrier->wait_for_a_ray();
+    frames.stop();
+    barrier->open();
+  }
+  EXPECT_LE(barrier->rays(), rig.camera.width) << "of one row";
 }
 
 }  // namespace

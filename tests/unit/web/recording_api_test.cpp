@@ -29,7 +29,11 @@ class OneStream final : public RecordingControl {
   explicit OneStream(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   std::optional<RecordingState> state(const std::string& stream) const override {
-    return stream == "face" ? std::optional(state_) : std::nullopt;
+    if (stream != "face") return std::nullopt;
+    RecordingState state = state_;
+    const std::lock_guard lock(mutex_);
+    state.whole_bytes = growing_ ? growing_->bytes() : 0;
+    return state;
   }
   Status start(const std::string&) override {
     if (state_.activity == RecordingActivity::kRecording) return Error{"is recorded already"};
@@ -185,6 +189,64 @@ TEST_F(RecordingApi, AFileThatIsBeingWrittenIsReadUpToItsLastWholeChunk) {
   for (const std::string& other : {inode + "1\"", inode + "\"", inode + "ffffffffffffffffff\"",
                                    std::string("\"growing-1-1\""), std::string("\"growing\"")})
     EXPECT_EQ(get("Range: bytes=0-9\r\nIf-Range: " + other + "\r\n").status, 200) << other;
+}
+
+// Where the chunks end in a recording that has its index: the index, and what says that the data ends, is
+// behind.
+std::size_t end_of_data(const std::string& recording) {
+  constexpr std::size_t kFooter = 8 + 8 + 4, kMagic = 8, kDataEnd = 9 + 4;
+  return u64_at(recording, recording.size() - kMagic - kFooter) - kDataEnd;
+}
+
+/// Asks for what came behind the chunks of `recording`, where it is no longer the one with this ETag.
+std::string new_since(const std::string& recording, const std::string& etag) {
+  return "Range: bytes=" + std::to_string(end_of_data(recording)) + "-\r\nIf-None-Match: " + etag + "\r\n";
+}
+
+ServerStatus make_status() {
+  ServerStatus status;
+  status.stream = "face";
+  return status;
+}
+
+TEST_F(RecordingApi, WhoWatchesIsToldThatARecordingGrowsAndReadsWhatIsNew) {
+  gateway->announce(make_info());
+  WsClient client(port, "face");
+  ASSERT_TRUE(client.next_of("info"));
+  gateway->publish(make_status());
+  ASSERT_TRUE(client.next_of("status"));
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  std::string have, etag;
+  const auto told = [&] {
+    gateway->publish(make_status());
+    const auto message = client.next_of("recording");
+    EXPECT_TRUE(message);
+    return message ? Json::parse(message->data) : Json();
+  };
+  for (std::uint64_t messages = 1; messages <= 4; ++messages) {
+    const Json event = told();
+    EXPECT_EQ(event["state"], "recording");
+    EXPECT_EQ(event["file"], "face-1.mcap");
+    const auto got = have.empty() ? get() : get(new_since(have, etag));
+    ASSERT_EQ(got.status, have.empty() ? 200 : 206);
+    if (!have.empty()) have.resize(end_of_data(have));
+    have += got.body;
+    etag = got.headers.at("etag");
+    EXPECT_EQ(end_of_data(have), event["whole_bytes"]);
+    EXPECT_EQ(messages_in(have), messages);
+    EXPECT_EQ(get(new_since(have, etag)).status, 304) << "until it grows";
+    ASSERT_TRUE(control.grow());
+  }
+  ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
+  EXPECT_EQ(told()["state"], "off");
+  const auto rest = get(new_since(have, etag));
+  ASSERT_EQ(rest.status, 206) << "it is finished";
+  EXPECT_EQ(have.substr(0, end_of_data(have)) + rest.body, content_of(folder / "face-1.mcap"));
+
+  WsClient late(port, "face");
+  const auto late_told = late.next_of("recording");
+  ASSERT_TRUE(late_told);
+  EXPECT_EQ(Json::parse(late_told->data)["state"], "off");
 }
 
 TEST_F(RecordingApi, AFileThatHasNoWholeChunkYetIsNotOfferedYet) {
