@@ -16,11 +16,7 @@ using testing::HasSubstr;
 TEST(RecordingFormats, FramesAreDescribedAndExported) {
   const TempFolder folder;
   const auto file = folder / "real.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "12"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 0, 12));
   const auto description = info(file);
   EXPECT_EQ(description["geometry_codecs"], nlohmann::json({"draco-mesh"}));
   EXPECT_EQ(description["texture_codecs"], nlohmann::json({"jpeg"}));
@@ -130,12 +126,7 @@ TEST(RecordingFormats, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
     GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
   }
   const TempFolder folder;
-  {
-    Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
-    const auto done =
-        run(on_loopback({"record", "face", "--out", folder / "live.mcap", "--frames", "9", "--foxglove"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(folder / "live.mcap", 0, 9, {"--foxglove"}));
   const auto done = run({program("relievo"), "convert", folder / "live.mcap", "--out", folder / "part.mcap",
                          "--frames", "3:6", "--foxglove", "--json"});
   ASSERT_EQ(done.status, 0) << done.err;
@@ -165,11 +156,7 @@ TEST(RecordingFormats, OtherMcapReadersDecodeEverySample) {
   }
   const TempFolder folder;
   const auto file = folder / "a.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "3000", "60", "100000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "20"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 3000, 20));
   const auto done = run({"/usr/bin/env", "node", js / "validate.mjs", file});
   ASSERT_EQ(done.status, 0) << done.err;
   const auto json = nlohmann::json::parse(done.out);
