@@ -44,6 +44,7 @@ struct Gap {
   std::uint64_t length = 0;
 };
 
+/// Of one recording, which is the whole file but where several were joined.
 struct Contents {
   std::map<std::uint16_t, Schema> schemas;    // by id, none 0
   std::map<std::uint16_t, Channel> channels;  // by id
@@ -63,8 +64,10 @@ enum class ReadContents {
   kByWalking,  // through the whole file: finds all that is whole, wherever it lies
 };
 
-/// Fails where the file is no MCAP file or cannot be read; a file cut short gives what is whole.
-Result<Contents> read_contents(const File& file, ReadContents how);
+/// Of each recording in the file: one, or more where others were put behind it (`cat a b`); their places are
+/// the file's, their ids their own. Fails where the file is no MCAP file or cannot be read; a file cut short
+/// gives what is whole.
+Result<std::vector<Contents>> read_contents(const File& file, ReadContents how);
 
 /// A chunk's records, checked against its CRC. Errors name no file or place: the caller knows both.
 Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk);

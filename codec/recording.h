@@ -92,6 +92,7 @@ struct RecordingSummary {
   std::uint64_t messages = 0;
   std::vector<std::string> damage;  // a line for each part left out because its bytes are wrong
   bool recovered = false;           // its index was rebuilt from what is whole
+  std::size_t recordings = 1;       // that the file was joined of, one behind the other: all of them are read
   std::uint64_t lost_bytes = 0;     // that are no records: at its end where it was cut short
 };
 

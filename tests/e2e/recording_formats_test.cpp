@@ -178,5 +178,46 @@ TEST(RecordingFormats, OtherMcapReadersDecodeEverySample) {
   EXPECT_EQ(json["topics"].size(), 3u);
 }
 
+TEST(RecordingFormats, RecordingsThatWereJoinedAreAllReadAndMadeOne) {
+  const TempFolder folder;
+  ASSERT_NO_FATAL_FAILURE(record_face(folder / "a.mcap", 3000, 12));
+  ASSERT_NO_FATAL_FAILURE(record_face(folder / "b.mcap", 3000, 9));
+  const auto joined = folder / "joined.mcap";
+  {
+    std::ofstream out(joined, std::ios::binary);
+    for (const char* part : {"a.mcap", "b.mcap"})
+      out << std::ifstream(folder / part, std::ios::binary).rdbuf();
+  }
+  std::vector<Bytes> frames = recorded_frames(folder / "a.mcap");
+  for (Bytes& frame : recorded_frames(folder / "b.mcap")) frames.push_back(std::move(frame));
+  ASSERT_EQ(frames.size(), 21u);
+
+  const auto description = info(joined);
+  EXPECT_EQ(description["recordings"], 2);
+  EXPECT_EQ(description["frames"], 21);
+  EXPECT_EQ(description["recovered"], false);
+  const auto played = run(on_loopback({"play", joined, "--wait-readers", "0", "--speed", "20", "--json"}));
+  ASSERT_EQ(played.status, 0) << played.err;
+  EXPECT_EQ(nlohmann::json::parse(played.out)["frames"], 21);
+  EXPECT_THAT(played.err, HasSubstr("is 2 recordings, one behind the other"));
+
+  const auto one = folder / "one.mcap";
+  const auto recovered = run({program("relievo"), "recover", joined, "--out", one, "--json"});
+  ASSERT_EQ(recovered.status, 0) << recovered.err;
+  EXPECT_EQ(nlohmann::json::parse(recovered.out)["recordings"], 2);
+  EXPECT_EQ(recorded_frames(one), frames);
+  EXPECT_EQ(info(one)["recordings"], 1);
+
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@mcap/core")) return;
+  const auto checked = run({"/usr/bin/env", "node", js / "validate.mjs", one});
+  ASSERT_EQ(checked.status, 0) << checked.err;
+  for (const auto& topic : nlohmann::json::parse(checked.out)["topics"]) {
+    if (topic["topic"] == "relievo/frame") {
+      EXPECT_EQ(topic["count"], 21);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace relievo::test
