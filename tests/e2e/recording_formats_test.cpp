@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
+#include "codec/frame_layout.h"
+#include "codec/texture_codec.h"
 #include "tests/e2e/record_play.h"
 #include "tests/support/temp_folder.h"
 
@@ -117,6 +120,60 @@ TEST(RecordingFormats, ARecordingIsCodedAnew) {
   EXPECT_EQ(back.status, 1);
   EXPECT_THAT(back.err, HasSubstr("can only be coded as draco-mesh"));
   EXPECT_FALSE(std::filesystem::exists(folder / "back.mcap"));
+}
+
+/// The texture's bytes of each frame.
+std::vector<Bytes> textures_of(const std::filesystem::path& file) {
+  std::vector<Bytes> out;
+  for (const Bytes& cdr : recorded_frames(file)) {
+    const auto view = read_frame_cdr(cdr);
+    const auto layout = view ? read_frame_layout(view->data) : Result<FrameLayout>(view.error());
+    EXPECT_TRUE(layout.ok()) << (layout ? "" : layout.error().message);
+    if (layout) out.emplace_back(layout->sections.texture.begin(), layout->sections.texture.end());
+  }
+  return out;
+}
+
+TEST(RecordingFormats, TexturesStayAsTheyAreUnlessOthersAreAskedFor) {
+  const TempFolder folder;
+  const bool has_h264 = check_texture_codec(TextureCodec::kH264).ok();
+  for (const std::string texture : {"jpeg", "h264"}) {
+    SCOPED_TRACE(texture);
+    const bool is_chain = texture == "h264";
+    if (is_chain && !has_h264) continue;
+    const std::string original = folder / (texture + ".mcap");
+    const auto served =
+        run({program("relievo-server"), "serve", "--source", "sim:plane,width=160,height=120,stripes=30",
+             "--web", "none", "--domain", kDomain, "--interface", "lo", "--fast", "--frames", "16",
+             "--key-interval", "5", "--texture", texture, "--record", original});
+    ASSERT_EQ(served.status, 0) << served.err;
+    const auto before = textures_of(original);
+    ASSERT_GT(before.size(), 12u);
+    int made = 0;
+    const auto convert = [&](const std::vector<std::string>& more) {
+      const std::string out = folder / (texture + std::to_string(made++) + ".mcap");
+      std::vector<std::string> command{program("relievo"), "convert", original, "--out", out, "--json"};
+      command.insert(command.end(), more.begin(), more.end());
+      const auto done = run(command);
+      EXPECT_EQ(done.status, 0) << done.err;
+      const auto shown =
+          run({program("relievo"), "export", out, "--out", out + "-png", "--format", "png", "--json"});
+      EXPECT_EQ(shown.status, 0) << shown.err;
+      EXPECT_EQ(nlohmann::json::parse(shown.out)["frames"], textures_of(out).size()) << "all decode";
+      return textures_of(out);
+    };
+    EXPECT_EQ(convert({"--geometry", "draco-grid", "--step-bits", "4"}), before);
+    EXPECT_EQ(convert({"--geometry", "metric"}), before);
+    EXPECT_EQ(convert({"--geometry", "visual", "--bound", "1"}), before);
+    EXPECT_NE(convert({"--texture-quality", "30"}), before);
+    // From between two key frames on: what builds on a picture that is not there is coded anew.
+    const auto part = convert({"--step-bits", "3", "--frames", "2:10"});
+    ASSERT_EQ(part.size(), 9u);
+    const std::size_t kept = is_chain ? 5 : 2;
+    EXPECT_TRUE(std::equal(part.begin() + static_cast<std::ptrdiff_t>(kept - 2), part.end(),
+                           before.begin() + static_cast<std::ptrdiff_t>(kept)));
+    EXPECT_EQ(is_chain, part[0] != before[2]);
+  }
 }
 
 /// From the live stream, and from a recording of it.
