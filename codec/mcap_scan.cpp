@@ -115,6 +115,7 @@ Result<Bytes> File::read(std::uint64_t offset, std::uint64_t length) const {
     if (got == 0) return Error{name_ + " became shorter while it was read"};
     done += static_cast<std::size_t>(got);
   }
+  bytes_read_ += length;
   return bytes;
 }
 

@@ -16,7 +16,7 @@
 
 namespace relievo::mcap {
 
-/// A file opened for reading. Any offset and length may be asked for.
+/// A file opened for reading. Any offset and length may be asked for. One thread.
 class File {
  public:
   static Result<std::unique_ptr<File>> open(const std::filesystem::path& path);
@@ -28,6 +28,7 @@ class File {
   std::uint64_t size() const { return size_; }  // when it was opened
   /// Fails, before it allocates, where the file does not hold these bytes.
   Result<Bytes> read(std::uint64_t offset, std::uint64_t length) const;
+  std::uint64_t bytes_read() const { return bytes_read_; }  // by read() so far
 
  private:
   File(int handle, std::string name, std::uint64_t size)
@@ -36,6 +37,7 @@ class File {
   const int handle_;
   const std::string name_;
   const std::uint64_t size_;
+  mutable std::uint64_t bytes_read_ = 0;
 };
 
 /// Bytes that are no records.

@@ -130,6 +130,9 @@ class RecordingReader {
   /// The log time of the last message at or before this one that is wanted; nothing where there is none.
   /// Reads the heads of messages alone, from there backwards, and checks no CRC: that is for next().
   virtual std::optional<std::int64_t> find_last(std::int64_t log_time_ns, const Wanted& wanted) = 0;
+
+  /// From the file so far, by all of these.
+  virtual std::uint64_t bytes_read() const = 0;
 };
 
 }  // namespace relievo

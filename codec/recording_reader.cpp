@@ -82,6 +82,7 @@ class Reader final : public RecordingReader {
     if ((*now)->size() == file_->size()) return false;
     std::uint64_t known = 0;  // where the chunks that it had end
     for (const Chunk& chunk : chunks_) known = std::max(known, chunk.offset + chunk.length);
+    read_before_ += file_->bytes_read();
     file_ = std::move(*now);
     const std::size_t chunks = chunks_.size();
     if (auto status = open(mcap::ReadContents::kByIndex); !status) return status.error();
@@ -134,6 +135,8 @@ class Reader final : public RecordingReader {
     }
     return found ? std::optional(to_ns(*found)) : std::nullopt;
   }
+
+  std::uint64_t bytes_read() const override { return read_before_ + file_->bytes_read(); }
 
  private:
   static constexpr std::int32_t kNoChannel = -1, kLeftOut = -2;
@@ -316,6 +319,7 @@ class Reader final : public RecordingReader {
   }
 
   std::unique_ptr<mcap::File> file_;
+  std::uint64_t read_before_ = 0;  // of the file as it was, which grew
   RecordingSummary summary_;
   std::vector<Chunk> chunks_;           // in order of their start
   std::vector<std::uint64_t> ends_by_;  // the latest message of each chunk and all before it
