@@ -199,11 +199,13 @@ class Reader final : public RecordingReader {
       RecordingChannel mine{channel.topic, channel.message_encoding,
                             schema == recording.schemas.end() ? "" : schema->second.name, channel.metadata};
       const auto next = static_cast<std::int32_t>(summary_.channels.size());
-      const auto [same, is_new] =
-          known_channels_.try_emplace({mine.topic, mine.message_encoding, mine.schema, mine.metadata}, next);
       if (differ.contains(channel.schema_id) || next > std::numeric_limits<std::uint16_t>::max()) {
         ids[id] = kLeftOut;
-      } else if (is_first || is_new) {
+        continue;
+      }
+      const auto [same, is_new] =
+          known_channels_.try_emplace({mine.topic, mine.message_encoding, mine.schema, mine.metadata}, next);
+      if (is_first || is_new) {
         ids[id] = next;
         summary_.channels.push_back(std::move(mine));
         summary_.channel_messages.push_back(0);

@@ -174,6 +174,13 @@ TEST_F(RecordingRecover, WhatIsDefinedOtherwiseBehindIsSaidAndLeftOut) {
             all_but(-1, -1));
   ASSERT_EQ(report.left_out.size(), 1u);
   EXPECT_NE(report.left_out[0].find("test::Frame"), std::string::npos) << report.left_out[0];
+  // Nor does what was left out stand for a channel of the same name behind it.
+  const Bytes three = joined(joined(whole_, another_recording(folder_, changed)), another_recording(folder_));
+  EXPECT_EQ(recovered_from(folder_, three, &report), with_another(all_but(-1, -1)));
+  EXPECT_EQ(report.recordings, 3u);
+  const auto reader = open(folder_ / "bad.mcap");
+  ASSERT_EQ(reader->summary().channels.size(), 3u);
+  EXPECT_EQ(reader->summary().channels[2].topic, "relievo/info");
 }
 
 TEST_F(RecordingRecover, ABadChunkCostsItselfAlone) {
