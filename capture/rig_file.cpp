@@ -2,12 +2,14 @@
 #include "capture/rig_file.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <span>
+#include <sstream>
 #include <string>
 
 #include "capture/pattern/pattern_check.h"
@@ -214,6 +216,29 @@ bool nests_too_deep(const std::string& content) {
   return false;
 }
 
+/// Whether the file is one map that begins at its lines' first column and is all there is. Behind the end of
+/// anything else OpenCV's parser looks for another document, and never leaves where a "-" comes instead.
+bool is_one_map(const std::string& content) {
+  if (content.find('\0') != std::string::npos) return false;
+  bool begun = false, in_map = false, ended = false;
+  std::istringstream lines(content);
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(line.find_last_not_of(" \t\r") + 1);
+    if (line.empty() || line.find_first_not_of(' ') == line.find('#')) continue;
+    if (ended) return false;
+    if (in_map) {
+      ended = line == "...";
+      if (!ended && (line.starts_with("---") || line.starts_with("..."))) return false;
+    } else if (line == "---" && !begun) {
+      begun = true;
+    } else if (begun || line[0] != '%') {
+      in_map = std::isalpha(static_cast<unsigned char>(line[0])) != 0 || line[0] == '_';
+      if (!in_map) return false;
+    }
+  }
+  return in_map;
+}
+
 /// Reads the file as FileStorage and hands it to `parse`; every failure becomes one line naming the file.
 template <typename T>
 Result<T> read(const std::filesystem::path& file, const std::function<T(const cv::FileStorage&)>& parse) {
@@ -227,6 +252,8 @@ Result<T> read(const std::filesystem::path& file, const std::function<T(const cv
   if (content.rfind("%YAML", 0) != 0)
     return Error{name + " is no OpenCV YAML file: it must start with %YAML:1.0"};
   if (nests_too_deep(content)) return Error{name + " is no rig or pattern: it nests too deep"};
+  if (!is_one_map(content))
+    return Error{name + " is no rig or pattern: it must be one map of names and values"};
   silence_opencv();
   try {
     const cv::FileStorage storage(content, cv::FileStorage::READ | cv::FileStorage::MEMORY);

@@ -15,6 +15,7 @@
 #include "client/time_range.h"
 #include "codec/foxglove.h"
 #include "codec/frame3d_codec.h"
+#include "codec/frame_layout.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "idl/cdr.h"
@@ -127,11 +128,12 @@ class Conversion {
     return write(sample);
   }
   Status encode(const RawSample& sample, FrameView view, const Frame3D& frame) {
-    const auto before = read_frame_header(view.data);
+    const auto before = read_frame_layout(view.data);
     if (!before) return before.error();
-    if (before->texture != TextureCodec::kNone) texture_ = before->texture;
+    if (before->header.texture != TextureCodec::kNone) texture_ = before->header.texture;
     const EncodeOptions wanted = encode_options(options_, texture_);
-    const auto bytes = encoder_->encode(frame, wanted);
+    const auto bytes =
+        keeps_texture(*before) ? encode_geometry(frame, wanted, *before) : encoder_->encode(frame, wanted);
     if (!bytes) return bytes.error();
     const auto header = read_frame_header(*bytes);
     if (wanted.geometry != GeometryCodec::kDracoMesh && header && header->geometry != wanted.geometry &&
@@ -146,6 +148,31 @@ class Conversion {
     converted_.bytes_before += sample.cdr.size();
     converted_.bytes_after += coded.cdr.size();
     return write(coded);
+  }
+  /// Unless something is asked of textures they stay as they are, byte for byte: coded anew they only lose.
+  /// Those that build on each other, from the first one on that decodes alone.
+  bool keeps_texture(const FrameLayout& frame) {
+    if (options_.texture || options_.texture_quality) return false;
+    if (frame.header.texture != TextureCodec::kH264) return true;
+    chain_begun_ = chain_begun_ || texture_is_key(frame.header.texture, frame.sections.texture);
+    return chain_begun_ && !options_.key_interval;
+  }
+  Result<Bytes> encode_geometry(const Frame3D& frame, EncodeOptions wanted, const FrameLayout& before) {
+    const auto& [was, sections] = before;
+    const bool alone = sections.texture.empty() || texture_is_key(was.texture, sections.texture);
+    // So that there are frames which decode alone.
+    if (was.texture == TextureCodec::kH264 && alone) encoder_->request_key_frame();
+    wanted.texture = TextureCodec::kNone;
+    const auto bytes = encoder_->encode(frame, wanted);
+    if (!bytes) return bytes.error();
+    const auto coded = read_frame_layout(*bytes);
+    if (!coded) return coded.error();
+    FrameHeader header = coded->header;
+    header.texture = was.texture;
+    header.texture_width = was.texture_width;
+    header.texture_height = was.texture_height;
+    header.is_key = header.is_key && alone;
+    return write_frame(header, {coded->sections.geometry, sections.texture, coded->sections.quality});
   }
   Status write(const RawSample& sample) {
     const auto view =
@@ -162,6 +189,7 @@ class Conversion {
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;
   TextureCodec texture_ = TextureCodec::kNone;  // the last one recorded
+  bool chain_begun_ = false;                    // of textures that build on each other
   Converted converted_;
 };
 
@@ -232,7 +260,8 @@ Command convert_command() {
             })
             ->type_name("NAME");
         app.add_option("--texture", options->texture,
-                       "Code frames anew, textures as " + texture_codec_names() + " (default as recorded)")
+                       "Code frames anew, textures as " + texture_codec_names() +
+                           " (default: they stay as they are, byte for byte)")
             ->check([](const std::string& name) {
               return texture_codec_named(name).value_or(TextureCodec::kNone) != TextureCodec::kNone
                          ? ""
@@ -252,7 +281,8 @@ Command convert_command() {
             ->check(CLI::Range(1, 1000));
         app.add_option("--draco-speed", options->draco_speed, "Of draco-mesh: 0 smallest, 9 fastest")
             ->check(CLI::Range(0, 9));
-        app.add_option("--texture-quality", options->texture_quality, "Of textures coded anew (default 80)")
+        app.add_option("--texture-quality", options->texture_quality,
+                       "Code frames anew, textures too (default 80 where they are)")
             ->check(CLI::Range(1, 100));
         app.add_flag(
             "--foxglove", options->foxglove,

@@ -208,6 +208,7 @@ Status describe_file(const Options& options, StopSignal& stop) {
     j["file_bytes"] = file_bytes;
     j["recorded"] = utc_text(summary.start_ns);
     j["duration_s"] = duration_s;
+    j["recordings"] = summary.recordings;
     j["recovered"] = summary.recovered;
     j["lost_bytes"] = summary.lost_bytes;
     j["damaged_parts"] = recorded->damaged() + summary.damage.size();
@@ -222,6 +223,10 @@ Status describe_file(const Options& options, StopSignal& stop) {
               utc_text(summary.start_ns).c_str(), duration_text(duration_s).c_str());
   if (info) print_info(*info);
   print_frames(totals);
+  if (summary.recordings > 1)
+    std::printf(
+        "joined      %zu recordings lie one behind the other in this file; all of them are told of here\n",
+        summary.recordings);
   if (summary.recovered) {
     const std::string lost =
         summary.lost_bytes > 0 ? "; " + bytes_text(summary.lost_bytes) + " are no part of a recording" : "";

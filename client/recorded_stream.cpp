@@ -54,6 +54,12 @@ Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, c
   recorded.reader_ = std::move(reader).value();
   const RecordingSummary& summary = recorded.reader_->summary();
 
+  if (summary.recordings > 1)
+    log_warning(
+        file.string() + " is " + std::to_string(summary.recordings) +
+        " recordings, one behind the other: all are read here; `relievo recover` makes one of them that " +
+        "other readers read, too");
+
   std::set<std::string> streams;
   for (const RecordingChannel& channel : summary.channels) {
     if (topic_of(channel) && !stream_of(channel).empty()) streams.insert(stream_of(channel));

@@ -25,6 +25,7 @@ std::string default_out(const std::filesystem::path& file) {
 void report(const Options& options, const RecoveredRecording& recovered) {
   if (options.json) {
     const nlohmann::json j = {{"file", options.out},
+                              {"recordings", recovered.recordings},
                               {"messages", recovered.messages},
                               {"attachments", recovered.attachments},
                               {"lost_bytes", recovered.lost_bytes},
@@ -35,6 +36,8 @@ void report(const Options& options, const RecoveredRecording& recovered) {
   std::printf("%s: %llu messages and %llu attachments\n", options.out.c_str(),
               static_cast<unsigned long long>(recovered.messages),
               static_cast<unsigned long long>(recovered.attachments));
+  if (recovered.recordings > 1)
+    std::printf("of %zu recordings that lay one behind the other\n", recovered.recordings);
   for (const std::string& line : recovered.left_out) std::printf("left out: %s\n", line.c_str());
   if (recovered.lost_bytes > 0) {
     std::printf("%llu bytes of the file are no part of a recording\n",

@@ -54,41 +54,111 @@ RELIEVO_AVX2 inline __m128i sizes_of(__m128i folded) {
 }
 
 RELIEVO_AVX2 inline __m256i within_tolerance(const GridResiduals& line, int b, __m256i columns,
-                                             __m256i expected, __m128i tables) {
+                                             __m256i expected) {
   const __m256i tolerance = _mm256_cvtepu8_epi32(load_octets(line.tolerance + b));
   const __m256i off = _mm256_sub_epi32(columns, expected);
   // Differences of places that are not there are far from any tolerance, whether or not they overflow.
   const __m256i far =
       _mm256_or_si256(_mm256_cmpgt_epi32(off, tolerance),
                       _mm256_cmpgt_epi32(_mm256_sub_epi32(_mm256_setzero_si256(), tolerance), off));
+  const __m128i tables = load_octets(line.tables + b);
   const __m256i alone = _mm256_cvtepi8_epi32(_mm_cmpeq_epi8(tables, _mm_set1_epi8(kAloneTable)));
   return _mm256_blendv_epi8(expected, columns, _mm256_or_si256(far, alone));
 }
 
-RELIEVO_AVX2 inline void residuals(const GridResiduals& line, int count) {
-  const __m256i kAbsent = _mm256_set1_epi32(StripeGrid::kAbsent);
-  for (int b = 0; b < count; b += 8) {
-    const __m128i tables = load_octets(line.tables + b);
-    const __m256i expected = load_ints(line.expected + b);
-    __m256i columns = load_ints(line.columns + b);
-    if (line.tolerance != nullptr) {
-      columns = within_tolerance(line, b, columns, expected, tables);
-      store_ints(columns, line.columns + b);
-    }
-    const __m256i d = _mm256_sub_epi32(columns, expected);
-    const __m256i folded = _mm256_xor_si256(_mm256_slli_epi32(d, 1), _mm256_srai_epi32(d, 31));
-    // Those that are no symbol become the first number above them, absent ones 255.
-    const __m256i seen = _mm256_min_epu32(folded, _mm256_set1_epi32(kDirectSymbols));
-    const __m256i gone = _mm256_srli_epi32(_mm256_cmpeq_epi32(columns, kAbsent), 24);
-    const __m128i symbols = narrow(_mm256_or_si256(seen, gone));
-    const __m128i octets = _mm_packus_epi16(symbols, symbols);
-    const __m128i absent = _mm_cmpeq_epi8(octets, _mm_set1_epi8(-1));
-    const __m128i done = is_direct(octets, tables);
-    store_octets(kinds_of(done, absent), line.kinds + b);
-    store_octets(_mm_blendv_epi8(load_octets(line.sizes + b), sizes_of(octets), done), line.sizes + b);
-    const __m128i first = _mm_mullo_epi16(_mm_cvtepu8_epi16(tables), _mm_set1_epi16(rans::kMostSymbols));
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(line.codes + b), _mm_add_epi16(first, symbols));
+/// Folded residuals of eight places; those that are no symbol are the first number above them, absent ones
+/// have 255 in it.
+RELIEVO_AVX2 inline __m256i folded_residuals(const GridResiduals& line, int b) {
+  const __m256i expected = load_ints(line.expected + b);
+  __m256i columns = load_ints(line.columns + b);
+  if (line.tolerance != nullptr) {
+    columns = within_tolerance(line, b, columns, expected);
+    store_ints(columns, line.columns + b);
   }
+  const __m256i d = _mm256_sub_epi32(columns, expected);
+  const __m256i folded = _mm256_xor_si256(_mm256_slli_epi32(d, 1), _mm256_srai_epi32(d, 31));
+  const __m256i seen = _mm256_min_epu32(folded, _mm256_set1_epi32(kDirectSymbols));
+  const __m256i absent = _mm256_cmpeq_epi32(columns, _mm256_set1_epi32(StripeGrid::kAbsent));
+  return _mm256_or_si256(seen, _mm256_srli_epi32(absent, 24));
+}
+
+struct Residuals {
+  __m128i kinds, sizes;
+};
+/// `octets`: of folded_residuals().
+RELIEVO_AVX2 inline Residuals residuals_of(__m128i octets, __m128i tables, __m128i sizes) {
+  const __m128i done = is_direct(octets, tables);
+  return {kinds_of(done, _mm_cmpeq_epi8(octets, _mm_set1_epi8(-1))),
+          _mm_blendv_epi8(sizes, sizes_of(octets), done)};
+}
+
+RELIEVO_AVX2 inline __m128i load16(const void* from) {
+  return _mm_loadu_si128(static_cast<const __m128i*>(from));
+}
+RELIEVO_AVX2 inline void store16(__m128i from, void* to) {
+  _mm_storeu_si128(static_cast<__m128i*>(to), from);
+}
+
+/// Sixteen numbers of 16 bits in their order, of eight and eight.
+RELIEVO_AVX2 inline __m256i narrow(__m256i first, __m256i second) {
+  return _mm256_permute4x64_epi64(_mm256_packus_epi32(first, second), 0b11011000);
+}
+
+RELIEVO_AVX2 inline void residuals(const GridResiduals& line, int count) {
+  int b = 0;
+  for (; b + 8 < count; b += 16) {
+    const __m256i symbols = narrow(folded_residuals(line, b), folded_residuals(line, b + 8));
+    const __m128i octets =
+        _mm_packus_epi16(_mm256_castsi256_si128(symbols), _mm256_extracti128_si256(symbols, 1));
+    const __m128i tables = load16(line.tables + b);
+    const Residuals those = residuals_of(octets, tables, load16(line.sizes + b));
+    store16(those.kinds, line.kinds + b);
+    store16(those.sizes, line.sizes + b);
+    const __m256i first =
+        _mm256_mullo_epi16(_mm256_cvtepu8_epi16(tables), _mm256_set1_epi16(rans::kMostSymbols));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(line.codes + b), _mm256_add_epi16(first, symbols));
+  }
+  if (b >= count) return;
+  const __m128i symbols = narrow(folded_residuals(line, b));
+  const __m128i tables = load_octets(line.tables + b);
+  const Residuals those =
+      residuals_of(_mm_packus_epi16(symbols, symbols), tables, load_octets(line.sizes + b));
+  store_octets(those.kinds, line.kinds + b);
+  store_octets(those.sizes, line.sizes + b);
+  const __m128i first = _mm_mullo_epi16(_mm_cvtepu8_epi16(tables), _mm_set1_epi16(rans::kMostSymbols));
+  store16(_mm_add_epi16(first, symbols), line.codes + b);
+}
+
+/// `left`, `here`, `right`: sizes of sixteen places and of those beside them; `alone`: -1 where nothing is
+/// above.
+RELIEVO_AVX2 inline __m128i contexts_of(__m128i left, __m128i here, __m128i right, __m128i alone) {
+  const __m128i t = _mm_add_epi8(_mm_add_epi8(left, right), _mm_add_epi8(here, here));
+  const __m128i small = _mm_setr_epi8(0, 1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4);
+  const __m128i below_16 = _mm_shuffle_epi8(small, _mm_min_epu8(t, _mm_set1_epi8(15)));
+  const __m128i from_16 = _mm_cmpeq_epi8(_mm_max_epu8(t, _mm_set1_epi8(16)), t);
+  const __m128i from_32 = _mm_cmpeq_epi8(_mm_max_epu8(t, _mm_set1_epi8(32)), t);
+  const __m128i contexts = _mm_sub_epi8(below_16, _mm_add_epi8(from_16, from_32));
+  return _mm_blendv_epi8(contexts, _mm_set1_epi8(kAloneTable), alone);
+}
+
+RELIEVO_AVX2 inline void contexts(const std::uint8_t* sizes, const std::int32_t* up1, int count,
+                                  std::uint8_t* out) {
+  const __m256i kAbsent = _mm256_set1_epi32(StripeGrid::kAbsent);
+  int b = 0;
+  for (; b + 8 < count; b += 16) {
+    const __m256i absent = _mm256_packs_epi32(_mm256_cmpeq_epi32(load_ints(up1 + b), kAbsent),
+                                              _mm256_cmpeq_epi32(load_ints(up1 + b + 8), kAbsent));
+    const __m256i in_order = _mm256_permute4x64_epi64(absent, 0b11011000);
+    const __m128i alone =
+        _mm_packs_epi16(_mm256_castsi256_si128(in_order), _mm256_extracti128_si256(in_order, 1));
+    store16(contexts_of(load16(sizes + b - 1), load16(sizes + b), load16(sizes + b + 1), alone), out + b);
+  }
+  if (b >= count) return;
+  const __m256i absent = _mm256_cmpeq_epi32(load_ints(up1 + b), kAbsent);
+  const __m128i shorts = _mm_packs_epi32(_mm256_castsi256_si128(absent), _mm256_extracti128_si256(absent, 1));
+  store_octets(contexts_of(load_octets(sizes + b - 1), load_octets(sizes + b), load_octets(sizes + b + 1),
+                           _mm_packs_epi16(shorts, shorts)),
+               out + b);
 }
 
 /// By which of eight are kept: their numbers, one after the other.

@@ -21,6 +21,22 @@ template <std::size_t Tables, std::size_t Symbols = rans::kMostSymbols>
 using Counts = std::array<std::uint32_t, Tables * Symbols>;
 using ControlCounts = Counts<kControlTables, kControlSymbols>;
 
+/// A stream's symbols, by their codes. Kept from grid to grid with its room, which is not filled anew.
+struct Codes {
+  std::vector<std::uint16_t> room;
+  std::uint16_t* end = nullptr;       // of those that are there
+  std::vector<std::uint32_t> starts;  // of rows
+
+  /// Room for so many, of which none is there.
+  void start(std::size_t most) {
+    if (room.size() < most) room.resize(most);
+    end = room.data();
+    starts.clear();
+  }
+  void start_row() { starts.push_back(static_cast<std::uint32_t>(end - room.data())); }
+  rans::Rows rows() const { return {{room.data(), end}, starts}; }
+};
+
 void put_varint(Bytes& out, std::size_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
   out.push_back(static_cast<std::uint8_t>(value));
@@ -32,7 +48,7 @@ void put_varint(Bytes& out, std::size_t value) {
 /// that all slices share, its streams.
 struct GridEncoder::Slice {
   int begin = 0, end = 0;
-  rans::Rows control, residuals, sigmas;
+  Codes control, residuals, sigmas;
   rans::BitWriter raw;
   std::uint32_t vertices = 0, triangles = 0;
   ControlCounts control_counts;
@@ -82,14 +98,6 @@ struct GridEncoder::Slice {
   void read_columns(const Input& in, int line);
   void read_alone(const Input& in, int line, const GridRows& rows, int b);
   void read_sigmas(const Input& in, int line);
-  /// What `write` puts into the control stream; at most `most` symbols.
-  template <typename Write>
-  void put_at_most(std::size_t most, const Write& write) {
-    const std::size_t start = control.codes.size();
-    control.codes.resize(start + most);
-    const std::uint16_t* behind = write(control.codes.data() + start);
-    control.codes.resize(static_cast<std::size_t>(behind - control.codes.data()));
-  }
   const std::int32_t* row(const StripeGrid& grid, int line) const {
     return line < begin ? absent.data() + StripeGrid::kMargin : grid.columns.data() + grid.at(line, 0);
   }
@@ -98,8 +106,13 @@ struct GridEncoder::Slice {
 void GridEncoder::Slice::start(int first, int last, const StripeGrid& grid) {
   begin = first;
   end = last;
-  for (rans::Rows* rows : {&control, &residuals, &sigmas}) rows->clear();
-  control.starts.push_back(0);
+  // Of a line its marks, the places below it and its cells, each with what is said of blocks; of the others
+  // one a place.
+  const auto places = static_cast<std::size_t>(end - begin + 1) * static_cast<std::size_t>(grid.stride());
+  control.start(4 * places);
+  control.start_row();
+  residuals.start(places);
+  sigmas.start(grid.sigmas.empty() ? 0 : places);
   vertices = triangles = 0;
   control_counts.fill(0);
   residual_counts.fill(0);
@@ -219,19 +232,15 @@ void GridEncoder::Slice::read_columns(const Input& in, int line) {
                      .codes = line_codes.data(),
                      .kinds = kinds.data()},
                     boundaries);
-  const std::size_t start = residuals.codes.size();
-  residuals.starts.push_back(static_cast<std::uint32_t>(start));
-  residuals.codes.resize(start + contexts.size());
+  residuals.start_row();
   for (int b = 0; b < boundaries; b += 8) {
     if ((load8(kinds.data() + b) & kByItself * kOnes) == 0) continue;
     for (int i = b; i < b + 8; ++i)  // behind the last boundary there are no vertices
       if (kinds[static_cast<std::size_t>(i)] == kByItself) read_alone(in, line, rows, i);
   }
-  std::uint16_t* const to = residuals.codes.data() + start;
-  const auto count =
-      static_cast<std::size_t>(kernels.pack(line_codes.data(), kinds.data(), boundaries, to) - to);
-  vertices += static_cast<std::uint32_t>(count);
-  residuals.codes.resize(start + count);
+  std::uint16_t* const row_end = kernels.pack(line_codes.data(), kinds.data(), boundaries, residuals.end);
+  vertices += static_cast<std::uint32_t>(row_end - residuals.end);
+  residuals.end = row_end;
 }
 
 /// A vertex that the kernel leaves.
@@ -263,7 +272,7 @@ void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
   const std::int32_t* further = row(in.grid, line - 2);
   const std::uint8_t* codes = in.grid.sigmas.data() + in.grid.at(line, 0);
   const std::ptrdiff_t stride = in.grid.stride();
-  sigmas.starts.push_back(static_cast<std::uint32_t>(sigmas.codes.size()));
+  sigmas.start_row();
   int last = kFirstSigma;
   for (int b = 0; b < in.grid.boundaries; ++b) {
     if (here[b] == kAbsent) continue;
@@ -276,24 +285,19 @@ void GridEncoder::Slice::read_sigmas(const Input& in, int line) {
     last = codes[b];
     const Symbol symbol = symbol_of(zigzag(codes[b] - p));
     if (symbol.count > 0) raw.put(symbol.rest, symbol.count);
-    sigmas.codes.push_back(rans::code_of(table, symbol.symbol));
+    *sigmas.end++ = rans::code_of(table, symbol.symbol);
   }
 }
 
 void GridEncoder::Slice::read(const Input& in) {
   // there[0] is the line above; the place at [1] the line itself. Nothing is above a slice.
   fill_there(in.grid, begin, there[1]);
-  // A line's marks, the places below it and its cells, each with what is said of blocks.
-  const auto most = static_cast<std::size_t>(4 * in.grid.stride());
-  put_at_most(most, [&](std::uint16_t* to) {
-    return read_places(in, begin, there[0].data() + StripeGrid::kMargin,
-                       there[1].data() + StripeGrid::kMargin, to);
-  });
+  std::uint16_t* to = read_places(in, begin, there[0].data() + StripeGrid::kMargin,
+                                  there[1].data() + StripeGrid::kMargin, control.end);
   for (int line = begin; line < end; ++line) {
     std::swap(there[0], there[1]);
     const std::uint8_t* here = there[0].data() + StripeGrid::kMargin;
-    if (!in.grid.interpolated.empty())
-      put_at_most(most, [&](std::uint16_t* to) { return read_marks(in, line, here, to); });
+    if (!in.grid.interpolated.empty()) to = read_marks(in, line, here, to);
     if (line + 1 < in.grid.lines) {
       // The first line of the slice below, too: where cells have corners.
       if (line + 1 < end) {
@@ -302,16 +306,15 @@ void GridEncoder::Slice::read(const Input& in) {
         there[1].swap(there_after);
       }
       const std::uint8_t* below = there[1].data() + StripeGrid::kMargin;
-      put_at_most(most, [&](std::uint16_t* to) {
-        return read_cells(in, line, here, below, read_places(in, line + 1, here, below, to));
-      });
+      to = read_cells(in, line, here, below, read_places(in, line + 1, here, below, to));
     }
     read_columns(in, line);
     if (!in.grid.sigmas.empty()) read_sigmas(in, line);
   }
-  rans::count_codes(control.codes, control_counts);
-  rans::count_codes(residuals.codes, residual_counts);
-  rans::count_codes(sigmas.codes, sigma_counts);
+  control.end = to;
+  rans::count_codes(control.rows().codes, control_counts);
+  rans::count_codes(residuals.rows().codes, residual_counts);
+  rans::count_codes(sigmas.rows().codes, sigma_counts);
 }
 
 void GridEncoder::Slice::write(const rans::EncoderTables& control_tables,
@@ -319,9 +322,10 @@ void GridEncoder::Slice::write(const rans::EncoderTables& control_tables,
                                const rans::EncoderTables* sigma_tables) {
   Bytes streams;
   std::array<std::size_t, 3> ends{};
-  ends[0] = rans::encode({control, control_tables}, {residuals, residual_tables}, words, streams);
+  ends[0] =
+      rans::encode({control.rows(), control_tables}, {residuals.rows(), residual_tables}, words, streams);
   ends[1] = streams.size();
-  if (sigma_tables != nullptr) rans::encode({sigmas, *sigma_tables}, words, streams);
+  if (sigma_tables != nullptr) rans::encode({sigmas.rows(), *sigma_tables}, words, streams);
   ends[2] = streams.size();
   const Bytes rest = raw.finish();
   bytes.clear();

@@ -84,6 +84,8 @@ GridModel fit_model(const StripeGrid& grid, const StripeGrid* key) {
   model.spacing = usual_spacing(grid, line_step);
   const auto row = [&](const StripeGrid& of, int line) { return of.columns.data() + of.at(line, 0); };
   GridSlopes sums;
+  const int places =
+      (grid.boundaries + 7) / 8 * 8;  // behind the last one are none, and eight are as quick as one
   for (int line = 4; line < grid.lines; line += line_step) {
     const GridRows rows{.up1 = row(grid, line - 1),
                         .up2 = row(grid, line - 2),
@@ -91,7 +93,7 @@ GridModel fit_model(const StripeGrid& grid, const StripeGrid* key) {
                         .up4 = row(grid, line - 4),
                         .key = nullptr,
                         .key_up = nullptr};
-    grid_kernels().slopes(row(grid, line), rows, limit, grid.boundaries, sums);
+    grid_kernels().slopes(row(grid, line), rows, limit, places, sums);
   }
   Fit<3> slopes = fit_of(sums);
   const auto w = slopes.weights();

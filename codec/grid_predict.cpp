@@ -165,7 +165,7 @@ RELIEVO_INLINE void there_body(const std::int32_t* columns, int count, std::uint
 }
 
 /// Of so few places that no sum overflows: limits are 2^12 at most.
-constexpr int kPlacesOfASum = 64;
+constexpr int kPlacesOfASum = 120;
 
 RELIEVO_INLINE void slopes_of(const std::int32_t* here, const GridRows& rows, int begin, int end,
                               std::int32_t limit, GridSlopes& sums) {
@@ -217,7 +217,8 @@ RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const s
   }
 }
 
-#define RELIEVO_KERNELS(set, attributes, residuals_of, pack_of, pack_cells_of, columns_of, there_of)         \
+#define RELIEVO_KERNELS(set, attributes, contexts_of, residuals_of, pack_of, pack_cells_of, columns_of,      \
+                        there_of)                                                                            \
   struct set {                                                                                               \
     attributes static void predict(const GridRows& rows, const GridModel& model, int count,                  \
                                    std::int32_t* expected) {                                                 \
@@ -225,7 +226,7 @@ RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const s
     }                                                                                                        \
     attributes static void contexts(const std::uint8_t* sizes, const std::int32_t* up1, int count,           \
                                     std::uint8_t* out) {                                                     \
-      contexts_body(sizes, up1, count, out);                                                                 \
+      contexts_of(sizes, up1, count, out);                                                                   \
     }                                                                                                        \
     attributes static void residuals(const GridResiduals& line, int count) { residuals_of(line, count); }    \
     attributes static std::uint16_t* pack(const std::uint16_t* codes, const std::uint8_t* kinds, int count,  \
@@ -255,10 +256,11 @@ RELIEVO_INLINE void diagonals_body(const std::int32_t* __restrict above, const s
     }                                                                                                        \
   }
 
-RELIEVO_KERNELS(Portable, , residuals_body, pack_body, pack_cells_body, columns_body, there_body);
+RELIEVO_KERNELS(Portable, , contexts_body, residuals_body, pack_body, pack_cells_body, columns_body,
+                there_body);
 #if defined(__x86_64__)
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], avx2::residuals, avx2::pack, avx2::pack_cells, avx2::columns,
-                avx2::there);
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], avx2::contexts, avx2::residuals, avx2::pack, avx2::pack_cells,
+                avx2::columns, avx2::there);
 #endif
 
 }  // namespace

@@ -115,10 +115,11 @@ Result<Bytes> File::read(std::uint64_t offset, std::uint64_t length) const {
     if (got == 0) return Error{name_ + " became shorter while it was read"};
     done += static_cast<std::size_t>(got);
   }
+  bytes_read_ += length;
   return bytes;
 }
 
-Result<Contents> read_contents(const File& file, ReadContents how) {
+Result<std::vector<Contents>> read_contents(const File& file, ReadContents how) {
   const std::uint64_t start_bytes = std::min<std::uint64_t>(file.size(), kMagic.size());
   const auto magic = file.read(0, start_bytes);
   if (!magic) return magic.error();
@@ -128,10 +129,10 @@ Result<Contents> read_contents(const File& file, ReadContents how) {
     Contents nothing;
     nothing.recovered = true;
     if (file.size() > 0) nothing.gaps.push_back({0, file.size()});
-    return nothing;
+    return std::vector{std::move(nothing)};
   }
   if (how == ReadContents::kByIndex) {
-    if (auto contents = read_index(file)) return std::move(*contents);
+    if (auto contents = read_index(file)) return std::vector{std::move(*contents)};
   }
   return walk_records(file, how == ReadContents::kByIndex ? ReadChunks::kWhereNeeded : ReadChunks::kAll);
 }

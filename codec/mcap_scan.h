@@ -16,7 +16,7 @@
 
 namespace relievo::mcap {
 
-/// A file opened for reading. Any offset and length may be asked for.
+/// A file opened for reading. Any offset and length may be asked for. One thread.
 class File {
  public:
   static Result<std::unique_ptr<File>> open(const std::filesystem::path& path);
@@ -28,6 +28,7 @@ class File {
   std::uint64_t size() const { return size_; }  // when it was opened
   /// Fails, before it allocates, where the file does not hold these bytes.
   Result<Bytes> read(std::uint64_t offset, std::uint64_t length) const;
+  std::uint64_t bytes_read() const { return bytes_read_; }  // by read() so far
 
  private:
   File(int handle, std::string name, std::uint64_t size)
@@ -36,6 +37,7 @@ class File {
   const int handle_;
   const std::string name_;
   const std::uint64_t size_;
+  mutable std::uint64_t bytes_read_ = 0;
 };
 
 /// Bytes that are no records.
@@ -44,6 +46,7 @@ struct Gap {
   std::uint64_t length = 0;
 };
 
+/// Of one recording, which is the whole file but where several were joined.
 struct Contents {
   std::map<std::uint16_t, Schema> schemas;    // by id, none 0
   std::map<std::uint16_t, Channel> channels;  // by id
@@ -63,8 +66,10 @@ enum class ReadContents {
   kByWalking,  // through the whole file: finds all that is whole, wherever it lies
 };
 
-/// Fails where the file is no MCAP file or cannot be read; a file cut short gives what is whole.
-Result<Contents> read_contents(const File& file, ReadContents how);
+/// Of each recording in the file: one, or more where others were put behind it (`cat a b`); their places are
+/// the file's, their ids their own. Fails where the file is no MCAP file or cannot be read; a file cut short
+/// gives what is whole.
+Result<std::vector<Contents>> read_contents(const File& file, ReadContents how);
 
 /// A chunk's records, checked against its CRC. Errors name no file or place: the caller knows both.
 Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk);

@@ -15,6 +15,7 @@ namespace {
 constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels
 constexpr std::uint64_t kMostHeaderBytes = 256;            // of a chunk, before its records
 constexpr std::uint64_t kWindowBytes = 1u << 20;           // read at once while looking for a record
+constexpr std::size_t kMostRecordings = 4096;              // that a file may be joined of
 
 /// Where a record that begins at `at` lies; nothing where the file is too short for it.
 struct Extent {
@@ -30,31 +31,32 @@ class Walk {
  public:
   Walk(const File& file, ReadChunks which) : file_(file), which_(which), effort_left_(4 * file.size()) {}
 
-  Result<Contents> run() {
+  Result<std::vector<Contents>> run() {
     std::uint64_t at = kMagic.size();
-    bool ended = false;
-    while (!ended && at < file_.size()) {
-      const auto record = extent(at);
+    while (at < file_.size()) {
+      const auto record = ended_ ? std::nullopt : extent(at);
       loose_messages_ = loose_messages_ || (record && record->op == Op::kMessage);
       if (record && add(*record)) {
         at = record->end();
-        ended = record->op == Op::kFooter;
+        if (record->op == Op::kFooter) at = end_at(at);
+        continue;
+      }
+      if (begins_at(at) && done_.size() + 1 < kMostRecordings) {
+        finish();
+        at += kMagic.size();
         continue;
       }
       const std::uint64_t next = find_next(at + 1);
       contents_.gaps.push_back({at, next - at});
+      ended_ = false;
       at = next;
     }
-    if (loose_messages_ && contents_.chunks.empty())
+    finish();
+    if (done_.size() == 1) done_[0].recovered = done_[0].recovered || !plain_end_;
+    const auto has_chunks = [](const Contents& contents) { return !contents.chunks.empty(); };
+    if (loose_messages_ && std::ranges::none_of(done_, has_chunks))
       return Error{file_.name() + ": messages outside chunks are not supported"};
-    const auto magic = file_.read(at, kMagic.size());
-    const bool whole = ended && magic && at + kMagic.size() == file_.size() &&
-                       std::equal(kMagic.begin(), kMagic.end(), magic->begin());
-    if (ended && !whole && at < file_.size()) contents_.gaps.push_back({at, file_.size() - at});
-    contents_.recovered = !whole || !plain_end_ || !contents_.gaps.empty();
-    for (const auto& [id, count] : counts_) contents_.statistics.channel_messages.emplace_back(id, count);
-    contents_.statistics.chunks = static_cast<std::uint32_t>(contents_.chunks.size());
-    return std::move(contents_);
+    return std::move(done_);
   }
 
  private:
@@ -69,10 +71,35 @@ class Walk {
     return out;
   }
 
-  /// True where a record could begin at `at`, or the file ends there.
+  /// Of a recording whose footer ends at `at`: where it ends itself.
+  std::uint64_t end_at(std::uint64_t at) {
+    const auto magic = file_.read(at, kMagic.size());
+    ended_ = magic && std::equal(kMagic.begin(), kMagic.end(), magic->begin());
+    return ended_ ? at + kMagic.size() : at;
+  }
+
+  /// Whether a recording begins at `at`: a file's first bytes and a header.
+  bool begins_at(std::uint64_t at) const {
+    const auto magic = file_.read(at, kMagic.size());
+    if (!magic || !std::equal(kMagic.begin(), kMagic.end(), magic->begin())) return false;
+    const auto header = extent(at + kMagic.size());
+    return header && header->op == Op::kHeader;
+  }
+
+  /// What was read of one recording is all of it.
+  void finish() {
+    contents_.recovered = !ended_ || !contents_.gaps.empty();
+    for (const auto& [id, count] : counts_) contents_.statistics.channel_messages.emplace_back(id, count);
+    contents_.statistics.chunks = static_cast<std::uint32_t>(contents_.chunks.size());
+    done_.push_back(std::exchange(contents_, {}));
+    counts_.clear();
+    ended_ = behind_data_ = false;
+  }
+
+  /// True where a record or a recording could begin at `at`, or the file ends there.
   bool goes_on_at(std::uint64_t at) const {
     const auto next = extent(at);
-    return at == file_.size() || (next && next->op <= Op::kDataEnd);
+    return at == file_.size() || (next && next->op <= Op::kDataEnd) || begins_at(at);
   }
 
   /// False where the record, or its length, cannot be.
@@ -217,7 +244,8 @@ class Walk {
     }
   }
 
-  /// The first place from `at` where a chunk or an attachment is whole; the file's end where there is none.
+  /// The first place from `at` where a chunk or an attachment is whole, or a recording begins; the file's end
+  /// where there is none.
   std::uint64_t find_next(std::uint64_t at) {
     while (at < file_.size()) {
       const auto window = file_.read(at, std::min(kWindowBytes, file_.size() - at));
@@ -225,6 +253,7 @@ class Walk {
       for (std::size_t i = 0; i < window->size(); ++i) {
         const auto op = static_cast<Op>((*window)[i]);
         if ((op == Op::kChunk || op == Op::kAttachment) && is_whole(at + i)) return at + i;
+        if ((*window)[i] == kMagic[0] && begins_at(at + i)) return at + i;
       }
       at += window->size();
     }
@@ -258,17 +287,19 @@ class Walk {
 
   const File& file_;
   const ReadChunks which_;
-  Contents contents_;
+  std::vector<Contents> done_;
+  Contents contents_;  // of the recording that is read
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::uint64_t effort_left_;  // bytes that may yet be read to tell whether a record is whole
   bool loose_messages_ = false;
   bool behind_data_ = false;
-  bool plain_end_ = false;
+  bool ended_ = false;      // as a whole recording does
+  bool plain_end_ = false;  // of the last footer
 };
 
 }  // namespace
 
-Result<Contents> walk_records(const File& file, ReadChunks which) {
+Result<std::vector<Contents>> walk_records(const File& file, ReadChunks which) {
   return Walk(file, which).run();
 }
 

@@ -15,11 +15,11 @@ namespace relievo::rans {
 void BitWriter::put(std::uint32_t value, int count) {
   bits_ |= static_cast<std::uint64_t>(value) << held_;
   held_ += count;
-  while (held_ >= 8) {
-    out_.push_back(static_cast<std::uint8_t>(bits_));
-    bits_ >>= 8;
-    held_ -= 8;
-  }
+  if (held_ < 32) return;
+  const auto* whole = reinterpret_cast<const std::uint8_t*>(&bits_);
+  out_.insert(out_.end(), whole, whole + 4);
+  bits_ >>= 32;
+  held_ -= 32;
 }
 
 void BitWriter::put_unary(std::uint32_t value) {
@@ -28,7 +28,7 @@ void BitWriter::put_unary(std::uint32_t value) {
 }
 
 Bytes BitWriter::finish() {
-  if (held_ > 0) out_.push_back(static_cast<std::uint8_t>(bits_));
+  for (; held_ > 0; held_ -= 8, bits_ >>= 8) out_.push_back(static_cast<std::uint8_t>(bits_));
   bits_ = 0;
   held_ = 0;
   return std::exchange(out_, {});
@@ -273,9 +273,8 @@ constexpr States kFirstStates{kLow, kLow, kLow, kLow};
 }  // namespace
 
 void encode(const Stream& lanes, Words& words, Bytes& out) {
-  const Rows none;
   StreamJob job{lanes.rows, lanes.tables.symbols(), end_of_words(lanes.rows, words.lanes), kFirstStates};
-  StreamJob single{none, nullptr, nullptr, kFirstStates};
+  StreamJob single{{}, nullptr, nullptr, kFirstStates};
   kernels().encode(job, single);
   append_stream(job, kLanes, words.lanes, out);
 }

@@ -115,21 +115,17 @@ struct DecoderTable {
   std::array<std::uint32_t, kScale> slots;
 };
 
-/// Rows of symbols' codes. The lanes take turns from a row's first symbol on.
+/// Rows of symbols' codes, which whoever made them keeps. The lanes take turns from a row's first symbol on.
 struct Rows {
-  std::vector<std::uint16_t> codes;
-  std::vector<std::uint32_t> starts;  // of each row, rising
-  void clear() {
-    codes.clear();
-    starts.clear();
-  }
+  std::span<const std::uint16_t> codes;
+  std::span<const std::uint32_t> starts;  // of each row, rising
 };
 
 /// Adds to `counts`, one for each code.
 void count_codes(std::span<const std::uint16_t> codes, std::span<std::uint32_t> counts);
 
 struct Stream {
-  const Rows& rows;
+  Rows rows;
   const EncoderTables& tables;
 };
 

@@ -229,17 +229,19 @@ struct Ways {
 RELIEVO_INLINE void step(const std::array<Ints, kLevels>& shares, const Ints& count,
                          std::array<Ints, kLevels>& best, Ways& ways) {
   constexpr int kHighest = kLargestLevel;
+  // The least of a way up or down grows by two bits a level. Less what it has grown by, it only ever falls:
+  // one step of those that wait for each other, not three.
   std::array<Ints, kLevels> from_below;
   Ints up = Ints{} + 1, down{}, is_from_above{};
   Ints least = Ints{} + kNever;
 #pragma GCC unroll 24
   for (int l = 0; l <= kHighest; ++l) {
     const auto at = static_cast<std::size_t>(l);
-    const Ints less = best[at] < least;
-    up |= less & (1 << l);
-    least = less ? best[at] : least;
-    from_below[at] = least + kBit;
-    least += 2 * kBit;
+    const std::int32_t grown = 2 * kBit * l;
+    const Ints here = best[at] - grown;
+    up |= (here < least) & (1 << l);
+    least = here < least ? here : least;
+    from_below[at] = least + (grown + kBit);
   }
   least = Ints{} + kNever;
   const Ints half = count * (kBit / 2);
@@ -247,12 +249,14 @@ RELIEVO_INLINE void step(const std::array<Ints, kLevels>& shares, const Ints& co
 #pragma GCC unroll 24
   for (int l = kHighest; l >= 0; --l) {
     const auto at = static_cast<std::size_t>(l);
-    const Ints better = least < from_below[at];
+    const std::int32_t grown = 2 * kBit * (kHighest - l);
+    const Ints from_above = least + grown;
+    const Ints better = from_above < from_below[at];
     is_from_above |= better & (1 << l);
-    const Ints way = better ? least : from_below[at];
-    const Ints less = best[at] < least;
-    down |= less & (1 << l);
-    least = (less ? best[at] : least) + 2 * kBit;
+    const Ints way = better ? from_above : from_below[at];
+    const Ints here = best[at] - grown;
+    down |= (here < least) & (1 << l);
+    least = (here < least ? here : least);
     best[at] = way + (l > 0 ? shares[at] - gain : Ints{});
     gain -= half;
   }
@@ -272,7 +276,8 @@ std::int32_t level_before(const Ways& ways, int table, std::int32_t level) {
 struct Counted {
   std::array<Ints, kMostSymbols> counts;
   Ints totals{};
-  Ints used{};  // symbols up to the last one that comes
+  Ints used{};                                    // symbols up to the last one that comes
+  std::array<std::uint8_t, kMostSymbols> ends{};  // 1 where it is the last one of a table
   std::int32_t most_used = 0;
 };
 
@@ -290,6 +295,7 @@ RELIEVO_INLINE void count_tables(const std::uint32_t* counts, std::size_t symbol
     }
     out.totals[t] = static_cast<std::int32_t>(total >> shift);
     out.used[t] = used;
+    if (used > 0) out.ends[static_cast<std::size_t>(used - 1)] = 1;
     out.most_used = std::max(out.most_used, used);
   }
 }
@@ -307,10 +313,8 @@ RELIEVO_INLINE void levels_body(const std::uint32_t* counts, std::size_t symbols
   for (std::int32_t s = 0; s < counted.most_used; ++s) {
     const auto at = static_cast<std::size_t>(s);
     step(shares, counted.counts[at], best, ways[at]);
+    if (counted.ends[at] == 0) continue;
     const Ints ends = counted.used == s + 1;
-    std::int32_t any = 0;
-    for (int t = 0; t < static_cast<int>(kTablesAtOnce); ++t) any |= ends[t];
-    if (any == 0) continue;
     Ints least = best[0];
     for (std::size_t l = 1; l < kLevels; ++l) {
       const Ints less = ends & (best[l] < least);

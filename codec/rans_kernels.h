@@ -17,7 +17,7 @@ using States = std::array<std::uint32_t, kLanes>;
 /// A stream on its way to words, the last symbol first. Words are written from `to` on downwards; the four
 /// before the last one may be written, too.
 struct StreamJob {
-  const Rows& rows;
+  Rows rows;
   const EncoderSymbol* symbols;
   std::uint16_t* to;
   States states;

@@ -92,6 +92,7 @@ struct RecordingSummary {
   std::uint64_t messages = 0;
   std::vector<std::string> damage;  // a line for each part left out because its bytes are wrong
   bool recovered = false;           // its index was rebuilt from what is whole
+  std::size_t recordings = 1;       // that the file was joined of, one behind the other: all of them are read
   std::uint64_t lost_bytes = 0;     // that are no records: at its end where it was cut short
 };
 
@@ -129,6 +130,9 @@ class RecordingReader {
   /// The log time of the last message at or before this one that is wanted; nothing where there is none.
   /// Reads the heads of messages alone, from there backwards, and checks no CRC: that is for next().
   virtual std::optional<std::int64_t> find_last(std::int64_t log_time_ns, const Wanted& wanted) = 0;
+
+  /// From the file so far, by all of these.
+  virtual std::uint64_t bytes_read() const = 0;
 };
 
 }  // namespace relievo

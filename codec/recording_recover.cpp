@@ -71,7 +71,8 @@ Result<RecoveredRecording> recover_recording(const fs::path& damaged, const fs::
   if (!writer) return writer.error();
   if (const Status copied = copy_description(from, **writer); !copied) return copied.error();
 
-  RecoveredRecording out{.attachments = from.attachments.size(), .lost_bytes = from.lost_bytes};
+  RecoveredRecording out{
+      .attachments = from.attachments.size(), .lost_bytes = from.lost_bytes, .recordings = from.recordings};
   out.left_out = from.damage;
   for (;;) {
     auto message = (*reader)->next();

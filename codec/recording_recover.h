@@ -16,6 +16,7 @@ struct RecoveredRecording {
   std::uint64_t messages = 0;         // copied
   std::uint64_t attachments = 0;      // copied
   std::uint64_t lost_bytes = 0;       // that were no records
+  std::size_t recordings = 1;         // that the file was joined of
   std::vector<std::string> left_out;  // a line for each damaged part, in the order in which they were met
   bool stopped = false;               // and nothing is written
 };

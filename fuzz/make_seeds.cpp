@@ -109,6 +109,13 @@ Status recordings(const fs::path& conformance, const fs::path& out) {
   write(out / "whole", whole);
   write(out / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)});
   write(out / "no_crcs", without_crcs(whole));
+  // Two files one behind the other, the first of them whole or cut short.
+  for (const auto& [name, size] :
+       {std::pair{"joined", whole.size()}, {"joined_behind_a_cut", whole.size() / 2}}) {
+    Bytes both(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
+    append_bytes(both, without_crcs(whole));
+    write(out / name, both);
+  }
   return {};
 }
 

@@ -49,11 +49,7 @@ void expect_copies(const std::vector<Bytes>& copies, const std::vector<Bytes>& o
 TEST(Play, RestampedFramesAreOfNowAndAsFarApartAsTheyWere) {
   const TempFolder folder;
   const auto file = folder / "then.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "10000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "40"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 20000, 40));
   std::map<std::uint64_t, std::pair<std::int64_t, std::string>> then, now;  // by sequence
   const auto keep = [](auto& into, const Bytes& cdr) {
     const auto frame = read_frame_cdr(cdr);
@@ -142,11 +138,7 @@ TEST(Play, FollowsAFileThatIsBeingWrittenUntilItIsFinished) {
   const TempFolder folder;
   const auto whole = folder / "whole.mcap";
   const auto growing = folder / "growing.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", whole, "--frames", "200"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(whole, 20000, 200));
   const std::size_t frames = recorded_frames(whole).size();
   std::ifstream in(whole, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(in), {}};
@@ -301,11 +293,7 @@ TEST(Play, DescriptionSurvivesADamagedFirstChunk) {
 TEST(Play, WebServesARecordingInALoop) {
   const TempFolder folder;
   const auto file = folder / "loop.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "3000", "60", "100000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "20"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 3000, 20));
   Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
   const std::uint16_t port = viewer_port(web);
   ASSERT_NE(port, 0) << web.err();

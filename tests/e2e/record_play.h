@@ -24,6 +24,16 @@ inline std::vector<std::string> on_loopback(std::vector<std::string> command) {
   return command;
 }
 
+/// Records the first `frames` of a stream "face" whose frames have `bytes` of noise for data; 0: real frames.
+inline void record_face(const std::filesystem::path& file, int bytes, int frames,
+                        const std::vector<std::string>& more = {}) {
+  Process server({program("test_publisher"), "face", kDomain, std::to_string(bytes), "60", "100000", "1"});
+  std::vector<std::string> command{"record", "face", "--out", file, "--frames", std::to_string(frames)};
+  command.insert(command.end(), more.begin(), more.end());
+  const auto done = run(on_loopback(std::move(command)));
+  ASSERT_EQ(done.status, 0) << done.err;
+}
+
 inline std::vector<Bytes> recorded_frames(const std::filesystem::path& file) {
   std::vector<Bytes> frames;
   auto reader = RecordingReader::open(file);

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
+#include "codec/frame_layout.h"
+#include "codec/texture_codec.h"
 #include "tests/e2e/record_play.h"
 #include "tests/support/temp_folder.h"
 
@@ -16,11 +19,7 @@ using testing::HasSubstr;
 TEST(RecordingFormats, FramesAreDescribedAndExported) {
   const TempFolder folder;
   const auto file = folder / "real.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "12"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 0, 12));
   const auto description = info(file);
   EXPECT_EQ(description["geometry_codecs"], nlohmann::json({"draco-mesh"}));
   EXPECT_EQ(description["texture_codecs"], nlohmann::json({"jpeg"}));
@@ -123,6 +122,60 @@ TEST(RecordingFormats, ARecordingIsCodedAnew) {
   EXPECT_FALSE(std::filesystem::exists(folder / "back.mcap"));
 }
 
+/// The texture's bytes of each frame.
+std::vector<Bytes> textures_of(const std::filesystem::path& file) {
+  std::vector<Bytes> out;
+  for (const Bytes& cdr : recorded_frames(file)) {
+    const auto view = read_frame_cdr(cdr);
+    const auto layout = view ? read_frame_layout(view->data) : Result<FrameLayout>(view.error());
+    EXPECT_TRUE(layout.ok()) << (layout ? "" : layout.error().message);
+    if (layout) out.emplace_back(layout->sections.texture.begin(), layout->sections.texture.end());
+  }
+  return out;
+}
+
+TEST(RecordingFormats, TexturesStayAsTheyAreUnlessOthersAreAskedFor) {
+  const TempFolder folder;
+  const bool has_h264 = check_texture_codec(TextureCodec::kH264).ok();
+  for (const std::string texture : {"jpeg", "h264"}) {
+    SCOPED_TRACE(texture);
+    const bool is_chain = texture == "h264";
+    if (is_chain && !has_h264) continue;
+    const std::string original = folder / (texture + ".mcap");
+    const auto served =
+        run({program("relievo-server"), "serve", "--source", "sim:plane,width=160,height=120,stripes=30",
+             "--web", "none", "--domain", kDomain, "--interface", "lo", "--fast", "--frames", "16",
+             "--key-interval", "5", "--texture", texture, "--record", original});
+    ASSERT_EQ(served.status, 0) << served.err;
+    const auto before = textures_of(original);
+    ASSERT_GT(before.size(), 12u);
+    int made = 0;
+    const auto convert = [&](const std::vector<std::string>& more) {
+      const std::string out = folder / (texture + std::to_string(made++) + ".mcap");
+      std::vector<std::string> command{program("relievo"), "convert", original, "--out", out, "--json"};
+      command.insert(command.end(), more.begin(), more.end());
+      const auto done = run(command);
+      EXPECT_EQ(done.status, 0) << done.err;
+      const auto shown =
+          run({program("relievo"), "export", out, "--out", out + "-png", "--format", "png", "--json"});
+      EXPECT_EQ(shown.status, 0) << shown.err;
+      EXPECT_EQ(nlohmann::json::parse(shown.out)["frames"], textures_of(out).size()) << "all decode";
+      return textures_of(out);
+    };
+    EXPECT_EQ(convert({"--geometry", "draco-grid", "--step-bits", "4"}), before);
+    EXPECT_EQ(convert({"--geometry", "metric"}), before);
+    EXPECT_EQ(convert({"--geometry", "visual", "--bound", "1"}), before);
+    EXPECT_NE(convert({"--texture-quality", "30"}), before);
+    // From between two key frames on: what builds on a picture that is not there is coded anew.
+    const auto part = convert({"--step-bits", "3", "--frames", "2:10"});
+    ASSERT_EQ(part.size(), 9u);
+    const std::size_t kept = is_chain ? 5 : 2;
+    EXPECT_TRUE(std::equal(part.begin() + static_cast<std::ptrdiff_t>(kept - 2), part.end(),
+                           before.begin() + static_cast<std::ptrdiff_t>(kept)));
+    EXPECT_EQ(is_chain, part[0] != before[2]);
+  }
+}
+
 /// From the live stream, and from a recording of it.
 TEST(RecordingFormats, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
   const std::filesystem::path js = RELIEVO_MCAP_JS;
@@ -130,12 +183,7 @@ TEST(RecordingFormats, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
     GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
   }
   const TempFolder folder;
-  {
-    Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
-    const auto done =
-        run(on_loopback({"record", "face", "--out", folder / "live.mcap", "--frames", "9", "--foxglove"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(folder / "live.mcap", 0, 9, {"--foxglove"}));
   const auto done = run({program("relievo"), "convert", folder / "live.mcap", "--out", folder / "part.mcap",
                          "--frames", "3:6", "--foxglove", "--json"});
   ASSERT_EQ(done.status, 0) << done.err;
@@ -165,11 +213,7 @@ TEST(RecordingFormats, OtherMcapReadersDecodeEverySample) {
   }
   const TempFolder folder;
   const auto file = folder / "a.mcap";
-  {
-    Process server({program("test_publisher"), "face", kDomain, "3000", "60", "100000", "1"});
-    const auto done = run(on_loopback({"record", "face", "--out", file, "--frames", "20"}));
-    ASSERT_EQ(done.status, 0) << done.err;
-  }
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 3000, 20));
   const auto done = run({"/usr/bin/env", "node", js / "validate.mjs", file});
   ASSERT_EQ(done.status, 0) << done.err;
   const auto json = nlohmann::json::parse(done.out);
@@ -189,6 +233,47 @@ TEST(RecordingFormats, OtherMcapReadersDecodeEverySample) {
     }
   }
   EXPECT_EQ(json["topics"].size(), 3u);
+}
+
+TEST(RecordingFormats, RecordingsThatWereJoinedAreAllReadAndMadeOne) {
+  const TempFolder folder;
+  ASSERT_NO_FATAL_FAILURE(record_face(folder / "a.mcap", 3000, 12));
+  ASSERT_NO_FATAL_FAILURE(record_face(folder / "b.mcap", 3000, 9));
+  const auto joined = folder / "joined.mcap";
+  {
+    std::ofstream out(joined, std::ios::binary);
+    for (const char* part : {"a.mcap", "b.mcap"})
+      out << std::ifstream(folder / part, std::ios::binary).rdbuf();
+  }
+  std::vector<Bytes> frames = recorded_frames(folder / "a.mcap");
+  for (Bytes& frame : recorded_frames(folder / "b.mcap")) frames.push_back(std::move(frame));
+  ASSERT_EQ(frames.size(), 21u);
+
+  const auto description = info(joined);
+  EXPECT_EQ(description["recordings"], 2);
+  EXPECT_EQ(description["frames"], 21);
+  EXPECT_EQ(description["recovered"], false);
+  const auto played = run(on_loopback({"play", joined, "--wait-readers", "0", "--speed", "20", "--json"}));
+  ASSERT_EQ(played.status, 0) << played.err;
+  EXPECT_EQ(nlohmann::json::parse(played.out)["frames"], 21);
+  EXPECT_THAT(played.err, HasSubstr("is 2 recordings, one behind the other"));
+
+  const auto one = folder / "one.mcap";
+  const auto recovered = run({program("relievo"), "recover", joined, "--out", one, "--json"});
+  ASSERT_EQ(recovered.status, 0) << recovered.err;
+  EXPECT_EQ(nlohmann::json::parse(recovered.out)["recordings"], 2);
+  EXPECT_EQ(recorded_frames(one), frames);
+  EXPECT_EQ(info(one)["recordings"], 1);
+
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@mcap/core")) return;
+  const auto checked = run({"/usr/bin/env", "node", js / "validate.mjs", one});
+  ASSERT_EQ(checked.status, 0) << checked.err;
+  for (const auto& topic : nlohmann::json::parse(checked.out)["topics"]) {
+    if (topic["topic"] == "relievo/frame") {
+      EXPECT_EQ(topic["count"], 21);
+    }
+  }
 }
 
 }  // namespace

@@ -131,6 +131,8 @@ TEST(Bench, Recording) {
       {"recording", "--source", kSource, "--minutes", "0.5", "--key-interval", "6", "--seeks", "7"});
   ASSERT_TRUE(report.is_object());
   expect_spread(report["open_ms"], 9, "open_ms");
+  expect_spread(report["seek_mb"], 14, "seek_mb");
+  EXPECT_LT(report["seek_mb"]["max"], report["file_mb"]) << "not all of it";
   EXPECT_GT(report["file_mb"], 0.1);
   for (const char* from : {"cached", "from disk"}) expect_spread(row(report, from)["seek_ms"], 7, from);
 }
@@ -153,6 +155,25 @@ TEST(Bench, Rate) {
   }
   EXPECT_EQ(report["rows"][0]["size"], 1.0);
   EXPECT_EQ(bench({"rate", "--texture", "gif"}).status, 2);
+}
+
+TEST(Bench, RateUnderDeadlines) {
+  // What nothing can miss is kept at the finest level, what nothing can keep missed at the coarsest.
+  const Json report =
+      report_of({"rate", "--source", "sim:object,width=320,height=240,stripes=40", "--geometry", "grid",
+                 "--texture", "jpeg", "--frames", "4", "--rounds", "5", "--deadline", "600000", "0.000001"});
+  ASSERT_TRUE(report.is_object());
+  ASSERT_EQ(report["rows"].size(), 2U);
+  for (const Json& row : report["rows"]) {
+    expect_spread(row["encode_ms"], 20, row["deadline_ms"].dump());
+    EXPECT_GE(row["encode_ms_p95"], row["encode_ms"]["median"]);
+    EXPECT_LE(row["encode_ms_p95"], row["encode_ms"]["max"]);
+  }
+  EXPECT_EQ(report["rows"][0]["deadline_ms"], 600000);
+  EXPECT_EQ(report["rows"][0]["late_share"], 0);
+  EXPECT_EQ(report["rows"][1]["late_share"], 1);
+  EXPECT_LT(report["rows"][0]["level"]["median"], report["rows"][1]["level"]["median"]);
+  EXPECT_EQ(bench({"rate", "--deadline", "0"}).status, 2);
 }
 
 TEST(Bench, Texture) {

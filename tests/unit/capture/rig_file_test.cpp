@@ -123,6 +123,35 @@ TEST(RigFile, RefusesFilesThatAreNone) {
   }
 }
 
+/// OpenCV's parser never comes back from what is behind the end of a document and begins with a dash.
+TEST(RigFile, RefusesWhatTheParserWouldNeverEndAt) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  for (const std::string& content :
+       {std::string("%YAML:1.0\n---ML:1.0\n---\n--\n"), std::string("%YAML:1.0\n---\na: 1\n---\n--\n"),
+        std::string("%YAML:1.0\n---\na: 1\n...\n--\n"), std::string("%YAML:1.0\n---\n  a: 1\nabc-: 1\n"),
+        std::string("%YAML:1.0\n---\n{a: 1}abc-\n"), std::string("%YAML:1.0\n---\n- 1\nabc-\n"),
+        std::string("%YAML:1.0\n---\na: 1\n\0---\n--\n", 26)}) {
+    test::write_text(file, content);
+    const Result<Rig> rig = read_rig(file);
+    ASSERT_FALSE(rig) << content;
+    EXPECT_THAT(rig.error().message, HasSubstr("it must be one map")) << content;
+  }
+}
+
+TEST(RigFile, ReadsWhatPeopleWrite) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  const std::string good = to_yaml(test::small_rig(Scan::kInterlaced));
+  for (const std::string& content :
+       {"%YAML:1.0\n# a rig\n---\n\n# of ours\n" + good.substr(good.find("---") + 4), good + "...\n\n",
+        good + "# and no more\n", replaced(good, "---\n", "")}) {
+    test::write_text(file, content);
+    const Result<Rig> rig = read_rig(file);
+    EXPECT_TRUE(rig) << (rig ? "" : rig.error().message) << "\n" << content;
+  }
+}
+
 TEST(RigFile, RefusesNestingThatWouldExhaustTheParser) {
   test::TempFolder folder;
   const auto file = folder.path() / "rig.yaml";

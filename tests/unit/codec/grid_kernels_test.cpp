@@ -23,7 +23,7 @@ namespace {
 
 TEST(GridKernels, PredictionsAndContextsAgree) {
   test::Random random(3);
-  constexpr int kPlaces = 64;
+  constexpr int kPlaces = 136;
   constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
   for (int round = 0; round < 200; ++round) {
     std::array<std::vector<std::int32_t>, 6> rows;
@@ -85,7 +85,7 @@ struct LineOutput {
 
 TEST(GridKernels, ResidualsAndColumnsAgreeAndAreEachOthersReverse) {
   test::Random random(4);
-  constexpr int kPlaces = 64;
+  constexpr int kPlaces = 72;
   constexpr std::int32_t kAbsent = StripeGrid::kAbsent;
   for (int round = 0; round < 200; ++round) {
     const std::uint32_t range = round % 4 == 0 ? 1U << 22 : 30;

@@ -54,19 +54,20 @@ TEST(Rans, SymbolsComeBackFromAnyTables) {
       encoders.set(t, levels_of(counts));
       ASSERT_TRUE(decoders[t].set(levels_of(counts)));
     }
-    Rows rows;
+    std::vector<std::uint16_t> codes;
+    std::vector<std::uint32_t> starts;
     std::vector<std::uint8_t> tables, symbols;
     for (std::uint32_t r = 0; r < 20; ++r) {
-      rows.starts.push_back(static_cast<std::uint32_t>(symbols.size()));
+      starts.push_back(static_cast<std::uint32_t>(symbols.size()));
       for (std::uint32_t i = random.below(40); i > 0; --i) {
         const std::uint32_t t = random.below(3);
         tables.push_back(static_cast<std::uint8_t>(t));
         symbols.push_back(alphabets[t][random.below(static_cast<std::uint32_t>(alphabets[t].size()))]);
-        rows.codes.push_back(code_of(tables.back(), symbols.back()));
+        codes.push_back(code_of(tables.back(), symbols.back()));
       }
     }
     Bytes bytes;
-    const Rows none;
+    const Rows rows{codes, starts}, none;
     if (lanes == kLanes) {
       encode({rows, encoders}, words, bytes);
     } else {
@@ -159,19 +160,18 @@ TEST(Rans, AlphabetsOfTwoKeepTheirOdds) {
     EncoderTables table(1);
     table.set(0, level);
     std::vector<std::uint8_t> symbols;
-    Rows rows;
-    rows.starts.push_back(0);
+    std::vector<std::uint16_t> codes;
     for (std::uint32_t i = 0; i < first + second; ++i) {
       symbols.push_back(i % 2 == 0 ? (i / 2 < second) : (second > first ? i / 2 < second : 0));
     }
     for (std::uint8_t& s : symbols) {
       s = second == 0 ? 0 : first == 0 ? 1 : s;
-      rows.codes.push_back(code_of(0, s));
+      codes.push_back(code_of(0, s));
     }
     Bytes bytes;
     Words words;
-    const Rows none;
-    bytes.resize(encode({rows, table}, {none, table}, words, bytes));
+    const std::vector<std::uint32_t> starts{0};
+    bytes.resize(encode({{codes, starts}, table}, {{}, table}, words, bytes));
     Decoder decoder(bytes, 1);
     for (const std::uint8_t s : symbols) ASSERT_EQ(decoder.one(first_frequency(level)), s != 0);
     EXPECT_TRUE(decoder.finished());
@@ -250,17 +250,20 @@ TEST(Rans, StreamsOfAllKernelsAgree) {
     tables.set(0, levels_of(counts));
     tables.set(1, BinaryLevel{true, true, static_cast<std::uint8_t>(1 + random.below(20))});
     const auto fill = [&](std::uint32_t rows, bool binary) {
-      Rows out;
+      std::pair<std::vector<std::uint16_t>, std::vector<std::uint32_t>> out;
+      auto& [codes, starts] = out;
       for (std::uint32_t r = 0; r < rows; ++r) {
-        out.starts.push_back(static_cast<std::uint32_t>(out.codes.size()));
+        starts.push_back(static_cast<std::uint32_t>(codes.size()));
         for (std::uint32_t i = random.below(50); i > 0; --i)
-          out.codes.push_back(
+          codes.push_back(
               binary ? code_of(1, random.below(9) == 0)
                      : code_of(0, alphabet[random.below(static_cast<std::uint32_t>(alphabet.size()))]));
       }
       return out;
     };
-    const Rows lanes = fill(random.below(20), false), single = fill(random.below(40), true);
+    const auto [lane_codes, lane_starts] = fill(random.below(20), false);
+    const auto [single_codes, single_starts] = fill(random.below(40), true);
+    const Rows lanes{lane_codes, lane_starts}, single{single_codes, single_starts};
     std::optional<std::pair<std::vector<std::uint16_t>, std::array<States, 2>>> reference;
     for (const Kernels& kernels : all_kernels()) {
       std::vector<std::uint16_t> a(lanes.codes.size() + 4), b(single.codes.size() + 4);

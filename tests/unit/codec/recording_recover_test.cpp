@@ -86,6 +86,103 @@ TEST_F(RecordingRecover, OfAWholeFileIsEverything) {
   EXPECT_EQ(read_file(folder_ / "bad.mcap"), whole_) << "the damaged file is not touched";
 }
 
+/// A recording of other times and numbers whose channels have other ids, and one channel of its own.
+Bytes another_recording(const TempFolder& folder, const RecordingSchema& schema = test::schema()) {
+  const auto file = folder / "b.mcap";
+  {
+    auto writer = create(file, {.chunk_ns = 5 * kStep_ns, .chunk_bytes = 1 << 20});
+    EXPECT_EQ(*writer->add_channel(schema, channel("relievo/info")), 0);
+    EXPECT_EQ(*writer->add_channel(schema, channel("relievo/status")), 1);
+    EXPECT_EQ(*writer->add_channel(schema, channel("relievo/frame")), 2);
+    EXPECT_TRUE(
+        writer->add_attachment({"rig.yaml", "application/yaml", kStart_ns, {'a', ':', ' ', '1'}}).ok());
+    EXPECT_TRUE(
+        writer->add_attachment({"rig.yaml", "application/yaml", kStart_ns, {'a', ':', ' ', '2'}}).ok());
+    for (int i = 100; i < 111; ++i)
+      EXPECT_TRUE(writer->write(message(static_cast<std::uint16_t>(i % 4 == 3 ? 1 : 2), i, 40)).ok());
+    EXPECT_TRUE(writer->finish().ok());
+  }
+  Bytes bytes = read_file(file);
+  std::filesystem::remove(file);
+  return bytes;
+}
+
+Bytes joined(const Bytes& a, std::span<const std::uint8_t> b) {
+  Bytes out = a;
+  out.insert(out.end(), b.begin(), b.end());
+  return out;
+}
+
+std::set<int> with_another(std::set<int> numbers) {
+  for (int i = 100; i < 111; ++i) numbers.insert(i);
+  return numbers;
+}
+
+TEST_F(RecordingRecover, OfRecordingsOneBehindTheOtherAllAreRead) {
+  const Bytes another = another_recording(folder_);
+  // In either order, and where the first one was cut short: within its end, its index, and a chunk.
+  const std::size_t cut = chunk_extent(whole_, 4).first + 20;
+  for (const Bytes& bytes :
+       {joined(whole_, another), joined(another, whole_), joined({whole_.begin(), whole_.end() - 4}, another),
+        joined({whole_.begin(), whole_.end() - 200}, another)}) {
+    RecoveredRecording report;
+    EXPECT_EQ(recovered_from(folder_, bytes, &report), with_another(all_but(-1, -1)));
+    EXPECT_EQ(report.recordings, 2u);
+    EXPECT_EQ(report.attachments, 3u) << "one is in both";
+  }
+  RecoveredRecording report;
+  EXPECT_EQ(recovered_from(
+                folder_, joined({whole_.begin(), whole_.begin() + static_cast<std::ptrdiff_t>(cut)}, another),
+                &report),
+            with_another(all_but(20, 22)));
+  EXPECT_EQ(report.recordings, 2u);
+  EXPECT_EQ(recovered_from(folder_, joined(joined(whole_, another), std::span(whole_).first(cut)), &report),
+            with_another(all_but(-1, -1)));
+  EXPECT_EQ(report.recordings, 3u);
+}
+
+TEST_F(RecordingRecover, JoinedRecordingsAreReadInOrderOfTimeAndSought) {
+  write_file(folder_ / "joined.mcap", joined(another_recording(folder_), whole_));
+  const auto reader = open(folder_ / "joined.mcap");
+  const RecordingSummary& summary = reader->summary();
+  EXPECT_EQ(summary.recordings, 2u);
+  EXPECT_FALSE(summary.recovered) << "nothing is missing";
+  EXPECT_EQ(summary.lost_bytes, 0u);
+  EXPECT_EQ(summary.messages, 34u);
+  ASSERT_EQ(summary.channels.size(), 3u);
+  EXPECT_EQ(summary.channels[1].topic, "relievo/status");
+  EXPECT_EQ(summary.channel_messages, (std::vector<std::uint64_t>{0, 7, 27}));
+  EXPECT_EQ(summary.start_ns, kStart_ns);
+  EXPECT_EQ(summary.end_ns, kStart_ns + 110 * kStep_ns);
+  const ReadBack back = read_all(*reader);
+  EXPECT_TRUE(back.errors.empty());
+  ASSERT_EQ(back.messages.size(), 34u);
+  for (std::size_t i = 1; i < back.messages.size(); ++i)
+    EXPECT_LT(back.messages[i - 1].sequence, back.messages[i].sequence);
+  EXPECT_EQ(reader->times(2)->size(), 27u);
+  ASSERT_TRUE(reader->seek(kStart_ns + 50 * kStep_ns).ok());
+  EXPECT_EQ((*reader->next())->sequence, 100u);
+  EXPECT_EQ(reader->find_last(kStart_ns + 99 * kStep_ns, [](std::uint16_t c, auto) { return c == 1; }),
+            kStart_ns + 19 * kStep_ns);
+}
+
+TEST_F(RecordingRecover, WhatIsDefinedOtherwiseBehindIsSaidAndLeftOut) {
+  RecordingSchema changed = schema();
+  changed.text += " // changed";
+  RecoveredRecording report;
+  EXPECT_EQ(recovered_from(folder_, joined(whole_, another_recording(folder_, changed)), &report),
+            all_but(-1, -1));
+  ASSERT_EQ(report.left_out.size(), 1u);
+  EXPECT_NE(report.left_out[0].find("test::Frame"), std::string::npos) << report.left_out[0];
+  // Nor does what was left out stand for a channel of the same name behind it.
+  const Bytes three = joined(joined(whole_, another_recording(folder_, changed)), another_recording(folder_));
+  EXPECT_EQ(recovered_from(folder_, three, &report), with_another(all_but(-1, -1)));
+  EXPECT_EQ(report.recordings, 3u);
+  const auto reader = open(folder_ / "bad.mcap");
+  ASSERT_EQ(reader->summary().channels.size(), 3u);
+  EXPECT_EQ(reader->summary().channels[2].topic, "relievo/info");
+}
+
 TEST_F(RecordingRecover, ABadChunkCostsItselfAlone) {
   for (const std::size_t inside : {60u, 200u}) {
     Bytes bytes = whole_;

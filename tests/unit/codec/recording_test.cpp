@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "base/time.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/codec/sample_recording.h"
 
@@ -141,6 +142,73 @@ TEST(Recording, TheLastMessageIsFoundAmongChunksThatOverlap) {
   const auto any = [](std::uint16_t, std::span<const std::uint8_t>) { return true; };
   for (int i = 0; i < 10; ++i)
     EXPECT_EQ(reader->find_last(kStart_ns + i * kStep_ns, any), kStart_ns + i * kStep_ns);
+}
+
+constexpr int kRate = 30, kKeyInterval = 15;
+constexpr std::size_t kFrameBytes = 2000;
+
+std::int64_t frame_time_ns(int frame) {
+  return kStart_ns + frame * kNanosecondsPerSecond / kRate;
+}
+
+/// Frames of which every fifteenth begins with a 1: it needs none before it.
+void write_frames(const std::filesystem::path& file, int minutes) {
+  auto writer = create(file, {.sync_ns = -1});
+  ASSERT_TRUE(writer->add_channel(schema(), channel("relievo/frame")).ok());
+  for (int i = 0; i < minutes * 60 * kRate; ++i) {
+    RecordedMessage m = message(0, i, kFrameBytes);
+    m.log_time_ns = frame_time_ns(i);
+    m.data[0] = i % kKeyInterval == 0 ? 1 : 0;
+    ASSERT_TRUE(writer->write(m).ok());
+  }
+  ASSERT_TRUE(writer->finish().ok());
+}
+
+struct SeekCost {
+  std::uint64_t bytes = 0, frames = 0;  // the most of any seek
+};
+
+/// Of getting to random times: to the key frame before, and on to the first frame that is not before the
+/// time.
+SeekCost cost_of_seeks(RecordingReader& reader) {
+  SeekCost most;
+  Random random(7);
+  const int frames = static_cast<int>(reader.summary().messages);
+  for (int i = 0; i < 300; ++i) {
+    const auto frame = static_cast<int>(random.below(static_cast<std::uint32_t>(frames)));
+    const std::uint64_t before = reader.bytes_read();
+    const auto key_ns = reader.find_last(
+        frame_time_ns(frame), [](std::uint16_t, std::span<const std::uint8_t> head) { return head[0] == 1; });
+    EXPECT_EQ(key_ns, frame_time_ns(frame / kKeyInterval * kKeyInterval));
+    if (!key_ns) break;
+    EXPECT_TRUE(reader.seek(*key_ns).ok());
+    std::uint64_t decoded = 0;
+    for (std::uint32_t at = ~0U; at != static_cast<std::uint32_t>(frame); ++decoded) {
+      const auto next = reader.next();
+      EXPECT_TRUE(next.ok() && *next);
+      if (!next || !*next) return most;
+      at = (*next)->sequence;
+      EXPECT_EQ(at, static_cast<std::uint32_t>(frame / kKeyInterval * kKeyInterval) + decoded);
+    }
+    most.bytes = std::max(most.bytes, reader.bytes_read() - before);
+    most.frames = std::max(most.frames, decoded);
+  }
+  return most;
+}
+
+// What a seek takes, whatever else the machine does: how long that is `relievo-bench recording` measures.
+TEST(Recording, ASeekReadsTwoSecondsAtMostHoweverLongTheRecordingIs) {
+  const TempFolder folder;
+  for (const int minutes : {1, 10}) {
+    SCOPED_TRACE(minutes);
+    const auto file = folder / (std::to_string(minutes) + ".mcap");
+    write_frames(file, minutes);
+    const auto reader = open(file);
+    EXPECT_LT(reader->bytes_read(), std::filesystem::file_size(file) / 100) << "opened by the index alone";
+    const SeekCost most = cost_of_seeks(*reader);
+    EXPECT_EQ(most.frames, static_cast<std::uint64_t>(kKeyInterval));
+    EXPECT_LT(most.bytes, 2 * kRate * kFrameBytes);
+  }
 }
 
 TEST(Recording, ChunksAreBoundedInTimeAndSize) {
