@@ -7,6 +7,7 @@ import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { launchChromium } from './chromium.mjs';
 import { Feeder, inState, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { withoutWebGl } from './web.mjs';
 
 const [feederPath, screenshots] = process.argv.slice(2);
 const kLooks = {
@@ -133,12 +134,7 @@ const checks = {
   async 'error: no WebGL'() {
     const made = await pages(async (options) => {
       const page = await newPage(options);
-      await page.addInitScript(() => {
-        const original = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-          return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
-        };
-      });
+      await withoutWebGl(page);
       await page.goto(origin);
       await inState(page, 'unsupported');
       return page;

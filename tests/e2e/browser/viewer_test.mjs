@@ -8,6 +8,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, shownPast } from './feeder.mjs';
+import { withoutWebGl } from './web.mjs';
 
 const [feederPath, shotsWanted] = process.argv.slice(2);
 
@@ -226,12 +227,7 @@ const checks = {
 
   async 'without WebGL the page says so'() {
     const page = await newPage();
-    await page.addInitScript(() => {
-      const original = HTMLCanvasElement.prototype.getContext;
-      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-        return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
-      };
-    });
+    await withoutWebGl(page);
     await page.goto(origin);
     await inState(page, 'unsupported');
     assert.match(await card(page), /WebGL 2/);

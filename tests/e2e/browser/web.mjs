@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `relievo web` of a recording, in the test's DDS domain.
+// `relievo web` of a recording, in the test's DDS domain; a browser that lacks what the web has.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 
@@ -21,3 +21,12 @@ export async function startWeb(relievoPath, recorded, options = []) {
   };
   return { address: said.trim().replace('viewer ', ''), stop };
 }
+
+/** What `page` opens from now on finds no WebGL. */
+export const withoutWebGl = (page) =>
+  page.addInitScript(() => {
+    const original = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+      return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
+    };
+  });
