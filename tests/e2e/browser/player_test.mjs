@@ -16,6 +16,7 @@ const [serverPath, relievoPath, packagePath] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-player-'));
 const site = join(scratch, 'site'); // what the other site serves
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
+const kWorkers = 2; // of a player: one decodes, one draws
 const kPolicy =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self'; connect-src 'self' ws://127.0.0.1:*";
 
@@ -150,8 +151,9 @@ void blob;
     await page.evaluate(() => (document.querySelector('relievo-player').src = 'take.mcap'));
     await when(page, (p) => p.state === 'file' && p.paused && p.duration > 1);
     const duration = await player(page, (p) => p.duration);
-    const { duration_s } = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(site, 'take.mcap')], { encoding: 'utf8' }));
-    assert.ok(Math.abs(duration - duration_s) < 2e-3, `${duration} s, not ${duration_s}`);
+    const { frames, frame_rate } = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(site, 'take.mcap')], { encoding: 'utf8' }));
+    const span = (frames - 1) / frame_rate; // from the first to the last
+    assert.ok(Math.abs(duration - span) < 2e-3, `${duration} s, not ${span}`);
     assert.ok(Math.abs((await player(page, (p) => p.currentTime)) - duration) < 1e-3);
     await page.evaluate(() => {
       const element = document.querySelector('relievo-player');
@@ -178,7 +180,7 @@ void blob;
       window.element_.remove();
     });
     await page.waitForFunction(() => document.querySelector('relievo-player') === null);
-    await eventually('its worker goes on', () => page.workers().length === workers - 1);
+    await eventually('its workers go on', () => page.workers().length === workers - kWorkers);
     await page.evaluate(() => {
       window.frames_.length = 0;
       document.body.append(window.element_);

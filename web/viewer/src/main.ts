@@ -167,6 +167,7 @@ class Viewer {
       return new View(this.ui.canvas, element<HTMLCanvasElement>('overlay'), {
         beforeDraw: () => this.draw(),
         contextLost: (lost) => (this.problem = lost ? text.contextLost : null),
+        failed: (why) => (this.problem = text.notDrawn(why)),
         way: (way) => this.change({ way }),
       });
     } catch {

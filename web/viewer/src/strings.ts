@@ -55,6 +55,7 @@ export const text = {
   momentGone: "the link's moment of this stream is not kept any more: it is live",
   contextLost: 'The graphics driver took the picture away. It should come back by itself.',
   noWebGl: 'This browser or its graphics driver has no WebGL 2. Try another browser, or turn on hardware acceleration.',
+  notDrawn: (why: string) => `The picture cannot be drawn: ${why}.`,
   noDecoder: (why: string) => `The decoder does not start: ${why}.`,
   legend: {
     depth: 'Depth, m',
