@@ -188,7 +188,7 @@ class Viewer {
   }
 
   private makeStreams(): void {
-    const body = this.panels.panel('streams', text.streams.title, (open) => void this.openStreams(body, open));
+    const body = this.panels.panel('streams', text.streams.title, (open) => this.openStreams(body, open));
   }
 
   private async openStreams(body: HTMLElement, open: boolean): Promise<void> {

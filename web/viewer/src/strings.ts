@@ -46,6 +46,9 @@ export const text = {
     help: 'Keys (?)',
   },
   close: 'Close',
+  panelFailed: 'What belongs here cannot be loaded: the server does not answer, or no longer has it.',
+  retry: 'Try again',
+  retryTitle: 'Load it from the server again',
   immersive: {
     enter: 'Headset',
     leave: 'Leave',
