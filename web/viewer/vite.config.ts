@@ -2,8 +2,10 @@
 import { createHash } from 'node:crypto';
 import { readdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
 import type { Plugin } from 'vite';
 import { defineConfig } from 'vitest/config';
+import { stageUrl } from './stagePlugin';
 
 const kServiceWorker = 'sw.js';
 
@@ -30,7 +32,7 @@ const gateway = process.env['RELIEVO_GATEWAY'] ?? 'http://127.0.0.1:8080';
 
 export default defineConfig({
   base: './',
-  plugins: [listFiles],
+  plugins: [listFiles, stageUrl(fileURLToPath(new URL('.', import.meta.url)))],
   build: {
     target: 'es2022',
     // Inlined assets would be data: URLs, which the gateway's content policy forbids for scripts and wasm.

@@ -87,7 +87,7 @@ export function pagesOf(browser, origin, complaints) {
 }
 
 export const look = (page) =>
-  page.evaluate(() => ({ ...window.relievo.diagnostics(), pixels: window.relievo.readPixels() }));
+  page.evaluate(async () => ({ ...window.relievo.diagnostics(), pixels: await window.relievo.readPixels() }));
 export const inState = (page, state) =>
   page.waitForFunction((wanted) => window.relievo?.diagnostics().state === wanted, state);
 export const shownPast = (page, count) =>

@@ -47,7 +47,7 @@ async function seen(page, { at, yaw }) {
       return new Promise((resolve) => {
         window.session.requestAnimationFrame(() => {
           // Behind the page's own drawing, in the same task: what was drawn is still there.
-          const gl = document.querySelector('#view').getContext('webgl2');
+          const gl = document.querySelector('#headset').getContext('webgl2');
           const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
           const rgba = new Uint8Array(4 * width * height);
           gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba);

@@ -10,20 +10,14 @@ import { tmpdir } from 'node:os';
 import { extname, join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { inState, look, runChecks, shownPast, still } from './feeder.mjs';
+import { recordObject } from './recorded.mjs';
 import { startWeb } from './web.mjs';
 
 const [serverPath, relievoPath, dist] = process.argv.slice(2);
 const kToken = 'a-token-for-this-test';
-const domain = process.env.RELIEVO_TEST_DOMAIN;
 
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-offline-'));
-const recorded = join(scratch, 'object.mcap');
-execFileSync(
-  serverPath,
-  ['serve', '--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--frames', '6', '--web', 'none', '--record', recorded,
-    '--domain', domain, '--interface', 'lo'],
-  { stdio: 'ignore' },
-);
+const recorded = recordObject(serverPath, join(scratch, 'object.mcap'), { rate: 6, frames: 5 });
 const surfaces = { ply: ['ply'], glb: ['glb'], draco: ['glb', '--draco'] };
 for (const [name, format] of Object.entries(surfaces)) {
   execFileSync(relievoPath, ['export', recorded, '--out', join(scratch, name), '--format', ...format], { stdio: 'ignore' });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: the package that `npm pack` makes holds <relievo-player> with its types, and a page of
 // another site with a strict content policy shows a live stream and a recording with it.
-// Run as: in_own_domain node player_test.mjs RELIEVO_SERVER PACKAGE, in web/viewer. Exit 77: no Chromium here.
+// Run as: in_own_domain node player_test.mjs RELIEVO_SERVER RELIEVO PACKAGE, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { createReadStream, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
@@ -9,15 +9,16 @@ import { createServer } from 'node:http';
 import { tmpdir } from 'node:os';
 import { extname, join, normalize } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
 
-const [serverPath, packagePath] = process.argv.slice(2);
+const [serverPath, relievoPath, packagePath] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-player-'));
 const site = join(scratch, 'site'); // what the other site serves
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
+const kWorkers = 2; // of a player: one decodes, one draws
 const kPolicy =
   "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self'; connect-src 'self' ws://127.0.0.1:*";
-const kFrames = 14;
 
 /** Files with ranges, as a recording needs them. */
 function serveSite() {
@@ -53,12 +54,7 @@ const web = await serveSite();
 const origin = `http://127.0.0.1:${web.address().port}`;
 const rig = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--allow-origin', origin]);
 writeFileSync(join(site, 'page.html'), '<!doctype html><title>Another site</title><script type="module" src="relievo-player/dist/relievo-player.js"></script><relievo-player controls></relievo-player>');
-execFileSync(
-  serverPath,
-  ['serve', '--source', kSource, '--frames', String(kFrames), '--web', 'none', '--record', join(site, 'take.mcap'), '--stream', 'take',
-    '--key-interval', '5', '--domain', process.env.RELIEVO_TEST_DOMAIN, '--interface', 'lo'],
-  { stdio: 'ignore' },
-);
+recordObject(serverPath, join(site, 'take.mcap'), { rate: 6, frames: 13, options: ['--stream', 'take', '--key-interval', '5'] });
 const browser = await launchChromium();
 const complaints = [];
 
@@ -155,7 +151,9 @@ void blob;
     await page.evaluate(() => (document.querySelector('relievo-player').src = 'take.mcap'));
     await when(page, (p) => p.state === 'file' && p.paused && p.duration > 1);
     const duration = await player(page, (p) => p.duration);
-    assert.ok(Math.abs(duration - (kFrames - 2) / 6) < 0.5, `${duration} s`);
+    const { frames, frame_rate } = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(site, 'take.mcap')], { encoding: 'utf8' }));
+    const span = (frames - 1) / frame_rate; // from the first to the last
+    assert.ok(Math.abs(duration - span) < 2e-3, `${duration} s, not ${span}`);
     assert.ok(Math.abs((await player(page, (p) => p.currentTime)) - duration) < 1e-3);
     await page.evaluate(() => {
       const element = document.querySelector('relievo-player');
@@ -182,7 +180,7 @@ void blob;
       window.element_.remove();
     });
     await page.waitForFunction(() => document.querySelector('relievo-player') === null);
-    await eventually('its worker goes on', () => page.workers().length === workers - 1);
+    await eventually('its workers go on', () => page.workers().length === workers - kWorkers);
     await page.evaluate(() => {
       window.frames_.length = 0;
       document.body.append(window.element_);

@@ -3,9 +3,9 @@
 // numbers, what is under the cursor, how a person moves, what is remembered, what the page weighs.
 // Run as: node see_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
-import { gzipSync } from 'node:zlib';
 import { eventually, launchChromium } from './chromium.mjs';
 import { depthOf, Feeder, inState, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { loadsOf } from './web.mjs';
 
 const kPage = { width: 800, height: 500 };
 const kFirstPictureBytes = 300_000; // gzipped
@@ -42,11 +42,10 @@ const checks = {
   async 'what comes before the first picture is small'() {
     feeder.say('start ball');
     const page = await newPage();
-    const bodies = [];
-    page.on('response', (response) => bodies.push(response.body().catch(() => Buffer.alloc(0))));
+    const loads = loadsOf(page);
     await page.goto(`${origin}/`);
     await shownPast(page, 1);
-    const bytes = (await Promise.all(bodies)).reduce((sum, body) => sum + gzipSync(body).length, 0);
+    const bytes = [...(await loads()).values()].reduce((sum, of) => sum + of, 0);
     console.log(`      ${bytes} bytes gzipped to the first picture`);
     assert.ok(bytes > 50_000 && bytes < kFirstPictureBytes, `${bytes} bytes`);
     await page.close();

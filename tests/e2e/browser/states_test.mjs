@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: in each state that is not live (empty, loading, stalled, error, reconnecting) the page
 // says in words what is the matter, on a card that covers no control and is not cut off, on desktops and phones, dark and
-// light; the button on it can be reached by keys. With a folder: makes the pictures of docs/viewer.md there.
+// light; the button on it can be reached by keys. A panel whose part cannot be loaded says so, and is tried again. With
+// a folder: makes the pictures of docs/viewer.md there.
 // Run as: node states_test.mjs GATEWAY_FEEDER [SCREENSHOTS], in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { launchChromium } from './chromium.mjs';
+import { eventually, launchChromium } from './chromium.mjs';
 import { Feeder, inState, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { withoutWebGl } from './web.mjs';
 
 const [feederPath, screenshots] = process.argv.slice(2);
 const kLooks = {
@@ -16,7 +18,7 @@ const kLooks = {
   'phone-light': { viewport: { width: 390, height: 780 }, colorScheme: 'light', hasTouch: true },
 };
 const kJpegQuality = 80;
-const feeder = await Feeder.start(feederPath);
+let feeder = await Feeder.start(feederPath);
 const origin = `http://127.0.0.1:${feeder.port}`;
 const browser = await launchChromium();
 const complaints = [];
@@ -133,12 +135,7 @@ const checks = {
   async 'error: no WebGL'() {
     const made = await pages(async (options) => {
       const page = await newPage(options);
-      await page.addInitScript(() => {
-        const original = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-          return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
-        };
-      });
+      await withoutWebGl(page);
       await page.goto(origin);
       await inState(page, 'unsupported');
       return page;
@@ -163,6 +160,41 @@ const checks = {
       await page.focus('#retry');
     }
     await inspect('Reconnecting', made, /Connection lost.*last picture.*Trying again/s);
+  },
+
+  async 'a panel that cannot be loaded says so, and is tried again'() {
+    const { port } = feeder;
+    feeder = await Feeder.restart(feederPath, port);
+    feeder.say('start ball');
+    // Nothing is kept of the page's parts, as where it is not in a secure context.
+    const page = await newPage({ viewport: { width: 1000, height: 640 }, serviceWorkers: 'block' });
+    await page.goto(origin);
+    await shownPast(page, 1);
+    await feeder.kill();
+    const names = ['streams', 'statistics', 'take'];
+    for (const name of names) {
+      await page.click(`#tool-${name}`);
+      await page.waitForSelector(`#panel-${name} .failed button:visible`);
+      assert.match(await page.textContent(`#panel-${name} .failed`), /cannot be loaded.*server.*Try again/s);
+      await page.focus(`#panel-${name} .failed button`);
+      await page.evaluate(() => document.activeElement.toggleAttribute('old'));
+      await page.keyboard.press('Enter'); // in vain
+      await page.waitForSelector(`#panel-${name} .failed button:focus:not([old])`);
+    }
+    feeder = await Feeder.restart(feederPath, port);
+    feeder.say('start ball');
+    for (const name of names) {
+      if (!(await page.isVisible(`#panel-${name}`))) await page.click(`#tool-${name}`);
+      await eventually(`${name} is not tried again`, () =>
+        page.evaluate((n) => {
+          const body = document.querySelector(`#panel-${n} .body`);
+          body.querySelector('.failed button')?.click(); // opened again, it was tried again: it may be there already
+          return body.querySelector('.failed') === null && body.childElementCount > 0;
+        }, name),
+      );
+      assert.ok((await page.textContent(`#panel-${name} .body`)).length > 20, `${name} is empty`);
+    }
+    await page.close();
   },
 };
 

@@ -113,6 +113,7 @@ try {
   assert.match(await codecs(hidden), /no H\.264 here/);
   assert.match(await codecs(video), /H\.264/);
   assert.doesNotMatch(await codecs(video), /JPEG|here/);
+  for (const page of [video, hidden]) await more(page, 2); // what was counted before may not be drawn yet
   const [there, here] = [await corners(video), await corners(hidden)];
   console.log(`coloured pixels: ${there.coloured} of H.264, ${here.coloured} of JPEG`);
   assert.ok(here.coloured > 5000, 'the texture is not on the page');

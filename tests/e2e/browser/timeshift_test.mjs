@@ -255,7 +255,7 @@ const onVideo = {
     assert.ok(keys.some((k) => k === false), 'every frame is a key frame');
     assert.equal((await look(page)).parts.texture > 0 && (await page.isHidden('#notice')), true, 'there is no picture');
     const from = Math.max(first, index - 9);
-    const picture = (of) => of.evaluate(() => window.relievo.readPixels().hash);
+    const picture = (of) => of.evaluate(async () => (await window.relievo.readPixels()).hash);
     await compare(page, Array.from({ length: Math.min(10, index - first) }, (_, i) => from + i), picture);
     const seen = await pointAt(page, from + 2); // that of the key frame before it
     assert.ok(seen.deviation > 5, `its picture is flat: ${seen.deviation}`);

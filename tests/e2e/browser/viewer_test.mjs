@@ -8,6 +8,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, shownPast } from './feeder.mjs';
+import { withoutWebGl } from './web.mjs';
 
 const [feederPath, shotsWanted] = process.argv.slice(2);
 
@@ -25,7 +26,7 @@ const more = async (page, frames) => shownPast(page, (await look(page)).shown + 
 const card = (page) => page.textContent('#card');
 const inMode = (page, mode) =>
   page.waitForFunction((wanted) => window.relievo.diagnostics().mode === wanted, mode);
-const hash = (page) => page.evaluate(() => window.relievo.readPixels().hash);
+const hash = (page) => page.evaluate(async () => (await window.relievo.readPixels()).hash);
 /** Until the picture stays as it is: what was under way has arrived, and no motion is left. */
 async function steady(page) {
   await eventually('the picture does not come to rest', async () => {
@@ -226,16 +227,29 @@ const checks = {
 
   async 'without WebGL the page says so'() {
     const page = await newPage();
-    await page.addInitScript(() => {
-      const original = HTMLCanvasElement.prototype.getContext;
-      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-        return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
-      };
-    });
+    await withoutWebGl(page);
     await page.goto(origin);
     await inState(page, 'unsupported');
     assert.match(await card(page), /WebGL 2/);
     await page.close();
+  },
+
+  async 'the page draws by itself where workers do not, also after the driver took the picture away'(page) {
+    const workers = page.workers().length;
+    const near = await newPage({ viewport: { width: 800, height: 500 } });
+    await near.addInitScript(() => delete HTMLCanvasElement.prototype.transferControlToOffscreen);
+    await near.goto(origin);
+    await more(near, 2);
+    assert.equal(near.workers().length, workers - 1, 'a worker draws');
+    assert.ok((await look(near)).pixels.covered > 0.2);
+    await near.evaluate(() => (window.taken = document.querySelector('#view').getContext('webgl2').getExtension('WEBGL_lose_context')).loseContext());
+    await inState(near, 'unsupported');
+    assert.match(await card(near), /took the picture away/);
+    await near.evaluate(() => window.taken.restoreContext());
+    await inState(near, 'live');
+    await more(near, 2);
+    assert.ok((await look(near)).pixels.covered > 0.2);
+    await near.close();
   },
 
   async 'until here: no error, no request to another host'() {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// `relievo web` of a recording, in the test's DDS domain.
+// `relievo web` of a recording, in the test's DDS domain; a browser that lacks what the web has; what a page loads.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
+import { gzipSync } from 'node:zlib';
 
 /** `options` beside those for the network; stop() ends it. */
 export async function startWeb(relievoPath, recorded, options = []) {
@@ -20,4 +21,31 @@ export async function startWeb(relievoPath, recorded, options = []) {
     await ended;
   };
   return { address: said.trim().replace('viewer ', ''), stop };
+}
+
+/** What `page` opens from now on finds no WebGL. */
+export const withoutWebGl = (page) =>
+  page.addInitScript(() => {
+    const original = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+      return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
+    };
+  });
+
+/**
+ * What `page` loads from now on: its result gives the gzipped bytes by address. What the page and its workers both ask for
+ * comes from the network once where the server says that the browser may keep it.
+ */
+export function loadsOf(page) {
+  const loads = [];
+  page.on('response', (response) => loads.push(response));
+  return async () => {
+    const bytes = new Map();
+    for (const response of loads) {
+      const before = bytes.get(response.url()) ?? 0;
+      if (before > 0 && /immutable/.test(response.headers()['cache-control'])) continue;
+      bytes.set(response.url(), before + gzipSync(await response.body().catch(() => '')).length);
+    }
+    return bytes;
+  };
 }

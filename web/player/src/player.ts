@@ -168,8 +168,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   async screenshot(): Promise<Blob> {
     const view = this.parts?.view;
     if (view === undefined || view.shown === null) throw new Error(text.take.nothing);
-    view.still();
-    const blob = await new Promise<Blob | null>((resolve) => view.canvas.toBlob(resolve)); // of this very drawing
+    const blob = await view.png();
     if (blob === null) throw new Error(text.take.nothing);
     return blob;
   }
@@ -182,7 +181,8 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     overlay.setAttribute('aria-hidden', 'true');
     this.box.replaceChildren(canvas, overlay, this.messageLine, this.timelineBox);
     try {
-      const view = new View(canvas, overlay, { beforeDraw: () => this.draw(), contextLost: () => undefined, way: () => undefined }, this.box);
+      const events = { beforeDraw: () => this.draw(), contextLost: () => undefined, failed: (why: string) => this.fail(text.notDrawn(why)), way: () => undefined };
+      const view = new View(canvas, overlay, events, this.box);
       const session = this.makeSession(view);
       this.timelineBox.replaceChildren();
       const timeline = new Timeline(this.timelineBox);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How the surface is shown, as a person chose it: kept between visits, and carried by links. Pure, but for the store.
+import type { DecodedFrame } from './messages';
 
 export const kModes = ['textured', 'shaded', 'wireframe', 'points', 'normals', 'depth', 'confidence'] as const;
 export type Mode = (typeof kModes)[number];
@@ -17,6 +18,22 @@ export type Split = (typeof kSplits)[number];
 
 export const kThemes = ['auto', 'dark', 'light'] as const;
 export type Theme = (typeof kThemes)[number];
+
+/** What a surface needs beside its vertices and triangles. */
+export interface Wants {
+  normals: boolean;
+  edges: boolean;
+  quality: boolean;
+}
+
+/** Of a mode; `textured`: the surface has a picture. */
+export function wantsOf(mode: Mode, textured: boolean): Wants {
+  const unlit = (mode === 'textured' && textured) || mode === 'depth' || mode === 'wireframe' || mode === 'points';
+  return { normals: !unlit, edges: mode === 'wireframe', quality: mode === 'confidence' };
+}
+
+export const hasPicture = ({ texture, coordinates }: Pick<DecodedFrame, 'texture' | 'coordinates'>): boolean =>
+  texture !== null && coordinates !== null;
 
 export interface Display {
   mode: Mode;

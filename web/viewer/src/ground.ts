@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A floor of squares under the surface and three axes at its corner, in metres of the rig camera's frame.
-import * as THREE from 'three';
+// A floor of squares under the surface and three axes at its corner, in metres of the rig camera's frame. Pure.
 import { metres, niceStep, steadyRange, ticks, type Range } from './palette';
 import type { Vec3 } from './pick';
 import type { Extent } from './surface';
 
 const kSquares = 12; // at most, along the longest side
 const kLabels = 6;
-const kAxisColours = [0xd8584c, 0x3f9f55, 0x4a86e0] as const; // x, y, z; their labels': style.css
 
 export interface Label {
   at: Vec3; // rig camera's frame
@@ -58,19 +56,9 @@ export function groundLabels({ x, y, z }: Ranges): Label[] {
 }
 
 export class Ground {
-  readonly object = new THREE.Group();
-  private readonly material = new THREE.LineBasicMaterial({ color: 0x8a97a6, transparent: true, opacity: 0.3 });
-  private readonly floor = new THREE.LineSegments(new THREE.BufferGeometry(), this.material);
-  private readonly axes = new THREE.Group();
-  private ranges: Ranges | null = null;
+  /** Null before there is a surface. */
+  ranges: Ranges | null = null;
   labels: readonly Label[] = [];
-
-  constructor() {
-    this.object.rotation.x = Math.PI;
-    this.object.visible = false;
-    this.floor.frustumCulled = false;
-    this.object.add(this.floor, this.axes);
-  }
 
   get step(): number | null {
     return this.ranges?.step ?? null;
@@ -81,24 +69,5 @@ export class Ground {
     if (ranges === this.ranges) return;
     this.ranges = ranges;
     this.labels = groundLabels(ranges);
-    this.setPoints(this.floor, groundLines(ranges));
-    const { x, y, z } = ranges;
-    const corner: Vec3 = [x.from, y.to, z.to];
-    const ends: Vec3[] = [[x.to, y.to, z.to], [x.from, y.from, z.to], [x.from, y.to, z.from]];
-    for (const child of [...this.axes.children]) (child as THREE.LineSegments).geometry.dispose();
-    this.axes.clear();
-    for (const [i, end] of ends.entries()) {
-      const material = new THREE.LineBasicMaterial({ color: kAxisColours[i]!, transparent: true, opacity: 0.48 });
-      const axis = new THREE.LineSegments(new THREE.BufferGeometry(), material);
-      axis.frustumCulled = false;
-      this.setPoints(axis, [corner, end]);
-      this.axes.add(axis);
-    }
-  }
-
-  private setPoints(lines: THREE.LineSegments, points: Vec3[]): void {
-    lines.geometry.dispose();
-    lines.geometry = new THREE.BufferGeometry();
-    lines.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points.flat()), 3));
   }
 }

@@ -167,6 +167,7 @@ class Viewer {
       return new View(this.ui.canvas, element<HTMLCanvasElement>('overlay'), {
         beforeDraw: () => this.draw(),
         contextLost: (lost) => (this.problem = lost ? text.contextLost : null),
+        failed: (why) => (this.problem = text.notDrawn(why)),
         way: (way) => this.change({ way }),
       });
     } catch {
@@ -187,7 +188,7 @@ class Viewer {
   }
 
   private makeStreams(): void {
-    const body = this.panels.panel('streams', text.streams.title, (open) => void this.openStreams(body, open));
+    const body = this.panels.panel('streams', text.streams.title, (open) => this.openStreams(body, open));
   }
 
   private async openStreams(body: HTMLElement, open: boolean): Promise<void> {

@@ -2,9 +2,9 @@
 // The surface on the graphics card. Buffers only grow, so that a mesh of changing size thirty times a second
 // allocates nothing.
 import * as THREE from 'three';
-import type { Mode } from './display';
+import { hasPicture, wantsOf, type Mode } from './display';
+import type { Drawn } from './drawing';
 import { Materials } from './materials';
-import type { DecodedFrame } from './messages';
 import type { Range } from './palette';
 import type { Pinhole } from './protocol';
 import { confidenceColours } from './quality';
@@ -63,12 +63,13 @@ export class SurfaceMesh {
   private mode_: Mode = 'textured';
   private vertices = 0;
   private triangleIndices = 0;
+  private size = ''; // of the picture
   private textured = false; // the frame shown has a picture and coordinates
   private hasNormals = false;
   private hasEdges = false;
   private hasQuality = false;
   private hasColours = false;
-  private frame: DecodedFrame | null = null;
+  private frame: Drawn | null = null;
 
   constructor() {
     this.object.rotation.x = Math.PI;
@@ -90,10 +91,8 @@ export class SurfaceMesh {
     this.materials.setPointSize(1.75 * ratio);
   }
 
-  get mode(): Mode {
-    return this.mode_;
-  }
   set mode(mode: Mode) {
+    if (mode === this.mode_) return;
     this.mode_ = mode;
     this.derive();
     this.apply();
@@ -108,17 +107,8 @@ export class SurfaceMesh {
     this.materials.setDepthRange(range);
   }
 
-  /** The surface shown, in the rig camera's frame; its picture is open until the next one is shown. */
-  get shown(): DecodedFrame | null {
-    return this.frame;
-  }
-
-  /** What the decoder should bring along for the mode. */
-  get wants(): { normals: boolean; edges: boolean; quality: boolean } {
-    return { normals: this.needsNormals, edges: this.mode_ === 'wireframe', quality: this.mode_ === 'confidence' };
-  }
-
-  show(frame: DecodedFrame): void {
+  /** The picture is the caller's, and open until the next one is shown. */
+  show(frame: Drawn): void {
     let grown = this.position.set(frame.positions);
     grown = this.triangle.set(frame.triangles) || grown;
     if (frame.coordinates !== null) grown = this.uv.set(frame.coordinates) || grown;
@@ -132,28 +122,27 @@ export class SurfaceMesh {
     this.triangleIndices = frame.triangles.length;
     this.hasNormals = frame.normals !== null;
     this.hasEdges = frame.edges !== null;
-    this.textured = frame.texture !== null && frame.coordinates !== null;
+    this.textured = hasPicture(frame);
     if (frame.texture !== null) this.setTexture(frame.texture);
     if (grown) this.attach();
     this.derive();
     this.apply();
   }
 
-  /** Gives back what it holds of the card, and its picture. */
+  /** Gives back what it holds of the card. */
   dispose(): void {
     for (const geometry of [this.solid, this.lines, this.cloud]) geometry.dispose();
     this.materials.dispose();
-    (this.texture.image as ImageBitmap | undefined | null)?.close();
     this.texture.dispose();
   }
 
   private setTexture(bitmap: ImageBitmap): void {
-    const old = this.texture.image as ImageBitmap | undefined | null;
     // The card's storage is of a fixed size.
-    if (old && (old.width !== bitmap.width || old.height !== bitmap.height)) this.texture.dispose();
+    const size = `${bitmap.width}x${bitmap.height}`;
+    if (size !== this.size) this.texture.dispose();
+    this.size = size;
     this.texture.image = bitmap;
     this.texture.needsUpdate = true;
-    old?.close();
   }
 
   // A frame that came before the mode was chosen lacks what the mode needs; on a stalled stream no other comes.
@@ -200,8 +189,7 @@ export class SurfaceMesh {
   }
 
   private get needsNormals(): boolean {
-    const unlit = (this.mode_ === 'textured' && this.textured) || this.mode_ === 'depth' || this.mode_ === 'wireframe';
-    return !unlit && this.mode_ !== 'points';
+    return wantsOf(this.mode_, this.textured).normals;
   }
 
   // Of confidence in its mode, else the surface's own.

@@ -31,7 +31,7 @@ export class Navigator {
   private readonly fly: Fly;
   private rig: Pinhole | null = null;
   private extent: Extent | null = null;
-  private size: Size = { width: 1, height: 1 };
+  size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
   private way_: Way = 'orbit';
   private fov_ = 0;
   private placed = false; // the first view is set

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rail of buttons at the page's edge, and the panels that some of them open, one at a time.
-import { element, make } from './dom';
+import { button as textButton, element, make } from './dom';
 import { text } from './strings';
 
 export type RailName = keyof typeof text.rail;
@@ -18,10 +18,14 @@ const kIcons: Record<RailName, string> = {
   help: 'M9 9a3 3 0 1 1 4.5 2.6c-1 .6-1.5 1.2-1.5 2.4M12 17.6v.1',
 };
 
+/** Told that its panel opens or closes; a promise where it loads what belongs into the panel. */
+type Changed = (open: boolean) => void | Promise<void>;
+
 interface Panel {
   box: HTMLElement;
+  body: HTMLElement;
   button: HTMLButtonElement;
-  changed: ((open: boolean) => void) | undefined;
+  changed: Changed | undefined;
 }
 
 export class Panels {
@@ -37,7 +41,7 @@ export class Panels {
   }
 
   /** A button that opens and closes a panel; the panel's content is the caller's. */
-  panel(name: RailName, title: string, changed?: (open: boolean) => void): HTMLElement {
+  panel(name: RailName, title: string, changed?: Changed): HTMLElement {
     const button = this.action(name, () => this.toggle(name));
     const close = make('button', { type: 'button', className: 'close', title: text.close, onclick: () => this.close() }, '×');
     close.setAttribute('aria-label', text.close);
@@ -47,7 +51,7 @@ export class Panels {
     element('panels').append(box);
     button.setAttribute('aria-expanded', 'false');
     button.setAttribute('aria-controls', box.id);
-    this.panels.set(name, { box, button, changed });
+    this.panels.set(name, { box, body, button, changed });
     return body;
   }
 
@@ -74,7 +78,22 @@ export class Panels {
     if (!open && panel.box.contains(document.activeElement)) panel.button.focus(); // keys go on from where they began
     panel.box.hidden = !open;
     panel.button.setAttribute('aria-expanded', String(open));
-    panel.changed?.(open);
+    this.load(panel, open);
+  }
+
+  private load(panel: Panel, open: boolean): void {
+    panel.changed?.(open)?.then(
+      () => panel.body.querySelector('.failed')?.remove(),
+      () => {
+        // It says so in place of what is missing.
+        const retry = textButton(text.retry, text.retryTitle, () => this.load(panel, !panel.box.hidden));
+        const failed = make('div', { className: 'failed' }, make('p', {}, text.panelFailed), retry);
+        failed.setAttribute('role', 'alert');
+        const focused = panel.body.querySelector('.failed')?.contains(document.activeElement) === true;
+        panel.body.replaceChildren(failed);
+        if (focused) retry.focus();
+      },
+    );
   }
 }
 

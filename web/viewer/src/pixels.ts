@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What was just drawn, in a few numbers.
 
+/** RGBA, from the lowest row. */
+export interface Pixels {
+  width: number;
+  height: number;
+  rgba: Uint8Array<ArrayBuffer>;
+}
+
 export interface PixelReport {
   width: number;
   height: number;
@@ -10,16 +17,14 @@ export interface PixelReport {
   hash: number;
 }
 
-/** RGBA, from the lowest row. */
-export function pixelsOf(gl: WebGL2RenderingContext): { width: number; height: number; rgba: Uint8Array<ArrayBuffer> } {
+export function pixelsOf(gl: WebGL2RenderingContext): Pixels {
   const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
   const rgba = new Uint8Array(width * height * 4);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
   return { width, height, rgba };
 }
 
-export function readPixels(gl: WebGL2RenderingContext): PixelReport {
-  const { width, height, rgba } = pixelsOf(gl);
+export function reportOf({ width, height, rgba }: Pixels): PixelReport {
   let [count, sum, squares, hash] = [0, 0, 0, 2166136261];
   for (let i = 0; i < rgba.length; i += 4) {
     if (rgba[i + 3]! < 128) continue;

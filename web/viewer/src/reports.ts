@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page tells tests and bug reports of itself.
 import { crc32 } from './crc32';
-import { pixelsOf, type PixelReport } from './pixels';
+import { reportOf, type PixelReport } from './pixels';
 import type { Playback } from './source';
 import type { View } from './view';
 
@@ -10,9 +10,9 @@ declare global {
     /** For tests and bug reports; not a stable interface. */
     relievo: {
       diagnostics(): object;
-      readPixels(): PixelReport | null;
+      readPixels(): Promise<PixelReport> | null;
       /** RGBA at a place of the canvas, in pixels of the page. */
-      pixelAt(x: number, y: number): number[];
+      pixelAt(x: number, y: number): Promise<number[]>;
       pick(x: number, y: number): object | null;
       toPage(point: [number, number, number]): object | null;
       pose(): object | null;
@@ -34,9 +34,9 @@ export interface Reporting {
 export function report(viewer: Reporting): void {
   window.relievo = {
     diagnostics: () => viewer.diagnostics(),
-    readPixels: () => viewer.view?.readPixels() ?? null,
-    pixelAt: (x, y) => {
-      const { width, height, rgba } = pixelsOf(viewer.view!.still());
+    readPixels: () => viewer.view?.pixels().then(reportOf) ?? null,
+    pixelAt: async (x, y) => {
+      const { width, height, rgba } = await viewer.view!.pixels();
       const { clientWidth, clientHeight } = viewer.view!.canvas;
       const column = Math.floor((x / clientWidth) * width);
       const row = height - 1 - Math.floor((y / clientHeight) * height);

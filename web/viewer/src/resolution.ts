@@ -34,10 +34,10 @@ export class Resolution {
   }
 }
 
-/** True where the processor draws, as far as the browser tells. */
-export function drawnInSoftware(): boolean {
+/** True where the processor draws, as far as the browser tells; null: there is no WebGL 2. */
+export function drawnInSoftware(): boolean | null {
   const gl = document.createElement('canvas').getContext('webgl2');
-  if (gl === null) return false;
+  if (gl === null) return null;
   const names = gl.getExtension('WEBGL_debug_renderer_info');
   const name = String(gl.getParameter(names?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
   gl.getExtension('WEBGL_lose_context')?.loseContext();

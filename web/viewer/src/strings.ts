@@ -46,6 +46,9 @@ export const text = {
     help: 'Keys (?)',
   },
   close: 'Close',
+  panelFailed: 'What belongs here cannot be loaded: the server does not answer, or no longer has it.',
+  retry: 'Try again',
+  retryTitle: 'Load it from the server again',
   immersive: {
     enter: 'Headset',
     leave: 'Leave',
@@ -55,6 +58,7 @@ export const text = {
   momentGone: "the link's moment of this stream is not kept any more: it is live",
   contextLost: 'The graphics driver took the picture away. It should come back by itself.',
   noWebGl: 'This browser or its graphics driver has no WebGL 2. Try another browser, or turn on hardware acceleration.',
+  notDrawn: (why: string) => `The picture cannot be drawn: ${why}.`,
   noDecoder: (why: string) => `The decoder does not start: ${why}.`,
   legend: {
     depth: 'Depth, m',

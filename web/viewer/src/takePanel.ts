@@ -52,9 +52,7 @@ export class TakePanel {
   }
 
   private async screenshot(): Promise<void> {
-    const { view } = this.of;
-    view.still();
-    const blob = await new Promise<Blob | null>((resolve) => view.canvas.toBlob(resolve)); // of this very drawing
+    const blob = await this.of.view.png();
     if (blob !== null) this.save(blob, 'png');
   }
 

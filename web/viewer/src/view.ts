@@ -1,27 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture: scene, surface, what is drawn over it. Draws only when something changed.
-import * as THREE from 'three';
-import type { Display, Mode, Way } from './display';
+// The picture: what is seen of which surfaces, and what is drawn over it. Draws only when something changed, and again
+// when the drawing before is done; who draws is the painter's matter.
+import { hasPicture, wantsOf, type Display, type Mode, type Wants, type Way } from './display';
+import type { Drawing, Painter } from './drawing';
 import { Ground, type Label } from './ground';
-import { SurfaceMesh } from './mesh';
 import type { DecodedFrame } from './messages';
 import { Navigator } from './navigator';
 import { Overlay } from './overlay';
+import { loadStage, makePainter } from './painter';
 import { steadyRange, type Range } from './palette';
 import { pick, type Picked } from './pick';
+import type { Pixels } from './pixels';
 import { around, placed, type Placement } from './placement';
-import { readPixels, type PixelReport } from './pixels';
 import type { Pinhole } from './protocol';
 import { Resolution, drawnInSoftware } from './resolution';
+import type { Stage } from './stage';
 import type { Extent } from './surface';
 
 const kStill_ms = 1000; // without a drawing: the picture stands still and can be as fine as the screen
-const kPoll_ms = 2;
+const kFirst = 0; // number of the first surface, for the painter
 
-/** A surface beside the first one, in a frame of its own camera. */
-export interface Beside {
+/** A surface, in a frame of its own camera. */
+interface Shown {
+  readonly id: number; // for the painter
+  frame: DecodedFrame | null;
+  picture: ImageBitmap | null; // the last there was: to be closed when another takes its place
+}
+
+/** A surface beside the first one. */
+export interface Beside extends Shown {
   readonly name: string;
-  readonly mesh: SurfaceMesh;
   extent: Extent | null; // of its first frame
 }
 
@@ -36,6 +44,8 @@ export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
   beforeDraw(): void;
   contextLost(lost: boolean): void;
+  /** Nothing can be drawn. */
+  failed(why: string): void;
   /** A person's hand left the rig's camera. */
   way(way: Way): void;
 }
@@ -47,9 +57,10 @@ export class View {
   readonly inSoftware = drawnInSoftware();
   private readonly sizes = new ResizeObserver(() => this.resize());
   private ended = false;
-  private readonly renderer: THREE.WebGLRenderer;
-  private readonly scene = new THREE.Scene();
-  private readonly surface = new SurfaceMesh();
+  private readonly painter: Painter;
+  private headset: Stage | null = null; // draws while a person wears one, instead
+  private readonly surface: Shown = { id: kFirst, frame: null, picture: null };
+  private nextId = kFirst + 1;
   private readonly ground = new Ground();
   private readonly besides: Beside[] = [];
   private placement_: Placement = 'beside';
@@ -59,13 +70,14 @@ export class View {
   name = '';
   private scheduled = false;
   private readonly resolution = new Resolution();
-  private scale = 0; // drawn at
-  private fence: WebGLSync | null = null; // of a drawing that is being timed
+  private painting = true; // until who draws is ready for the next
+  private again = false; // something changed meanwhile
+  private timing = false; // until the graphics are done with one of them
+  private mode_: Mode = 'textured';
+  private background_: string | null = null;
   private stillTimer = 0;
   private range: Range | null = null;
   private grid = false;
-  private readonly head = new THREE.PerspectiveCamera(); // of a person with a headset, who moves it
-  private readonly lamp = new THREE.Group(); // with whoever looks
   drawn = 0;
 
   /** Throws where there is no WebGL 2. `overlay` lies over `canvas`; `keys`: where those are listened to that move. */
@@ -75,39 +87,44 @@ export class View {
     private readonly events: ViewEvents,
     keys: EventTarget = window,
   ) {
+    if (this.inSoftware === null) throw new Error('there is no WebGL 2');
     // Four samples a pixel cost a processor that draws more than all the rest.
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.inSoftware, alpha: true });
-    this.renderer.setClearAlpha(0);
+    this.painter = makePainter(canvas, !this.inSoftware, {
+      ready: () => this.painted(),
+      took: (ms) => {
+        this.timing = false;
+        if (ms !== null) this.resolution.took(ms);
+      },
+      contextLost: (lost) => {
+        if (this.ended) return;
+        events.contextLost(lost);
+        if (!lost) this.invalidate();
+      },
+      failed: (why) => events.failed(why),
+    });
     this.overlay = new Overlay(overlay);
     const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
     this.navigator = new Navigator(canvas, navigated, keys);
-    this.setScale(1);
-    this.scene.add(this.surface.object, this.ground.object, this.navigator.camera);
-    this.light();
-    canvas.addEventListener('webglcontextlost', () => events.contextLost(true));
-    canvas.addEventListener('webglcontextrestored', () => {
-      events.contextLost(false);
-      this.invalidate();
-    });
     this.sizes.observe(canvas);
     this.resize();
   }
 
   set display(display: Display) {
-    for (const mesh of this.meshes) mesh.mode = display.mode;
+    this.mode_ = display.mode;
     this.grid = display.grid;
     if (this.navigator.way !== display.way) this.navigator.way = display.way;
     if (this.navigator.wantedFieldOfView !== display.fov) this.navigator.wantedFieldOfView = display.fov;
     this.invalidate();
   }
   get mode(): Mode {
-    return this.surface.mode;
+    return this.mode_;
   }
-  get wants(): { normals: boolean; edges: boolean; quality: boolean } {
-    return this.surface.wants;
+  get wants(): Wants {
+    const { frame } = this.surface;
+    return wantsOf(this.mode_, frame !== null && hasPicture(frame));
   }
   get shown(): DecodedFrame | null {
-    return this.surface.shown;
+    return this.surface.frame;
   }
   /** Of the depth mode's colours. */
   get depthRange(): Range | null {
@@ -124,7 +141,7 @@ export class View {
   }
 
   show(frame: DecodedFrame): void {
-    this.surface.show(frame);
+    this.paint(this.surface, frame);
     if (frame.extent === null) return;
     const isFirst = this.extent === null;
     this.extent = frame.extent;
@@ -134,25 +151,22 @@ export class View {
 
   /** The surface of another stream; what it shows comes by showBeside(). */
   addBeside(name: string): Beside {
-    const beside: Beside = { name, mesh: new SurfaceMesh(), extent: null };
-    beside.mesh.mode = this.mode;
-    beside.mesh.setPixelRatio(this.pixelRatio);
+    const beside: Beside = { id: this.nextId++, name, frame: null, picture: null, extent: null };
     this.besides.push(beside);
-    this.scene.add(beside.mesh.object);
     return beside;
   }
 
   removeBeside(beside: Beside): void {
     this.besides.splice(this.besides.indexOf(beside), 1);
-    this.scene.remove(beside.mesh.object);
-    beside.mesh.dispose();
+    this.painter.remove(beside.id);
+    this.headset?.remove(beside.id);
+    beside.picture?.close();
     this.arrange();
   }
 
   /** It gets its place by its first frame, and keeps it. */
   showBeside(beside: Beside, frame: DecodedFrame): void {
-    beside.mesh.show(frame);
-    if (this.range !== null) beside.mesh.setDepthRange(this.range);
+    this.paint(beside, frame);
     if (beside.extent !== null || frame.extent === null) return;
     beside.extent = frame.extent;
     this.arrange();
@@ -169,8 +183,8 @@ export class View {
     return Object.fromEntries(this.besides.map(({ name }, i) => [name, this.offsets[i + 1] ?? 0]));
   }
 
-  private get meshes(): SurfaceMesh[] {
-    return [this.surface, ...this.besides.map(({ mesh }) => mesh)];
+  private get surfaces(): Shown[] {
+    return [this.surface, ...this.besides];
   }
   private get names(): string[] {
     return [this.name, ...this.besides.map(({ name }) => name)];
@@ -181,7 +195,6 @@ export class View {
 
   private arrange(): void {
     this.offsets = placed(this.extents, this.placement_);
-    for (const [i, { mesh }] of this.besides.entries()) mesh.object.position.x = this.offsets[i + 1]!;
     this.useExtent();
     this.navigator.reset();
   }
@@ -191,7 +204,6 @@ export class View {
     if (all === null) return;
     this.ground.setExtent(all);
     this.range = steadyRange(all.min[2], all.max[2], this.range);
-    for (const mesh of this.meshes) mesh.setDepthRange(this.range);
     this.navigator.setExtent(all);
   }
 
@@ -200,7 +212,7 @@ export class View {
     const ray = this.navigator.ray(at);
     if (ray === null) return null;
     let first: Hit | null = null;
-    for (const [i, { shown: surface }] of this.meshes.entries()) {
+    for (const [i, { frame: surface }] of this.surfaces.entries()) {
       const stream = this.names[i]!;
       const right = this.rightOf(stream);
       if (surface === null || right === null) continue;
@@ -233,51 +245,59 @@ export class View {
     this.sizes.disconnect();
     window.clearTimeout(this.stillTimer);
     this.navigator.end();
-    for (const mesh of this.meshes) mesh.dispose();
-    this.renderer.dispose();
+    this.painter.end();
+    this.headset?.end();
+    for (const { picture } of this.surfaces) picture?.close();
   }
 
   /** Draws for a headset until its session ends. Its origin, where the person is now, is the rig's camera. */
   async immerse(session: XRSession): Promise<void> {
-    const { xr } = this.renderer;
+    const Stage = await loadStage();
+    // A headset is given what the page's own thread draws.
+    const canvas = document.createElement('canvas');
+    canvas.id = 'headset';
+    canvas.hidden = true;
+    this.canvas.after(canvas);
+    const stage = new Stage(canvas, !this.inSoftware, { took: () => undefined, contextLost: () => undefined });
     session.addEventListener('end', () => {
-      this.renderer.setAnimationLoop(null);
-      xr.enabled = false;
-      this.navigator.camera.add(this.lamp);
+      this.headset = null;
+      window.setTimeout(() => {
+        stage.end(); // behind what else hears of the session's end
+        canvas.remove();
+      });
+      for (const shown of this.surfaces) this.repaint(shown, this.painter);
       this.resize();
       this.invalidate();
     });
-    xr.enabled = true;
-    xr.setReferenceSpaceType('local');
-    await xr.setSession(session);
-    this.head.add(this.lamp);
-    this.scene.add(this.head);
-    this.renderer.setAnimationLoop(() => {
-      if (this.ended || !xr.isPresenting) return;
-      this.events.beforeDraw();
-      this.draw();
+    for (const shown of this.surfaces) this.repaint(shown, stage);
+    this.headset = stage;
+    await stage.immerse(session, () => {
+      if (!this.ended) this.events.beforeDraw();
       ++this.drawn;
+      return this.drawing(1);
     });
   }
 
   invalidate(): void {
     // A headset draws at its own beat, and the page's stands still.
-    if (this.scheduled || this.ended || this.renderer.xr.isPresenting) return;
+    if (this.scheduled || this.ended || this.headset !== null) return;
+    if (this.painting) {
+      this.again = true;
+      return;
+    }
     this.scheduled = true;
     requestAnimationFrame((now) => {
       if (!this.ended) this.events.beforeDraw();
       this.scheduled = false; // what changed until here is drawn now, not once more
-      if (this.ended) return;
+      if (this.ended || this.headset !== null) return;
       this.navigator.update(now);
-      this.setScale(this.resolution.scale);
-      this.render();
-      this.time();
+      this.render(this.resolution.scale);
     });
   }
 
   /** Whether something will be drawn without anything happening before: motion that dies away, a finer picture. */
   get isBusy(): boolean {
-    return this.scheduled || this.fence !== null || this.stillTimer !== 0;
+    return this.scheduled || this.painting || this.timing || this.stillTimer !== 0;
   }
 
   /** Of the screen's pixels that are drawn while the picture moves. */
@@ -285,52 +305,87 @@ export class View {
     return this.resolution.scale;
   }
 
-  /** What is on the screen, for tests and for reports of people whose picture is wrong. */
-  readPixels(): PixelReport {
-    return readPixels(this.still());
+  /** What is on the screen, as fine as that is: drawn anew. */
+  pixels(): Promise<Pixels> {
+    return this.painter.read(this.drawing(1)); // what is seen does not depend on how quickly it was drawn
   }
 
-  /** Drawn now, as fine as the screen; to be read before anything else happens. */
-  still(): WebGL2RenderingContext {
-    this.setScale(1); // what is seen does not depend on how quickly it was drawn
-    this.draw();
-    return this.renderer.getContext() as WebGL2RenderingContext;
+  /** The same as a PNG file, transparent where nothing is; null: the browser cannot. */
+  png(): Promise<Blob | null> {
+    return this.painter.png(this.drawing(1));
   }
 
   /** Behind the surface, where the page cannot show through; null: nothing. */
-  set background(colour: THREE.ColorRepresentation | null) {
-    this.scene.background = colour === null ? null : new THREE.Color(colour);
+  set background(colour: string | null) {
+    this.background_ = colour;
     this.invalidate();
   }
 
   // The rig's camera sees none.
   private get showsGround(): boolean {
-    return this.grid && this.surface.shown !== null && !this.isRigView;
+    return this.grid && this.surface.frame !== null && !this.isRigView;
   }
 
   private get isRigView(): boolean {
-    return this.navigator.isRigView && !this.renderer.xr.isPresenting;
+    return this.navigator.isRigView && this.headset === null;
   }
 
-  private draw(): void {
-    this.ground.object.visible = this.showsGround;
+  private paint(shown: Shown, frame: DecodedFrame): void {
+    shown.frame = frame;
+    if (this.headset !== null) this.headset.show(shown.id, frame);
+    else this.painter.show(shown.id, frame);
+    if (frame.texture === null) return;
+    if (shown.picture !== frame.texture) shown.picture?.close();
+    shown.picture = frame.texture;
+  }
+
+  private repaint({ id, frame }: Shown, by: Pick<Painter, 'show'>): void {
+    if (frame !== null) by.show(id, frame);
+  }
+
+  /** `scale`: of the screen's pixels. */
+  private drawing(scale: number, timed = false): Drawing {
+    const { camera, size, rigCamera } = this.navigator;
+    const rights: number[] = [0];
     // Another rig's camera sees something else.
-    for (const { mesh } of this.besides) mesh.object.visible = !this.isRigView;
-    this.surface.setLens(this.isRigView ? this.navigator.rigCamera : null);
-    this.renderer.render(this.scene, this.renderer.xr.isPresenting ? this.head : this.navigator.camera);
+    for (const [i, { id }] of this.besides.entries()) rights[id] = this.isRigView ? NaN : (this.offsets[i + 1] ?? 0);
+    camera.updateMatrixWorld();
+    return {
+      ...size,
+      ratio: Math.min(window.devicePixelRatio, 2) * scale,
+      world: camera.matrixWorld.toArray(),
+      projection: camera.projectionMatrix.toArray(),
+      mode: this.mode_,
+      lens: this.isRigView ? rigCamera : null,
+      range: this.range,
+      ground: this.showsGround ? this.ground.ranges : null,
+      rights,
+      background: this.background_,
+      timed,
+    };
   }
 
-  private render(): void {
-    this.draw();
+  private painted(): void {
+    this.painting = false;
+    if (!this.again) return;
+    this.again = false;
+    this.invalidate();
+  }
+
+  private render(scale: number): void {
+    const drawing = this.drawing(scale, !document.hidden);
+    this.painting = true;
+    this.timing ||= drawing.timed;
+    this.painter.draw(drawing);
     ++this.drawn;
     this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
     window.clearTimeout(this.stillTimer);
     this.stillTimer = 0;
-    if (this.scale === 1) return;
+    if (scale === 1) return;
     this.stillTimer = window.setTimeout(() => {
       this.stillTimer = 0;
-      this.setScale(1);
-      this.render();
+      if (this.painting) this.again = true;
+      else if (this.headset === null) this.render(1);
     }, kStill_ms);
   }
 
@@ -347,53 +402,10 @@ export class View {
     return [...above, ...ground]; // the first ones have their place
   }
 
-  private get pixelRatio(): number {
-    return Math.min(window.devicePixelRatio, 2) * this.scale;
-  }
-
-  private setScale(scale: number): void {
-    if (scale === this.scale) return;
-    this.scale = scale;
-    this.renderer.setPixelRatio(this.pixelRatio);
-    for (const mesh of this.meshes) mesh.setPixelRatio(this.pixelRatio);
-  }
-
-  // How long the graphics card, or the processor in its place, takes for what was just asked of it.
-  private time(): void {
-    if (this.fence !== null || document.hidden) return;
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
-    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    if (this.fence === null) return; // the context is lost
-    gl.flush();
-    const start = performance.now();
-    const poll = (): void => {
-      if (this.fence === null) return;
-      const status = gl.getSyncParameter(this.fence, gl.SYNC_STATUS) as number | null;
-      if (status === gl.UNSIGNALED) {
-        window.setTimeout(poll, kPoll_ms);
-        return;
-      }
-      gl.deleteSync(this.fence);
-      this.fence = null;
-      if (status === gl.SIGNALED) this.resolution.took(performance.now() - start);
-    };
-    window.setTimeout(poll, kPoll_ms);
-  }
-
-  private light(): void {
-    this.scene.add(new THREE.HemisphereLight(0xdce7ff, 0x4a4038, 1.1));
-    // A key light over the viewer's left shoulder, so that relief reads from every side.
-    const key = new THREE.DirectionalLight(0xfff3e2, 2.1);
-    key.position.set(-0.9, 1.1, 0.6);
-    key.target.position.set(0, 0, -1);
-    this.lamp.add(key, key.target);
-    this.navigator.camera.add(this.lamp);
-  }
-
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
-    if (clientWidth === 0 || clientHeight === 0 || this.renderer.xr.isPresenting) return;
-    this.renderer.setSize(clientWidth, clientHeight, false);
+    if (clientWidth === 0 || clientHeight === 0 || this.headset !== null) return;
+    if (clientWidth === this.navigator.size.width && clientHeight === this.navigator.size.height) return;
     this.navigator.resize({ width: clientWidth, height: clientHeight });
   }
 }

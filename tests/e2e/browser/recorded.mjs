@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording of the simulated rig without a gap, however slow or loaded the machine.
+import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { rmSync } from 'node:fs';
+
+/** Records `frames` surfaces of sim:object into `file`, about `rate` of them a second; returns `file`. `options`: more of serve. */
+export function recordObject(serverPath, file, { rate, frames, options = [] }) {
+  const domain = process.env.RELIEVO_TEST_DOMAIN;
+  assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
+  const source = `sim:object,width=320,height=240,stripes=60,rate=${rate}`;
+  // The first surface takes two frames of the camera.
+  const args = ['serve', '--source', source, '--frames', String(frames + 1), '--web', 'none', '--record', file, '--domain', domain, '--interface', 'lo'];
+  let said;
+  // A server that keeps a rig's pace drops what it is too slow for. Then it takes the time that it needs.
+  for (const pace of [[], ['--fast']]) {
+    rmSync(file, { force: true });
+    const { status, stderr } = spawnSync(serverPath, [...args, ...options, ...pace], { encoding: 'utf8' });
+    assert.equal(status, 0, stderr);
+    if (stderr.includes(`recorded ${frames} frames, 0 lost`)) return file;
+    said = stderr;
+  }
+  throw new Error(`frames were dropped at any pace: ${said}`);
+}

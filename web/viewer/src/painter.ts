@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the picture is drawn: by a worker, where the browser lets workers draw, else by this page.
+import type { Drawing, Drawn, Painter, PainterEvents } from './drawing';
+import type { DecodedFrame } from './messages';
+import type { Pixels } from './pixels';
+import type { Stage } from './stage';
+import stageUrl from 'virtual:stage-url';
+import type { StageReply, StageRequest } from './stageMessages';
+
+/** On this page's thread, from the worker's own file. Loaded when it is needed. */
+export async function loadStage(): Promise<typeof Stage> {
+  const module = (await import(/* @vite-ignore */ stageUrl)) as typeof import('./stage.worker');
+  return module.Stage;
+}
+
+export function makePainter(canvas: HTMLCanvasElement, antialias: boolean, events: PainterEvents): Painter {
+  return workersDraw() ? new FarPainter(canvas, antialias, events) : new NearPainter(canvas, antialias, events);
+}
+
+function workersDraw(): boolean {
+  if (typeof OffscreenCanvas === 'undefined' || !('transferControlToOffscreen' in HTMLCanvasElement.prototype)) return false;
+  const gl = new OffscreenCanvas(1, 1).getContext('webgl2');
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return gl !== null;
+}
+
+class FarPainter implements Painter {
+  private readonly worker = new Worker(stageUrl, { type: 'module' });
+  private readonly asked = new Map<number, (answer: unknown) => void>();
+  private nextId = 1;
+
+  constructor(canvas: HTMLCanvasElement, antialias: boolean, events: PainterEvents) {
+    this.worker.onmessage = (event: MessageEvent<StageReply>) => {
+      const reply = event.data;
+      if (reply.type === 'ready') events.ready();
+      if (reply.type === 'took') events.took(reply.ms);
+      if (reply.type === 'contextLost') events.contextLost(reply.lost);
+      if (reply.type === 'failed') events.failed(reply.why);
+      if (reply.type === 'answer') {
+        this.asked.get(reply.id)?.(reply.answer);
+        this.asked.delete(reply.id);
+      }
+    };
+    this.worker.onerror = (event) => {
+      event.preventDefault();
+      events.failed(event.message || 'what draws cannot be loaded');
+    };
+    const offscreen = canvas.transferControlToOffscreen();
+    this.say({ type: 'start', canvas: offscreen, antialias }, [offscreen]);
+  }
+
+  show(surface: number, { positions, coordinates, normals, triangles, edges, quality, colours = null, texture }: DecodedFrame): void {
+    const frame: Drawn = { positions, coordinates, normals, triangles, edges, quality, colours, texture };
+    this.say({ type: 'show', surface, frame });
+  }
+  remove(surface: number): void {
+    this.say({ type: 'remove', surface });
+  }
+  draw(drawing: Drawing): void {
+    this.say({ type: 'draw', drawing });
+  }
+  read(drawing: Drawing): Promise<Pixels> {
+    return this.ask('read', drawing) as Promise<Pixels>;
+  }
+  png(drawing: Drawing): Promise<Blob | null> {
+    return this.ask('png', drawing) as Promise<Blob | null>;
+  }
+  end(): void {
+    this.worker.terminate();
+  }
+
+  private ask(type: 'read' | 'png', drawing: Drawing): Promise<unknown> {
+    const id = this.nextId++;
+    return new Promise((resolve) => {
+      this.asked.set(id, resolve);
+      this.say({ type, drawing, id });
+    });
+  }
+  private say(request: StageRequest, transfer: Transferable[] = []): void {
+    this.worker.postMessage(request, transfer);
+  }
+}
+
+class NearPainter implements Painter {
+  private readonly stage: Promise<Stage>; // loaded where workers do not draw
+
+  constructor(
+    canvas: HTMLCanvasElement,
+    antialias: boolean,
+    private readonly events: PainterEvents,
+  ) {
+    this.stage = loadStage().then((Stage) => new Stage(canvas, antialias, events));
+    this.stage.then(events.ready, (error: unknown) => events.failed(error instanceof Error ? error.message : String(error)));
+  }
+
+  show(surface: number, frame: DecodedFrame): void {
+    this.then((stage) => stage.show(surface, frame));
+  }
+  remove(surface: number): void {
+    this.then((stage) => stage.remove(surface));
+  }
+  draw(drawing: Drawing): void {
+    this.then((stage) => {
+      stage.draw(drawing);
+      this.events.ready();
+    });
+  }
+  read(drawing: Drawing): Promise<Pixels> {
+    return this.stage.then((stage) => stage.read(drawing));
+  }
+  png(drawing: Drawing): Promise<Blob | null> {
+    return this.stage.then((stage) => stage.png(drawing));
+  }
+  end(): void {
+    this.then((stage) => stage.end());
+  }
+
+  private then(act: (stage: Stage) => void): void {
+    void this.stage.then(act, () => undefined); // that there is none was told
+  }
+}
