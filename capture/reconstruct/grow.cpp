@@ -14,6 +14,7 @@ namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMargin = 2;
+constexpr std::array kBeside{-1, 1};  // boundaries
 
 constexpr int kMoves = 4;        // boundaries around that were elsewhere
 constexpr int kCell_px = 4;      // in which motion is told,
@@ -31,8 +32,6 @@ constexpr float kMostMoved_px = 1.2F;  // farther from where it is expected it i
 constexpr float kStands_px = 0.1F;  // less from one frame to the next, and it stands still,
 constexpr float kSure_px = 0.2F;    // what is less sure of its place is not remembered
 constexpr float kStood_px = 0.3F;   // or, where the field shows it, comes back
-constexpr float kOthers_px = 0.5F;  // another boundary was so near: it still is
-constexpr float kOthersStand_px = 0.3F;
 constexpr float kElsewhere = 2.F;   // pitches: it was on what has moved away
 constexpr float kSameLook = 0.12F;  // Backdrop::difference of what is back
 constexpr float kAlike = 0.2F;      // the same, where the step is seen, too
@@ -234,7 +233,7 @@ float Growth::pitch_beside(int line, int boundary, int side) {
 /// As far from the next one on the line as on the lines around, or as that one is from its next.
 std::optional<Growth::Prediction> Growth::predict_beside(int line, int boundary) {
   const float* here = row(now_, line);
-  for (const int side : {-1, 1}) {
+  for (const int side : kBeside) {
     const float from = here[boundary + side];
     if (!known(from)) continue;
     float sigma = kPitch_px;
@@ -295,29 +294,24 @@ std::optional<Growth::Prediction> Growth::predict_between(int line, int boundary
 
 /// Whether what stands still, and what the frame before saw, allow a boundary there. A place that only looks
 /// as if the boundary before it went on is the more likely to be of another surface, the more is known of
-/// that.
+/// that, unless much moves there.
 bool Growth::fits_before(const SlideFieldView& view, int line, int boundary, const FoundStep& found,
                          bool beside) {
   const float column = found.column_px;
   if (std::fabs(found.moved_px) > kMostMoved_px) return false;
-  const float* before = row(before_, line);
-  const float since = std::fabs(before[boundary] - column);
+  const float since = std::fabs(row(before_, line)[boundary] - column);
   const bool stood = since < kStood_px || since > kElsewhere * pitch_px_;
   if (backdrop_.stands(line, boundary, column)) {
     const auto difference = backdrop_.difference(view, line, boundary, column);
     return difference ? *difference < kAlike : stood;
   }
-  if (beside && !stood) {
-    const float* here = row(now_, line);
-    for (const int next : {boundary - 1, boundary + 1})
-      if (next >= 0 && next < boundaries_ && backdrop_.stands(line, next, here[next])) return false;
-  }
-  for (int b = 0; b < boundaries_; ++b) {
-    if (b == boundary) continue;
-    if (std::fabs(before[b] - column) < kOthers_px) return false;
-    if (std::fabs(backdrop_.column_px(line, b) - column) < kOthersStand_px) return false;
-  }
-  return true;
+  if (!beside || stood) return true;
+  if (view.moving != nullptr && view.moving->around(line, column) >= MovingPlaces::kMost) return true;
+  const float* here = row(now_, line);
+  return std::none_of(kBeside.begin(), kBeside.end(), [&](int side) {
+    const int next = boundary + side;
+    return next >= 0 && next < boundaries_ && backdrop_.stands(line, next, here[next]);
+  });
 }
 
 std::optional<FoundStep> Growth::look(const SlideFieldView& view, int line, int boundary,

@@ -240,12 +240,24 @@ TEST_F(AfterAnother, WhatWasOfUnknownPlaceIsNotRemembered) {
   EXPECT_EQ(grow(), 0U);
 }
 
-TEST_F(AfterAnother, WhereAnotherBoundaryStoodItStillDoes) {
-  for (int line = 0; line < kLines; ++line) {  // the wall has that of two stripes earlier there
-    first_.lose(line, kLost - 2);
-    first_.result.boundary[Frame::at(line, kLost)] = kLost - 2;
-  }
-  EXPECT_EQ(grow(), 0U);
+TEST(Growth, BesideWhatStandsStillALineGoesOnWhereMuchMovesOnly) {
+  constexpr int kLost = kBoundaries - 1;
+  const auto grown = [](bool others_move) {
+    Frame first, second;
+    for (int line = 0; line < kLines; ++line) first.lose(line, kLost), second.lose(line, kLost);
+    SequenceResult as_moves = second.result;
+    if (others_move) std::fill(as_moves.still.begin(), as_moves.still.end(), std::uint8_t{0});
+    MovingPlaces moving;
+    moving.find(kWidth, as_moves, second.edges);
+    Growth growth(kIdentity, kBoundaries, kLines);
+    for (int k = 0; k < 2; ++k)  // under both slides
+      growth.grow({first.picture.view(), first.colours, nullptr, k}, first.edges, first.result,
+                  first.recovered);
+    return growth.grow({.field = second.picture.view(), .colours = second.colours, .moving = &moving},
+                       second.edges, second.result, second.recovered);
+  };
+  EXPECT_EQ(grown(true), static_cast<std::size_t>(kLines));
+  EXPECT_EQ(grown(false), 0U);
 }
 
 TEST(Growth, BesideAnOutlineTheLineGoesOn) {
