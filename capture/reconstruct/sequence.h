@@ -124,8 +124,10 @@ class SequenceDecoder {
   bool as_deep(const EdgeImage& edges, int line, std::uint32_t first, std::uint32_t end,
                const SequenceResult& out) const;
   static float moved_px(int line, float column_px, const SequenceContext& context);
-  void expect_moving(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
-                     const std::int32_t* boundary, int count, float* gains) const;
+  int choose_moving(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                    std::int32_t* boundary, float* gains) const;
+  float expected_gain(int line, float column_px, float was_px, const SequenceContext& context,
+                      int boundary) const;
   std::int32_t& cell(int line, int boundary);
   void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);

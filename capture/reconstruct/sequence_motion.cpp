@@ -17,7 +17,7 @@ constexpr float kOffShare = 0.2F;           // and of that motion more
 constexpr std::uint32_t kLeastInARow = 3;   // edges that confirm a run, whatever its others do
 constexpr std::uint32_t kContradicted = 4;  // one edge in so many of a run is let pass,
 constexpr std::uint32_t kLeastAsDeep = 5;   // or three where so many are all as deep as what was there
-constexpr float kNear_px = 3;      // of where an edge's motion says it was: a boundary that was there
+constexpr float kNear_px = 2;      // of where an edge's motion says it was: a boundary that was there
 constexpr float kWasNear = 2.5F;   // gains so much
 constexpr float kAsDeep = 1.5F;    // one as deep as what was near there
 constexpr float kStands_px = 1;    // of where a boundary stands still: it is that one, and
@@ -58,33 +58,23 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
   });
 }
 
-/// Where the scene moved, the other slide's frame often shows another surface, and agrees with a wrong
-/// boundary by chance. So of a moving edge's candidates those gain that the frame before speaks for: by their
-/// place, by their depth, or for they were hidden and are back where they stand still. One that is near where
-/// it stands still, but not there, would be on a surface just before that: more likely the boundary is
-/// another, and its run only seems to go on with what stands beside it.
-void SequenceDecoder::expect_moving(const EdgeImage& edges, int line, std::uint32_t e,
-                                    const SequenceContext& context, const std::int32_t* boundary, int count,
-                                    float* gains) const {
-  if (beside_[e].tracked) return;
-  const float column = edges.edges[e].column_px;
+/// What the frame before says for a boundary at a place: by where the boundary was, if what is there was at
+/// `was_px`; by its depth; or for it was hidden and is back where it stands still. One that is near where it
+/// stands still, but not there, would be on a surface just before that: more likely the boundary is another,
+/// and its run only seems to go on with what stands beside it.
+float SequenceDecoder::expected_gain(int line, float column_px, float was_px, const SequenceContext& context,
+                                     int boundary) const {
+  float gain = 0;
   if (context.before_px != nullptr && context.motion != nullptr) {
-    const float was = column - moved_px(line, column, context);
     const float near = kNear_px * context.motion->scale;
-    for (int i = 0; i < count; ++i)
-      if (was_seen(line, context, boundary[i], [&](int, float px) { return std::fabs(px - was) < near; }))
-        gains[i] += kWasNear;
+    if (was_seen(line, context, boundary, [&](int, float px) { return std::fabs(px - was_px) < near; }))
+      gain += kWasNear;
   }
-  for (int i = 0; i < count && depths_.known(); ++i)
-    if (depths_.has(line, boundary[i], column)) gains[i] += kAsDeep;
-  for (int i = 0; i < count && context.backdrop != nullptr; ++i) {
-    const float off = std::fabs(column - context.backdrop->column_px(line, boundary[i]));
-    if (off < kStands_px) {
-      gains[i] += kStands;
-    } else if (off < kHovering * context.backdrop->pitch_px(line, boundary[i])) {
-      gains[i] -= kHovers;
-    }
-  }
+  if (depths_.has(line, boundary, column_px)) gain += kAsDeep;
+  if (context.backdrop == nullptr) return gain;
+  const float off = std::fabs(column_px - context.backdrop->column_px(line, boundary));
+  if (off < kStands_px) return gain + kStands;
+  return off < kHovering * context.backdrop->pitch_px(line, boundary) ? gain - kHovers : gain;
 }
 
 /// Whether an edge that moves cannot be a boundary by where that was before.
