@@ -15,8 +15,10 @@ namespace {
 constexpr std::size_t kPlaces = kPathCandidates;
 constexpr float kNever = -std::numeric_limits<float>::infinity();
 
-int choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
-                    std::int32_t* boundary, float* gain) {
+/// Tells `each` the boundaries whose own agreement is near enough the best, and their gains.
+template <class Each>
+void for_near(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
+              const Each& each) {
   const auto count = static_cast<std::size_t>(colours.count);
   const auto own = [&](std::size_t b) {
     return edge.left[static_cast<std::size_t>(colours.left[b])] +
@@ -25,9 +27,6 @@ int choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, c
   float best_own = kNever;
   for (std::size_t b = 0; b < count; ++b) best_own = std::max(best_own, own(b));
   const float least = std::max(0.F, best_own - rules.transition_slack);
-  std::array<std::int32_t, kPlaces> kept{};
-  std::array<float, kPlaces> kept_gain{};
-  std::size_t size = 0;
   for (std::size_t b = 0; b < count; ++b) {
     if (own(b) < least) continue;
     const float left = edge.other_left[static_cast<std::size_t>(colours.other_left[b])];
@@ -35,24 +34,25 @@ int choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, c
     const float other =
         edge.tracked ? left + right - (std::min(left, right) < rules.contradiction ? rules.contradicted : 0)
                      : std::max(rules.other_floor, left + right);
-    const float g = own(b) + other - rules.threshold;
-    if (size == kPlaces) {
-      // The worst makes room, of equal ones the last.
-      std::size_t worst = 0;
-      for (std::size_t i = 1; i < kPlaces; ++i) worst = kept_gain[i] <= kept_gain[worst] ? i : worst;
-      if (kept_gain[worst] >= g) continue;
-      std::copy(kept.begin() + static_cast<std::ptrdiff_t>(worst) + 1, kept.end(),
-                kept.begin() + static_cast<std::ptrdiff_t>(worst));
-      std::copy(kept_gain.begin() + static_cast<std::ptrdiff_t>(worst) + 1, kept_gain.end(),
-                kept_gain.begin() + static_cast<std::ptrdiff_t>(worst));
-      --size;
-    }
-    kept[size] = static_cast<std::int32_t>(b);
-    kept_gain[size++] = g;
+    each(static_cast<std::int32_t>(b), own(b) + other - rules.threshold);
   }
-  std::copy_n(kept.begin(), size, boundary);
-  std::copy_n(kept_gain.begin(), size, gain);
-  return static_cast<int>(size);
+}
+
+int near_portable(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
+                  std::int32_t* boundary, float* gain) {
+  int used = 0;
+  for_near(colours, edge, rules, [&](std::int32_t b, float g) {
+    boundary[used] = b;
+    gain[used++] = g;
+  });
+  return used;
+}
+
+int choose_portable(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
+                    std::int32_t* boundary, float* gain) {
+  BestCandidates best(boundary, gain);
+  for_near(colours, edge, rules, [&](std::int32_t b, float g) { best.add(b, g); });
+  return best.used();
 }
 
 // Eight numbers at once; a processor with narrower registers takes several for them.
@@ -156,13 +156,13 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> kPack = [] {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from.data() + at));
 }
 
-[[gnu::target("avx2")]] int choose_avx2(const BoundaryColours& colours, const EdgeAgreement& edge,
-                                        const GainRules& rules, std::int32_t* boundary, float* gain) {
-  constexpr std::size_t kBlock = 1024;  // boundaries looked at at once; a longer pattern is the reference's
+constexpr std::size_t kBlock = 1024;  // boundaries looked at at once; a longer pattern is the reference's
+
+/// Gains of those near enough, packed; and the best of each lane.
+[[gnu::target("avx2")]] std::size_t pack_near(const BoundaryColours& colours, const EdgeAgreement& edge,
+                                              const GainRules& rules, std::int32_t* boundary_of,
+                                              float* gain_of, __m256& lane_best) {
   const auto count = static_cast<std::size_t>(colours.count);
-  if (count > kBlock) {
-    return choose_portable(colours, edge, rules, boundary, gain);
-  }
   const __m256 left = _mm256_loadu_ps(edge.left.data());
   const __m256 right = _mm256_loadu_ps(edge.right.data());
   const __m256 other_left = _mm256_loadu_ps(edge.other_left.data());
@@ -180,15 +180,9 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> kPack = [] {
   best = _mm256_max_ps(best, _mm256_shuffle_ps(best, best, 0xb1));
   const __m256 least =
       _mm256_max_ps(_mm256_setzero_ps(), _mm256_sub_ps(best, _mm256_set1_ps(rules.transition_slack)));
-
-  // Gains of those near enough, packed; and the best of each lane. Eight of them are not below the worst of
-  // these, so nothing below it is among the eight best.
-  std::array<float, kBlock + 8> gain_of;
-  std::array<std::int32_t, kBlock + 8> boundary_of;
-  std::array<std::uint8_t, kBlock / 8> stays;
   std::size_t size = 0;
   const __m256 never = _mm256_set1_ps(kNever);
-  __m256 lane_best = never;
+  lane_best = never;
   const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   for (std::size_t b = 0; b < count; b += 8) {
     const __m256 own = _mm256_load_ps(own_of.data() + b);
@@ -206,9 +200,32 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> kPack = [] {
             : _mm256_max_ps(_mm256_set1_ps(rules.other_floor), sum);
     const __m256 g = _mm256_sub_ps(_mm256_add_ps(own, other), _mm256_set1_ps(rules.threshold));
     lane_best = _mm256_max_ps(lane_best, _mm256_blendv_ps(never, g, near));
-    size = append(g, _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(b))), mask, gain_of.data(),
-                  boundary_of.data(), size);
+    size = append(g, _mm256_add_epi32(lanes, _mm256_set1_epi32(static_cast<int>(b))), mask, gain_of,
+                  boundary_of, size);
   }
+  return size;
+}
+
+[[gnu::target("avx2")]] int near_avx2(const BoundaryColours& colours, const EdgeAgreement& edge,
+                                      const GainRules& rules, std::int32_t* boundary, float* gain) {
+  if (static_cast<std::size_t>(colours.count) > kBlock)
+    return near_portable(colours, edge, rules, boundary, gain);
+  __m256 lane_best;
+  return static_cast<int>(pack_near(colours, edge, rules, boundary, gain, lane_best));
+}
+
+[[gnu::target("avx2")]] int choose_avx2(const BoundaryColours& colours, const EdgeAgreement& edge,
+                                        const GainRules& rules, std::int32_t* boundary, float* gain) {
+  if (static_cast<std::size_t>(colours.count) > kBlock)
+    return choose_portable(colours, edge, rules, boundary, gain);
+  // Eight of the best of each lane are not below the worst of these, so nothing below it is among the eight
+  // best.
+  std::array<float, kBlock + 8> gain_of;
+  std::array<std::int32_t, kBlock + 8> boundary_of;
+  std::array<std::uint8_t, kBlock / 8> stays;
+  __m256 lane_best;
+  std::size_t size = pack_near(colours, edge, rules, boundary_of.data(), gain_of.data(), lane_best);
+  const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   if (size > kPlaces) {
     __m256 worst = _mm256_min_ps(lane_best, _mm256_permute2f128_ps(lane_best, lane_best, 1));
     worst = _mm256_min_ps(worst, _mm256_shuffle_ps(worst, worst, 0x4e));
@@ -260,6 +277,20 @@ constexpr std::array<std::array<std::uint8_t, 8>, 256> kPack = [] {
 
 }  // namespace
 
+void BestCandidates::add(std::int32_t boundary, float gain) {
+  if (used_ == kPathCandidates) {
+    // The worst makes room, of equal ones the last.
+    int worst = 0;
+    for (int i = 1; i < used_; ++i) worst = gain_[i] <= gain_[worst] ? i : worst;
+    if (gain_[worst] >= gain) return;
+    std::copy(boundary_ + worst + 1, boundary_ + used_, boundary_ + worst);
+    std::copy(gain_ + worst + 1, gain_ + used_, gain_ + worst);
+    --used_;
+  }
+  boundary_[used_] = boundary;
+  gain_[used_++] = gain;
+}
+
 void BoundaryColours::add(Primary l, Primary r, Primary ol, Primary o_r) {
   left.push_back(l);
   right.push_back(r);
@@ -282,9 +313,9 @@ void PathCandidates::resize(std::size_t edges) {
 
 const std::vector<PathKernels>& all_path_kernels() {
   static const std::vector<PathKernels> kernels = [] {
-    std::vector<PathKernels> out{{"portable", choose_portable, extend_portable}};
+    std::vector<PathKernels> out{{"portable", choose_portable, near_portable, extend_portable}};
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) out.push_back({"avx2", choose_avx2, extend_avx2});
+    if (__builtin_cpu_supports("avx2")) out.push_back({"avx2", choose_avx2, near_avx2, extend_avx2});
 #endif
     return out;
   }();

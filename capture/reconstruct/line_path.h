@@ -63,6 +63,21 @@ struct PathCandidates {
   void resize(std::size_t edges);
 };
 
+/// The best kPathCandidates of those added, by gain and of equal ones the first, in the order of adding.
+class BestCandidates {
+ public:
+  /// Written to the front of `boundary` and `gain`, each of kPathCandidates places.
+  BestCandidates(std::int32_t* boundary, float* gain) : boundary_(boundary), gain_(gain) {}
+
+  void add(std::int32_t boundary, float gain);
+  int used() const { return used_; }
+
+ private:
+  std::int32_t* boundary_;
+  float* gain_;
+  int used_ = 0;
+};
+
 /// A path goes on in order to `edge` from the edges [first, edge), or starts there.
 struct PathStep {
   int first, edge;
@@ -78,6 +93,11 @@ struct PathKernels {
   /// not below 0.
   int (*choose)(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
                 std::int32_t* boundary, float* gain);
+
+  /// The same, but all whose own agreement is near enough the best. `boundary` and `gain` have colours.count
+  /// places each and eight more.
+  int (*near)(const BoundaryColours& colours, const EdgeAgreement& edge, const GainRules& rules,
+              std::int32_t* boundary, float* gain);
 
   /// Fills best and from of the edge's places in use. Of equal ways the first in place is taken.
   void (*extend)(const PathStep& step, const OrderRules& rules, PathCandidates& candidates);

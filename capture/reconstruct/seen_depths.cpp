@@ -11,17 +11,14 @@ constexpr int kEveryLine = 2;
 constexpr float kReach_px = 16;  // that a surface comes along the lines from one frame to the next
 constexpr float kDeep_px = 3;    // that it moves stripes by
 
-/// Bins a column where a boundary is from the farthest on; below zero or too many beyond what is expected.
-float bin_of(const ColumnRange& columns, float column_px, int bins) {
-  const auto [low, high] = columns;
-  return (column_px - low) / (high - low) * static_cast<float>(bins);
-}
-
 }  // namespace
 
 void SeenDepths::fill(const std::vector<float>& before_px, const std::vector<ColumnRange>& columns,
                       const FieldMotion& motion) {
-  columns_ = columns;
+  scales_.resize(columns.size());
+  std::transform(columns.begin(), columns.end(), scales_.begin(), [](const ColumnRange& c) {
+    return Scale{c[0], static_cast<float>(kBins) / (c[1] - c[0])};
+  });
   cells_ = motion.cells;
   const int boundaries = static_cast<int>(columns.size());
   const int lines = static_cast<int>(before_px.size()) / boundaries;
@@ -31,7 +28,8 @@ void SeenDepths::fill(const std::vector<float>& before_px, const std::vector<Col
   for (int line = 0; line < lines; line += kEveryLine, before += kEveryLine * boundaries) {
     Depths* row = seen_.data() + static_cast<std::ptrdiff_t>(line / FieldMotion::kCellLines * cells_);
     for (int b = 0; b < boundaries; ++b) {
-      const float bin = bin_of(columns[static_cast<std::size_t>(b)], before[b], kBins);
+      const Scale& scale = scales_[static_cast<std::size_t>(b)];
+      const float bin = (before[b] - scale.low_px) * scale.bins_a_px;
       const int cell = std::isnan(bin) ? cells_ : static_cast<int>(before[b]) / FieldMotion::kCellWidth;
       if (cell < cells_ && bin >= 0 && bin < kBins) row[cell].set(static_cast<std::size_t>(bin));
     }
@@ -52,10 +50,10 @@ bool SeenDepths::has(int line, int boundary, float column_px) const {
   const int row = line / FieldMotion::kCellLines;
   const int cell = static_cast<int>(column_px) / FieldMotion::kCellWidth;
   if (row >= rows_ || cell >= cells_) return false;
-  const ColumnRange& columns = columns_[static_cast<std::size_t>(boundary)];
+  const Scale& scale = scales_[static_cast<std::size_t>(boundary)];
   const Depths& depths = around_[static_cast<std::size_t>(row * cells_ + cell)];
-  const float first = bin_of(columns, column_px - kDeep_px, kBins);
-  const float last = bin_of(columns, column_px + kDeep_px, kBins);
+  const float first = (column_px - kDeep_px - scale.low_px) * scale.bins_a_px;
+  const float last = (column_px + kDeep_px - scale.low_px) * scale.bins_a_px;
   if (!(first < kBins) || !(last >= 0)) return false;
   const auto end = static_cast<std::size_t>(std::min(last, static_cast<float>(kBins - 1)));
   for (auto bin = static_cast<std::size_t>(std::max(first, 0.F)); bin <= end; ++bin)

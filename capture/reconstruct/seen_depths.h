@@ -31,7 +31,11 @@ class SeenDepths {
   static constexpr int kBins = 128;
   using Depths = std::bitset<kBins>;
 
-  std::vector<ColumnRange> columns_;
+  /// Of a boundary: where it would be farthest, and how many bins a column is.
+  struct Scale {
+    float low_px, bins_a_px;
+  };
+  std::vector<Scale> scales_;
   int cells_ = 0;  // in a row of them, as of FieldMotion
   int rows_ = 0;
   std::vector<Depths> seen_, around_;  // [row][cell]: in it, and in those around, too

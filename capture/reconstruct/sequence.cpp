@@ -151,42 +151,23 @@ void SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, con
 /// As PathKernels::choose, of an edge that moved: the other slide's frame often shows another surface there
 /// and agrees with wrong boundaries by chance, so that what was seen before decides which ones are likely.
 int SequenceDecoder::choose_moving(const EdgeImage& edges, int line, std::uint32_t e,
-                                   const SequenceContext& context, std::int32_t* boundary,
+                                   const SequenceContext& context, Scratch& scratch, std::int32_t* boundary,
                                    float* gains) const {
-  const Slide& shown = shown_slide(context);
-  const EdgeAgreement agreement = agreement_of(edges.edges[e], beside_[e]);
-  const auto own = [&](std::size_t b) {
-    return agreement.left[static_cast<std::size_t>(shown.table.left[b])] +
-           agreement.right[static_cast<std::size_t>(shown.table.right[b])];
-  };
-  const auto count = static_cast<std::size_t>(boundaries_);
-  float best = 0;
-  for (std::size_t b = 0; b < count; ++b) best = std::max(best, own(b));
-  const float least = std::max(0.F, best - kGains.transition_slack);
+  const BoundaryColours& colours = shown_slide(context).table;
+  const auto places = static_cast<std::size_t>(colours.count) + 8;
+  scratch.near_boundary.resize(places);
+  scratch.near_gain.resize(places);
+  const int near = path_kernels().near(colours, agreement_of(edges.edges[e], beside_[e]), kGains,
+                                       scratch.near_boundary.data(), scratch.near_gain.data());
   const float column = edges.edges[e].column_px;
   const bool moves = context.motion != nullptr && context.before_motion != nullptr;
   const float was = moves ? column - moved_px(line, column, context) : column;
-  int used = 0;
-  for (std::size_t b = 0; b < count; ++b) {
-    const float own_gain = own(b);
-    if (own_gain < least) continue;
-    const float other = agreement.other_left[static_cast<std::size_t>(shown.table.other_left[b])] +
-                        agreement.other_right[static_cast<std::size_t>(shown.table.other_right[b])];
-    const float gain = own_gain + std::max(kGains.other_floor, other) - kGains.threshold +
-                       expected_gain(line, column, was, context, static_cast<int>(b));
-    if (used == kPathCandidates) {
-      // The worst makes room, of equal ones the last.
-      int worst = 0;
-      for (int i = 1; i < used; ++i) worst = gains[i] <= gains[worst] ? i : worst;
-      if (gains[worst] >= gain) continue;
-      std::copy(boundary + worst + 1, boundary + used, boundary + worst);
-      std::copy(gains + worst + 1, gains + used, gains + worst);
-      --used;
-    }
-    boundary[used] = static_cast<std::int32_t>(b);
-    gains[used++] = gain;
+  BestCandidates best(boundary, gains);
+  for (auto i = std::size_t{0}; i < static_cast<std::size_t>(near); ++i) {
+    const std::int32_t b = scratch.near_boundary[i];
+    best.add(b, scratch.near_gain[i] + expected_gain(line, column, was, context, b));
   }
-  return used;
+  return best.used();
 }
 
 void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const SequenceContext& context,
@@ -221,7 +202,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
     } else {
       used = beside_[index].tracked
                  ? kernels.choose(shown.table, agreement_of(edge, beside_[index]), kGains, boundary, gains)
-                 : choose_moving(edges, line, index, context, boundary, gains);
+                 : choose_moving(edges, line, index, context, scratch, boundary, gains);
       for (int i = 0; i < used && context.expected != nullptr; ++i) {
         const auto [low, high] = (*context.expected)[static_cast<std::size_t>(boundary[i])];
         if (edge.column_px < low || edge.column_px > high) gains[i] -= kUnexpected;

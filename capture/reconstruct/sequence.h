@@ -81,7 +81,9 @@ class SequenceDecoder {
     EdgeSides sides;            // of one line
     std::vector<float> off_px;  // of its edges: how far off the other slide's frame showed them
     PathCandidates candidates;
-    std::vector<std::uint8_t> clear;  // one an edge of it
+    std::vector<std::int32_t> near_boundary;  // of an edge, those of its colours,
+    std::vector<float> near_gain;             // and their gains
+    std::vector<std::uint8_t> clear;          // one an edge of it
     double score = 0;
     std::size_t in_order = 0;
     std::vector<Open> open;  // of the worker's lines
@@ -125,7 +127,7 @@ class SequenceDecoder {
                const SequenceResult& out) const;
   static float moved_px(int line, float column_px, const SequenceContext& context);
   int choose_moving(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
-                    std::int32_t* boundary, float* gains) const;
+                    Scratch& scratch, std::int32_t* boundary, float* gains) const;
   float expected_gain(int line, float column_px, float was_px, const SequenceContext& context,
                       int boundary) const;
   std::int32_t& cell(int line, int boundary);

@@ -65,12 +65,12 @@ bool SequenceDecoder::moved_as_measured(const EdgeImage& edges, int line, std::u
 float SequenceDecoder::expected_gain(int line, float column_px, float was_px, const SequenceContext& context,
                                      int boundary) const {
   float gain = 0;
-  if (context.before_px != nullptr && context.motion != nullptr) {
+  if (depths_.has(line, boundary, column_px)) {
     const float near = kNear_px * context.motion->scale;
+    gain = kAsDeep;
     if (was_seen(line, context, boundary, [&](int, float px) { return std::fabs(px - was_px) < near; }))
       gain += kWasNear;
   }
-  if (depths_.has(line, boundary, column_px)) gain += kAsDeep;
   if (context.backdrop == nullptr) return gain;
   const float off = std::fabs(column_px - context.backdrop->column_px(line, boundary));
   if (off < kStands_px) return gain + kStands;
