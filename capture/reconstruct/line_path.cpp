@@ -279,16 +279,16 @@ constexpr std::size_t kBlock = 1024;  // boundaries looked at at once; a longer 
 
 void BestCandidates::add(std::int32_t boundary, float gain) {
   if (used_ == kPathCandidates) {
-    // The worst makes room, of equal ones the last.
-    int worst = 0;
-    for (int i = 1; i < used_; ++i) worst = gain_[i] <= gain_[worst] ? i : worst;
-    if (gain_[worst] >= gain) return;
-    std::copy(boundary_ + worst + 1, boundary_ + used_, boundary_ + worst);
-    std::copy(gain_ + worst + 1, gain_ + used_, gain_ + worst);
+    if (gain_[worst_] >= gain) return;
+    std::copy(boundary_ + worst_ + 1, boundary_ + used_, boundary_ + worst_);
+    std::copy(gain_ + worst_ + 1, gain_ + used_, gain_ + worst_);
     --used_;
   }
   boundary_[used_] = boundary;
   gain_[used_++] = gain;
+  if (used_ < kPathCandidates) return;
+  worst_ = 0;
+  for (int i = 1; i < used_; ++i) worst_ = gain_[i] <= gain_[worst_] ? i : worst_;
 }
 
 void BoundaryColours::add(Primary l, Primary r, Primary ol, Primary o_r) {

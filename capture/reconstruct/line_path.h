@@ -76,6 +76,7 @@ class BestCandidates {
   std::int32_t* boundary_;
   float* gain_;
   int used_ = 0;
+  int worst_ = 0;  // makes room for a better one: of equal ones the last
 };
 
 /// A path goes on in order to `edge` from the edges [first, edge), or starts there.
