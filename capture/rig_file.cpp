@@ -2,24 +2,19 @@
 #include "capture/rig_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <opencv2/core.hpp>
 #include <span>
-#include <sstream>
 #include <string>
 
 #include "capture/pattern/pattern_check.h"
+#include "capture/storage_text.h"
 
 namespace relievo {
 namespace {
 
-constexpr int kMaxPixels = 16384;                   // a side
-constexpr std::uintmax_t kMaxFileBytes = 1u << 20;  // no rig or pattern comes near it
-constexpr int kMaxNesting = 16;                     // nor this
+constexpr int kMaxPixels = 16384;  // a side
 
 /// What was wrong with a file, thrown only between the functions of this file.
 struct Refused {
@@ -34,15 +29,6 @@ std::string text(double value) {
   char out[32];
   std::snprintf(out, sizeof out, "%g", value);
   return out;
-}
-
-/// OpenCV prints every error to stderr before it throws; the caller reports it once, in its own words.
-void silence_opencv() {
-  static const bool done = [] {
-    cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
-    return true;
-  }();
-  static_cast<void>(done);
 }
 
 cv::FileNode node(const cv::FileStorage& storage, const std::string& key) {
@@ -202,61 +188,14 @@ Pattern pattern_of(const cv::FileStorage& storage) {
   return pattern;
 }
 
-/// OpenCV's parser calls itself for each level and would run out of stack. "[[[", "{{{" and "- - -" nest on a
-/// line; how deep indentation can go is bounded by kMaxFileBytes.
-bool nests_too_deep(const std::string& content) {
-  int brackets = 0, dashes = 0;
-  for (const char c : content) {
-    if (c == '[' || c == '{') ++brackets;
-    if (c == ']' || c == '}') --brackets;
-    if (c == '-') ++dashes;
-    if (c != '-' && c != ' ') dashes = 0;
-    if (brackets > kMaxNesting || dashes > kMaxNesting) return true;
-  }
-  return false;
-}
-
-/// Whether the file is one map that begins at its lines' first column and is all there is. Behind the end of
-/// anything else OpenCV's parser looks for another document, and never leaves where a "-" comes instead.
-bool is_one_map(const std::string& content) {
-  if (content.find('\0') != std::string::npos) return false;
-  bool begun = false, in_map = false, ended = false;
-  std::istringstream lines(content);
-  for (std::string line; std::getline(lines, line);) {
-    line.erase(line.find_last_not_of(" \t\r") + 1);
-    if (line.empty() || line.find_first_not_of(' ') == line.find('#')) continue;
-    if (ended) return false;
-    if (in_map) {
-      ended = line == "...";
-      if (!ended && (line.starts_with("---") || line.starts_with("..."))) return false;
-    } else if (line == "---" && !begun) {
-      begun = true;
-    } else if (begun || line[0] != '%') {
-      in_map = std::isalpha(static_cast<unsigned char>(line[0])) != 0 || line[0] == '_';
-      if (!in_map) return false;
-    }
-  }
-  return in_map;
-}
-
 /// Reads the file as FileStorage and hands it to `parse`; every failure becomes one line naming the file.
 template <typename T>
 Result<T> read(const std::filesystem::path& file, const std::function<T(const cv::FileStorage&)>& parse) {
   const std::string name = file.string();
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(file, code)) return Error{name + " is missing"};
-  if (std::filesystem::file_size(file, code) > kMaxFileBytes || code) return Error{name + " is too large"};
-  std::ifstream in(file, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(in), {}};
-  if (!in) return Error{name + " cannot be read: check its permissions"};
-  if (content.rfind("%YAML", 0) != 0)
-    return Error{name + " is no OpenCV YAML file: it must start with %YAML:1.0"};
-  if (nests_too_deep(content)) return Error{name + " is no rig or pattern: it nests too deep"};
-  if (!is_one_map(content))
-    return Error{name + " is no rig or pattern: it must be one map of names and values"};
-  silence_opencv();
+  const auto content = read_storage_text(file, StorageForm::kYaml);
+  if (!content) return content.error();
   try {
-    const cv::FileStorage storage(content, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    const cv::FileStorage storage(*content, cv::FileStorage::READ | cv::FileStorage::MEMORY);
     if (!storage.isOpened()) return Error{name + " is empty"};
     return parse(storage);
   } catch (const Refused& refused) {

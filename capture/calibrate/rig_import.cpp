@@ -7,6 +7,7 @@
 #include <span>
 
 #include "capture/rig_file.h"
+#include "capture/storage_text.h"
 
 namespace relievo {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMetresPerMillimetre = 0.001;
-constexpr std::uintmax_t kMaxFileBytes = 16u << 20;
 
 /// A program's names for the parts of a rig.
 struct Keys {
@@ -103,13 +103,12 @@ Status settle_projector(PinholeModel& projector, int width, int height) {
 
 Result<ImportedRig> import_rig(const fs::path& file, int projector_width, int projector_height) {
   const std::string name = file.string();
-  std::error_code code;
-  if (!fs::is_regular_file(file, code)) return Error{name + " is missing"};
-  if (fs::file_size(file, code) > kMaxFileBytes || code) return Error{name + " is too large"};
+  const auto text = read_storage_text(file, StorageForm::kYamlOrXml);
+  if (!text) return text.error();
   ImportedRig out;
   try {
-    const cv::FileStorage storage(name, cv::FileStorage::READ);
-    if (!storage.isOpened()) return Error{name + " is no OpenCV YAML or XML file"};
+    const cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    if (!storage.isOpened()) return Error{name + " is empty"};
     if (!storage["camera_matrix"].empty()) {
       auto rig = read_rig(file);
       if (!rig) return rig.error();
@@ -127,6 +126,8 @@ Result<ImportedRig> import_rig(const fs::path& file, int projector_width, int pr
     return Error{name + ": " + refused.message};
   } catch (const cv::Exception& e) {
     return Error{name + " is no valid YAML or XML: " + e.err};
+  } catch (const std::exception& e) {
+    return Error{name + " cannot be read: " + e.what()};
   }
   if (const Status settled = settle_projector(out.rig.projector, projector_width, projector_height);
       !settled) {

@@ -6,17 +6,18 @@
 #include <opencv2/core.hpp>
 
 #include "capture/rig_file.h"
+#include "capture/storage_text.h"
 
 namespace relievo {
 
 Result<RigPart> read_rig_part(const std::filesystem::path& file) {
   const std::string name = file.string();
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(file, code)) return Error{name + " is missing"};
+  const auto text = read_storage_text(file, StorageForm::kYaml);
+  if (!text) return text.error();
   RigPart part;
   try {
-    const cv::FileStorage storage(name, cv::FileStorage::READ);
-    if (!storage.isOpened()) return Error{name + " is no OpenCV YAML file"};
+    const cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    if (!storage.isOpened()) return Error{name + " is empty"};
     if (!storage["camera_matrix"].empty() || !storage["projector_matrix"].empty()) {
       auto rig = read_rig(file);
       if (!rig) return rig.error();
@@ -33,6 +34,8 @@ Result<RigPart> read_rig_part(const std::filesystem::path& file) {
     }
   } catch (const cv::Exception& e) {
     return Error{name + " is no valid YAML: " + e.err};
+  } catch (const std::exception& e) {
+    return Error{name + " cannot be read: " + e.what()};
   }
   if (!part.colour_matrix)
     return Error{name + " is no rig.yaml: it has neither camera_matrix nor colour_matrix"};

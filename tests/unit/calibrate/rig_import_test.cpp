@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
 
 #include "capture/calibrate/rig_part.h"
 #include "tests/support/temp_folder.h"
@@ -60,6 +61,40 @@ TEST(RigImport, ErrorsNameFileAndKey) {
               HasSubstr("no calibration known here"));
   std::ofstream(folder / "text.yaml") << "hello";
   EXPECT_FALSE(import_rig(folder / "text.yaml", 0, 0).ok());
+}
+
+/// The input that fuzzing found for rig.yaml: OpenCV's parser never comes back from it.
+std::string yaml_behind_its_end() {
+  std::ifstream in(RELIEVO_SOURCE_DIR "/fuzz/corpus/take/yaml_behind_its_end", std::ios::binary);
+  in.get();  // which file of a take it is
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(RigImport, RefusesWhatTheParserWouldNeverEndAt) {
+  const TempFolder folder;
+  const std::string found = yaml_behind_its_end();
+  ASSERT_TRUE(found.starts_with("%YAML"));
+  for (const std::string& content : {found, sltk() + "---\n--\n", sltk() + "...\n--\n"}) {
+    std::ofstream(folder / "c.yaml") << content;
+    EXPECT_THAT(import_rig(folder / "c.yaml", 0, 0).error().message, HasSubstr("it must be one map"))
+        << content;
+    EXPECT_THAT(read_rig_part(folder / "c.yaml").error().message, HasSubstr("it must be one map")) << content;
+  }
+}
+
+/// Each level would take of the parser's stack.
+TEST(RigImport, RefusesNestingThatWouldExhaustTheParser) {
+  const TempFolder folder;
+  std::string xml = "<?xml version=\"1.0\"?>\n<opencv_storage>\n", list = "%YAML:1.0\n---\na: ";
+  for (int i = 0; i < 100'000; ++i) {
+    xml += "<a>";
+    list += '[';
+  }
+  std::ofstream(folder / "c.xml") << xml;
+  EXPECT_THAT(import_rig(folder / "c.xml", 0, 0).error().message, HasSubstr("too many tags"));
+  std::ofstream(folder / "c.yaml") << list;
+  EXPECT_THAT(import_rig(folder / "c.yaml", 0, 0).error().message, HasSubstr("nests too deep"));
+  EXPECT_THAT(read_rig_part(folder / "c.yaml").error().message, HasSubstr("nests too deep"));
 }
 
 TEST(RigPart, ColoursAloneReadBackExactly) {
