@@ -154,8 +154,12 @@ export class StorePlayer implements Playback {
       this.timer = window.setTimeout(() => this.pump(), wait);
     } else if (this.running) {
       this.running = false;
-      this.handed.ended?.();
+      this.ended();
     }
+  }
+
+  protected ended(): void {
+    this.handed.ended?.();
   }
 
   private async send(index: number): Promise<void> {
