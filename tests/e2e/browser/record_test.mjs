@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: where the server has no folder for recordings, the record button saves what the page
 // keeps and what follows as a recording that `relievo` reads whole and the page shows as it was; where it has one, the
-// server records there, with what came before, and lists the file.
+// server records there, with what came before, and lists the file, which plays while it is being written and grows.
 // Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -26,6 +26,14 @@ const { open } = pagesOf(browser, server.address, complaints);
 const { open: openRecording } = pagesOf(browser, recordingServer.address, complaints);
 const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
 const kKept = 12;
+async function order(action) {
+  const answer = await fetch(`${recordingServer.address}/api/recording/kept`, {
+    method: 'POST',
+    body: JSON.stringify({ action }),
+    headers: { 'content-type': 'application/json' },
+  });
+  assert.equal(answer.status, 200, await answer.text());
+}
 let last; // the surface shown last while it was recorded
 
 const checks = {
@@ -130,20 +138,71 @@ const checks = {
   async 'the button follows what somebody else records'() {
     const page = await openRecording();
     await shownPast(page, 2);
-    const order = async (action) => {
-      const answer = await fetch(`${recordingServer.address}/api/recording/kept`, {
-        method: 'POST',
-        body: JSON.stringify({ action }),
-        headers: { 'content-type': 'application/json' },
-      });
-      assert.equal(answer.status, 200, await answer.text());
-    };
     const isPressed = (is) =>
       page.waitForFunction((p) => document.querySelector('#tool-record').getAttribute('aria-pressed') === p, is);
     await order('start');
     await isPressed('true');
     await order('stop');
     await isPressed('false');
+    await page.close();
+  },
+
+  async 'what is being written plays, grows, and goes on at its end until it is whole'() {
+    const page = await openRecording();
+    await shownPast(page, 2);
+    const before = readdirSync(folder);
+    await order('start');
+    let file;
+    await eventually('it is not listed', async () => {
+      const { recordings } = await (await fetch(`${recordingServer.address}/api/recordings`)).json();
+      file = recordings.find((r) => r.recording && !before.includes(r.file))?.file;
+      return file !== undefined;
+    });
+    await page.click('#tool-streams');
+    await page.click(`#panel-streams li:has-text("${file}") button:has-text("Show")`);
+    await inState(page, 'file');
+    const opened = await playback(page);
+    const grownBy = (times, n) =>
+      page.waitForFunction((least) => window.relievo.diagnostics().playback.times.length >= least, times.length + n);
+
+    // Paused, it grows and stays where it is.
+    await page.focus('#view');
+    await page.keyboard.press(' ');
+    await page.waitForFunction(() => !window.relievo.diagnostics().playback.playing);
+    const paused = await playback(page);
+    await grownBy(opened.times, 12);
+    const grown = await playback(page);
+    assert.deepEqual(grown.times.slice(0, opened.times.length), opened.times);
+    assert.deepEqual([grown.index, grown.position, grown.playing], [paused.index, paused.position, false]);
+    await page.waitForFunction((end) => Number(document.querySelector('#timeline input[type=range]').max) >= end, grown.times.at(-1));
+
+    // Playing, it goes on with what was not there when it came to the end.
+    await page.keyboard.press(' ');
+    await page.keyboard.press('End');
+    await eventually('it is not at its end', async () => {
+      const { index, times } = await playback(page);
+      return index === times.length - 1;
+    });
+    for (let i = 0; i < 2; ++i) {
+      const { index, playing } = await playback(page);
+      assert.ok(playing, 'it waits for nothing at its end');
+      await page.waitForFunction((last) => window.relievo.diagnostics().playback.index > last + 6, index);
+    }
+    const { number } = await page.evaluate(() => window.relievo.surface());
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame > n, number);
+
+    // Whole, it ends.
+    await order('stop');
+    await page.waitForFunction(() => {
+      const { playing, index, times } = window.relievo.diagnostics().playback;
+      return !playing && index === times.length - 1;
+    });
+    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, file)], { encoding: 'utf8' }));
+    const whole = await playback(page);
+    assert.equal(whole.times.length, told.frames);
+    assert.equal((await look(page)).errors, 0, (await look(page)).lastError);
+    await page.keyboard.press('Home');
+    await eventually('its beginning is not shown any more', async () => (await playback(page)).index === 0);
     await page.close();
   },
 

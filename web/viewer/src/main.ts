@@ -483,6 +483,10 @@ class Viewer {
     const { streams } = this.server;
     this.session.everConnected = true;
     for (const { name, recorder } of streams) this.record.listed(name, recorder);
+    if (this.serverFile !== null) {
+      const writing = streams.find(({ recorder }) => recorder?.file === this.serverFile);
+      void this.session.source?.told?.(writing?.recorder ?? undefined);
+    }
     const first = streams[0];
     const missing = this.session.info === null && this.server.find(this.stream) === undefined;
     if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);

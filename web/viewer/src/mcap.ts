@@ -6,12 +6,14 @@ import type { Sample } from './frameStore';
 
 /** A file, or anything like it. `read` gives fewer bytes only at the end. */
 export interface Bytes {
-  size: number;
+  readonly size: number;
   /** read() here brings much around it along; for a little in many places there is readLittle(). */
   isRemote?: boolean;
   read(at: number, length: number): Promise<Uint8Array>;
   /** Only this, where it is not there already. */
   readLittle?(at: number, length: number): Promise<Uint8Array>;
+  /** It may have changed from `end` on, where it then is read anew; `size` says how much there is. */
+  grow?(end: number): Promise<void>;
 }
 
 export const bytesOf = (blob: Blob): Bytes => ({
@@ -28,6 +30,8 @@ export interface McapMessage {
 export interface McapFile {
   topics: Map<number, string>; // of the channels
   messages: McapMessage[]; // by time
+  /** Of its chunks, where more may follow while it is written; null: there is no index. */
+  end: number | null;
   /** Why only the beginning is there; null: all is. */
   damage: string | null;
 }
@@ -35,6 +39,7 @@ export interface McapFile {
 const kMagic = [0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a];
 const kRecordHead = 9;
 const kFooterBytes = kRecordHead + 20;
+const kDataEndBytes = kRecordHead + 4; // between the chunks and the index
 const kMessageHead = 22; // of a message's content, before its data
 const kMaxChunk = 2 ** 30;
 const kTogether = 16; // reads at a time
@@ -45,7 +50,17 @@ export async function openMcap(file: Bytes): Promise<McapFile> {
   const start = await file.read(0, kMagic.length);
   if (!kMagic.every((b, i) => start[i] === b)) throw new Error('it is no MCAP file');
   const indexed = await readIndexed(file);
-  const found = indexed ?? (await walk(file));
+  return inOrder(indexed ?? (await walk(file)));
+}
+
+/** What was added behind `end` of a file that has grown. */
+export async function openAdded(file: Bytes, end: number): Promise<McapFile> {
+  const found = await readIndexed(file, end);
+  if (found === null) throw new Error('its index is damaged');
+  return inOrder(found);
+}
+
+function inOrder(found: McapFile): McapFile {
   found.messages.sort((a, b) => a.timeMs - b.timeMs);
   return found;
 }
@@ -106,8 +121,8 @@ function readChannel(content: Uint8Array, topics: Map<number, string>): void {
   topics.set(view.getUint16(0, true), new TextDecoder().decode(content.subarray(8, 8 + length)));
 }
 
-/** Null where there is no index, or its CRC is wrong. */
-async function readIndexed(file: Bytes): Promise<McapFile | null> {
+/** The messages of chunks from `from` on. Null where there is no index, or its CRC is wrong. */
+async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
   const tail = await file.read(Math.max(0, file.size - kFooterBytes - kMagic.length), kFooterBytes + kMagic.length);
   if (tail.length < kFooterBytes + kMagic.length || tail[0] !== kOp.footer) return null;
   if (!kMagic.every((b, i) => tail[kFooterBytes + i] === b)) return null;
@@ -123,7 +138,9 @@ async function readIndexed(file: Bytes): Promise<McapFile | null> {
   try {
     for (const { op, content } of records(summary)) {
       if (op === kOp.channel) readChannel(content, topics);
-      if (op === kOp.chunkIndex) chunks.push(readChunkIndex(content));
+      if (op !== kOp.chunkIndex) continue;
+      const chunk = readChunkIndex(content);
+      if (chunk.at >= from) chunks.push(chunk);
     }
     const messages: McapMessage[] = [];
     for (let i = 0; i < chunks.length; i += kTogether) {
@@ -131,7 +148,7 @@ async function readIndexed(file: Bytes): Promise<McapFile | null> {
       const indices = await Promise.all(some.map((chunk) => file.read(chunk.indexAt, chunk.indexBytes)));
       for (const [j, index] of indices.entries()) addIndexed(index, some[j]!.recordsAt, file.size, messages);
     }
-    return { topics, messages, damage: null };
+    return { topics, messages, end: summaryAt - kDataEndBytes, damage: null };
   } catch (error) {
     if (error instanceof Compressed) throw error;
     return null;
@@ -173,7 +190,7 @@ function addIndexed(index: Uint8Array, recordsAt: number, size: number, messages
 
 /** From the beginning as far as it is sound; half a chunk is not read, since nothing vouches for it. */
 async function walk(file: Bytes): Promise<McapFile> {
-  const found: McapFile = { topics: new Map(), messages: [], damage: 'it has no index: it was cut short' };
+  const found: McapFile = { topics: new Map(), messages: [], end: null, damage: 'it has no index: it was cut short' };
   for (let at = kMagic.length; at < file.size; ) {
     const head = await file.read(at, kRecordHead);
     const length = lengthOf(head);

@@ -146,6 +146,8 @@ export interface ServerRecording {
   file: string;
   frames: number;
   bytes: number;
+  /** What can be read of it by now; not said by older servers. */
+  whole_bytes?: number;
   started_ns: number;
   pre_roll_s: number;
   message: string;

@@ -3,7 +3,7 @@
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
 import { kTextureH264, parseFrame } from './frame';
 import type { FrameStore, Sample, StoredFrame } from './frameStore';
-import { openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
+import { openAdded, openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
 import type { StreamInfo } from './protocol';
 import { videoTextureIsKey } from './videoTexture';
 
@@ -14,11 +14,13 @@ const kFarHeadMs = 8; // between those of a remote file
 const kFarSayMs = 500; // between marks drawn meanwhile
 
 export class Recording implements FrameStore {
-  readonly times: Float64Array;
+  times: Float64Array;
   readonly startMs: number; // UTC of the first frame
   readonly first = 0;
   /** Of each frame whose head was read. */
   readonly heads: (FrameHead | undefined)[];
+
+  private bytes: number; // of the file whose index was read last
 
   private constructor(
     private readonly file: Bytes,
@@ -27,9 +29,11 @@ export class Recording implements FrameStore {
     readonly info: StreamInfo | null,
     readonly description: Uint8Array | null,
     readonly damage: string | null,
+    private end_: number | null,
   ) {
+    this.bytes = file.size;
     this.startMs = frames[0]!.timeMs;
-    this.times = Float64Array.from(frames, (m) => m.timeMs - this.startMs);
+    this.times = this.timesOf(frames);
     this.heads = new Array<FrameHead | undefined>(frames.length);
   }
 
@@ -45,7 +49,35 @@ export class Recording implements FrameStore {
     // A channel is a stream's; a file of several shows the first.
     const own = frames.filter((m) => m.channel === frames[0]!.channel);
     const isOf = info?.stream === one; // these frames
-    return new Recording(file, own, one, isOf ? info : null, isOf ? description : null, found.damage);
+    return new Recording(file, own, one, isOf ? info : null, isOf ? description : null, found.damage, found.end);
+  }
+
+  /** Of what is there of a file that may be written on; null: it cannot grow. */
+  get end(): number | null {
+    return this.file.grow === undefined ? null : this.end_;
+  }
+
+  /** Looks for frames behind those that there are, which keep their places. Whether there are any. */
+  async grow(): Promise<boolean> {
+    const { end, file } = this;
+    if (end === null) return false;
+    await file.grow!(end);
+    const bytes = file.size;
+    if (bytes === this.bytes) return false;
+    const added = await openAdded(file, end);
+    const frames = ofTopic(added, kFrameTopic).filter((m) => m.channel === this.frames[0]!.channel);
+    [this.bytes, this.end_] = [bytes, added.end];
+    if (frames.length === 0) return false;
+    for (const frame of frames) this.frames.push(frame);
+    this.heads.length = this.frames.length;
+    this.times = this.timesOf(this.frames);
+    return true;
+  }
+
+  // A server's clock that was put back since makes no frame come before one that is there.
+  private timesOf(frames: McapMessage[]): Float64Array {
+    let last = 0;
+    return Float64Array.from(frames, (m) => (last = Math.max(last, m.timeMs - this.startMs)));
   }
 
   get count(): number {

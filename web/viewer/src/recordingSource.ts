@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording as a source of frames.
+// A recording as a source of frames. One of the server that is still being written grows, and who is at its end goes
+// on with what comes.
+import type { ServerRecording } from './protocol';
 import type { Recording } from './recording';
 import type { FrameSource, Moment, Playback, SourceEvents } from './source';
 import { StorePlayer } from './storePlayer';
@@ -10,9 +12,19 @@ export class RecordingSource extends StorePlayer implements FrameSource {
   readonly live = false;
   readonly kept = null;
   readonly playback: Playback = this;
+  private isWritten = false; // by the server, as far as it has said
+  private settled = false; // was read when that was over
+  private refused = false;
+  private asking = false;
+  private marking = false;
+  private atEnd = false; // played to it, and nobody did anything since
 
   /** Plays from its start, or is at `begin`; times that it does not have mean nothing. */
-  constructor(recording: Recording, events: SourceEvents, begin: Moment | null = null) {
+  constructor(
+    private readonly recording: Recording,
+    private readonly events: SourceEvents,
+    begin: Moment | null = null,
+  ) {
     super(recording, events);
     // Not before the caller holds the source.
     queueMicrotask(() => {
@@ -25,11 +37,95 @@ export class RecordingSource extends StorePlayer implements FrameSource {
       if (has) this.seek(at);
       if (!has || begin!.playing) this.play();
     });
-    void recording.readHeads(() => {
-      this.changed();
-      return !this.stopped;
-    });
+    void this.mark();
+  }
+
+  /** At the end of what is still being written, too, where it goes on by itself. */
+  override get playing(): boolean {
+    return super.playing || this.awaits;
+  }
+
+  override play(): void {
+    this.atEnd = false;
+    super.play();
+  }
+
+  override pause(): void {
+    this.atEnd = false;
+    super.pause();
+  }
+
+  override seek(atMs: number): void {
+    const goesOn = this.awaits;
+    this.atEnd = false;
+    super.seek(atMs);
+    if (goesOn) super.play();
+  }
+
+  async told(recorder: ServerRecording | undefined): Promise<void> {
+    const { end } = this.recording;
+    if (end === null || this.asking || this.refused) return;
+    // One that was stopped says so until it is whole.
+    const isWritten = recorder?.state === 'recording' || (recorder?.state === 'off' && recorder.message !== '');
+    const more = isWritten ? (recorder.whole_bytes ?? 0) > end : !this.settled;
+    if (isWritten) {
+      this.settled = false;
+      this.write(true);
+    }
+    if (!more) return;
+    this.asking = true;
+    try {
+      const grew = await this.recording.grow();
+      if (this.stopped) return;
+      if (grew) this.grew();
+      this.settled = !isWritten;
+    } catch (error) {
+      // The network may be back the next time; what the server refuses, it refuses again.
+      if (!(error instanceof TypeError)) {
+        this.refused = true;
+        if (!this.stopped) this.events.nonsense(error instanceof Error ? error.message : String(error));
+      }
+    } finally {
+      this.asking = false;
+    }
+    if (!isWritten || this.refused) this.write(false);
   }
 
   retryNow(): void {}
+
+  protected override ended(): void {
+    this.atEnd = true;
+    this.goOn(); // it may have grown just now
+  }
+
+  private get awaits(): boolean {
+    return this.atEnd && this.isWritten;
+  }
+
+  private write(isWritten: boolean): void {
+    if (isWritten === this.isWritten) return;
+    this.isWritten = isWritten;
+    this.changed();
+  }
+
+  private grew(): void {
+    this.goOn();
+    this.changed();
+    void this.mark();
+  }
+
+  private goOn(): void {
+    if (this.atEnd && this.position < this.times[this.times.length - 1]!) this.play();
+  }
+
+  // What decodes alone, and gaps.
+  private async mark(): Promise<void> {
+    if (this.marking) return;
+    this.marking = true;
+    await this.recording.readHeads(() => {
+      this.changed();
+      return !this.stopped;
+    });
+    this.marking = false;
+  }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A file of the server, read in parts: what is asked for comes in blocks, of which the last ones are kept, and the
-// next one is fetched ahead.
+// next one is fetched ahead. It may grow there meanwhile.
 import type { Bytes } from './mcap';
 
 export const kBlock = 2 ** 18; // bytes
@@ -16,21 +16,33 @@ export class RemoteFile implements Bytes {
 
   private constructor(
     private readonly url: URL,
-    readonly size: number,
-    private readonly etag: string,
+    private size_: number,
+    private etag: string,
     private readonly fetch: Fetch,
   ) {}
+
+  get size(): number {
+    return this.size_;
+  }
 
   /** Throws where the server has no such file, or does not give parts of it. */
   static async open(url: URL, fetch: Fetch = (at, init) => window.fetch(at, init)): Promise<RemoteFile> {
     const head = await fetch(url, { headers: { Range: 'bytes=0-0' }, cache: 'no-store' });
     if (head.status === 404) throw new Error('it is not there (HTTP 404)');
-    const size = Number(/\/(\d+)$/.exec(head.headers.get('content-range') ?? '')?.[1]);
-    const etag = head.headers.get('etag') ?? '';
-    if (head.status !== 206 || !Number.isSafeInteger(size) || etag === '') {
-      throw new Error(`the server does not give parts of it (HTTP ${head.status})`);
-    }
+    const { size, etag } = versionOf(head);
     return new RemoteFile(url, size, etag, fetch);
+  }
+
+  async grow(end: number): Promise<void> {
+    // One byte says how much there is now. The rest is read where it is needed.
+    const headers = { Range: `bytes=${end}-${end}`, 'If-None-Match': this.etag };
+    const head = await this.fetch(this.url, { headers, cache: 'no-store' });
+    if (head.status === 304) return;
+    if (head.status !== 206) await head.body?.cancel();
+    ({ size: this.size_, etag: this.etag } = versionOf(head));
+    for (const index of [...this.blocks.keys()]) {
+      if ((index + 1) * kBlock > end) this.blocks.delete(index);
+    }
   }
 
   async read(at: number, length: number): Promise<Uint8Array> {
@@ -102,6 +114,15 @@ export class RemoteFile implements Bytes {
     if (bytes.length !== end - at) throw new Error('a part of the recording came short');
     return bytes;
   }
+}
+
+function versionOf(head: Response): { size: number; etag: string } {
+  const size = Number(/\/(\d+)$/.exec(head.headers.get('content-range') ?? '')?.[1]);
+  const etag = head.headers.get('etag') ?? '';
+  if (head.status !== 206 || !Number.isSafeInteger(size) || etag === '') {
+    throw new Error(`the server does not give parts of it (HTTP ${head.status})`);
+  }
+  return { size, etag };
 }
 
 class Changed extends Error {}

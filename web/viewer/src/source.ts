@@ -2,7 +2,7 @@
 // Where frames come from: a live stream, or a recording. One kind of events, whichever it is.
 import type { FrameStore } from './frameStore';
 import type { Loop } from './playback';
-import type { FramePrefix, ServerMessage } from './protocol';
+import type { FramePrefix, ServerMessage, ServerRecording } from './protocol';
 
 export interface SourceEvents {
   open(): void;
@@ -27,6 +27,11 @@ export interface FrameSource {
   /** This many frames more may come: so many were shown, or not even that. */
   credit(n?: number, shown?: boolean): void;
   retryNow(): void;
+  /**
+   * Of a recording of the server: what the server says of it now, so that what it wrote since is shown, too; undefined:
+   * it writes another, or none.
+   */
+  told?(recorder: ServerRecording | undefined): Promise<void>;
   stop(): void;
 }
 

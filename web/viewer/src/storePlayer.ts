@@ -99,6 +99,7 @@ export class StorePlayer implements Playback {
   seek(atMs: number): void {
     const now = performance.now();
     this.clock.seek(atMs, now);
+    if (!this.clock.playing) this.running = false; // also where it has just come to the end
     this.wanted = this.due(now);
     this.pump();
   }
@@ -154,8 +155,12 @@ export class StorePlayer implements Playback {
       this.timer = window.setTimeout(() => this.pump(), wait);
     } else if (this.running) {
       this.running = false;
-      this.handed.ended?.();
+      this.ended();
     }
+  }
+
+  protected ended(): void {
+    this.handed.ended?.();
   }
 
   private async send(index: number): Promise<void> {

@@ -13,7 +13,7 @@ const kFreshMs = 15_000; // between pictures of a stream that is not shown
 export interface StreamsPanelEvents {
   choose(name: string): void;
   beside(name: string, on: boolean): void;
-  /** A finished recording in the server's folder. */
+  /** A recording in the server's folder, which may still be written. */
   recording(file: string): void;
   placement(placement: Placement): void;
 }

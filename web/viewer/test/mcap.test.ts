@@ -147,6 +147,46 @@ describe('Recording', () => {
     expect(recording.times[7]! - recording.times[6]!).toBeCloseTo(4 * 33, 3);
   });
 
+  it('grows behind what is there, of which nothing is read again', async () => {
+    const of = (count: number): Promise<Memory> => write(kFrames.slice(0, count), { chunkSize: 1 }); // a message a chunk
+    const [some, more] = [await of(9), await of(14)];
+    let [now, from] = [some.bytes, Infinity]; // what the server has, and the first byte read
+    const file: Bytes = {
+      get size() {
+        return some.size;
+      },
+      read: (at, length) => {
+        from = Math.min(from, at);
+        return some.read(at, length);
+      },
+      grow: async () => void (some.bytes = now),
+    };
+    const recording = await Recording.open(file);
+    await recording.readHeads(() => true);
+    expect(await recording.grow()).toBe(false);
+    const { end, times } = recording;
+    expect(Buffer.compare(some.bytes.slice(0, end!), more.bytes.slice(0, end!))).toBe(0);
+
+    now = more.bytes;
+    from = Infinity;
+    expect(await recording.grow()).toBe(true);
+    expect(from).toBeGreaterThanOrEqual(end!);
+    expect(recording.count).toBe(14);
+    expect(recording.times.slice(0, 9)).toEqual(times);
+    expect(recording.times[13]! - times[0]!).toBeCloseTo(13 * 33, 3);
+    expect((await recording.head(13)).sequence).toBe(13);
+    expect(recording.isKey(5)).toBe(true);
+    expect(recording.end).toBeGreaterThan(end!);
+    expect(await recording.grow()).toBe(false);
+    expect(recording.count).toBe(14);
+  });
+
+  it('of this device does not grow', async () => {
+    const recording = await Recording.open(await write(kFrames));
+    expect(recording.end).toBeNull();
+    expect(await recording.grow()).toBe(false);
+  });
+
   it('without a frame is none', async () => {
     await expect(Recording.open(await write([]))).rejects.toThrow(/no frame/);
   });

@@ -21,6 +21,7 @@ class Server {
     }
     const condition = headers.get('if-range');
     if (condition !== null && condition !== this.etag) return new Response(this.bytes, { status: 200 });
+    if (headers.get('if-none-match') === this.etag) return new Response(null, { status: 304 });
     const [from, to] = range.slice('bytes='.length).split('-').map(Number) as [number, number];
     const total = this.bytes.length;
     return new Response(this.bytes.slice(from, to + 1), {
@@ -60,6 +61,41 @@ describe('RemoteFile', () => {
     const file = await RemoteFile.open(url, server.fetch);
     server.etag = '"two"';
     await expect(file.read(0, 4)).rejects.toThrow('changed');
+  });
+
+  it('reads on where it has grown, anew only what may have changed', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, server.fetch);
+    const end = 2 * kBlock + 100; // an index is behind it, which the next chunks take the place of
+    await file.read(0, 3 * kBlock);
+    await file.grow(end);
+    expect(file.size).toBe(server.bytes.length);
+
+    const before = server.bytes;
+    server.bytes = Uint8Array.from({ length: 5 * kBlock }, (_, i) => (i < end ? before[i]! : (i * 7 + 3) & 255));
+    server.etag = '"two"';
+    await file.grow(end);
+    expect(file.size).toBe(server.bytes.length);
+    server.asked = [];
+    expect(Buffer.compare(await file.read(0, 5 * kBlock), server.bytes)).toBe(0);
+    expect(server.asked.map((range) => Number(/=(\d+)/.exec(range)![1]) / kBlock)).toEqual([2, 3, 4]);
+  });
+
+  it('stays as it is where it cannot grow', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, server.fetch);
+    const { size } = file;
+    server.failures = 1;
+    await expect(file.grow(10)).rejects.toThrow(TypeError);
+    const gone = await RemoteFile.open(url, async (_, init) => {
+      const isAsked = new Headers(init.headers).has('if-none-match');
+      return isAsked ? new Response('gone', { status: 404 }) : server.fetch(url, init);
+    });
+    await expect(gone.grow(10)).rejects.toThrow('HTTP 404');
+    for (const one of [file, gone]) {
+      expect(one.size).toBe(size);
+      expect(await one.read(7, 4)).toEqual(server.bytes.slice(7, 11));
+    }
   });
 
   it('is not opened where the server gives no parts', async () => {

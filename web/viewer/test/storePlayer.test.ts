@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-import { describe, expect, it } from 'vitest';
-import { framesBefore } from '../src/storePlayer';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import type { FrameStore } from '../src/frameStore';
+import { framesBefore, StorePlayer } from '../src/storePlayer';
 
 const kNothing = { key: -1, last: -1 };
 
@@ -22,5 +23,42 @@ describe('framesBefore', () => {
     expect(framesBefore(36, 30, { key: 30, last: 33 }, true)).toEqual([34, 35]);
     expect(framesBefore(32, 30, { key: 30, last: 36 }, true)).toEqual([30, 31]);
     expect(framesBefore(33, 30, { key: 60, last: 61 }, true)).toEqual([30, 31, 32]);
+  });
+});
+
+describe('StorePlayer', () => {
+  beforeEach(() => {
+    vi.useFakeTimers();
+    vi.stubGlobal('window', globalThis);
+  });
+  afterEach(() => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
+
+  it('has not played to the end where somebody went back at that moment', async () => {
+    const prefix = { bytes: 48, sequence: 0, captureMs: 0, publishMs: 0, sentMs: 0, drops: 0 };
+    const store = {
+      times: Float64Array.of(0, 100, 200),
+      first: 0,
+      keyBefore: async (index: number) => index,
+      buildsOnFrameBefore: async () => false,
+      read: async () => ({ prefix, message: new ArrayBuffer(48) }),
+    } as unknown as FrameStore;
+    const ends: number[] = []; // where it was
+    const player = new StorePlayer(store, { frame: () => player.credit(), nonsense: () => undefined, ended: () => ends.push(player.position) });
+    player.play();
+    await vi.advanceTimersByTimeAsync(199);
+    vi.spyOn(performance, 'now').mockReturnValue(performance.now() + 10); // the player's timer is late
+    expect(player.position).toBe(200); // as the time line asks
+    player.seek(0);
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(player.playing).toBe(false);
+    expect(ends).toEqual([]);
+
+    vi.restoreAllMocks();
+    player.play();
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(ends).toEqual([200]);
   });
 });
