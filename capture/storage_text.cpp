@@ -24,16 +24,26 @@ void silence_opencv() {
   static_cast<void>(done);
 }
 
+bool is_comment(const std::string& line) {
+  const std::size_t first = line.find_first_not_of(' ');
+  return first != std::string::npos && line[first] == '#';
+}
+
 /// OpenCV's parser calls itself for each level and would run out of stack. "[[[", "{{{" and "- - -" nest on a
-/// line; how deep indentation can go is bounded by kMaxFileBytes.
+/// line; how deep indentation can go is bounded by kMaxFileBytes. Lines that are comments nest nothing.
 bool nests_too_deep(const std::string& content) {
   int brackets = 0, dashes = 0;
-  for (const char c : content) {
-    if (c == '[' || c == '{') ++brackets;
-    if (c == ']' || c == '}') --brackets;
-    if (c == '-') ++dashes;
-    if (c != '-' && c != ' ') dashes = 0;
-    if (brackets > kMaxNesting || dashes > kMaxNesting) return true;
+  std::istringstream lines(content);
+  for (std::string line; std::getline(lines, line);) {
+    if (is_comment(line)) continue;
+    dashes = 0;
+    for (const char c : line) {
+      if (c == '[' || c == '{') ++brackets;
+      if (c == ']' || c == '}') --brackets;
+      if (c == '-') ++dashes;
+      if (c != '-' && c != ' ') dashes = 0;
+      if (brackets > kMaxNesting || dashes > kMaxNesting) return true;
+    }
   }
   return false;
 }
@@ -46,7 +56,7 @@ bool is_one_map(const std::string& content) {
   std::istringstream lines(content);
   for (std::string line; std::getline(lines, line);) {
     line.erase(line.find_last_not_of(" \t\r") + 1);
-    if (line.empty() || line.find_first_not_of(' ') == line.find('#')) continue;
+    if (line.empty() || is_comment(line)) continue;
     if (ended) return false;
     if (in_map) {
       ended = line == "...";

@@ -165,6 +165,19 @@ TEST(RigFile, RefusesNestingThatWouldExhaustTheParser) {
   }
 }
 
+TEST(RigFile, CommentsNestNothing) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "pattern.yaml";
+  const std::string text = to_yaml(test::small_pattern());
+  const std::string head = "%YAML:1.0\n---\n";
+  ASSERT_TRUE(text.starts_with(head));
+  const std::string ruler = "# " + std::string(60, '-') + "\n # " + std::string(60, '[') + "\n";
+  test::write_text(file, head + ruler + text.substr(head.size()));
+  const Result<Pattern> read = read_pattern(file);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->stripes(), test::small_pattern().stripes());
+}
+
 TEST(PatternFile, ReadsBack) {
   test::TempFolder folder;
   const auto file = folder.path() / "pattern.yaml";
