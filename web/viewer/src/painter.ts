@@ -94,13 +94,13 @@ class NearPainter implements Painter {
   }
 
   show(surface: number, frame: DecodedFrame): void {
-    this.then((stage) => stage.show(surface, frame));
+    this.onStage((stage) => stage.show(surface, frame));
   }
   remove(surface: number): void {
-    this.then((stage) => stage.remove(surface));
+    this.onStage((stage) => stage.remove(surface));
   }
   draw(drawing: Drawing): void {
-    this.then((stage) => {
+    this.onStage((stage) => {
       stage.draw(drawing);
       this.events.ready();
     });
@@ -112,10 +112,10 @@ class NearPainter implements Painter {
     return this.stage.then((stage) => stage.png(drawing));
   }
   end(): void {
-    this.then((stage) => stage.end());
+    this.onStage((stage) => stage.end());
   }
 
-  private then(act: (stage: Stage) => void): void {
+  private onStage(act: (stage: Stage) => void): void {
     void this.stage.then(act, () => undefined); // that there is none was told
   }
 }
