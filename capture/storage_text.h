@@ -12,7 +12,7 @@ namespace relievo {
 
 enum class StorageForm { kYaml, kYamlOrXml };
 
-/// The text of a file, for cv::FileStorage::MEMORY: at most 1 MB, nested no deeper than the parsers' stack
+/// The text of a file, for OpenCV to read from memory: at most 1 MB, nested no deeper than the parsers' stack
 /// bears, and if YAML one map that is all there is. Errors name the file. Also keeps OpenCV from printing
 /// what it throws.
 Result<std::string> read_storage_text(const std::filesystem::path& file, StorageForm form);

@@ -21,7 +21,6 @@ class SeenDepths {
   void fill(const std::vector<float>& before_px, const std::vector<ColumnRange>& columns,
             const FieldMotion& motion);
   void clear() { cells_ = 0; }
-  bool known() const { return cells_ > 0; }
 
   /// Whether a boundary at a place would be about as deep as something that was seen near there. False where
   /// nothing is known.

@@ -56,8 +56,19 @@ Chosen choose(const PathKernels& kernels, const BoundaryColours& colours, const 
   return out;
 }
 
-/// As the header says.
-Chosen expected_choice(const BoundaryColours& colours, const EdgeAgreement& edge) {
+Chosen near(const PathKernels& kernels, const BoundaryColours& colours, const EdgeAgreement& edge) {
+  const auto places = static_cast<std::size_t>(colours.count) + 8;
+  Chosen out{std::vector<std::int32_t>(places, -9), std::vector<float>(places, -9)};
+  const auto n =
+      static_cast<std::size_t>(kernels.near(colours, edge, kGains, out.boundary.data(), out.gain.data()));
+  out.boundary.resize(n);
+  out.gain.resize(n);
+  return out;
+}
+
+/// As the header says, of `most` boundaries.
+Chosen expected_choice(const BoundaryColours& colours, const EdgeAgreement& edge,
+                       std::size_t most = kPathCandidates) {
   const auto own = [&](int b) {
     const auto i = static_cast<std::size_t>(b);
     return edge.left[static_cast<std::size_t>(colours.left[i])] +
@@ -77,7 +88,7 @@ Chosen expected_choice(const BoundaryColours& colours, const EdgeAgreement& edge
     all.emplace_back(own(b) + other - kGains.threshold, -b);
   }
   std::sort(all.rbegin(), all.rend());
-  if (all.size() > kPathCandidates) all.resize(kPathCandidates);
+  if (all.size() > most) all.resize(most);
   std::sort(all.begin(), all.end(),
             [](const auto& a, const auto& b) { return std::get<1>(a) > std::get<1>(b); });
   Chosen out;
@@ -104,6 +115,7 @@ TEST_P(LinePath, ChoosesTheBestBoundaries) {
         const Chosen expected = expected_choice(colours, edge);
         ASSERT_EQ(got.boundary, expected.boundary) << stripes << " stripes, round " << round;
         ASSERT_EQ(got.gain, expected.gain);
+        ASSERT_TRUE(near(kernels(), colours, edge) == expected_choice(colours, edge, 10'000));
       }
     }
   }
@@ -122,6 +134,7 @@ TEST_P(LinePath, ChoosesFromAVeryLongPattern) {
   for (int round = 0; round < 20; ++round) {
     const EdgeAgreement edge = random_edge(random, 0.25F);
     ASSERT_TRUE(choose(kernels(), colours, edge) == expected_choice(colours, edge));
+    ASSERT_TRUE(near(kernels(), colours, edge) == expected_choice(colours, edge, 10'000));
   }
 }
 
