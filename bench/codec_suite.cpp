@@ -219,26 +219,24 @@ Status measure(const Codec& codec, const Judge& by, const Job& job, Samples& sam
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.repeats.frames + 1, stop, {.truth = true});
-  if (!loop) return loop.error();
-  if (!*loop) return {};
-  const auto frames = reconstruct_all(**loop, options.decoder, stop);
-  if (!frames) return frames.error();
-  if (!*frames) return {};
+  const auto loaded =
+      load_reconstructed(options.source, options.repeats.frames + 1, stop, options.decoder, {.truth = true});
+  if (!loaded) return loaded.error();
+  if (!*loaded) return {};
+  const auto& [loop, frames] = **loaded;
 
   std::vector<Job> jobs;
   std::vector<double> vertices, triangles;
   WorkingVolume volume{Volume{}};
-  for (const Frame3D& frame : **frames) {
+  for (const Frame3D& frame : frames) {
     const Volume& box = volume.fit(frame.surface.positions);
-    jobs.push_back(
-        {frame, (*loop)->truth(frame.number), box, volume.bits(PipelineOptions{}.depth_resolution)});
+    jobs.push_back({frame, loop.truth(frame.number), box, volume.bits(PipelineOptions{}.depth_resolution)});
     vertices.push_back(static_cast<double>(frame.surface.positions.size()));
     triangles.push_back(static_cast<double>(frame.surface.triangles.size()));
   }
 
   // Round by round, so that whatever else the machine does meets all codecs alike.
-  const SourceInfo& source = (*loop)->info();
+  const SourceInfo& source = loop.info();
   const Judge by{source.rig, source.pattern};
   std::vector<Codec> all = codecs(source);
   if (!options.only.empty())

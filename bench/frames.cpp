@@ -115,22 +115,25 @@ std::unique_ptr<FieldSource> FrameLoop::play() const {
   return std::make_unique<LoopSource>(*this);
 }
 
-Result<std::optional<std::vector<Frame3D>>> reconstruct_all(const FrameLoop& loop, Decoder decoder,
-                                                            StopSignal& stop) {
-  using Frames = std::optional<std::vector<Frame3D>>;
+Result<std::optional<Reconstructed>> load_reconstructed(const std::string& uri, int count, StopSignal& stop,
+                                                        Decoder decoder, const FrameLoop::Options& options) {
+  auto loaded = FrameLoop::load(uri, count, stop, options);
+  if (!loaded) return loaded.error();
+  if (!*loaded) return std::optional<Reconstructed>();
+  FrameLoop& loop = **loaded;
   auto reconstructor = Reconstructor::create(loop.info().rig, loop.info().pattern, {.decoder = decoder});
   if (!reconstructor) return reconstructor.error();
   std::vector<Frame3D> frames;
   Progress progress("reconstruct", "frames", loop.size());
   for (std::uint64_t n = 0; n < loop.size(); ++n) {
-    if (stop.stopped()) return Frames{};
+    if (stop.stopped()) return std::optional<Reconstructed>();
     auto frame = reconstructor->add(loop.at(n));
     if (!frame) return frame.error();
     if (*frame && !(*frame)->surface.positions.empty()) frames.push_back(**std::move(frame));
     progress.update(n + 1);
   }
   if (frames.empty()) return Error{"no frame of " + loop.info().name + " could be reconstructed"};
-  return Frames(std::move(frames));
+  return std::optional<Reconstructed>({std::move(loop), std::move(frames)});
 }
 
 }  // namespace relievo::bench

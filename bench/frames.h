@@ -50,9 +50,15 @@ class FrameLoop {
   std::map<std::uint64_t, ImageF> truths_;
 };
 
-/// Surfaces and textures of the loop's frames, in order. The error says where none could be reconstructed.
-/// Nothing once stopped.
-Result<std::optional<std::vector<Frame3D>>> reconstruct_all(const FrameLoop& loop, Decoder decoder,
-                                                            StopSignal& stop);
+/// A source's first frames, and their surfaces and textures in order.
+struct Reconstructed {
+  FrameLoop loop;
+  std::vector<Frame3D> frames;
+};
+
+/// As FrameLoop::load(). The error says where none could be reconstructed.
+Result<std::optional<Reconstructed>> load_reconstructed(const std::string& uri, int count, StopSignal& stop,
+                                                        Decoder decoder = ReconstructOptions{}.decoder,
+                                                        const FrameLoop::Options& options = {});
 
 }  // namespace relievo::bench

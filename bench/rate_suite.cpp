@@ -157,25 +157,23 @@ Result<std::vector<Row>> rows_of_levels(const FrameLoop& loop, const std::vector
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.repeats.frames + 1, stop);
-  if (!loop) return loop.error();
-  if (!*loop) return {};
-  const auto frames = reconstruct_all(**loop, ReconstructOptions{}.decoder, stop);
-  if (!frames) return frames.error();
-  if (!*frames) return {};
+  const auto loaded = load_reconstructed(options.source, options.repeats.frames + 1, stop);
+  if (!loaded) return loaded.error();
+  if (!*loaded) return {};
+  const auto& [loop, frames] = **loaded;
 
   const bool of_deadlines = !options.deadlines_ms.empty();
-  auto rows = of_deadlines ? rows_of_deadlines(**loop, **frames, options, stop)
-                           : rows_of_levels(**loop, **frames, options, stop);
+  auto rows = of_deadlines ? rows_of_deadlines(loop, frames, options, stop)
+                           : rows_of_levels(loop, frames, options, stop);
   if (!rows) return rows.error();
   if (stop.stopped()) return {};
   print({.suite = "rate",
          .settings = {{"source", options.source},
                       {"geometry", options.geometry},
                       {"texture", options.texture},
-                      {"frames", static_cast<double>((*frames)->size())},
+                      {"frames", static_cast<double>(frames.size())},
                       {"rounds", static_cast<double>(options.repeats.rounds)}},
-         .figures = {{"frame_rate", (*loop)->info().rig.frame_rate}},
+         .figures = {{"frame_rate", loop.info().rig.frame_rate}},
          .rows = std::move(*rows),
          .notes =
              {of_deadlines

@@ -147,13 +147,11 @@ Result<Measured> measure(const Options& options, const ScratchFile& file, StopSi
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.frames + 1, stop);
-  if (!loop) return loop.error();
-  if (!*loop) return {};
-  const auto frames = reconstruct_all(**loop, ReconstructOptions{}.decoder, stop);
-  if (!frames) return frames.error();
-  if (!*frames) return {};
-  const auto group = encode_group(options, **loop, **frames);
+  const auto loaded = load_reconstructed(options.source, options.frames + 1, stop);
+  if (!loaded) return loaded.error();
+  if (!*loaded) return {};
+  const auto& [loop, frames] = **loaded;
+  const auto group = encode_group(options, loop, frames);
   if (!group) return group.error();
   const ScratchFile file(options.folder);
   if (auto written = write_recording(options, *group, file.path(), stop); !written) return written;

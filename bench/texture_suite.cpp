@@ -95,12 +95,10 @@ class Stream {
 };
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto loop = FrameLoop::load(options.source, options.repeats.frames + 1, stop);
-  if (!loop) return loop.error();
-  if (!*loop) return {};
-  const auto frames = reconstruct_all(**loop, ReconstructOptions{}.decoder, stop);
-  if (!frames) return frames.error();
-  if (!*frames) return {};
+  const auto loaded = load_reconstructed(options.source, options.repeats.frames + 1, stop);
+  if (!loaded) return loaded.error();
+  if (!*loaded) return {};
+  const std::vector<Frame3D>& frames = (*loaded)->frames;
 
   // Round by round, so that whatever else the machine does meets all codecs alike.
   const std::vector<Codec> all = codecs();
@@ -108,9 +106,9 @@ Status run(const Options& options, StopSignal& stop) {
   for (int round = 0; round < options.repeats.rounds; ++round) {
     for (std::size_t c = 0; c < all.size(); ++c) {
       Samples warm_up;
-      if (const Status done = Stream(all[c]).add((*frames)->front().texture, warm_up); !done) return done;
+      if (const Status done = Stream(all[c]).add(frames.front().texture, warm_up); !done) return done;
       Stream stream(all[c]);
-      for (const Frame3D& frame : **frames) {
+      for (const Frame3D& frame : frames) {
         if (stop.stopped()) return {};
         if (const Status done = stream.add(frame.texture, samples[c]); !done) return done;
       }
@@ -133,10 +131,10 @@ Status run(const Options& options, StopSignal& stop) {
                      {"psnr_db", psnr},
                      {"lossless", of.lossless}}});
   }
-  const Image8& picture = (*frames)->front().texture;
+  const Image8& picture = frames.front().texture;
   print({.suite = "texture",
          .settings = {{"source", options.source},
-                      {"frames", static_cast<double>((*frames)->size())},
+                      {"frames", static_cast<double>(frames.size())},
                       {"rounds", static_cast<double>(options.repeats.rounds)},
                       {"width", static_cast<double>(picture.width())},
                       {"height", static_cast<double>(picture.height())}},

@@ -47,23 +47,24 @@ struct Chosen {
   bool operator==(const Chosen&) const = default;
 };
 
-Chosen choose(const PathKernels& kernels, const BoundaryColours& colours, const EdgeAgreement& edge) {
-  Chosen out{std::vector<std::int32_t>(kPathCandidates, -9), std::vector<float>(kPathCandidates, -9)};
+/// Of a kernel that writes up to `places` boundaries.
+Chosen written_by(decltype(PathKernels::choose) kernel, int places, const BoundaryColours& colours,
+                  const EdgeAgreement& edge) {
+  const auto size = static_cast<std::size_t>(places);
+  Chosen out{std::vector<std::int32_t>(size, -9), std::vector<float>(size, -9)};
   const auto n =
-      static_cast<std::size_t>(kernels.choose(colours, edge, kGains, out.boundary.data(), out.gain.data()));
+      static_cast<std::size_t>(kernel(colours, edge, kGains, out.boundary.data(), out.gain.data()));
   out.boundary.resize(n);
   out.gain.resize(n);
   return out;
 }
 
+Chosen choose(const PathKernels& kernels, const BoundaryColours& colours, const EdgeAgreement& edge) {
+  return written_by(kernels.choose, kPathCandidates, colours, edge);
+}
+
 Chosen near(const PathKernels& kernels, const BoundaryColours& colours, const EdgeAgreement& edge) {
-  const auto places = static_cast<std::size_t>(colours.count) + 8;
-  Chosen out{std::vector<std::int32_t>(places, -9), std::vector<float>(places, -9)};
-  const auto n =
-      static_cast<std::size_t>(kernels.near(colours, edge, kGains, out.boundary.data(), out.gain.data()));
-  out.boundary.resize(n);
-  out.gain.resize(n);
-  return out;
+  return written_by(kernels.near, colours.count + 8, colours, edge);
 }
 
 /// As the header says, of `most` boundaries.
