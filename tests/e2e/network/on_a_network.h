@@ -44,6 +44,12 @@ class OnANetwork : public ::testing::Test {
     }
   }
 
+  bool has_frame(int host, std::uint64_t sequence) const {
+    bool has = false;
+    each_frame(host, [&](const RecordedMessage& frame) { return !(has = frame.sequence == sequence); });
+    return has;
+  }
+
   /// When a host's recorder had its first frame after a time, in seconds after it; nothing where it had none.
   std::optional<double> came_back_after_s(int host, std::int64_t time_ns) const {
     std::optional<double> after_s;
