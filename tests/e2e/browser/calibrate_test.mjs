@@ -114,7 +114,7 @@ const checks = {
           await press(page, 'take');
           await page.waitForSelector('#calibration-views [data-used=true]');
           assert.match(await page.textContent('#calibration-views li'), /35 corners/);
-          await page.waitForFunction(() => /hold the board/.test(document.querySelector('#calibration-next').textContent));
+          await page.waitForFunction(() => /hold the board/.test(document.querySelector('#calibration-next')?.textContent));
           await eventually('the projector shows no stripes', () => screen.seen().coloured > 0.9);
           await shot(page, 'geometry');
           await page.check('#calibration input[type=checkbox]');

@@ -88,7 +88,7 @@ const checks = {
     await page.waitForFunction(() => window.relievo.diagnostics().mode === 'shaded');
     await page.click('#immersive');
     await page.waitForFunction(
-      () => window.session !== undefined && document.querySelector('#immersive').textContent === 'Leave',
+      () => window.session !== undefined && document.querySelector('#immersive')?.textContent === 'Leave',
     );
     for (const [right, up, back, yaw] of [
       [0, 0, 0, 0],
@@ -128,7 +128,7 @@ const checks = {
   async 'leaving brings the page back'(page) {
     const pose = await page.evaluate(() => window.relievo.pose());
     await page.evaluate(() => window.session.end());
-    await page.waitForFunction(() => document.querySelector('#immersive').textContent === 'Headset');
+    await page.waitForFunction(() => document.querySelector('#immersive')?.textContent === 'Headset');
     const before = await look(page);
     await page.waitForFunction((n) => window.relievo.diagnostics().drawn > n, before.drawn);
     await eventually('nothing is drawn', async () => (await look(page)).pixels.covered > 0.1);

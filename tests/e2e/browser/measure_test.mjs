@@ -104,7 +104,7 @@ const onFeeder = {
     await page.mouse.up();
     assert.equal((await look(page)).measurements.length, 0);
     await page.mouse.click(5, 400);
-    await page.waitForFunction(() => /no surface/.test(document.querySelector('#panel-measure').textContent));
+    await page.waitForFunction(() => /no surface/.test(document.querySelector('#panel-measure')?.textContent));
   },
 
   async 'no error, no request to another host'() {
@@ -140,7 +140,7 @@ const onServer = {
   async 'the readout under the cursor says depth and deviation'(page) {
     const at = await page.evaluate((p) => window.relievo.toPage(p), onCube(0, 0));
     await page.mouse.move(at.x, at.y);
-    await page.waitForFunction(() => /depth [\d.]+ ± [\d.]+ mm/.test(document.querySelector('#cursor').textContent));
+    await page.waitForFunction(() => /depth [\d.]+ ± [\d.]+ mm/.test(document.querySelector('#cursor')?.textContent));
     assert.match(await page.textContent('#panel-measure'), /±: one standard deviation.*calibration adds its own/);
     const depth = Number(/depth ([\d.]+)/.exec(await page.textContent('#cursor'))[1]);
     near(depth, onCube(0, 0)[2] * 1000, 1, 'depth under the cursor');

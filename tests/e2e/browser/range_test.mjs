@@ -99,7 +99,7 @@ const checks = {
     key = await openRecorded(page, recorded);
     await setRange(page, key + 2, key + 7);
     await openPanel(page);
-    await page.waitForFunction(() => /: 6 frames/.test(document.querySelector('#range').textContent));
+    await page.waitForFunction(() => /: 6 frames/.test(document.querySelector('#range')?.textContent));
     const { path, name } = await take(page, 'MCAP');
     assert.equal(name, 'relievo-object.mcap');
     const told = info(path);
@@ -147,7 +147,7 @@ const checks = {
           [...document.querySelectorAll('#range button')].find((b) => b.textContent === 'GLBs').click();
         }),
     );
-    await page.waitForFunction(() => /^Cancelled/.test(document.querySelector('#panel-take [role=status]').textContent));
+    await page.waitForFunction(() => /^Cancelled/.test(document.querySelector('#panel-take [role=status]')?.textContent));
     await page.waitForTimeout(500);
     assert.equal(downloads, 0, 'a file all the same');
     const { path } = await take(page, 'MCAP');

@@ -41,7 +41,7 @@ const checks = {
     await shownPast(page, 2);
     await page.waitForFunction((n) => window.relievo.diagnostics().playback.times.length >= n, kKept);
     await page.click('#tool-record');
-    await page.waitForFunction(() => document.querySelector('#tool-record').getAttribute('aria-pressed') === 'true');
+    await page.waitForFunction(() => document.querySelector('#tool-record')?.getAttribute('aria-pressed') === 'true');
     assert.match(await page.textContent('#recording'), /^0:0\d, [\d.]+ MB$/);
     const { shown } = await look(page);
     await shownPast(page, shown + 6);
@@ -54,7 +54,7 @@ const checks = {
     const [file] = await Promise.all([page.waitForEvent('download'), page.keyboard.press('x')]);
     assert.match(file.suggestedFilename(), /^object-\d{8}-\d{6}\.mcap$/);
     await file.saveAs(saved);
-    await page.waitForFunction(() => /object-.*\.mcap: \d+ frames/.test(document.querySelector('#recording').textContent));
+    await page.waitForFunction(() => /object-.*\.mcap: \d+ frames/.test(document.querySelector('#recording')?.textContent));
     assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'false');
   },
 
@@ -93,10 +93,10 @@ const checks = {
     await shownPast(page, 4);
     const { shown } = await look(page);
     await page.click('#tool-record');
-    await page.waitForFunction(() => document.querySelector('#tool-record').getAttribute('aria-pressed') === 'true');
+    await page.waitForFunction(() => document.querySelector('#tool-record')?.getAttribute('aria-pressed') === 'true');
     await shownPast(page, shown + 3);
     await page.click('#tool-record');
-    await page.waitForFunction(() => /kept-.*\.mcap/.test(document.querySelector('#recording').textContent));
+    await page.waitForFunction(() => /kept-.*\.mcap/.test(document.querySelector('#recording')?.textContent));
     assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'false');
     let listed;
     await eventually('the file is not listed as finished', async () => {
@@ -139,7 +139,7 @@ const checks = {
     const page = await openRecording();
     await shownPast(page, 2);
     const isPressed = (is) =>
-      page.waitForFunction((p) => document.querySelector('#tool-record').getAttribute('aria-pressed') === p, is);
+      page.waitForFunction((p) => document.querySelector('#tool-record')?.getAttribute('aria-pressed') === p, is);
     await order('start');
     await isPressed('true');
     await order('stop');

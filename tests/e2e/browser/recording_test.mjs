@@ -207,7 +207,7 @@ const checks = {
     const bad = join(scratch, 'bad.mcap');
     writeFileSync(bad, 'not a recording at all, only some words in a file');
     await page.setInputFiles('#file', bad);
-    await page.waitForFunction(() => /no MCAP file/.test(document.querySelector('#card').textContent));
+    await page.waitForFunction(() => /no MCAP file/.test(document.querySelector('#card')?.textContent));
     await page.click('#dismiss');
     assert.equal(await page.isVisible('#card'), false);
     assert.equal((await look(page)).state, 'file');

@@ -92,7 +92,7 @@ const checks = {
       const { rgb } = await mean(page);
       assert.ok(rgb[1] > 1.5 * rgb[0] && rgb[1] > 1.5 * rgb[2], `the plane is not green: ${rgb}`);
       const before = await page.textContent('#state');
-      await page.waitForFunction((text) => document.querySelector('#state').textContent !== text, before);
+      await page.waitForFunction((text) => document.querySelector('#state')?.textContent !== text, before);
       for (const name of kPictures) await show(page, name);
       assert.ok((await page.textContent('#advice')).includes('Nothing'));
       if (screenshots) await shots(server.address, 'plane');

@@ -77,7 +77,7 @@ try {
   // The menu: by keys alone, told in words, and kept by address and link.
   await page.goto(address);
   await shownPast(1);
-  const told = (pattern) => page.waitForFunction((p) => new RegExp(p).test(document.querySelector('#quality-why').textContent), pattern);
+  const told = (pattern) => page.waitForFunction((p) => new RegExp(p).test(document.querySelector('#quality-why')?.textContent), pattern);
   const now = (rung) => page.waitForFunction((r) => window.relievo.diagnostics().quality.now === r, rung);
   await page.keyboard.press('b');
   await told('^Full comes: nothing else was asked for');
@@ -101,7 +101,7 @@ try {
   assert.ok(drawn, 'the picture is not shown');
   await page.keyboard.press('Escape');
   await page.keyboard.press('i');
-  await page.waitForFunction(() => /qualityPicture alone comes, as chosen/.test(document.querySelector('#panel-statistics').textContent));
+  await page.waitForFunction(() => /qualityPicture alone comes, as chosen/.test(document.querySelector('#panel-statistics')?.textContent));
   await page.keyboard.press('b');
   await page.selectOption('#quality', 'auto');
   await now('full');

@@ -19,7 +19,7 @@ const complaints = [];
 const { open } = pagesOf(browser, server.address, complaints);
 
 const split = (page) => page.evaluate(() => document.body.dataset.split);
-const note = (page, of) => page.waitForFunction((words) => document.querySelector('#stripes-note').textContent.includes(words), of);
+const note = (page, of) => page.waitForFunction((words) => document.querySelector('#stripes-note')?.textContent.includes(words), of);
 /** Of a picture on the page: its share of pixels of a saturated colour, those of kRead, and how often the hue changes in the middle line. */
 const colours = (page, id) =>
   page.evaluate(

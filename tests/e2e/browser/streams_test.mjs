@@ -110,7 +110,7 @@ const checks = {
         for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${name}: ${'xyz'[i]} at ${u}, ${v}`);
         await page.mouse.move(...at);
         const said = new RegExp(`^${name} · depth ([\\d.]+)`);
-        await page.waitForFunction((source) => new RegExp(source).test(document.querySelector('#cursor').textContent), said.source);
+        await page.waitForFunction((source) => new RegExp(source).test(document.querySelector('#cursor')?.textContent), said.source);
         near(Number(said.exec(await page.textContent('#cursor'))[1]), point[2] * 1000, 2, `${name}: depth at ${u}, ${v}`);
       }
     }
@@ -134,7 +134,7 @@ const checks = {
     }
     await clickOn('ball', 0.15, 0.2);
     await clickOn('other', 0.15, 0.2);
-    await page.waitForFunction(() => /of another stream/.test(document.querySelector('#panel-measure').textContent));
+    await page.waitForFunction(() => /of another stream/.test(document.querySelector('#panel-measure')?.textContent));
     assert.equal((await look(page)).measurements.length, 2);
     await clickOn('ball', 0.15, 0.8); // the first place still counts
     await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 3);

@@ -35,7 +35,7 @@ export async function pointAt(page, index) {
       height: canvas.clientHeight,
       deviation: Math.sqrt(squares / n - (sum / n) ** 2),
       hash,
-      time: document.querySelector('.preview span').textContent,
+      time: document.querySelector('.preview span')?.textContent,
     };
   });
 }

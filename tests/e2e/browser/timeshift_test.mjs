@@ -75,8 +75,8 @@ const onFeeder = {
     const now = await playback(page);
     assert.ok(now.following && now.playing, JSON.stringify(now));
     await page.keyboard.press('i');
-    await page.waitForFunction(() => /the last\d+ s of at most 60 s/.test(document.querySelector('#panel-statistics').textContent));
-    await page.waitForFunction(() => /memory\d+ MB of at most 256 MB/.test(document.querySelector('#panel-statistics').textContent));
+    await page.waitForFunction(() => /the last\d+ s of at most 60 s/.test(document.querySelector('#panel-statistics')?.textContent));
+    await page.waitForFunction(() => /memory\d+ MB of at most 256 MB/.test(document.querySelector('#panel-statistics')?.textContent));
     await page.keyboard.press('i');
   },
 
@@ -89,7 +89,7 @@ const onFeeder = {
     assert.equal((await surface(page)).number, number);
     assert.equal(await page.getAttribute('#follow', 'aria-pressed'), 'false');
     assert.match(await page.textContent('#timeline'), /−\d+:\d\d/);
-    await page.waitForFunction(() => document.querySelector('#badge-text').textContent === 'Paused');
+    await page.waitForFunction(() => document.querySelector('#badge-text')?.textContent === 'Paused');
   },
 
   async 'a link says the time of day, and whoever has not kept it is told'(page) {
@@ -97,7 +97,7 @@ const onFeeder = {
     assert.match(link, /&time=\d{4}-\d\d-\d\dT[^&]*Z&play=0$/);
     const other = await open(link.slice(new URL(link).origin.length));
     await inState(other, 'live');
-    await other.waitForFunction(() => /is not kept any more/.test(document.querySelector('#source').textContent));
+    await other.waitForFunction(() => /is not kept any more/.test(document.querySelector('#source')?.textContent));
     await shownPast(other, 1);
     assert.match(await other.evaluate(() => window.relievo.link()), /&time=live$/);
     await other.close();
@@ -150,7 +150,7 @@ const onFeeder = {
     const { playing, following, index, first, times } = await playback(page);
     assert.ok(playing && !following);
     assert.ok(index < first + times.length - 5, `at ${index} of ${first + times.length}`);
-    await page.waitForFunction(() => document.querySelector('#badge-text').textContent === 'Behind live');
+    await page.waitForFunction(() => document.querySelector('#badge-text')?.textContent === 'Behind live');
   },
 
   async 'L is live again'(page) {

@@ -70,7 +70,7 @@ const checks = {
     assert.ok(second.frame > first.frame);
     assert.notEqual(second.pixels.hash, first.pixels.hash);
     await page.waitForFunction(() =>
-      /frame\d+rate[\d.]+ \/slatency\d+ ms/.test(document.querySelector('#statistics').textContent),
+      /frame\d+rate[\d.]+ \/slatency\d+ ms/.test(document.querySelector('#statistics')?.textContent),
     );
     await page.waitForFunction(() => window.relievo.diagnostics().latencyMs > 0);
   },
@@ -186,7 +186,7 @@ const checks = {
     });
     await more(page, 4);
     assert.match((await look(page)).lastError, /frame is cut short/);
-    await page.waitForFunction(() => /errors\d/.test(document.querySelector('#statistics').textContent));
+    await page.waitForFunction(() => /errors\d/.test(document.querySelector('#statistics')?.textContent));
   },
 
   async 'an ended and a vanished stream are told apart from a stall'(page) {
@@ -194,7 +194,7 @@ const checks = {
     await inState(page, 'ended');
     assert.match(await card(page), /The take is at its end\./);
     feeder.say('gone');
-    await page.waitForFunction(() => /left the network/.test(document.querySelector('#card').textContent));
+    await page.waitForFunction(() => /left the network/.test(document.querySelector('#card')?.textContent));
     feeder.say('start ball');
     await inState(page, 'live');
   },
@@ -261,7 +261,7 @@ const checks = {
     await feeder.kill();
     await inState(page, 'lost');
     assert.match(await card(page), /Connection lost/);
-    await page.waitForFunction(() => /in \d+ s/.test(document.querySelector('#card-text').textContent));
+    await page.waitForFunction(() => /in \d+ s/.test(document.querySelector('#card-text')?.textContent));
     await page.waitForTimeout(600);
     await page.screenshot({ path: join(shots, 'lost.png') });
     feeder = await Feeder.restart(feederPath, port);
