@@ -56,10 +56,12 @@ export class RecordingSource extends StorePlayer implements FrameSource {
   }
 
   override seek(atMs: number): void {
-    const goesOn = this.awaits;
+    const goesOn = this.isWritten && this.playing;
     this.atEnd = false;
     super.seek(atMs);
-    if (goesOn) super.play();
+    if (!goesOn || super.playing) return;
+    if (this.position < this.endMs) super.play();
+    else this.atEnd = true; // else it would begin again
   }
 
   async told(recorder: ServerRecording | undefined): Promise<void> {
@@ -102,6 +104,10 @@ export class RecordingSource extends StorePlayer implements FrameSource {
     return this.atEnd && this.isWritten;
   }
 
+  private get endMs(): number {
+    return this.times[this.times.length - 1]!;
+  }
+
   private write(isWritten: boolean): void {
     if (isWritten === this.isWritten) return;
     this.isWritten = isWritten;
@@ -115,7 +121,7 @@ export class RecordingSource extends StorePlayer implements FrameSource {
   }
 
   private goOn(): void {
-    if (this.atEnd && this.position < this.times[this.times.length - 1]!) this.play();
+    if (this.atEnd && this.position < this.endMs) this.play();
   }
 
   // What decodes alone, and gaps.

@@ -67,8 +67,9 @@ export class StorePlayer implements Playback {
   get position(): number {
     return this.clock.position(performance.now());
   }
+  /** Until its last frame was taken by the page, which may be later than its clock's end. */
   get playing(): boolean {
-    return this.clock.playing;
+    return this.running;
   }
   get speed(): number {
     return this.clock.speed;
