@@ -15,6 +15,8 @@
 #include "capture/reconstruct/instant.h"
 #include "capture/reconstruct/match.h"
 #include "capture/reconstruct/moving_places.h"
+#include "capture/reconstruct/persistence.h"
+#include "capture/reconstruct/place_grid.h"
 #include "capture/reconstruct/readmit.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
@@ -22,6 +24,7 @@
 #include "capture/reconstruct/sharp_luma.h"
 #include "capture/reconstruct/trace.h"
 #include "capture/reconstruct/weak_signal.h"
+#include "capture/reconstruct/weigh.h"
 
 namespace relievo {
 namespace {
@@ -81,6 +84,9 @@ struct SlideDecoder::State {
   MovingPlaces moving;
   FieldPlacer field_placer;
   Growth growth;
+  PlaceGrid places;
+  Persistence persistence;
+  Weighing weighing;
 
   Observation newer;
   Observation previous;  // the frame before
@@ -295,6 +301,13 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
     report.filters.recovered += grown;
     report.matched += grown;
+    s.places.fill(s.pattern.boundaries(), pool, s.result, s.edges, s.recovered);
+    const std::size_t carried = s.persistence.carry(s.moving, pool, s.places, s.recovered);
+    report.filters.recovered += carried;
+    report.matched += carried;
+    const WeighingCounts weighed = s.weighing.weigh(s.places, pool, s.result, s.edges, s.recovered);
+    report.filters.rejected += weighed.rejected;
+    report.filters.moved += weighed.moved;
   }
   s.list(pool, out);
   return true;

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/place_grid.h"
+
+#include <algorithm>
+
+namespace relievo {
+
+void PlaceGrid::fill(int boundaries, WorkerPool& pool, const SequenceResult& result, const EdgeImage& edges,
+                     const std::vector<RecoveredBoundary>& recovered) {
+  if (boundaries != boundaries_ || edges.lines != lines_) {
+    boundaries_ = boundaries;
+    lines_ = edges.lines;
+    // What lies around the lines stays as it is here.
+    places_.assign(static_cast<std::size_t>(stride() * (lines_ + 2 * kMargin)), {});
+  }
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+    for (int l = begin; l < end; ++l) {
+      Place* here = line(l);
+      std::fill_n(here, boundaries_, Place{});
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(l)];
+           e < edges.line_start[static_cast<std::size_t>(l) + 1]; ++e)
+        if (result.boundary[e] >= 0)
+          here[result.boundary[e]] = {edges.edges[e].column_px, edges.edges[e].sigma_px};
+    }
+  });
+  for (const RecoveredBoundary& r : recovered) line(r.line)[r.boundary] = {r.column_px, r.sigma_px};
+}
+
+}  // namespace relievo

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/weigh.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace relievo {
+namespace {
+
+constexpr float kStripe_px = 10.5F;  // stripes wider than this allow for as much more
+constexpr int kGapsEvery = 8;        // lines
+
+// Standard deviations of what is foretold, measured on simulated scenes.
+constexpr float kStraight_px = 0.06F;  // from three neighbours in line
+constexpr float kBend = 1.4F;          // more for each pixel that the three are out of line
+constexpr float kBendShare = 0.7F;     // of a bend that is taken to go on
+constexpr float kTwoAcross_px = 1.F;   // more, from two only
+constexpr float kTwoAlong_px = 0.2F;
+constexpr float kBetween = 0.1F;  // of the difference of the lines above and below
+constexpr float kAlong = 1.5F;    // times these along the boundary: errors there are the place's own errors
+constexpr float kAgree = 3.F;     // standard deviations between a place and what is foretold of it
+
+constexpr float kUnsure_px = 0.08F;  // what is surer than this stays as it is
+constexpr float kOwn = 1.3F;         // times its standard deviation: blur across a step is no noise
+constexpr float kOwnLeast_px = 0.02F;
+constexpr float kOut_px = 0.15F;    // outwards, at the end of a surface
+constexpr float kStrong_px = 0.5F;  // standard deviation of what is foretold and nothing agrees with
+constexpr float kMost_px = 0.85F;   // standard deviation, after weighing, times how far neighbours pulled
+
+float square(float x) {
+  return x * x;
+}
+
+}  // namespace
+
+void Weighing::measure_gaps(const PlaceGrid& places, WorkerPool& pool) {
+  gaps_.reset(pool.threads());
+  std::vector<float>& gaps = gaps_.of(0);
+  for (int line = 0; line < places.lines(); line += kGapsEvery) {
+    const Place* here = places.line(line);
+    for (int b = 0; b + 1 < places.boundaries(); ++b) {
+      const float gap = here[b + 1].column_px - here[b].column_px;
+      if (gap > 0) gaps.push_back(gap);
+    }
+  }
+  scale_ = std::max(1.F, gaps_.median(0) / kStripe_px);
+}
+
+/// A place's own column and all that is foretold of it and agrees, by their variances. Nothing where it is to
+/// be given up.
+std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride) const {
+  const float own_variance = square(kOwn * own->sigma_px) + square(kOwnLeast_px);
+  float weights = 1 / own_variance;
+  float sum = weights * own->column_px;
+  float off = 0;
+  int count = 0;
+  bool against = false;
+  const auto take = [&](float column_px, float variance) {
+    const float apart = square(column_px - own->column_px);
+    const float expected = variance + own_variance;
+    if (!(apart < kAgree * kAgree * expected)) {
+      against = against || (apart == apart && variance < kStrong_px * kStrong_px);
+      return;  // nor what is not known
+    }
+    weights += 1 / variance;
+    sum += column_px / variance;
+    off += apart / expected;
+    ++count;
+  };
+  // From three neighbours in one direction, or two.
+  const auto foretell = [&](std::ptrdiff_t step, float two_px, float times) {
+    const Place &a = own[step], &b = own[2 * step], &c = own[3 * step];
+    const float straight = 2 * a.column_px - b.column_px;
+    const float bend = a.column_px - 2 * b.column_px + c.column_px;
+    const bool three = bend == bend;
+    const float model = three ? kStraight_px + kBend * std::fabs(bend) : kStraight_px + two_px;
+    const float share = three ? kBendShare : 0;
+    const float noise =
+        square((2 + share) * a.sigma_px) + square((1 + 2 * share) * b.sigma_px) + square(share * c.sigma_px);
+    take(straight + (three ? share * bend : 0), square(times) * (square(model) + square(kOwn) * noise));
+  };
+  foretell(-1, kTwoAcross_px, 1);
+  foretell(1, kTwoAcross_px, 1);
+  foretell(-stride, kTwoAlong_px, kAlong);
+  foretell(stride, kTwoAlong_px, kAlong);
+  const Place &above = own[-stride], &below = own[stride];
+  const float apart = below.column_px - above.column_px;
+  take(0.5F * (above.column_px + below.column_px),
+       square(kAlong) * (square(kStraight_px + kBetween * std::fabs(apart)) +
+                         square(kOwn / 2) * (square(above.sigma_px) + square(below.sigma_px))));
+  if (count == 0 && against) return std::nullopt;
+  // Where the surface ends its end is its own.
+  float column_px = sum / weights;
+  if (!own[-1].known()) column_px = std::max(column_px, own->column_px - kOut_px);
+  if (!own[1].known()) column_px = std::min(column_px, own->column_px + kOut_px);
+  const float sigma_px = 1 / std::sqrt(weights);
+  const float doubt = count == 0 ? 0 : off / static_cast<float>(count);
+  if (sigma_px * (1 + doubt) > kMost_px * scale_) return std::nullopt;
+  return Place{column_px, sigma_px};
+}
+
+/// Weighs a place; false where it is to be given up.
+bool Weighing::settle(const PlaceGrid& places, int line, int boundary, float& column_px,
+                      float& sigma_px) const {
+  const Place* own = places.line(line) + boundary;
+  if (own->column_px != column_px) return true;  // the grid has another one of that boundary
+  const std::optional<Place> now = weighed(own, places.stride());
+  if (!now) return false;
+  column_px = now->column_px;
+  sigma_px = now->sigma_px;
+  return true;
+}
+
+WeighingCounts Weighing::weigh(const PlaceGrid& places, WorkerPool& pool, SequenceResult& result,
+                               EdgeImage& edges, std::vector<RecoveredBoundary>& recovered) {
+  measure_gaps(places, pool);
+  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
+    for (int line = begin; line < end; ++line) {
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        Edge& edge = edges.edges[e];
+        std::int16_t& boundary = result.boundary[e];
+        if (boundary < 0 || edge.sigma_px < kUnsure_px) continue;
+        if (settle(places, line, boundary, edge.column_px, edge.sigma_px)) {
+          ++counts.moved;
+        } else {
+          boundary = -1;
+          ++counts.rejected;
+        }
+      }
+    }
+  });
+  WeighingCounts total;
+  for (const WeighingCounts& c : counts_) {
+    total.moved += c.moved;
+    total.rejected += c.rejected;
+  }
+  const std::size_t found = recovered.size();
+  std::size_t sure = 0;
+  std::erase_if(recovered, [&](RecoveredBoundary& r) {
+    const bool is_sure = r.sigma_px < kUnsure_px;
+    sure += is_sure;
+    return !is_sure && !settle(places, r.line, r.boundary, r.column_px, r.sigma_px);
+  });
+  total.moved += recovered.size() - sure;
+  total.rejected += found - recovered.size();
+  return total;
+}
+
+}  // namespace relievo

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Places that are not sure, after all boundaries are found: those of a silhouette, of a shadow's edge, of
+// what moves. Each is weighed against what the boundaries around foretell, on the line and along it, which
+// the checks before could not do where these were found later. What is still unsure then, or is only held by
+// neighbours that pull it far, is given up.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "base/parallel.h"
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/place_grid.h"
+#include "capture/reconstruct/ranked_sample.h"
+#include "capture/reconstruct/recover.h"
+#include "capture/reconstruct/sequence.h"
+
+namespace relievo {
+
+/// Every count is of boundaries.
+struct WeighingCounts {
+  std::size_t moved = 0;
+  std::size_t rejected = 0;
+};
+
+/// Keeps its scratch memory from frame to frame. One thread.
+class Weighing {
+ public:
+  /// Moves columns of `edges` and `recovered`, and updates their standard deviations; gives up boundaries of
+  /// `result` (-1), and takes them out of `recovered`. `places` are those of both, of one instant.
+  WeighingCounts weigh(const PlaceGrid& places, WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
+                       std::vector<RecoveredBoundary>& recovered);
+
+ private:
+  void measure_gaps(const PlaceGrid& places, WorkerPool& pool);
+  std::optional<Place> weighed(const Place* own, std::ptrdiff_t stride) const;
+  bool settle(const PlaceGrid& places, int line, int boundary, float& column_px, float& sigma_px) const;
+
+  RankedSample gaps_;                   // from one boundary to the next
+  float scale_ = 1;                     // of what is tolerated, from the stripes' width
+  std::vector<WeighingCounts> counts_;  // one a worker
+};
+
+}  // namespace relievo
