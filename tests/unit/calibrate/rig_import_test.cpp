@@ -97,6 +97,41 @@ TEST(RigImport, RefusesNestingThatWouldExhaustTheParser) {
   EXPECT_THAT(read_rig_part(folder / "c.yaml").error().message, HasSubstr("nests too deep"));
 }
 
+/// OpenCV's own matrix reader takes the memory of what is declared, and writes as many sizes as there are
+/// into room for 32.
+TEST(RigImport, RefusesMatricesThatDeclareMoreThanTheyHold) {
+  const TempFolder folder;
+  std::string sizes = "sizes: [ 1";
+  for (int i = 0; i < 5000; ++i) sizes += ", 1";
+  for (const std::string& shape : {std::string("rows: 20000\n   cols: 20000\n   dt: d"),
+                                   std::string("rows: 3\n   cols: 3\n   dt: \"512d\""),
+                                   std::string("rows: -3\n   cols: -3\n   dt: d"), sizes + " ]\n   dt: d"}) {
+    const std::string colours = "%YAML:1.0\n---\ncolour_matrix: !!opencv-matrix\n   " + shape +
+                                "\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\n";
+    std::ofstream(folder / "rig.yaml") << colours;
+    EXPECT_THAT(read_rig_part(folder / "rig.yaml").error().message, HasSubstr("3 x 3")) << shape;
+    std::string foreign = sltk();
+    const std::string was = "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n";
+    foreign.replace(foreign.find(was), was.size(), "T: !!opencv-matrix\n   " + shape + "\n");
+    std::ofstream(folder / "c.yaml") << foreign;
+    EXPECT_THAT(import_rig(folder / "c.yaml", 0, 0).error().message, HasSubstr("3 x 1")) << shape;
+  }
+}
+
+/// What is imported becomes a rig.yaml, which must be one that is read again.
+TEST(RigImport, RefusesWhatWouldBeNoRig) {
+  const TempFolder folder;
+  std::ofstream(folder / "c.yaml") << sltk("0., 0., 0.");
+  EXPECT_THAT(import_rig(folder / "c.yaml", 0, 0).error().message, HasSubstr("depth needs a baseline"));
+}
+
+TEST(RigPart, ColoursThatAreNoNumbersAreRefused) {
+  const TempFolder folder;
+  std::ofstream(folder / "rig.yaml") << "%YAML:1.0\n---\n"
+                                     << matrix("colour_matrix", 3, 3, "1., 0., 0., 0., .Nan, 0., 0., 0., 1.");
+  EXPECT_THAT(read_rig_part(folder / "rig.yaml").error().message, HasSubstr("no finite number"));
+}
+
 TEST(RigPart, ColoursAloneReadBackExactly) {
   const TempFolder folder;
   const std::array<double, 9> colours = {1.25, -0.1, 1.0 / 3, 0, 1, 0, -1e-7, 0, 2};
