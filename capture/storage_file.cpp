@@ -72,8 +72,17 @@ bool is_one_map(const std::string& content) {
   return in_map;
 }
 
+/// Data in base64: OpenCV's reader of it does not end where the text's line does, and nobody writes rigs so.
+bool has_base64(const std::string& content) {
+  std::istringstream lines(content);
+  for (std::string line; std::getline(lines, line);)
+    if (!is_comment(line) && line.find("binary") != std::string::npos) return true;
+  return false;
+}
+
 /// Empty where the parser may have it. XML nests no deeper than it has tags, however they are written.
 std::string trouble(const std::string& content, StorageForm form) {
+  if (has_base64(content)) return "is refused: it has binary data";
   if (form == StorageForm::kYamlOrXml && content.starts_with("<?xml")) {
     return std::count(content.begin(), content.end(), '<') > kMaxTags ? "is refused: it has too many tags"
                                                                       : "";

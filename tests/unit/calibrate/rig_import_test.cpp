@@ -63,23 +63,35 @@ TEST(RigImport, ErrorsNameFileAndKey) {
   EXPECT_FALSE(import_rig(folder / "text.yaml", 0, 0).ok());
 }
 
-/// The input that fuzzing found for rig.yaml: OpenCV's parser never comes back from it.
-std::string yaml_behind_its_end() {
-  std::ifstream in(RELIEVO_SOURCE_DIR "/fuzz/corpus/take/yaml_behind_its_end", std::ios::binary);
-  in.get();  // which file of a take it is
+/// Inputs that fuzzing found: OpenCV's parser never comes back from them.
+std::string found(const std::string& name) {
+  std::ifstream in(RELIEVO_SOURCE_DIR "/fuzz/corpus/" + name, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
 TEST(RigImport, RefusesWhatTheParserWouldNeverEndAt) {
   const TempFolder folder;
-  const std::string found = yaml_behind_its_end();
-  ASSERT_TRUE(found.starts_with("%YAML"));
-  for (const std::string& content : {found, sltk() + "---\n--\n", sltk() + "...\n--\n"}) {
+  const std::string behind = found("take/yaml_behind_its_end").substr(1);  // which file of a take it is
+  ASSERT_TRUE(behind.starts_with("%YAML"));
+  for (const std::string& content : {behind, sltk() + "---\n--\n", sltk() + "...\n--\n"}) {
     std::ofstream(folder / "c.yaml") << content;
     EXPECT_THAT(import_rig(folder / "c.yaml", 0, 0).error().message, HasSubstr("it must be one map"))
         << content;
     EXPECT_THAT(read_rig_part(folder / "c.yaml").error().message, HasSubstr("it must be one map")) << content;
   }
+}
+
+TEST(RigImport, RefusesBase64ThatTheParserWouldNeverEndAt) {
+  const TempFolder folder;
+  const std::string yaml = found("calibration/base64_that_never_ends");
+  ASSERT_TRUE(yaml.starts_with("%YAML"));
+  for (const std::string& content :
+       {yaml, std::string("<?xml version=\"1.0\"?>\n<opencv_storage><a type_id=\"binary\">MWQg</a>")}) {
+    std::ofstream(folder / "c.yaml") << content;
+    EXPECT_THAT(import_rig(folder / "c.yaml", 0, 0).error().message, HasSubstr("binary data")) << content;
+  }
+  std::ofstream(folder / "c.yaml") << "%YAML:1.0\n---\n# no binary data\n" << sltk().substr(14);
+  EXPECT_TRUE(import_rig(folder / "c.yaml", 0, 0).ok());
 }
 
 /// Each level would take of the parser's stack.
