@@ -8,13 +8,13 @@
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <sstream>
+#include <string_view>
 
 namespace relievo {
 namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = 1u << 20;  // no rig or pattern comes near it
-constexpr int kMaxNesting = 16;                     // nor this
-constexpr int kMaxTags = 1000;                      // nor this; known calibrations have about 100
+constexpr std::size_t kMaxNesting = 16;             // nor this
 
 /// OpenCV prints every error to stderr before it throws; the caller reports it once, in its own words.
 void silence_opencv() {
@@ -33,14 +33,14 @@ bool is_comment(const std::string& line) {
 /// OpenCV's parser calls itself for each level and would run out of stack. "[[[", "{{{" and "- - -" nest on a
 /// line; how deep indentation can go is bounded by kMaxFileBytes. Lines that are comments nest nothing.
 bool nests_too_deep(const std::string& content) {
-  int brackets = 0, dashes = 0;
+  std::size_t brackets = 0, dashes = 0;
   std::istringstream lines(content);
   for (std::string line; std::getline(lines, line);) {
     if (is_comment(line)) continue;
     dashes = 0;
     for (const char c : line) {
       if (c == '[' || c == '{') ++brackets;
-      if (c == ']' || c == '}') --brackets;
+      if ((c == ']' || c == '}') && brackets > 0) --brackets;
       if (c == '-') ++dashes;
       if (c != '-' && c != ' ') dashes = 0;
       if (brackets > kMaxNesting || dashes > kMaxNesting) return true;
@@ -72,6 +72,70 @@ bool is_one_map(const std::string& content) {
   return in_map;
 }
 
+/// XML as FileStorage writes it: one tree of tags with no attribute but type_id, and ASCII between them. Of
+/// anything else OpenCV's parser makes null pointers.
+class PlainXml {
+ public:
+  explicit PlainXml(const std::string& content) : rest_(content) {}
+
+  /// Empty where it is.
+  std::string trouble() {
+    static constexpr const char* kWrong = "is refused: it is no XML that OpenCV writes";
+    if (!take(R"(<?xml version="1.0"?>)")) return kWrong;
+    do {
+      const std::string_view between = take_until('<');
+      const bool is_blank = between.find_first_not_of(" \t\r\n") == std::string_view::npos;
+      if ((!is_blank && open_.size() < 2) || !std::ranges::all_of(between, is_plain)) return kWrong;
+      if (rest_.empty() || !take_tag()) return kWrong;
+      if (open_.size() > kMaxNesting) return "is refused: it nests too deep";
+    } while (!open_.empty());
+    return rest_.find_first_not_of(" \t\r\n") == std::string_view::npos ? "" : kWrong;
+  }
+
+ private:
+  static bool is_plain(char c) {
+    return (c >= ' ' && c <= '~' && c != '&') || c == '\t' || c == '\r' || c == '\n';
+  }
+  bool take(std::string_view text) {
+    if (!rest_.starts_with(text)) return false;
+    rest_.remove_prefix(text.size());
+    return true;
+  }
+  std::string_view take_until(char end) {
+    const std::string_view out = rest_.substr(0, rest_.find(end));
+    rest_.remove_prefix(out.size());
+    return out;
+  }
+  std::string_view take_name() {
+    const auto is_name = [](char c) {
+      return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
+    };
+    const auto end = std::ranges::find_if_not(rest_, is_name);
+    const std::string_view out = rest_.substr(0, static_cast<std::size_t>(end - rest_.begin()));
+    rest_.remove_prefix(out.size());
+    const bool begins =
+        !out.empty() && (std::isalpha(static_cast<unsigned char>(out[0])) != 0 || out[0] == '_');
+    return begins ? out : std::string_view();
+  }
+  /// <name>, <name type_id="name"> or the </name> of the one that is open.
+  bool take_tag() {
+    take("<");
+    if (take("/")) {
+      const bool closes = !open_.empty() && take_name() == open_.back() && take(">");
+      if (closes) open_.pop_back();
+      return closes;
+    }
+    const std::string_view name = take_name();
+    if (name.empty() || (open_.empty() && name != "opencv_storage")) return false;
+    if (take(" type_id=\"") && (take_name().empty() || !take("\""))) return false;
+    open_.push_back(name);
+    return take(">");
+  }
+
+  std::string_view rest_;
+  std::vector<std::string_view> open_;  // outermost first
+};
+
 /// Data in base64: OpenCV's reader of it does not end where the text's line does, and nobody writes rigs so.
 bool has_base64(const std::string& content) {
   std::istringstream lines(content);
@@ -80,13 +144,10 @@ bool has_base64(const std::string& content) {
   return false;
 }
 
-/// Empty where the parser may have it. XML nests no deeper than it has tags, however they are written.
+/// Empty where the parser may have it.
 std::string trouble(const std::string& content, StorageForm form) {
   if (has_base64(content)) return "is refused: it has binary data";
-  if (form == StorageForm::kYamlOrXml && content.starts_with("<?xml")) {
-    return std::count(content.begin(), content.end(), '<') > kMaxTags ? "is refused: it has too many tags"
-                                                                      : "";
-  }
+  if (form == StorageForm::kYamlOrXml && content.starts_with("<?xml")) return PlainXml(content).trouble();
   if (!content.starts_with("%YAML")) {
     return form == StorageForm::kYaml
                ? "is no OpenCV YAML file: it must start with %YAML:1.0"
