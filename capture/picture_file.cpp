@@ -144,7 +144,7 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
   std::vector<std::uint8_t> file{std::istreambuf_iterator<char>(in), {}};
   if (!in) return Error{name + " cannot be read: check its permissions"};
   const auto declared = declared_pixels(file);
-  if (!declared) return Error{name + " is no picture that is read here: PNG, JPEG, BMP, PNM or TIFF"};
+  if (!declared) return Error{name + " cannot be read as a picture: it is no PNG, JPEG, BMP, PNM or TIFF"};
   if (*declared > kMostPicturePixels || *declared > kMostPicturePixelsPerByte * file.size())
     return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
   try {
