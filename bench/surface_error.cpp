@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,14 +15,25 @@ namespace {
 
 constexpr std::int64_t kNowhere = -1;
 
+constexpr double kSamePlace_px = 1;    // texture coordinates of a vertex before and after coding, at most
+constexpr double kOnSheet = 0.01;      // stripes beside a boundary, at most, of one that lies on it
+constexpr double kMostOnSheets = 0.9;  // of a surface whose codec keeps boundaries
+
 std::int64_t place(std::int64_t line, std::int64_t boundary, const Pattern& pattern) {
   return line * pattern.boundaries() + boundary;
 }
 
-/// Line and boundary of a vertex as one number. kNowhere where camera or projector do not see it. Its texture
-/// coordinates tell the line exactly, but not the boundary, of which two may be seen at one place; lines lie
-/// too close for the positions of coarse codecs.
-std::int64_t place_of(const Surface& surface, std::size_t vertex, const Rig& rig, const Pattern& pattern) {
+/// Where a vertex lies. Lines lie too close for the positions of coarse codecs, so texture coordinates tell
+/// them where there are any; they do not tell the boundary, of which two may be seen at one place.
+struct Place {
+  std::int64_t line = 0, boundary = 0;  // the nearest one
+  double off_boundary = 0;              // stripes
+  std::optional<double> column_px;      // in the texture
+};
+
+/// Nothing where camera or projector do not see it.
+std::optional<Place> place_of(const Surface& surface, std::size_t vertex, const Rig& rig,
+                              const Pattern& pattern) {
   const Vec3f& p = surface.positions[vertex];
   const auto& r = rig.projector_from_camera_rotation;
   const auto& t = rig.projector_from_camera_translation;
@@ -29,17 +41,52 @@ std::int64_t place_of(const Surface& surface, std::size_t vertex, const Rig& rig
   const double qx = r[0] * x + r[1] * y + r[2] * z + t[0];
   const double qy = r[3] * x + r[4] * y + r[5] * z + t[1];
   const double qz = r[6] * x + r[7] * y + r[8] * z + t[2];
-  if (!(z > 0 && qz > 0)) return kNowhere;
-  const double row =
-      surface.texture_coordinates.empty()
-          ? distort(rig.camera, x / z, y / z)[1]
-          : static_cast<double>(surface.texture_coordinates[vertex][1]) * rig.camera.height - 0.5;
+  if (!(z > 0 && qz > 0)) return std::nullopt;
+  Place out;
+  double row = 0;
+  if (surface.texture_coordinates.empty()) {
+    row = distort(rig.camera, x / z, y / z)[1];
+  } else {
+    const auto& [u, v] = surface.texture_coordinates[vertex];
+    row = static_cast<double>(v) * rig.camera.height - 0.5;
+    out.column_px = static_cast<double>(u) * rig.camera.width - 0.5;
+  }
   const double column = distort(rig.projector, qx / qz, qy / qz)[0];
-  const long line = std::lround(row / (rig.scan == Scan::kInterlaced ? 2 : 1));
-  const long boundary = std::lround((column + 0.5) * pattern.stripes() / rig.projector.width) - 1;
-  if (line < 0 || line >= rig.camera.height || boundary < 0 || boundary >= pattern.boundaries())
-    return kNowhere;
-  return place(line, boundary, pattern);
+  out.line = std::lround(row / (rig.scan == Scan::kInterlaced ? 2 : 1));
+  const double stripes = (column + 0.5) * pattern.stripes() / rig.projector.width;
+  out.boundary = std::lround(stripes) - 1;
+  out.off_boundary = std::abs(stripes - std::round(stripes));
+  if (out.line < 0 || out.line >= rig.camera.height) return std::nullopt;
+  return out;
+}
+
+/// Whether each vertex lies on a boundary, as it does where a codec sends columns: it may have moved along
+/// it, but is no other's.
+bool lies_on_sheets(const std::vector<std::optional<Place>>& places) {
+  const auto on =
+      std::ranges::count_if(places, [](const auto& p) { return p && p->off_boundary <= kOnSheet; });
+  return static_cast<double>(on) >= kMostOnSheets * static_cast<double>(places.size());
+}
+
+/// The encoded vertex there: of those seen at its column of the texture the one whose boundary is
+/// nearest, since stripes may lie closer than a coarse codec's steps. kNowhere where there is none.
+std::int64_t match_of(const Place& found, const Surface& encoded, const std::vector<std::int64_t>& vertex_at,
+                      const Pattern& pattern, bool on_sheets) {
+  const auto at = [&](std::int64_t boundary) {
+    const bool is_one = boundary >= 0 && boundary < pattern.boundaries();
+    return is_one ? vertex_at[static_cast<std::size_t>(place(found.line, boundary, pattern))] : kNowhere;
+  };
+  if (on_sheets || !found.column_px) return at(found.boundary);
+  const std::int64_t nearest = std::clamp<std::int64_t>(found.boundary, 0, pattern.boundaries() - 1);
+  for (std::int64_t off = 0; off < pattern.boundaries(); ++off) {
+    for (const std::int64_t boundary : {nearest - off, nearest + off}) {
+      const std::int64_t v = at(boundary);
+      if (v == kNowhere) continue;
+      const double column_px = static_cast<double>(encoded.grid[static_cast<std::size_t>(v)].column_px);
+      if (std::abs(column_px - *found.column_px) <= kSamePlace_px) return v;
+    }
+  }
+  return kNowhere;
 }
 
 }  // namespace
@@ -57,11 +104,15 @@ Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decode
     const std::int64_t at = place(encoded.grid[v].line, encoded.grid[v].boundary, pattern);
     if (at < std::ssize(vertex_at)) vertex_at[static_cast<std::size_t>(at)] = static_cast<std::int64_t>(v);
   }
+  std::vector<std::optional<Place>> places;
+  for (std::size_t i = 0; i < decoded.positions.size(); ++i)
+    places.push_back(place_of(decoded, i, rig, pattern));
+  const bool on_sheets = lies_on_sheets(places);
   SurfaceError error;
   double squares = 0;
   for (std::size_t i = 0; i < decoded.positions.size(); ++i) {
-    const std::int64_t at = place_of(decoded, i, rig, pattern);
-    const std::int64_t match = at != kNowhere ? vertex_at[static_cast<std::size_t>(at)] : kNowhere;
+    const std::int64_t match =
+        places[i] ? match_of(*places[i], encoded, vertex_at, pattern, on_sheets) : kNowhere;
     if (match == kNowhere)
       return Error{"vertex " + std::to_string(i) + " that was decoded was never encoded"};
     const Vec3f& a = encoded.positions[static_cast<std::size_t>(match)];

@@ -15,6 +15,10 @@ namespace relievo {
 /// rotation that is none, a singular colour matrix).
 Result<Rig> read_rig(const std::filesystem::path& file);
 
+/// What read_rig() asks of a rig whatever file it is from: lenses, rotation, baseline and colours that can be
+/// worked with. Errors name the key of a rig.yaml.
+Status check_rig(const Rig& rig);
+
 /// Errors name the file and what is wrong: a missing key, a palette of the wrong length or with white or
 /// black, a digit out of range, a stripe repeating its neighbour's colour on a slide, the first boundary code
 /// that repeats.

@@ -17,15 +17,14 @@
 #include "codec/mcap_records.h"
 #include "codec/recording.h"
 #include "codec/texture_codec.h"
+#include "fuzz/seeds.h"
 #include "idl/cdr.h"
 #include "tests/support/make_surface.h"
-#include "tests/support/striped_scene.h"
 #include "tests/support/temp_folder.h"
 
-namespace relievo {
-namespace {
+namespace relievo::fuzz {
 
-namespace fs = std::filesystem;
+namespace {
 
 [[noreturn]] void fail(const char* what, const fs::path& file) {
   const std::string why = std::strerror(errno);
@@ -33,12 +32,17 @@ namespace fs = std::filesystem;
   std::exit(1);
 }
 
-Bytes read(const fs::path& file) {
+constexpr const char* kVectors = "tests/conformance";
+
+}  // namespace
+
+Bytes read_seed(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) fail("read", file);
   return Bytes(std::istreambuf_iterator<char>(in), {});
 }
-void write(const fs::path& file, const Bytes& bytes) {
+
+void write_seed(const fs::path& file, std::span<const std::uint8_t> bytes) {
   fs::create_directories(file.parent_path());
   std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -46,21 +50,24 @@ void write(const fs::path& file, const Bytes& bytes) {
   if (!out) fail("write", file);
 }
 
+namespace {
+
 /// Each vector, those to be refused too, and each sequence of frames that build on one another.
-Status frames(const fs::path& conformance, const fs::path& out) {
+Status frames(const fs::path& source, const fs::path& out) {
   for (const char* folder : {"frame_v1", "grid_v1", "draco_grid_v1"}) {
-    for (const auto& entry : fs::directory_iterator(conformance / folder))
+    for (const auto& entry : fs::directory_iterator(source / kVectors / folder))
       if (entry.path().extension() == ".rlv")
-        write(out / (std::string(folder) + "_" + entry.path().filename().string()), read(entry.path()));
+        write_seed(out / (std::string(folder) + "_" + entry.path().filename().string()),
+                   read_seed(entry.path()));
   }
-  std::ifstream expected(conformance / "grid_v1" / "expected.json");
+  std::ifstream expected(source / kVectors / "grid_v1" / "expected.json");
   const nlohmann::json told = nlohmann::json::parse(expected);
   int number = 0;
   for (const auto& sequence : told["sequences"]) {
     Bytes all;
     for (const auto& frame : sequence)
-      append_bytes(all, read(conformance / "grid_v1" / frame["file"].get<std::string>()));
-    write(out / ("sequence_" + std::to_string(number++)), all);
+      append_bytes(all, read_seed(source / kVectors / "grid_v1" / frame["file"].get<std::string>()));
+    write_seed(out / ("sequence_" + std::to_string(number++)), all);
   }
   return {};
 }
@@ -79,8 +86,8 @@ Bytes without_crcs(Bytes bytes) {
 }
 
 /// A frame as a sample.
-Bytes frame_sample(const fs::path& conformance) {
-  return write_frame_cdr({"face", 1, 2, 3, 4, read(conformance / "grid_v1" / "plain.rlv")});
+Bytes frame_sample(const fs::path& source) {
+  return write_frame_cdr({"face", 1, 2, 3, 4, read_seed(source / kVectors / "grid_v1" / "plain.rlv")});
 }
 
 Status record(const fs::path& file, const Bytes& sample) {
@@ -101,20 +108,20 @@ Status record(const fs::path& file, const Bytes& sample) {
   return finished ? Status() : finished.error();
 }
 
-Status recordings(const fs::path& conformance, const fs::path& out) {
+Status recordings(const fs::path& source, const fs::path& out) {
   const test::TempFolder folder;
   const fs::path file = folder / "a.mcap";
-  if (auto status = record(file, frame_sample(conformance)); !status) return status;
-  const Bytes whole = read(file);
-  write(out / "whole", whole);
-  write(out / "cut", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 2)});
-  write(out / "no_crcs", without_crcs(whole));
+  if (auto status = record(file, frame_sample(source)); !status) return status;
+  const Bytes whole = read_seed(file);
+  write_seed(out / "whole", whole);
+  write_seed(out / "cut", std::span(whole).first(whole.size() / 2));
+  write_seed(out / "no_crcs", without_crcs(whole));
   // Two files one behind the other, the first of them whole or cut short.
   for (const auto& [name, size] :
        {std::pair{"joined", whole.size()}, {"joined_behind_a_cut", whole.size() / 2}}) {
     Bytes both(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
     append_bytes(both, without_crcs(whole));
-    write(out / name, both);
+    write_seed(out / name, both);
   }
   return {};
 }
@@ -185,10 +192,10 @@ Bytes status_sample() {
   return sample_of(body);
 }
 
-Status samples(const fs::path& conformance, const fs::path& out) {
-  write(out / "frame", frame_sample(conformance));
-  write(out / "info", info_sample());
-  write(out / "status", status_sample());
+Status samples(const fs::path& source, const fs::path& out) {
+  write_seed(out / "frame", frame_sample(source));
+  write_seed(out / "info", info_sample());
+  write_seed(out / "status", status_sample());
   if (const auto info = read_info_cdr(info_sample()); !info) return info.error();
   if (const auto status = read_status_cdr(status_sample()); !status) return status.error();
   return {};
@@ -212,44 +219,34 @@ Status textures(const fs::path&, const fs::path& out) {
       append(bytes, static_cast<std::uint16_t>(section.size()));
       append_bytes(bytes, section);
     }
-    write(out / std::to_string(static_cast<int>(codec)), bytes);
-  }
-  return {};
-}
-
-Status takes(const fs::path&, const fs::path& out) {
-  const test::TempFolder folder;
-  if (!test::write_striped_take(test::striped_scene(), folder.path(), 2))
-    return Error{"the take cannot be written"};
-  std::uint8_t number = 0;  // in the order of take.cpp
-  for (const char* file :
-       {"rig.yaml", "pattern.yaml", "timestamps.csv", "frames/000000.png", "truth/000000.npy"}) {
-    Bytes bytes{number++};
-    append_bytes(bytes, read(folder / file));
-    write(out / fs::path(file).filename(), bytes);
+    write_seed(out / std::to_string(static_cast<int>(codec)), bytes);
   }
   return {};
 }
 
 struct Target {
   const char* name;
-  Status (*make)(const fs::path& conformance, const fs::path& out);
+  Status (*make)(const fs::path& source, const fs::path& out);
 };
-constexpr Target kTargets[] = {
-    {"frame", frames}, {"recording", recordings}, {"cdr", samples}, {"texture", textures}, {"take", takes}};
+constexpr Target kTargets[] = {{"frame", frames},        {"recording", recordings},
+                               {"cdr", samples},         {"texture", textures},
+                               {"take", take_seeds},     {"calibration", calibration_seeds},
+                               {"mesh", mesh_seeds},     {"picture", picture_seeds},
+                               {"config", config_seeds}, {"gateway", gateway_seeds}};
 
 }  // namespace
-}  // namespace relievo
+}  // namespace relievo::fuzz
 
 int main(int argc, char** argv) {
   using namespace relievo;
+  using namespace relievo::fuzz;
   if (argc != 3 && argc != 4) return 2;
-  const fs::path conformance = fs::path(argv[1]) / "tests" / "conformance";
+  const fs::path source = argv[1];
   const fs::path out = argv[2];
   bool made = true;
   for (const Target& target : kTargets) {
     if (argc == 4 && std::string_view(argv[3]) != target.name) continue;
-    const Status status = target.make(conformance, out / target.name);
+    const Status status = target.make(source, out / target.name);
     if (!status) std::fprintf(stderr, "seeds of %s: %s\n", target.name, status.error().message.c_str());
     made = made && status.ok();
   }

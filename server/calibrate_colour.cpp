@@ -10,6 +10,7 @@
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
+#include "capture/picture_file.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
 #include "server/calibration_report.h"

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "capture/calibrate/pictures.h"
+#include "capture/picture_file.h"
 
 namespace relievo {
 namespace {

@@ -68,21 +68,6 @@ Result<std::vector<fs::path>> pictures_in(const fs::path& folder) {
   return files;
 }
 
-Result<Image8> read_rgb(const fs::path& file) {
-  std::error_code code;
-  if (!fs::is_regular_file(file, code)) return Error{file.string() + " is missing"};
-  try {
-    cv::Mat bgr = cv::imread(file.string(), cv::IMREAD_COLOR);
-    if (bgr.empty()) return Error{file.string() + " cannot be read as a picture: is it damaged?"};
-    Image8 rgb(bgr.cols, bgr.rows, 3);
-    cv::Mat out(rgb.height(), rgb.width(), CV_8UC3, rgb.data());
-    cv::cvtColor(bgr, out, cv::COLOR_BGR2RGB);
-    return rgb;
-  } catch (const cv::Exception& e) {
-    return Error{file.string() + " cannot be read as a picture: " + e.err};
-  }
-}
-
 Image8 grey_of(const Image8& rgb) {
   Image8 grey(rgb.width(), rgb.height(), 1);
   const std::uint8_t* in = rgb.data();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of any common format, for calibration and import.
+// Folders of pictures, for calibration and import.
 #pragma once
 
 #include <filesystem>
@@ -13,9 +13,6 @@ namespace relievo {
 /// Pictures directly in `folder`, in the order of their names, where "2" is before "10". Fails where the
 /// folder cannot be read.
 Result<std::vector<std::filesystem::path>> pictures_in(const std::filesystem::path& folder);
-
-/// 8 bits, RGB. The error names the file.
-Result<Image8> read_rgb(const std::filesystem::path& file);
 
 /// (R + 2 G + B) / 4.
 Image8 grey_of(const Image8& rgb);

@@ -122,8 +122,10 @@ Result<PointCloud> read_points(std::istream& in) {
     if (!in)
       return Error{"it ends after " + std::to_string(i) + " of " + std::to_string(header->vertices) +
                    " vertices"};
-    cloud.positions.push_back({static_cast<float>(values[index[0]]), static_cast<float>(values[index[1]]),
-                               static_cast<float>(values[index[2]])});
+    const Vec3f position{static_cast<float>(values[index[0]]), static_cast<float>(values[index[1]]),
+                         static_cast<float>(values[index[2]])};
+    if (!std::all_of(position.begin(), position.end(), [](float x) { return std::isfinite(x); })) continue;
+    cloud.positions.push_back(position);
     if (coloured) {
       const auto byte = [&](std::size_t n) {
         return static_cast<std::uint8_t>(std::clamp(values[index[n]], 0.0, 255.0));

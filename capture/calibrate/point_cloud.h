@@ -17,8 +17,8 @@ struct PointCloud {
   std::vector<std::array<std::uint8_t, 3>> colours;  // empty or as long as positions
 };
 
-/// The vertices of a PLY, ASCII or binary little endian; faces and other properties are skipped. The error
-/// names the file.
+/// The vertices of a PLY, ASCII or binary little endian; faces, other properties and points that are
+/// not finite (scanners' way to say none) are skipped. The error names the file.
 Result<PointCloud> read_ply_points(const std::filesystem::path& file);
 
 /// Binary little endian; written whole or not at all. The error names the file.

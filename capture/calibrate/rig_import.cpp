@@ -3,11 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
 #include <span>
 
 #include "capture/rig_file.h"
-#include "capture/storage_text.h"
+#include "capture/storage_file.h"
 
 namespace relievo {
 namespace {
@@ -34,25 +33,13 @@ struct Refused {
   std::string message;
 };
 
-void values(const cv::FileStorage& storage, const char* key, std::span<double> out) {
-  cv::Mat found;
-  try {
-    found = storage[key].mat();
-  } catch (const std::exception&) {  // reported just below
-  }
-  if (found.total() != out.size() || found.channels() != 1) {
-    throw Refused{std::string(key) + " must be a matrix of " + std::to_string(out.size()) + " numbers"};
-  }
-  found.convertTo(found, CV_64F);
-  std::copy(found.begin<double>(), found.end<double>(), out.begin());
-  if (!std::all_of(out.begin(), out.end(), [](double v) { return std::isfinite(v); })) {
-    throw Refused{std::string(key) + " holds a value that is no finite number"};
-  }
+void values(const StorageFile& file, const char* key, int rows, int cols, std::span<double> out) {
+  if (const Status read = file.matrix(key, rows, cols, out); !read) throw Refused{read.error().message};
 }
 
-void size_of(const cv::FileStorage& storage, const char* key, bool height_first, PinholeModel& model) {
+void size_of(const StorageFile& file, const char* key, bool height_first, PinholeModel& model) {
   std::array<double, 2> size{};
-  values(storage, key, size);
+  values(file, key, 1, 2, size);
   if (height_first) std::swap(size[0], size[1]);
   if (!(size[0] >= 8 && size[1] >= 8 && size[0] <= 16384 && size[1] <= 16384)) {
     throw Refused{std::string(key) + " is no picture's size"};
@@ -61,28 +48,27 @@ void size_of(const cv::FileStorage& storage, const char* key, bool height_first,
   model.height = static_cast<int>(size[1]);
 }
 
-void lens(const cv::FileStorage& storage, const char* matrix, const char* distortion, PinholeModel& model) {
-  values(storage, matrix, model.matrix);
-  values(storage, distortion, model.distortion);
-  if (!(model.fx() > 0 && model.fy() > 0))
-    throw Refused{std::string(matrix) + " has a focal length not above 0"};
+void lens(const StorageFile& file, const char* matrix, const char* distortion, PinholeModel& model) {
+  values(file, matrix, 3, 3, model.matrix);
+  values(file, distortion, 1, 5, model.distortion);
 }
 
-ImportedRig foreign(const cv::FileStorage& storage, const Keys& keys) {
+ImportedRig foreign(const StorageFile& file, const Keys& keys) {
   ImportedRig out;
   out.format = keys.format;
   Rig& rig = out.rig;
   rig.scan = Scan::kProgressive;
   rig.frame_rate = 29.97;
   rig.colour_matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  size_of(storage, keys.camera_size, keys.height_first, rig.camera);
-  lens(storage, keys.camera_matrix, keys.camera_distortion, rig.camera);
-  if (keys.projector_size != nullptr) size_of(storage, keys.projector_size, keys.height_first, rig.projector);
-  lens(storage, keys.projector_matrix, keys.projector_distortion, rig.projector);
-  values(storage, keys.rotation, rig.projector_from_camera_rotation);
-  values(storage, keys.translation, rig.projector_from_camera_translation);
+  size_of(file, keys.camera_size, keys.height_first, rig.camera);
+  lens(file, keys.camera_matrix, keys.camera_distortion, rig.camera);
+  if (keys.projector_size != nullptr) size_of(file, keys.projector_size, keys.height_first, rig.projector);
+  lens(file, keys.projector_matrix, keys.projector_distortion, rig.projector);
+  values(file, keys.rotation, 3, 3, rig.projector_from_camera_rotation);
+  values(file, keys.translation, 3, 1, rig.projector_from_camera_translation);
   for (double& t : rig.projector_from_camera_translation) t *= kMetresPerMillimetre;
-  if (storage[keys.rms].isReal()) out.stereo_rms = storage[keys.rms].real();
+  const double rms = file.number(keys.rms).value_or(0);
+  if (rms >= 0 && std::isfinite(rms)) out.stereo_rms = rms;
   return out;
 }
 
@@ -101,22 +87,20 @@ Status settle_projector(PinholeModel& projector, int width, int height) {
 
 }  // namespace
 
-Result<ImportedRig> import_rig(const fs::path& file, int projector_width, int projector_height) {
-  const std::string name = file.string();
-  const auto text = read_storage_text(file, StorageForm::kYamlOrXml);
-  if (!text) return text.error();
+Result<ImportedRig> import_rig(const fs::path& path, int projector_width, int projector_height) {
+  const std::string name = path.string();
+  const auto file = StorageFile::open(path, StorageForm::kYamlOrXml);
+  if (!file) return file.error();
   ImportedRig out;
   try {
-    const cv::FileStorage storage(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    if (!storage.isOpened()) return Error{name + " is empty"};
-    if (!storage["camera_matrix"].empty()) {
-      auto rig = read_rig(file);
+    if (file->has("camera_matrix")) {
+      auto rig = read_rig(path);
       if (!rig) return rig.error();
       out = {*rig, "rig.yaml", 0};
-    } else if (!storage[kSltk.camera_matrix].empty()) {
-      out = foreign(storage, kSltk);
-    } else if (!storage[kProcam.camera_matrix].empty()) {
-      out = foreign(storage, kProcam);
+    } else if (file->has(kSltk.camera_matrix)) {
+      out = foreign(*file, kSltk);
+    } else if (file->has(kProcam.camera_matrix)) {
+      out = foreign(*file, kProcam);
     } else {
       return Error{name +
                    " is no calibration known here: a rig.yaml, sltk's (cam_K ...) or procam-calibration's "
@@ -124,15 +108,12 @@ Result<ImportedRig> import_rig(const fs::path& file, int projector_width, int pr
     }
   } catch (const Refused& refused) {
     return Error{name + ": " + refused.message};
-  } catch (const cv::Exception& e) {
-    return Error{name + " is no valid YAML or XML: " + e.err};
-  } catch (const std::exception& e) {
-    return Error{name + " cannot be read: " + e.what()};
   }
   if (const Status settled = settle_projector(out.rig.projector, projector_width, projector_height);
       !settled) {
     return settled.error().in(name);
   }
+  if (const Status sound = check_rig(out.rig); !sound) return sound.error().in(name);
   return out;
 }
 

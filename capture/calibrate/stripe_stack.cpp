@@ -6,6 +6,7 @@
 
 #include "capture/calibrate/pictures.h"
 #include "capture/pattern/slides.h"
+#include "capture/picture_file.h"
 
 namespace relievo {
 namespace {

@@ -8,9 +8,10 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
+
+#include "capture/picture_file.h"
 
 namespace relievo::sim {
 namespace {
@@ -196,8 +197,11 @@ std::size_t obj_index(long index, std::size_t count) {
   return static_cast<std::size_t>(i);
 }
 
-/// The first texture picture of a material library; none where there is none to be read.
+/// The first texture picture of a material library; none where there is none to be read. A mesh names any
+/// file, also a device that never ends.
 std::optional<std::filesystem::path> obj_texture(const std::filesystem::path& library) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(library, code)) return std::nullopt;
   std::ifstream in(library);
   for (std::string line; std::getline(in, line);) {
     std::istringstream words(line);
@@ -205,18 +209,6 @@ std::optional<std::filesystem::path> obj_texture(const std::filesystem::path& li
     if (words >> word >> name && word == "map_Kd") return library.parent_path() / name;
   }
   return std::nullopt;
-}
-
-Image8 read_texture(const std::filesystem::path& file) {
-  const cv::Mat bgr = cv::imread(file.string(), cv::IMREAD_COLOR);
-  if (bgr.empty()) throw Bad{"names the texture " + file.string() + ", which cannot be read"};
-  Image8 out(bgr.cols, bgr.rows, 3);
-  for (int y = 0; y < bgr.rows; ++y) {
-    for (int x = 0; x < bgr.cols; ++x) {
-      for (int c = 0; c < 3; ++c) out.row(y)[3 * x + c] = bgr.ptr(y)[3 * x + 2 - c];
-    }
-  }
-  return out;
 }
 
 MeshFile read_obj(const std::string& content, const std::filesystem::path& folder) {
@@ -252,7 +244,11 @@ MeshFile read_obj(const std::string& content, const std::filesystem::path& folde
         for (const std::size_t k : {std::size_t{0}, i - 1, i}) mesh.corner_texture.push_back(places[k]);
       }
     } else if (word == "mtllib" && words >> word && mesh.texture.empty()) {
-      if (const auto file = obj_texture(folder / word)) mesh.texture = read_texture(*file);
+      if (const auto file = obj_texture(folder / word)) {
+        auto picture = read_rgb(*file);
+        if (!picture) throw Bad{"names a texture: " + picture.error().message};
+        mesh.texture = *std::move(picture);
+      }
     }
   }
   if (!all_textured || mesh.texture.empty()) mesh.corner_texture.clear();

@@ -48,6 +48,25 @@ TEST_P(ServerTextures, AreRecordedDescribedAndExported) {
 INSTANTIATE_TEST_SUITE_P(Codecs, ServerTextures, testing::Values("jpeg", "webp", "png", "h264"),
                          [](const auto& test) { return test.param; });
 
+/// On any machine: whoever runs it knows whether the hardware does the work.
+TEST_F(TakeTest, ItIsSaidWhoMakesH264) {
+  const Finished served = run(serve(source_, {"--frames", "2", "--fast", "--texture", "h264"}));
+  if (served.err.find("this build has no H.264") != std::string::npos) GTEST_SKIP() << served.err;
+  ASSERT_EQ(served.status, 0) << served.err;
+  EXPECT_NE(served.err.find("H.264 by "), std::string::npos) << served.err;
+  if (served.err.find("H.264 by x264") != std::string::npos) {
+    EXPECT_NE(served.err.find("no hardware encoder"), std::string::npos) << served.err;
+    for (const std::string name : {"nvenc", "vaapi", "v4l2m2m"}) {
+      EXPECT_NE(served.err.find("h264_" + name), std::string::npos) << served.err;
+      const Finished forced =
+          run(serve(source_, {"--frames", "2", "--texture", "h264", "--texture-encoder", name}));
+      EXPECT_EQ(forced.status, 1) << forced.err;
+      EXPECT_NE(forced.err.find("h264_" + name), std::string::npos) << forced.err;
+      EXPECT_NE(forced.err.find("--texture-encoder"), std::string::npos) << forced.err;
+    }
+  }
+}
+
 TEST_F(TakeTest, ABitRateIsKept) {
   const std::string file = (folder_.path() / "rate.mcap").string();
   const Finished served = run(serve(source_, {"--loop", "--frames", "120", "--fast", "--texture-quality",

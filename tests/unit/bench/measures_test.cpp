@@ -2,6 +2,7 @@
 // What the benchmarks compute: spreads, and the error of a decoded surface.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "bench/report.h"
@@ -75,6 +76,34 @@ TEST(SurfaceError, VerticesThatShareAPlaceInTheTextureAreNotMixedUp) {
   const auto error = surface_error(encoded, encoded, kRig, kPattern);
   ASSERT_TRUE(error) << error.error().message;
   EXPECT_EQ(error->max_m, 0);
+}
+
+TEST(SurfaceError, OfACodecWhoseStepsAreWiderThanAStripe) {
+  const Surface encoded = test::grid_frame(kScene).surface;
+  Surface decoded = test::grid_frame(kScene).surface;
+  double most = 0;
+  for (Vec3f& p : decoded.positions) {
+    const Vec3f was = p;
+    for (float& x : p) x *= 1.05F;  // along its ray, over several stripes
+    most = std::max<double>(most, std::hypot(p[0] - was[0], p[1] - was[1], p[2] - was[2]));
+  }
+  const auto error = surface_error(encoded, decoded, kRig, kPattern);
+  ASSERT_TRUE(error) << error.error().message;
+  EXPECT_NEAR(error->max_m, most, 1e-6);
+}
+
+TEST(SurfaceError, OfACodecThatMovesAColumnFurtherThanToItsNeighbour) {
+  const Surface encoded = test::grid_frame(kScene).surface;
+  Surface decoded = test::grid_frame(kScene).surface;
+  const auto& was = encoded.grid[5];
+  const float column_px = was.column_px + 9;
+  const Triangulator triangulator(kRig, kPattern, kScene.height / 2, 2);
+  decoded.positions[5] = *triangulator.point(was.boundary, was.line, column_px);
+  decoded.texture_coordinates[5][0] = (column_px + 0.5F) / static_cast<float>(kRig.camera.width);
+  const auto error = surface_error(encoded, decoded, kRig, kPattern);
+  ASSERT_TRUE(error) << error.error().message;
+  const Vec3f &a = encoded.positions[5], &b = decoded.positions[5];
+  EXPECT_NEAR(error->max_m, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]), 1e-6);
 }
 
 TEST(SurfaceError, AVertexThatWasNeverEncodedIsNoMatch) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <random>
 
 #include "capture/calibrate/point_cloud.h"
@@ -53,6 +54,17 @@ TEST(PointCloud, PlyRoundTripAndAscii) {
   const auto ascii = read_ply_points(folder / "b.ply");
   ASSERT_TRUE(ascii.ok()) << ascii.error().message;
   EXPECT_EQ(ascii->positions.at(0), (Vec3f{1.5f, 2.5f, -3}));
+}
+
+TEST(PointCloud, PointsThatAreNoneAreSkipped) {
+  const TempFolder folder;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const PointCloud cloud{{{1, 2, 3}, {nan, nan, nan}, {4, 5, 6}}, {{1, 1, 1}, {2, 2, 2}, {3, 3, 3}}};
+  ASSERT_TRUE(write_ply_points(folder / "a.ply", cloud).ok());
+  const auto read = read_ply_points(folder / "a.ply");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_EQ(read->positions, (std::vector<Vec3f>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_EQ(read->colours, (std::vector<std::array<std::uint8_t, 3>>{{1, 1, 1}, {3, 3, 3}}));
 }
 
 TEST(PointCloud, HostilePlyIsAnError) {

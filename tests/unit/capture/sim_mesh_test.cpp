@@ -52,6 +52,16 @@ TEST(MeshFile, AsciiAndBinaryPlyReadAlike) {
   }
 }
 
+/// A mesh of others may name any file; reading this one would never end.
+TEST(MeshFile, AMaterialThatIsNoFileIsNone) {
+  test::TempFolder folder;
+  test::write_text(folder.path() / "m.obj",
+                   "mtllib /dev/zero\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n");
+  const auto mesh = sim::read_mesh(folder.path() / "m.obj");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_TRUE(mesh->texture.empty());
+}
+
 TEST(MeshFile, ObjWithATexture) {
   test::TempFolder folder;
   Image8 texture(2, 2, 3);

@@ -43,12 +43,13 @@ const kDataEndBytes = kRecordHead + 4; // between the chunks and the index
 const kMessageHead = 22; // of a message's content, before its data
 const kMaxChunk = 2 ** 30;
 const kTogether = 16; // reads at a time
-const kOp = { footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, dataEnd: 15 };
+const kWindow = 2 ** 20; // read at once while looking for a recording
+const kOp = { header: 1, footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, dataEnd: 15 };
 
 /** Throws with what a person should know where the file is none of ours. */
 export async function openMcap(file: Bytes): Promise<McapFile> {
   const start = await file.read(0, kMagic.length);
-  if (!kMagic.every((b, i) => start[i] === b)) throw new Error('it is no MCAP file');
+  if (!isMagic(start)) throw new Error('it is no MCAP file');
   const indexed = await readIndexed(file);
   return inOrder(indexed ?? (await walk(file)));
 }
@@ -114,18 +115,18 @@ function* records(bytes: Uint8Array): Generator<Record> {
   }
 }
 
-function readChannel(content: Uint8Array, topics: Map<number, string>): void {
+function readChannel(content: Uint8Array, topics: Map<number, string>, id?: number): void {
   const view = viewOf(content);
   const length = content.length >= 8 ? view.getUint32(4, true) : Infinity;
   if (8 + length > content.length) throw new Error('its index is damaged');
-  topics.set(view.getUint16(0, true), new TextDecoder().decode(content.subarray(8, 8 + length)));
+  topics.set(id ?? view.getUint16(0, true), new TextDecoder().decode(content.subarray(8, 8 + length)));
 }
 
 /** The messages of chunks from `from` on. Null where there is no index, or its CRC is wrong. */
 async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
   const tail = await file.read(Math.max(0, file.size - kFooterBytes - kMagic.length), kFooterBytes + kMagic.length);
   if (tail.length < kFooterBytes + kMagic.length || tail[0] !== kOp.footer) return null;
-  if (!kMagic.every((b, i) => tail[kFooterBytes + i] === b)) return null;
+  if (!isMagic(tail.subarray(kFooterBytes))) return null;
   const view = viewOf(tail);
   const summaryAt = u64(view, kRecordHead);
   const crc = view.getUint32(kRecordHead + 16, true);
@@ -188,38 +189,118 @@ function addIndexed(index: Uint8Array, recordsAt: number, size: number, messages
   }
 }
 
-/** From the beginning as far as it is sound; half a chunk is not read, since nothing vouches for it. */
-async function walk(file: Bytes): Promise<McapFile> {
-  const found: McapFile = { topics: new Map(), messages: [], end: null, damage: 'it has no index: it was cut short' };
-  for (let at = kMagic.length; at < file.size; ) {
-    const head = await file.read(at, kRecordHead);
-    const length = lengthOf(head);
-    if (length < 0 || at + kRecordHead + length > file.size) return found;
-    if (head[0] === kOp.chunk && length <= kMaxChunk) {
-      const content = await file.read(at + kRecordHead, length);
-      if (!addChunk(content, at + kRecordHead, found)) found.damage = 'a part of it is damaged and left out';
-    } else if (head[0] === kOp.channel && length <= kMaxChunk) {
-      readChannel(await file.read(at + kRecordHead, length), found.topics);
-    } else if (head[0] === kOp.dataEnd || head[0] === 0) {
-      return found;
-    }
-    at += kRecordHead + length;
+/** What is read of a file without its index. */
+class Walked {
+  readonly found: McapFile = { topics: new Map(), messages: [], end: null, damage: null };
+  private readonly channels = new Map<string, number>(); // of each channel's description
+  private ids = new Map<number, number>(); // of this recording's channels
+  private parts = 1;
+
+  /** Another recording follows in the same file; its ids are its own, but a channel of the same description goes on. */
+  next(): void {
+    this.ids = new Map();
+    ++this.parts;
   }
+  get joined(): boolean {
+    return this.parts > 1;
+  }
+
+  addChannel(content: Uint8Array): void {
+    const told = new TextDecoder('latin1').decode(content.subarray(4)); // all but its numbers
+    const own = viewOf(content).getUint16(0, true);
+    const id = this.channels.get(told) ?? kIds * (this.parts - 1) + own;
+    this.channels.set(told, id);
+    this.ids.set(own, id);
+    readChannel(content, this.found.topics, id);
+  }
+
+  /** False where its CRC is wrong. */
+  addChunk(content: Uint8Array, at: number): boolean {
+    if (content.length < kChunkHead) return false;
+    checkCompression(content, 28);
+    const crc = viewOf(content).getUint32(24, true);
+    const inner = content.subarray(kChunkHead);
+    if (crc !== 0 && crc32(inner) !== crc) return false;
+    for (const record of records(inner)) {
+      if (record.op === kOp.channel) this.addChannel(record.content);
+      if (record.op !== kOp.message || record.content.length < kMessageHead) continue;
+      const view = viewOf(record.content);
+      const own = view.getUint16(0, true);
+      this.found.messages.push({ channel: this.ids.get(own) ?? own, timeMs: timeMs(view, 6), at: at + kChunkHead + record.at });
+    }
+    return true;
+  }
+}
+
+const kIds = 2 ** 16; // that a recording's channels can have
+
+/** As far as it is sound, and through recordings that were joined; half a chunk is not read, since nothing vouches for it. */
+async function walk(file: Bytes): Promise<McapFile> {
+  const walked = new Walked();
+  const { found } = walked;
+  let whole = true; // all before
+  let ended = false; // the recording that is read, by its footer
+  for (let at = kMagic.length; at < file.size; ) {
+    if (await beginsAt(file, at)) {
+      walked.next();
+      whole &&= ended;
+      ended = false;
+      at += kMagic.length;
+      continue;
+    }
+    const record = await recordAt(file, at);
+    if (record === null) {
+      at = await nextBeginning(file, at + 1);
+      continue;
+    }
+    const { op, length, end } = record;
+    let sound = await goesOnAt(file, end);
+    if (op === kOp.chunk && length <= kMaxChunk) {
+      const content = await file.read(at + kRecordHead, length);
+      sound = walked.addChunk(content, at + kRecordHead);
+      if (!sound) found.damage = 'a part of it is damaged and left out';
+    } else if (op === kOp.channel && sound) {
+      walked.addChannel(await file.read(at + kRecordHead, length));
+    }
+    // Where it was cut short, what follows may have begun within it.
+    at = sound ? end : Math.min(end, await nextBeginning(file, at + 1, end));
+    if (op !== kOp.footer || !sound) continue;
+    ended = isMagic(await file.read(at, kMagic.length));
+    if (ended) at += kMagic.length;
+  }
+  if (!walked.joined) found.damage ??= 'it has no index: it was cut short';
+  else if (!whole || !ended) found.damage ??= 'a part of it was cut short';
   return found;
 }
 
-/** False where its CRC is wrong. */
-function addChunk(content: Uint8Array, at: number, found: McapFile): boolean {
-  if (content.length < kChunkHead) return false;
-  checkCompression(content, 28);
-  const crc = viewOf(content).getUint32(24, true);
-  const inner = content.subarray(kChunkHead);
-  if (crc !== 0 && crc32(inner) !== crc) return false;
-  for (const record of records(inner)) {
-    if (record.op === kOp.channel) readChannel(record.content, found.topics);
-    if (record.op !== kOp.message || record.content.length < kMessageHead) continue;
-    const view = viewOf(record.content);
-    found.messages.push({ channel: view.getUint16(0, true), timeMs: timeMs(view, 6), at: at + kChunkHead + record.at });
+const isMagic = (bytes: Uint8Array): boolean => kMagic.every((b, i) => bytes[i] === b);
+
+/** Null where the file is too short for it, or there is none, as where a power loss left zeros. */
+async function recordAt(file: Bytes, at: number): Promise<{ op: number; length: number; end: number } | null> {
+  const head = await file.read(at, kRecordHead);
+  const length = lengthOf(head);
+  const end = at + kRecordHead + length;
+  return length < 0 || head[0] === 0 || end > file.size ? null : { op: head[0]!, length, end };
+}
+
+/** Whether a record or a recording could begin there, or the file ends. */
+async function goesOnAt(file: Bytes, at: number): Promise<boolean> {
+  const next = await recordAt(file, at);
+  return at === file.size || (next !== null && next.op <= kOp.dataEnd) || isMagic(await file.read(at, kMagic.length));
+}
+
+/** Whether a recording does: a file's first bytes and a header. */
+async function beginsAt(file: Bytes, at: number): Promise<boolean> {
+  const bytes = await file.read(at, kMagic.length + 1);
+  return isMagic(bytes) && bytes[kMagic.length] === kOp.header;
+}
+
+/** Where the next recording begins from `at` on; the file's end where none does before `end`. */
+async function nextBeginning(file: Bytes, at: number, end = file.size): Promise<number> {
+  for (; at < end; at += kWindow) {
+    const window = await file.read(at, kWindow + kMagic.length); // so that none is missed between two
+    for (let i = window.indexOf(kMagic[0]!); i >= 0 && i < kWindow; i = window.indexOf(kMagic[0]!, i + 1))
+      if (isMagic(window.subarray(i)) && (await beginsAt(file, at + i))) return at + i;
   }
-  return true;
+  return file.size;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: what an independent writer wrote is found, by its index and without; damage is told and does no harm.
-import { McapWriter } from '@mcap/core';
+import { McapWriter, type McapWriterOptions } from '@mcap/core';
 import { describe, expect, it } from 'vitest';
 import { kFrameHeadBytes, readFrameHead } from '../src/cdr';
 import { crc32 } from '../src/crc32';
@@ -41,20 +41,20 @@ class Memory implements Bytes {
   read = async (at: number, length: number): Promise<Uint8Array> => this.bytes.slice(at, at + length);
 }
 
-async function write(frames: number[], options = {}): Promise<Memory> {
+async function write(frames: number[], options: Partial<McapWriterOptions> = {}, channels = kChannels): Promise<Memory> {
   const file = new Memory();
   const writer = new McapWriter({ writable: file, chunkSize: 700, ...options });
   await writer.start({ profile: '', library: 'test' });
   const schemaId = await writer.registerSchema({ name: 'x', encoding: 'omgidl', data: new Uint8Array(0) });
-  const ids: number[] = [];
-  for (const topic of kChannels) {
-    ids.push(await writer.registerChannel({ topic, schemaId, messageEncoding: 'cdr', metadata: new Map() }));
+  const ids = new Map<string, number>();
+  for (const topic of channels) {
+    ids.set(topic, await writer.registerChannel({ topic, schemaId, messageEncoding: 'cdr', metadata: new Map() }));
   }
   for (const sequence of frames) {
     const time = 1_700_000_000_000_000_000n + BigInt(sequence) * 33_000_000n;
     const message = { sequence, logTime: time, publishTime: time };
-    await writer.addMessage({ channelId: ids[0]!, ...message, data: frameCdr(sequence, sequence % 5 === 0) });
-    await writer.addMessage({ channelId: ids[1]!, ...message, data: new Uint8Array([1, 2, 3]) });
+    await writer.addMessage({ channelId: ids.get(kChannels[0]!)!, ...message, data: frameCdr(sequence, sequence % 5 === 0) });
+    await writer.addMessage({ channelId: ids.get(kChannels[1]!)!, ...message, data: new Uint8Array([1, 2, 3]) });
   }
   await writer.end();
   file.finish();
@@ -106,6 +106,37 @@ describe('openMcap', () => {
     expect(damage).toMatch(/damaged/);
     expect(messages.length).toBeLessThan(sound.length);
     expect(messages.length).toBeGreaterThan(0);
+  });
+
+  const joined = (...parts: Uint8Array[]): Memory => {
+    const file = new Memory();
+    file.bytes = new Uint8Array(Buffer.concat(parts));
+    return file;
+  };
+
+  it('reads recordings that were joined, ids by themselves', async () => {
+    const [first, second] = [await write(kFrames.slice(0, 9)), await write(kFrames.slice(9), {}, ['relievo/other', ...kChannels])];
+    const file = joined(first.bytes, second.bytes, (await write(kFrames.slice(2, 4))).bytes);
+    const { topics, messages, damage } = await openMcap(file);
+    expect(damage).toBeNull();
+    const frames = messages.filter((m) => topics.get(m.channel) === kChannels[0]);
+    expect(new Set(frames.map((m) => m.channel)).size).toBe(1);
+    const read = await Promise.all(frames.map(async (m) => readFrameHead(await readMessage(file, m)).sequence));
+    expect(read).toEqual([0, 1, 2, 2, 3, 3, ...kFrames.slice(4)]);
+    expect((await Recording.open(file)).count).toBe(kFrames.length + 2);
+  });
+
+  it('reads what follows a recording that was cut short', async () => {
+    const [first, second] = [await write(kFrames.slice(0, 9)), await write(kFrames.slice(9))];
+    for (const share of [0.31, 0.5, 0.77]) {
+      const { topics, messages, damage } = await openMcap(joined(first.bytes.slice(0, first.size * share), second.bytes));
+      expect(damage).toMatch(/cut short|left out/);
+      const frames = messages.filter((m) => topics.get(m.channel) === kChannels[0]);
+      expect(frames.length).toBeGreaterThan(kFrames.length - 9);
+      expect(frames.length).toBeLessThan(kFrames.length);
+    }
+    const { damage } = await openMcap(joined(first.bytes, second.bytes.slice(0, second.size / 2)));
+    expect(damage).toMatch(/cut short/);
   });
 
   it('refuses what it cannot read, and says why', async () => {
