@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
+#include "base/histogram.h"
 #include "base/recording_state.h"
 #include "base/rung.h"
 #include "base/stream.h"
-#include "web/gateway/histogram.h"
 #include "web/gateway/stage_times.h"
 
 namespace relievo {
