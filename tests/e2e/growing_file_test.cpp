@@ -62,7 +62,7 @@ class GrowingFile : public ::testing::Test {
 
   const TempFolder folder_;
   const std::filesystem::path file_ = folder_ / "growing.mcap";
-  Process publisher_{{program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"}};
+  Process publisher_{publish_face(20000)};
   Process recorder_{on_loopback({"record", "face", "--out", file_})};
   std::optional<Process> web_;
   std::uint16_t port_ = 0;

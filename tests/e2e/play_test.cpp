@@ -82,7 +82,7 @@ TEST(Play, KilledRecorderLeavesAFileThatPlaysByteForByte) {
   const TempFolder folder;
   const auto file = folder / "cut.mcap";
   {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    Process server(publish_face(20000));
     Process recorder(on_loopback({"record", "face", "--out", file}));
     ASSERT_TRUE(wait_for_size(file, 1'500'000)) << recorder.err();
     recorder.signal(SIGKILL);
@@ -226,7 +226,7 @@ TEST(Play, DescriptionSurvivesADamagedFirstChunk) {
   const TempFolder folder;
   const auto file = folder / "damaged.mcap";
   {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    Process server(publish_face(20000));
     Process recorder(on_loopback({"record", "face", "--out", file}));
     ASSERT_TRUE(wait_for_size(file, 2'000'000)) << recorder.err();
     recorder.signal(SIGINT);
