@@ -70,7 +70,11 @@ class DdsLiveReader final : public LiveReader {
   }
 
   void compare_clocks() override {
-    if (clock_) clock_->ask();
+    if (!clock_) return;
+    std::unique_lock lock(mutex_);
+    ClientReport told = told_;
+    lock.unlock();
+    clock_->ask(told);
   }
 
  private:
@@ -153,14 +157,19 @@ class DdsLiveReader final : public LiveReader {
     report_.rung = message.rung;
     report_.moves += moved;
     report_.lost += seen_.lost;
+    told_.lost = report_.lost;
     if (!decoded) {
       if (report_.frames > 0) ++report_.skipped;  // before, it was not yet there
+      told_.skipped = report_.skipped;
       return;
     }
     ++report_.frames;
     report_.bytes += message.data->size();
+    const std::int64_t latency_ns = now_ns + (clock ? clock->offset_ns : 0) - message.capture_time_ns;
     decode_ms_.add(milliseconds(took_ns));
-    latency_ms_.add(milliseconds(now_ns + (clock ? clock->offset_ns : 0) - message.capture_time_ns));
+    latency_ms_.add(milliseconds(latency_ns));
+    told_.decode.add(seconds(took_ns));
+    told_.decoded_after.add(seconds(latency_ns));
   }
 
   const Options options_;
@@ -179,6 +188,7 @@ class DdsLiveReader final : public LiveReader {
 
   mutable std::mutex mutex_;  // of what follows
   Report report_;
+  ClientReport told_;  // to the server
   LastValues decode_ms_, latency_ms_;
 
   std::atomic<Subscriber*> subscriber_{nullptr};

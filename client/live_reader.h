@@ -50,7 +50,7 @@ class LiveReader {
   virtual ~LiveReader() = default;
 
   virtual Report report() const = 0;
-  /// Asks the server for its time: to be called once a second or so.
+  /// Asks the server for its time and tells it what is decoded here: to be called once a second or so.
   virtual void compare_clocks() = 0;
 };
 

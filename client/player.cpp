@@ -89,7 +89,6 @@ Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& st
     if (auto status = recorded.seek(range_of(options, recorded).from_ns); !status) return status;
     const std::int64_t start_ns = steady_now_ns();
     if (auto status = play_once(recorded, options, stop, publish); !status) return status;
-    if (options.at_end) options.at_end();
     // A recording of a single moment must not loop as fast as the machine can.
     if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + 30'000'000 - steady_now_ns()));
   } while (options.loop && !stop.stopped());

@@ -22,7 +22,6 @@ struct PlayOptions {
   // Frames are said to be captured now: in the recorded order, their times apart as recorded, at that speed.
   bool restamp = false;
   std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none
-  std::function<void()> at_end = {};    // called at each end of what is played
 };
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <thread>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "client/player.h"
 #include "client/recorded_stream.h"
 #include "client/rung_relay.h"
+#include "codec/recording_follower.h"
 #include "idl/cdr.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -32,8 +34,8 @@ struct Options {
   std::shared_ptr<WebOptions> web;
 };
 
-constexpr std::chrono::milliseconds kRelayTick{200};
-constexpr std::chrono::seconds kLeft{5};  // nobody writes a file that was last written to so long ago
+constexpr std::chrono::milliseconds kTick{200};
+constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a file that long unchanged
 
 Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   Subscriber::Callbacks callbacks;
@@ -53,14 +55,15 @@ Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
 }
 
 // A recording played in a loop on a thread of its own, straight into the gateway. One that is being written
-// is gone on with at its end.
+// is gone on with at its end. Pages read the file itself, which grows for them.
 class LoopedFile {
  public:
   LoopedFile(std::string file, RecordedStream recorded, Gateway& gateway, StopSignal& stop)
-      : file_(std::move(file)), recorded_(std::move(recorded)), gateway_(gateway) {
+      : file_(std::move(file)), recorded_(std::move(recorded)), gateway_(gateway), name_(recorded_.stream()) {
     // Before anyone is told the address: who follows it at once finds the stream.
     if (auto info = recorded_.find_info(); info && *info) (void)publish(**info).ok();
-    if (!is_being_written()) offer();
+    if (is_being_written()) follower_.emplace(file_);
+    look();
     thread_ = std::thread([this, &stop] { run(stop); });
   }
   LoopedFile(const LoopedFile&) = delete;
@@ -68,9 +71,25 @@ class LoopedFile {
   /// The stop signal must be given before.
   ~LoopedFile() { thread_.join(); }
 
+  /// To be called every few tenths of a second, on the thread that made it: offers what there is to read.
+  void look() {
+    OfferedRecording offered{.file = file_};
+    if (follower_) {
+      const auto found = follower_->look();
+      const std::int64_t now_ns = steady_now_ns();
+      if (!found && !std::exchange(damaged_, true))
+        log_warning(found.error().message + ": pages have what is before that");
+      if (found && *found == RecordingFollower::Found::kMore) came_ns_ = now_ns;
+      offered.growing = follower_->growing();
+      offered.has_index = found && *found == RecordingFollower::Found::kFinished;
+      offered.grows = found && !offered.has_index && now_ns - came_ns_ < kLeft_ns;
+    }
+    gateway_.offer(name_, offered);
+  }
+
  private:
   void run(StopSignal& stop) {
-    const Status status = play(recorded_, {.loop = true, .follow = true, .at_end = [this] { offer(); }}, stop,
+    const Status status = play(recorded_, {.loop = true, .follow = true}, stop,
                                [this](const RawSample& sample) { return publish(sample); });
     if (!status) {
       log_error(file_ + ": " + status.error().message);
@@ -82,11 +101,7 @@ class LoopedFile {
     std::error_code ignored;
     const auto age =
         std::filesystem::file_time_type::clock::now() - std::filesystem::last_write_time(file_, ignored);
-    return recorded_.summary().recovered && age < kLeft;
-  }
-  // To be read in parts, which what is being written cannot: pages have the stream until then, which grows.
-  void offer() {
-    if (!std::exchange(offered_, true)) gateway_.offer(recorded_.stream(), file_);
+    return recorded_.summary().recovered && age < std::chrono::nanoseconds(kLeft_ns);
   }
 
   // Unreadable samples are skipped: the viewer counts the gap.
@@ -112,7 +127,10 @@ class LoopedFile {
   RecordedStream recorded_;
   Gateway& gateway_;
   std::uint64_t sequence_ = 0;
-  bool offered_ = false;
+  const std::string name_;
+  std::optional<RecordingFollower> follower_;  // of what is, or was, being written
+  std::int64_t came_ns_ = steady_now_ns();     // when it was last longer than before
+  bool damaged_ = false;
   std::thread thread_;
 };
 
@@ -187,7 +205,10 @@ Status run(const Options& options, StopSignal& stop) {
                                  .c_str());
   std::fflush(stdout);  // whoever waits for the address reads a pipe
   tell_ready();
-  while (!stop.wait_for(kRelayTick)) relay.update();
+  while (!stop.wait_for(kTick)) {
+    relay.update();
+    for (const auto& file : files) file->look();
+  }
   tell_stopping();
   wishes.answer_with({});
   return {};

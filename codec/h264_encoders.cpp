@@ -32,8 +32,9 @@ Status set_x264(AVCodecContext& codec, VideoSpeed speed, double rate_factor) {
   av_opt_set(codec.priv_data, "preset", preset(speed), 0);
   av_opt_set(codec.priv_data, "tune", "zerolatency", 0);
   av_opt_set_int(codec.priv_data, "forced-idr", 1, 0);
-  // Who encodes says which pictures are key pictures, and nobody else.
-  av_opt_set(codec.priv_data, "x264-params", "keyint=infinite:scenecut=0:sliced-threads=0", 0);
+  // Who encodes says which pictures are key pictures, and nobody else. Adaptive quantisation would spend most
+  // bits on the noise of what no light falls on.
+  av_opt_set(codec.priv_data, "x264-params", "keyint=infinite:scenecut=0:sliced-threads=0:aq-mode=0", 0);
   av_opt_set_double(codec.priv_data, "crf", rate_factor, 0);
   return {};
 }

@@ -3,12 +3,17 @@
 
 #include <dds/dds.h>
 
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
 #include <mutex>
 #include <random>
 #include <utility>
 
 #include "base/log.h"
 #include "base/time.h"
+#include "idl/client_reports.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
 #include "relievo.h"
@@ -52,6 +57,33 @@ struct Ends {
   }
 };
 
+std::optional<Histogram> histogram_of(const dds_sequence_unsigned_long_long& counts, double sum_s) {
+  Histogram out;
+  if (counts._length != out.counts.size() || !std::isfinite(sum_s) || sum_s < 0) return {};
+  std::copy_n(counts._buffer, out.counts.size(), out.counts.begin());
+  out.sum_s = sum_s;
+  return out;
+}
+
+/// Nothing where the asker decodes nothing, is of a version that does not tell, or tells nonsense.
+std::optional<ClientReport> report_of(const relievo_ClockQuestion& question) {
+  const auto decode = histogram_of(question.decode_counts, question.decode_s);
+  const auto decoded_after = histogram_of(question.decoded_after_counts, question.decoded_after_s);
+  if (!decode || !decoded_after) return {};
+  return ClientReport{.client = question.client == nullptr ? "" : question.client,
+                      .id = question.asker,
+                      .decode = *decode,
+                      .decoded_after = *decoded_after,
+                      .lost = question.lost,
+                      .skipped = question.skipped};
+}
+
+std::string this_process() {
+  std::array<char, 64> host{};
+  gethostname(host.data(), host.size() - 1);
+  return host.data() + (":" + std::to_string(getpid()));
+}
+
 class DdsClockService final : public ClockService {
  public:
   DdsClockService(std::string stream, Clock clock) : stream_(std::move(stream)), clock_(std::move(clock)) {}
@@ -66,7 +98,7 @@ class DdsClockService final : public ClockService {
     return {};
   }
 
-  void take() const {
+  void take() {
     const std::int64_t heard_ns = clock_();
     take_all(ends_.reader.get(), [&](const void* sample) {
       const auto& question = *static_cast<const relievo_ClockQuestion*>(sample);
@@ -78,12 +110,23 @@ class DdsClockService final : public ClockService {
       answer.heard_ns = heard_ns;
       answer.answered_ns = clock_();
       dds_write(ends_.writer.get(), &answer);
+      if (auto report = report_of(question)) {
+        const std::lock_guard lock(mutex_);
+        book_.add(*std::move(report), steady_now_ns());
+      }
     });
+  }
+
+  ClientReports client_reports() const override {
+    const std::lock_guard lock(mutex_);
+    return book_.reports(steady_now_ns());
   }
 
  private:
   const std::string stream_;
   const Clock clock_;
+  mutable std::mutex mutex_;
+  ClientReportBook book_;  // by mutex_
   Ends ends_;
 };
 
@@ -107,10 +150,25 @@ class DdsClockProbe final : public ClockProbe {
 
   void ask() override {
     relievo_ClockQuestion question{};
-    question.stream = const_cast<char*>(stream_.c_str());  // only read
-    question.asker = asker_;
-    question.asked_ns = utc_now_ns();
-    dds_write(ends_.writer.get(), &question);
+    question.client = const_cast<char*>("");
+    write(question);
+  }
+
+  void ask(const ClientReport& report) override {
+    relievo_ClockQuestion question{};
+    question.client = const_cast<char*>(name_.c_str());
+    const auto lend = [](const Histogram& histogram) {
+      const auto size = static_cast<std::uint32_t>(histogram.counts.size());
+      return dds_sequence_unsigned_long_long{size, size, const_cast<std::uint64_t*>(histogram.counts.data()),
+                                             false};
+    };
+    question.decode_counts = lend(report.decode);
+    question.decode_s = report.decode.sum_s;
+    question.decoded_after_counts = lend(report.decoded_after);
+    question.decoded_after_s = report.decoded_after.sum_s;
+    question.lost = report.lost;
+    question.skipped = report.skipped;
+    write(question);
   }
 
   std::optional<ClockOffset> offset() const override {
@@ -129,8 +187,16 @@ class DdsClockProbe final : public ClockProbe {
   }
 
  private:
+  void write(relievo_ClockQuestion& question) {
+    question.stream = const_cast<char*>(stream_.c_str());  // only read
+    question.asker = asker_;
+    question.asked_ns = utc_now_ns();
+    dds_write(ends_.writer.get(), &question);
+  }
+
   const std::shared_ptr<Domain> domain_;
   const std::string stream_;
+  const std::string name_ = this_process();
   std::uint64_t asker_ = 0;
   Ends ends_;
   mutable std::mutex mutex_;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "base/client_report.h"
 #include "base/result.h"
 #include "idl/domain.h"
 
@@ -23,6 +24,9 @@ class ClockService {
   static Result<std::unique_ptr<ClockService>> create(const Domain& domain, const std::string& stream,
                                                       Clock clock);
   virtual ~ClockService() = default;
+
+  /// What those who asked said of themselves. Any thread.
+  virtual ClientReports client_reports() const = 0;
 };
 
 /// The same for a stream that goes on without: null, and why not is logged.

@@ -205,6 +205,10 @@ class DdsPublisher final : public Publisher {
     return bytes;
   }
 
+  ClientReports client_reports() const override {
+    return clock_ ? clock_->client_reports() : ClientReports{};
+  }
+
   ~DdsPublisher() override {
     // Waits for a call in progress; `wanted_` outlives it.
     dds_set_listener(requests_.get(), nullptr);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/client_report.h"
 #include "base/clock_offset.h"
 #include "base/refused_peers.h"
 #include "base/result.h"
@@ -69,6 +70,8 @@ class Publisher {
   virtual int matched_readers() const = 0;
   /// Of frames, to readers that asked for them again. Any thread.
   virtual std::uint64_t sent_again_bytes() const = 0;
+  /// What clients say that they decode of it. Any thread.
+  virtual ClientReports client_reports() const = 0;
 };
 
 /// Writes a lower rung of a stream's quality ladder, beside the Publisher of the stream itself; its readers
@@ -133,7 +136,8 @@ class Subscriber {
   virtual void request_key_frame(const std::string& stream) = 0;
 };
 
-/// Compares this machine's clock with that of a stream's server. Any thread.
+/// Compares this machine's clock with that of a stream's server, and tells that server what is decoded here.
+/// Any thread.
 class ClockProbe {
  public:
   static Result<std::unique_ptr<ClockProbe>> create(const DomainOptions& domain, const std::string& stream);
@@ -141,6 +145,8 @@ class ClockProbe {
 
   /// Once a second or so; the answer comes by itself, or never.
   virtual void ask() = 0;
+  /// The same, telling of a client that decodes; its name and id are the probe's to say.
+  virtual void ask(const ClientReport& report) = 0;
   /// What the last answers say; nothing where there was none: a server of an older version, or none.
   virtual std::optional<ClockOffset> offset() const = 0;
 };

@@ -11,12 +11,12 @@ namespace {
 // Measured by `relievo-bench rate --source sim:walk` (h264, metric). Other scenes and codecs differ, which
 // the feedback takes up.
 constexpr std::array kLevels{
-    RateLevel{90, 6, true, true, 1.000, 1.000, 41.3},   RateLevel{85, 6, true, true, 0.650, 0.780, 41.0},
-    RateLevel{80, 6, true, true, 0.510, 0.660, 40.7},   RateLevel{75, 5, true, true, 0.410, 0.610, 40.3},
-    RateLevel{70, 5, false, true, 0.260, 0.560, 39.9},  RateLevel{64, 4, false, true, 0.200, 0.540, 39.3},
-    RateLevel{57, 4, false, true, 0.168, 0.530, 38.7},  RateLevel{50, 4, false, false, 0.130, 0.500, 37.9},
-    RateLevel{42, 3, false, false, 0.101, 0.485, 36.8}, RateLevel{34, 3, false, false, 0.089, 0.480, 35.7},
-    RateLevel{25, 2, false, false, 0.071, 0.470, 34.6}, RateLevel{15, 2, false, false, 0.065, 0.460, 33.1}};
+    RateLevel{90, 6, true, true, 1.000, 1.000, 41.2},   RateLevel{85, 6, true, true, 0.886, 0.920, 41.15},
+    RateLevel{80, 6, true, true, 0.791, 0.890, 40.9},   RateLevel{75, 5, true, true, 0.676, 0.860, 40.7},
+    RateLevel{70, 5, false, true, 0.446, 0.840, 40.2},  RateLevel{64, 4, false, true, 0.357, 0.820, 39.7},
+    RateLevel{57, 4, false, true, 0.293, 0.770, 39.0},  RateLevel{50, 4, false, false, 0.223, 0.765, 38.2},
+    RateLevel{42, 3, false, false, 0.167, 0.758, 37.4}, RateLevel{34, 3, false, false, 0.140, 0.742, 35.9},
+    RateLevel{25, 2, false, false, 0.111, 0.640, 34.9}, RateLevel{15, 2, false, false, 0.098, 0.620, 33.5}};
 constexpr double kCoarsest = static_cast<double>(kLevels.size() - 1);
 
 constexpr double kFirstPlace = 4;  // until the first frames have been seen
@@ -32,7 +32,7 @@ constexpr double kMostOwed = 10;     // shares: what no level can keep is not he
 constexpr double kMostSpared = 5;
 constexpr double kCoarser = 0.6;  // part of the way to a coarser place that a frame goes
 constexpr double kFiner = 0.12;
-constexpr double kFormReach = 0.75;  // of a level: step, sigmas and lines stay until it is so far away
+constexpr double kFormReach = 1.5;  // levels: step, sigmas and lines stay until it is so far away
 constexpr std::size_t kLeastTimes = 16;
 constexpr double kReserve = 0.9;  // of the deadline
 constexpr double kSeen = 0.5;     // part of a new PSNR that is believed

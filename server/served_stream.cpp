@@ -205,6 +205,7 @@ Status RunningStream::open() {
     around_.stages->add(name_, [pipeline = pipeline_.get(), publisher = publisher_.get()] {
       StageTimes times = pipeline->stages();
       times.sent_again_bytes = publisher->sent_again_bytes();
+      times.clients = publisher->client_reports();
       return times;
     });
   return {};

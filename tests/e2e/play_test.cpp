@@ -82,7 +82,7 @@ TEST(Play, KilledRecorderLeavesAFileThatPlaysByteForByte) {
   const TempFolder folder;
   const auto file = folder / "cut.mcap";
   {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    Process server(publish_face(20000));
     Process recorder(on_loopback({"record", "face", "--out", file}));
     ASSERT_TRUE(wait_for_size(file, 1'500'000)) << recorder.err();
     recorder.signal(SIGKILL);
@@ -163,39 +163,6 @@ TEST(Play, FollowsAFileThatIsBeingWrittenUntilItIsFinished) {
   EXPECT_EQ(nlohmann::json::parse(player.out())["damaged"], 0);
 }
 
-// Proves: a page that watches a file that is being written sees what is written meanwhile, and can read it in
-// parts once it is finished.
-TEST(Play, WebGoesOnInAFileThatIsBeingWritten) {
-  const TempFolder folder;
-  const auto file = folder / "growing.mcap";
-  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
-  Process recorder(on_loopback({"record", "face", "--out", file}));
-  ASSERT_TRUE(wait_for_size(file, 200'000)) << recorder.err();
-  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
-  const std::uint16_t port = viewer_port(web);
-  ASSERT_NE(port, 0) << web.err();
-  const auto offered = [&] {
-    const auto streams = nlohmann::json::parse(request(port, "GET", "/api/streams").body);
-    return !streams["streams"].empty() && streams["streams"][0]["recording"].is_string();
-  };
-  const std::size_t at_first = recorded_frames(file).size();
-  WsClient client(port, "face");
-  ASSERT_EQ(client.status(), 101);
-  ASSERT_TRUE(client.credit(8));
-  std::set<std::string> seen;  // their bytes, of which no two frames have the same
-  for (std::size_t came = 0; seen.size() < at_first + 120; ++came) {
-    ASSERT_LT(came, 20 * at_first + 2000) << "it repeats what it had at first";
-    const auto frame = client.next_of("frame");
-    ASSERT_TRUE(frame) << "after " << seen.size() << " frames of " << at_first;
-    constexpr std::size_t kPrefix = 48;
-    seen.insert(frame->data.substr(kPrefix));
-    ASSERT_TRUE(client.credit(1));
-  }
-  recorder.signal(SIGINT);
-  ASSERT_EQ(recorder.wait(), 0) << recorder.err();
-  EXPECT_TRUE(eventually(offered)) << "when its end has been played";
-}
-
 TEST(Play, ServerToKilledRecorderToPlayerToSecondRecorder) {
   const TempFolder folder;
   const auto cut = folder / "cut.mcap";
@@ -259,7 +226,7 @@ TEST(Play, DescriptionSurvivesADamagedFirstChunk) {
   const TempFolder folder;
   const auto file = folder / "damaged.mcap";
   {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    Process server(publish_face(20000));
     Process recorder(on_loopback({"record", "face", "--out", file}));
     ASSERT_TRUE(wait_for_size(file, 2'000'000)) << recorder.err();
     recorder.signal(SIGINT);

@@ -43,7 +43,7 @@ std::vector<std::uint64_t> sequence_numbers(const fs::path& file) {
 
 TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
   const TempFolder folder;
-  Process server({program("test_publisher"), "face", kDomain, "0", "60", "100000", "1"});
+  Process server(publish_face(0));
   const auto command = record({"--out", folder / "face.mcap", "--split-size", "60kB", "--frames", "100"});
   std::size_t before = 0;
   for (int pass = 1; pass <= 2; ++pass) {
@@ -75,7 +75,7 @@ TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
 /// files end at twice their size.
 TEST(RecordFiles, OldSegmentsGo) {
   const TempFolder folder;
-  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  Process server(publish_face(20000));
   const auto done = run(record(
       {"--out", folder / "face.mcap", "--split-size", "100kB", "--keep-size", "700kB", "--frames", "100"}));
   ASSERT_EQ(done.status, 0) << done.err;
@@ -101,7 +101,7 @@ TEST(RecordFiles, OldSegmentsGo) {
 TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
   const TempFolder folder;
   {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+    Process server(publish_face(20000));
     const auto done = run(record({"--out", folder / "face.mcap", "--frames", "120"}));
     ASSERT_EQ(done.status, 0) << done.err;
   }

@@ -24,10 +24,17 @@ inline std::vector<std::string> on_loopback(std::vector<std::string> command) {
   return command;
 }
 
+/// Starts the stream "face" with its first reader: 60 frames a second with `bytes` of noise for data; 0: real
+/// frames.
+inline std::vector<std::string> publish_face(int bytes, int frames = 100'000) {
+  return {program("test_publisher"), "face", kDomain, std::to_string(bytes), "60",
+          std::to_string(frames),    "1"};
+}
+
 /// Records the first `frames` of a stream "face" whose frames have `bytes` of noise for data; 0: real frames.
 inline void record_face(const std::filesystem::path& file, int bytes, int frames,
                         const std::vector<std::string>& more = {}) {
-  Process server({program("test_publisher"), "face", kDomain, std::to_string(bytes), "60", "100000", "1"});
+  Process server(publish_face(bytes));
   std::vector<std::string> command{"record", "face", "--out", file, "--frames", std::to_string(frames)};
   command.insert(command.end(), more.begin(), more.end());
   const auto done = run(on_loopback(std::move(command)));

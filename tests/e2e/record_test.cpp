@@ -16,7 +16,7 @@ using testing::HasSubstr;
 TEST(Record, InterruptedRecorderCompletesItsFile) {
   const TempFolder folder;
   const auto file = folder / "whole.mcap";
-  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  Process server(publish_face(20000));
   Process recorder(on_loopback({"record", "face", "--out", file, "--json"}));
   ASSERT_TRUE(wait_for_size(file, 500'000)) << recorder.err();
   recorder.signal(SIGINT);
@@ -38,11 +38,11 @@ TEST(Record, RecorderKeepsToItsLimitAndSurvivesARestartOfTheServer) {
   const auto file = folder / "limit.mcap";
   Process recorder(on_loopback({"record", "face", "--out", file, "--frames", "60", "--json"}));
   {
-    Process server({program("test_publisher"), "face", kDomain, "20000", "60", "40", "1"});
+    Process server(publish_face(20000, 40));
     ASSERT_TRUE(wait_for_size(file, 60'000)) << server.err() << recorder.err();
     ASSERT_TRUE(server.wait_for_text("done")) << server.err();
   }
-  Process server({program("test_publisher"), "face", kDomain, "20000", "60", "100000", "1"});
+  Process server(publish_face(20000));
   ASSERT_EQ(recorder.wait(), 0) << recorder.err();
   EXPECT_EQ(nlohmann::json::parse(recorder.out())["frames"], 60);
   EXPECT_EQ(info(file)["frames"], 60);
@@ -57,7 +57,7 @@ TEST(Record, RecorderKeepsToItsLimitAndSurvivesARestartOfTheServer) {
 TEST(Record, FullDiskEndsTheRecordingWithAReadableFile) {
   const TempFolder folder;
   const auto file = folder / "full.mcap";
-  Process server({program("test_publisher"), "face", kDomain, "50000", "60", "100000", "1"});
+  Process server(publish_face(50000));
   std::string command = "trap '' XFSZ; ulimit -f 3000; exec";  // 3,072,000 bytes
   for (const auto& argument : on_loopback({"record", "face", "--out", file}))
     command += " '" + argument + "'";

@@ -89,7 +89,7 @@ class Server : public Gateway, private ConnectionHost {
   void announce(const StreamInfo& info) override { hub_.announce(info); }
   void publish(const std::string& stream, const FrameMessage& frame) override { hub_.publish(stream, frame); }
   void publish(const ServerStatus& status) override;
-  void offer(const std::string& stream, const std::filesystem::path& recording) override {
+  void offer(const std::string& stream, const OfferedRecording& recording) override {
     hub_.offer(stream, recording);
   }
   int watchers(const std::string& stream, Rung rung) const override { return hub_.watchers(stream, rung); }

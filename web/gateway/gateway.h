@@ -17,6 +17,7 @@
 #include "base/stream.h"
 #include "base/web_options.h"
 #include "web/gateway/calibration_control.h"
+#include "web/gateway/offered_recording.h"
 #include "web/gateway/recording_control.h"
 #include "web/gateway/rig_control.h"
 #include "web/gateway/stage_times.h"
@@ -74,8 +75,9 @@ class Gateway {
   virtual void publish(const std::string& stream, const FrameMessage& frame) = 0;
   virtual void publish(const ServerStatus& status) = 0;
   /// The stream, which was announced, is played from this file: clients may read it
-  /// (/recordings/STREAM.mcap), each at its own place. Until it is withdrawn.
-  virtual void offer(const std::string& stream, const std::filesystem::path& recording) = 0;
+  /// (/recordings/STREAM.mcap), each at its own place, and is it while it grows. Until it is withdrawn, or
+  /// another is offered.
+  virtual void offer(const std::string& stream, const OfferedRecording& recording) = 0;
   /// Clients of that rung of a stream, which are to be given its frames by publish().
   virtual int watchers(const std::string& stream, Rung rung) const = 0;
   /// How far the clock of the stream's server is ahead of this machine's.

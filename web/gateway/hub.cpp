@@ -217,7 +217,7 @@ void Hub::withdraw(const std::string& stream) {
   entry.latest.reset();
   entry.latest_key.reset();
   entry.facts.status.reset();
-  entry.facts.recording.clear();
+  entry.facts.recording = {};
   entry.facts.clock_offset_ns.reset();
   entry.last_sequence = {};
   entry.status_version = entry.recording_version = 0;
@@ -236,16 +236,16 @@ void Hub::withdraw(const std::string& stream) {
   erase_if_unused(stream);
 }
 
-void Hub::offer(const std::string& stream, const std::filesystem::path& recording) {
+void Hub::offer(const std::string& stream, const OfferedRecording& recording) {
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(stream);
   if (it != streams_.end() && it->second->live) it->second->facts.recording = recording;
 }
 
-std::optional<std::filesystem::path> Hub::recording_of(const std::string& stream) const {
+std::optional<OfferedRecording> Hub::recording_of(const std::string& stream) const {
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(stream);
-  if (it == streams_.end() || it->second->facts.recording.empty()) return std::nullopt;
+  if (it == streams_.end() || !it->second->facts.recording.readable()) return std::nullopt;
   return it->second->facts.recording;
 }
 

@@ -15,10 +15,11 @@
 #include <string>
 #include <vector>
 
+#include "base/histogram.h"
 #include "base/recording_state.h"
 #include "base/rung.h"
 #include "base/stream.h"
-#include "web/gateway/histogram.h"
+#include "web/gateway/offered_recording.h"
 #include "web/gateway/stage_times.h"
 
 namespace relievo {
@@ -35,7 +36,7 @@ struct StreamSnapshot {
   std::size_t watchers = 0;
   std::array<std::size_t, kWebRungs.size()> watchers_of{};  // of each detail, on it or on their way to it
   std::optional<std::int64_t> clock_offset_ns;  // of the server's clock to this one, where it is known
-  std::filesystem::path recording;              // that it is played from; empty: none that clients may read
+  OfferedRecording recording;                   // that it is played from, if it is
   std::optional<RecordingState> recorded;       // on request; not the hub's to know, filled in by who asks
   std::optional<StageTimes> stages;             // likewise, of a stream that is made in this process
   bool looked_at = false;                       // likewise: its camera's frames can be (/api/rig)
@@ -72,10 +73,11 @@ class Hub {
   std::int64_t clock_offset_ns(const std::string& stream) const;  // 0 where it is not known
   void withdraw(const std::string& stream);
   /// A stream that was announced is played from this file, until it is withdrawn.
-  void offer(const std::string& stream, const std::filesystem::path& recording);
+  void offer(const std::string& stream, const OfferedRecording& recording);
   /// To its clients, also to those that come later, where it differs from what they were told last.
   void publish_recording(const std::string& stream, const RecordingState& state);
-  std::optional<std::filesystem::path> recording_of(const std::string& stream) const;
+  /// Nothing where there is none that can be read.
+  std::optional<OfferedRecording> recording_of(const std::string& stream) const;
 
   /// `wake` is called, from any thread and with the hub locked, when take() has something; it must not call
   /// back.

@@ -63,6 +63,37 @@ std::string label(const std::string& value) {
   return "\"" + out + "\"";
 }
 
+/// What clients over DDS told the server of themselves.
+void write_clients(Exposition& out, const std::vector<StreamSnapshot>& streams) {
+  const auto each = [&](const char* name, const char* type, const char* help, const auto& write) {
+    out.family(name, type, help);
+    for (const auto& s : streams) {
+      if (!s.stages) continue;
+      for (const ClientReport& client : s.stages->clients.clients) {
+        char id[20];
+        std::snprintf(id, sizeof id, "%016llx", static_cast<unsigned long long>(client.id));
+        write("stream=" + label(s.info.stream) + ",client=" + label(client.client) + ",id=\"" + id + '"',
+              client);
+      }
+    }
+  };
+  each("relievo_client_decode_seconds", "histogram", "What decoding a frame takes a client over DDS.",
+       [&](const std::string& of, const ClientReport& client) { out.histogram(of, client.decode); });
+  each(
+      "relievo_client_latency_seconds", "histogram",
+      "From a frame's capture until a client over DDS had decoded it, with the clocks' difference taken out.",
+      [&](const std::string& of, const ClientReport& client) { out.histogram(of, client.decoded_after); });
+  each("relievo_client_lost_total", "counter", "Frames lost on the way to a client over DDS.",
+       [&](const std::string& of, const ClientReport& client) {
+         out.sample("{" + of + "}", static_cast<double>(client.lost));
+       });
+  each("relievo_client_skipped_total", "counter",
+       "Frames that a client over DDS could not decode, as those that build on a lost one.",
+       [&](const std::string& of, const ClientReport& client) {
+         out.sample("{" + of + "}", static_cast<double>(client.skipped));
+       });
+}
+
 /// Of streams that are made in this process.
 void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
   const auto each = [&](const char* name, const char* type, const char* help, const auto& write) {
@@ -70,12 +101,14 @@ void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
     for (const auto& s : streams)
       if (s.stages) write("stream=" + label(s.info.stream), *s.stages);
   };
-  each("relievo_stage_seconds", "histogram", "What each stage takes for a frame, without waiting for it.",
+  each("relievo_stage_seconds", "histogram",
+       "What each stage takes for a frame, without waiting for it; decode: at the clients over DDS.",
        [&](const std::string& stream, const StageTimes& times) {
          out.histogram(stream + ",stage=\"reconstruct\"", times.reconstruct);
          out.histogram(stream + ",stage=\"encode_geometry\"", times.encode_geometry);
          out.histogram(stream + ",stage=\"encode_texture\"", times.encode_texture);
          out.histogram(stream + ",stage=\"publish\"", times.publish);
+         out.histogram(stream + ",stage=\"decode\"", times.clients.decode);
        });
   each("relievo_stage_waiting", "gauge", "Frames that wait before a stage.",
        [&](const std::string& stream, const StageTimes& times) {
@@ -91,6 +124,7 @@ void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
        [&](const std::string& stream, const StageTimes& times) {
          out.sample("{" + stream + "}", static_cast<double>(times.sent_again_bytes));
        });
+  write_clients(out, streams);
 }
 
 }  // namespace

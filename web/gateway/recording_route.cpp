@@ -52,18 +52,25 @@ struct Version {
   std::string etag;
 };
 
-/// What is to be read of a file of the folder; nothing where it has only just been begun.
-std::optional<Version> version_of(const std::string& name, const struct stat& file, std::string_view if_range,
-                                  const RecordingControl& control) {
-  const auto growing = control.growing(name);
+/// What is to be read of a recording; nothing where it has only just been begun.
+std::optional<Version> version_of(const OfferedRecording& recording, const struct stat& file,
+                                  std::string_view if_range) {
   const auto as_of = [&](std::uint64_t bytes) -> std::optional<Version> {
-    auto end = growing && bytes > 0 ? growing->end_at(bytes) : nullptr;
+    auto end = recording.growing && bytes > 0 ? recording.growing->end_at(bytes) : nullptr;
     if (!end) return std::nullopt;
     return Version{{bytes, std::move(end)}, growing_etag(file, bytes)};
   };
   if (auto version = as_of(growing_bytes(if_range, file))) return version;
-  if (control.is_open(name)) return as_of(growing ? growing->bytes() : 0);
+  if (!recording.has_index) return as_of(recording.growing ? recording.growing->bytes() : 0);
   return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file)};
+}
+
+std::optional<OfferedRecording> recording_of_folder(const std::string& name,
+                                                    const RecordingControl& control) {
+  const auto file = recording_file(name, control);
+  if (!file) return std::nullopt;
+  return OfferedRecording{
+      .file = *file, .growing = control.growing(name), .has_index = !control.is_open(name)};
 }
 
 }  // namespace
@@ -89,24 +96,20 @@ std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) c
 
 HttpReply recording_reply(std::string_view name, const HttpRequest& request, const RouteContext& context) {
   if (!name.ends_with(kSuffix)) return text_reply(404, "no recording has such a name");
-  auto file = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
+  auto recording = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
   int follow = 0;
-  if (!file && context.recordings != nullptr) {
-    file = recording_file(std::string(name), *context.recordings);
+  if (!recording && context.recordings != nullptr) {
+    recording = recording_of_folder(std::string(name), *context.recordings);
     follow = O_NOFOLLOW;  // what somebody links to from there is none of ours
   }
-  if (!file) return text_reply(404, "there is no such recording");
-  const int descriptor = open(file->c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
+  if (!recording) return text_reply(404, "there is no such recording");
+  const int descriptor = open(recording->file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
   struct stat status {};
   if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     if (descriptor >= 0) close(descriptor);
     return text_reply(404, "the recording is gone");
   }
-  std::optional<Version> version;
-  if (follow == 0)
-    version = Version{{static_cast<std::uint64_t>(status.st_size)}, etag_of(status)};
-  else
-    version = version_of(std::string(name), status, request.if_range, *context.recordings);
+  const auto version = version_of(*recording, status, request.if_range);
   if (!version) {
     close(descriptor);
     return text_reply(404, "the recording has only just begun: ask again in a second");

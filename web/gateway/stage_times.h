@@ -7,7 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "web/gateway/histogram.h"
+#include "base/client_report.h"
+#include "base/histogram.h"
 
 namespace relievo {
 
@@ -17,6 +18,7 @@ struct StageTimes {
   // Frames that wait now, before each stage.
   std::size_t waiting_reconstruct = 0, waiting_encode = 0, waiting_publish = 0;
   std::uint64_t sent_again_bytes = 0;  // that DDS readers had asked for a second time
+  ClientReports clients;               // that read it over DDS and decode it
 };
 
 /// Every function may be called from any thread and returns at once.

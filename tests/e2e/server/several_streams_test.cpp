@@ -197,6 +197,34 @@ TEST_F(SeveralStreams, MetricsSayWhatEachStageTakes) {
   }
 }
 
+TEST_F(SeveralStreams, MetricsSayWhatItsClientsDecode) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("left", 3)) << server.process().err();
+  Process client({program("relievo").string(), "stats", "left", "--domain", std::to_string(own_domain()),
+                  "--interface", "lo"});
+  std::string of;
+  std::string metrics;
+  const auto value = [&](const std::string& name) { return metric_in(metrics, name); };
+  EXPECT_TRUE(eventually([&] {
+    metrics = request(server.port(), "GET", "/metrics").body;
+    const std::string head = "relievo_client_decode_seconds_count{stream=\"left\",";
+    const auto at = metrics.find(head);
+    if (at == std::string::npos) return false;
+    const auto open = metrics.find('{', at);
+    of = metrics.substr(open, metrics.find('}', at) + 1 - open);
+    return value("relievo_client_decode_seconds_count" + of) >= 3 &&
+           value("relievo_stage_seconds_count{stream=\"left\",stage=\"decode\"}") >= 1;
+  })) << metrics;
+  EXPECT_THAT(of, HasSubstr(":" + std::to_string(client.pid()) + "\",id="));
+  EXPECT_GT(value("relievo_client_decode_seconds_sum" + of), 0);
+  EXPECT_EQ(value("relievo_client_latency_seconds_count" + of),
+            value("relievo_client_decode_seconds_count" + of));
+  EXPECT_GE(value("relievo_client_latency_seconds_sum" + of),
+            value("relievo_client_decode_seconds_sum" + of));
+  EXPECT_EQ(value("relievo_client_lost_total" + of), 0);
+  EXPECT_EQ(value("relievo_stage_seconds_count{stream=\"right\",stage=\"decode\"}"), 0);
+}
+
 TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   WebServer server(command());
   const Reader left("left");

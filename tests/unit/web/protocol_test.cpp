@@ -44,6 +44,26 @@ TEST(Protocol, HostileNamesCannotForgeMetrics) {
   EXPECT_NE(text.find(R"({stream="a\"} 1\nrelievo_forged 1\\"} 1)"), std::string::npos);
 }
 
+TEST(Protocol, ClientsOverDdsAreToldApartWhateverTheyCallThemselves) {
+  StreamSnapshot snapshot;
+  snapshot.info.stream = "s";
+  StageTimes& stages = snapshot.stages.emplace();
+  const std::string name = "a\"} 1\nrelievo_forged 1\\";
+  stages.clients.clients = {{.client = name, .id = 1, .lost = 5}, {.client = name, .id = 2, .skipped = 6}};
+  stages.clients.clients[1].decode.add(0.003);
+  stages.clients.decode.add(0.003);
+  const std::string text = metrics_text({snapshot}, {}, {});
+  EXPECT_EQ(text.find("\nrelievo_forged"), std::string::npos);
+  const auto of = [&](const char* id) {
+    return R"({stream="s",client="a\"} 1\nrelievo_forged 1\\",id="000000000000000)" + std::string(id) + "\"}";
+  };
+  EXPECT_EQ(metric_in(text, "relievo_client_lost_total" + of("1")), 5);
+  EXPECT_EQ(metric_in(text, "relievo_client_skipped_total" + of("2")), 6);
+  EXPECT_EQ(metric_in(text, "relievo_client_decode_seconds_count" + of("1")), 0);
+  EXPECT_EQ(metric_in(text, "relievo_client_decode_seconds_count" + of("2")), 1);
+  EXPECT_EQ(metric_in(text, R"(relievo_stage_seconds_count{stream="s",stage="decode"})"), 1);
+}
+
 TEST(Protocol, ClientMessages) {
   const auto credit = parse_client_message(R"({"type":"credit","n":2})");
   ASSERT_TRUE(credit.ok());

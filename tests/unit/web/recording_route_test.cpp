@@ -78,7 +78,7 @@ class Recordings : public GatewayTest {
     std::ofstream(file, std::ios::binary) << content;
     std::ofstream(folder / "secret.mcap") << "secret";
     gateway->announce(make_info());
-    gateway->offer("face", file);
+    gateway->offer("face", {.file = file});
   }
   Response get(const std::string& headers = {}) {
     return request(port, "GET", "/recordings/face.mcap", headers);
@@ -179,7 +179,7 @@ TEST_F(Recordings, AreNotToldWithoutAToken) {
   std::ofstream(folder / "tokens") << "correct-horse-battery\n";
   start({.port = 0, .web = {.token_file = folder / "tokens"}});
   gateway->announce(make_info());
-  gateway->offer("face", file);
+  gateway->offer("face", {.file = file});
   EXPECT_EQ(get().status, 401);
   EXPECT_EQ(get("Authorization: Bearer correct-horse-battery\r\n").status, 200);
 }

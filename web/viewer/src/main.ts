@@ -486,6 +486,9 @@ class Viewer {
     if (this.serverFile !== null) {
       const writing = streams.find(({ recorder }) => recorder?.file === this.serverFile);
       void this.session.source?.told?.(writing?.recorder ?? undefined);
+    } else if (this.stream !== null) {
+      const bytes = this.server.find(this.stream)?.growing_bytes ?? null;
+      void this.session.source?.told?.(bytes === null ? undefined : { state: 'recording', whole_bytes: bytes, message: '' });
     }
     const first = streams[0];
     const missing = this.session.info === null && this.server.find(this.stream) === undefined;

@@ -131,6 +131,8 @@ export interface ListedStream {
   state: string;
   /** Where the file is that it is played from, relative to the page; not said by older servers. */
   recording?: string | null;
+  /** What can be read by now of such a file that is still being written; null, or not said: it does not grow. */
+  growing_bytes?: number | null;
   /**
    * What its recording on request is doing, whoever started it; null: there is no folder. Not said by older
    * servers.
@@ -152,6 +154,9 @@ export interface ServerRecording {
   pre_roll_s: number;
   message: string;
 }
+
+/** What is said of a file that is being written. */
+export type Written = Pick<ServerRecording, 'state' | 'whole_bytes' | 'message'>;
 
 export interface StreamList {
   version: string;

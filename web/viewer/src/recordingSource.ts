@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording as a source of frames. One of the server that is still being written grows, and who is at its end goes
 // on with what comes.
-import type { ServerRecording } from './protocol';
+import type { Written } from './protocol';
 import type { Recording } from './recording';
 import type { FrameSource, Moment, Playback, SourceEvents } from './source';
 import { StorePlayer } from './storePlayer';
@@ -64,7 +64,7 @@ export class RecordingSource extends StorePlayer implements FrameSource {
     else this.atEnd = true; // else it would begin again
   }
 
-  async told(recorder: ServerRecording | undefined): Promise<void> {
+  async told(recorder: Written | undefined): Promise<void> {
     const { end } = this.recording;
     if (end === null || this.asking || this.refused) return;
     // One that was stopped says so until it is whole.

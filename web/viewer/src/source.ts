@@ -2,7 +2,7 @@
 // Where frames come from: a live stream, or a recording. One kind of events, whichever it is.
 import type { FrameStore } from './frameStore';
 import type { Loop } from './playback';
-import type { FramePrefix, ServerMessage, ServerRecording } from './protocol';
+import type { FramePrefix, ServerMessage, Written } from './protocol';
 
 export interface SourceEvents {
   open(): void;
@@ -31,7 +31,7 @@ export interface FrameSource {
    * Of a recording of the server: what the server says of it now, so that what it wrote since is shown, too; undefined:
    * it writes another, or none.
    */
-  told?(recorder: ServerRecording | undefined): Promise<void>;
+  told?(recorder: Written | undefined): Promise<void>;
   stop(): void;
 }
 

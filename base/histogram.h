@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 namespace relievo {
 
@@ -22,6 +23,22 @@ struct Histogram {
     while (i < kBounds_s.size() && positive_s > kBounds_s[i]) ++i;
     ++counts[i];
     sum_s += positive_s;
+  }
+  /// What was added to `before` to make this; nothing where that cannot have been.
+  std::optional<Histogram> since(const Histogram& before) const {
+    Histogram out;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      if (counts[i] < before.counts[i]) return {};
+      out.counts[i] = counts[i] - before.counts[i];
+    }
+    if (!(sum_s >= before.sum_s)) return {};
+    out.sum_s = sum_s - before.sum_s;
+    return out;
+  }
+  Histogram& operator+=(const Histogram& more) {
+    for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += more.counts[i];
+    sum_s += more.sum_s;
+    return *this;
   }
 };
 

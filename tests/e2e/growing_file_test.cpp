@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: `relievo web` of a file that is being written is of what it has by then: its stream goes on, and a
+// page that reads the file reads what is new alone, until the file is finished; also where whoever writes it
+// is killed.
+#include <signal.h>
+
+#include <fstream>
+#include <set>
+
+#include "tests/e2e/record_play.h"
+#include "tests/support/patience.h"
+#include "tests/support/socket_client.h"
+#include "tests/support/temp_folder.h"
+
+namespace relievo::test {
+namespace {
+
+using Json = nlohmann::json;
+
+class GrowingFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(eventually([&] {
+      std::error_code none;
+      return std::filesystem::file_size(file_, none) >= 200'000 && !none;
+    })) << recorder_.err();
+    web_.emplace(std::vector<std::string>{program("relievo"), "web", file_, "--listen", "127.0.0.1:0"});
+    port_ = viewer_port(*web_);
+    ASSERT_NE(port_, 0) << web_->err();
+  }
+
+  Json stream() const { return Json::parse(request(port_, "GET", "/api/streams").body)["streams"].at(0); }
+  Response get(const std::string& headers = {}) const {
+    return request(port_, "GET", "/recordings/face.mcap", headers);
+  }
+  /// As a page does that has `have_`: what is behind its data, with the index of all. False: nothing is.
+  bool reads_on() {
+    std::string headers;
+    if (!have_.empty())
+      headers = "Range: bytes=" + std::to_string(data_bytes()) + "-\r\nIf-None-Match: " + etag_ + "\r\n";
+    const Response got = get(headers);
+    if (got.status == 304) return false;
+    EXPECT_EQ(got.status, have_.empty() ? 200 : 206);
+    have_.resize(have_.empty() ? 0 : data_bytes());
+    have_ += got.body;
+    etag_ = got.headers.at("etag");
+    std::ofstream(folder_ / "have.mcap", std::ios::binary) << have_;
+    EXPECT_EQ(info(folder_ / "have.mcap")["recovered"], false) << "it has an index";
+    return true;
+  }
+  std::size_t data_bytes() const {
+    std::uint64_t summary = 0;
+    std::memcpy(&summary, have_.data() + have_.size() - 8 - 20, sizeof summary);
+    return summary - 13;
+  }
+  void expect_all() {
+    const auto mine = recorded_frames(folder_ / "have.mcap");
+    const auto all = recorded_frames(file_);
+    EXPECT_EQ(mine.size(), all.size());
+    EXPECT_TRUE(mine == all);
+  }
+
+  const TempFolder folder_;
+  const std::filesystem::path file_ = folder_ / "growing.mcap";
+  Process publisher_{publish_face(20000)};
+  Process recorder_{on_loopback({"record", "face", "--out", file_})};
+  std::optional<Process> web_;
+  std::uint16_t port_ = 0;
+  std::string have_, etag_;
+};
+
+// Who watches the stream of it, as programs do that know nothing of files.
+TEST_F(GrowingFile, ItsStreamGoesOnWithWhatIsWritten) {
+  const std::size_t at_first = recorded_frames(file_).size();
+  WsClient client(port_, "face");
+  ASSERT_EQ(client.status(), 101);
+  ASSERT_TRUE(client.credit(8));
+  std::set<std::string> seen;  // their bytes, of which no two frames have the same
+  for (std::size_t came = 0; seen.size() < at_first + 120; ++came) {
+    ASSERT_LT(came, 20 * at_first + 2000) << "it repeats what it had at first";
+    const auto frame = client.next_of("frame");
+    ASSERT_TRUE(frame) << "after " << seen.size() << " frames of " << at_first;
+    constexpr std::size_t kPrefix = 48;
+    seen.insert(frame->data.substr(kPrefix));
+    ASSERT_TRUE(client.credit(1));
+  }
+}
+
+TEST_F(GrowingFile, PagesReadWhatIsNewAloneUntilItIsFinished) {
+  ASSERT_TRUE(eventually([&] { return stream()["recording"].is_string(); }));
+  EXPECT_EQ(stream()["recording"], "recordings/face.mcap");
+  ASSERT_TRUE(reads_on());
+  const std::string first = have_, first_etag = etag_;
+  for (int growths = 0; growths < 3; ++growths) {
+    const std::size_t before = data_bytes();
+    ASSERT_TRUE(eventually([&] { return stream()["growing_bytes"].get<std::uint64_t>() > before; }));
+    ASSERT_TRUE(reads_on());
+    EXPECT_GT(data_bytes(), before);
+  }
+  recorder_.signal(SIGINT);
+  ASSERT_EQ(recorder_.wait(), 0) << recorder_.err();
+  ASSERT_TRUE(eventually([&] { return stream()["growing_bytes"].is_null(); }));
+  reads_on();
+  expect_all();
+  EXPECT_FALSE(reads_on()) << "that was the last time";
+  EXPECT_EQ(get().body.size(), std::filesystem::file_size(file_)) << "the file itself";
+  const Response part = get("Range: bytes=1000-\r\nIf-Range: " + first_etag + "\r\n");
+  EXPECT_EQ(part.status, 206);
+  EXPECT_TRUE(part.body == first.substr(1000)) << "who began to read it as it was goes on so";
+}
+
+TEST_F(GrowingFile, OfAKilledRecorderAllThatIsWholeIsThereWithAnIndex) {
+  ASSERT_TRUE(eventually([&] { return stream()["recording"].is_string(); }));
+  ASSERT_TRUE(reads_on());
+  recorder_.signal(SIGKILL);
+  ASSERT_TRUE(recorder_.wait());
+  ASSERT_TRUE(eventually([&] { return stream()["growing_bytes"].is_null(); })) << "nothing came for 5 s";
+  reads_on();
+  expect_all();
+}
+
+}  // namespace
+}  // namespace relievo::test
