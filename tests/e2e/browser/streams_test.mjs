@@ -4,7 +4,7 @@
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, inState, isRim, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, freeMiddle, inState, isRim, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
 const browser = await launchChromium();
@@ -119,9 +119,15 @@ const checks = {
   },
 
   async 'lengths are measured on each, not between rigs that nobody has placed'(page) {
-    const clickOn = async (...place) => page.mouse.click(...(await placeOf(page, ...place)).at);
+    const clickOn = async (...place) => {
+      const { at } = await placeOf(page, ...place);
+      assert.equal(await page.evaluate(([x, y]) => document.elementFromPoint(x, y)?.id, at), 'view', `${place} at ${at}`);
+      await page.mouse.click(...at);
+    };
+    for (let i = 0; i < 11; ++i) await page.keyboard.press('-'); // the panel lies over what is at the right
     await page.keyboard.press('m');
     await page.click('#panel-measure .segments button:text-is("Distance")');
+    await still(page);
     for (const name of ['other', 'ball']) {
       const [a, b] = [(await placeOf(page, name, 0.15, 0.2)).point, (await placeOf(page, name, 0.5, 0.55)).point];
       const { length } = (await look(page)).measurements;
@@ -159,10 +165,10 @@ const checks = {
     await still(page);
     await page.keyboard.press('ArrowLeft');
     await still(page);
-    const { width, height } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
+    const middle = await freeMiddle(page);
     const now = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
-    near(now.x, width / 2, 3, 'the pivot, to the right');
-    near(now.y, height / 2, 3, 'the pivot, down');
+    near(now.x, middle.x, 3, 'the pivot, to the right');
+    near(now.y, middle.y, 3, 'the pivot, down');
     await page.keyboard.press('r');
     await still(page);
   },

@@ -20,11 +20,12 @@ export interface Drawing {
   ground: Ranges | null; // null: not drawn
   rights: number[]; // by surface, metres to the right of its camera's frame; NaN: not drawn
   background: string | null;
+  smooth: boolean; // rims, in modes that show a picture or relief
   timed: boolean; // how long the graphics take is told
 }
 
 /** Of a frame what is drawn. */
-export type Drawn = Pick<DecodedFrame, 'positions' | 'coordinates' | 'normals' | 'triangles' | 'edges' | 'quality' | 'colours' | 'texture'>;
+export type Drawn = Pick<DecodedFrame, 'positions' | 'coordinates' | 'normals' | 'triangles' | 'edges' | 'quality' | 'rims' | 'colours' | 'texture'>;
 
 export interface PainterEvents {
   /** For the next draw(): at first, and when that before was handed to the graphics. */

@@ -78,6 +78,7 @@ class Viewer {
         this.fileProblem = null;
         this.refresh();
       },
+      insets: (insets) => this.view?.navigator.setInsets(insets),
       retry: () => {
         this.session.source?.retryNow();
         this.server.retryNow();
@@ -180,6 +181,7 @@ class Viewer {
     if (this.view === null) return null;
     const body = this.panels.panel('measure', text.measure.title, (open) => {
       this.measure!.open = open;
+      this.view!.measuring = open;
       this.wish();
     });
     const described = (name: string): StreamInfo | null =>

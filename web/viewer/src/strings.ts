@@ -73,6 +73,7 @@ export const text = {
     background: 'Background',
     theme: 'Theme',
     grid: 'Grid and axes, metres',
+    smooth: 'Smooth rims',
     split: 'Beside the surface',
     fov: 'Field of view',
     fovOfRig: "as the rig's camera",

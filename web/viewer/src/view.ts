@@ -78,6 +78,8 @@ export class View {
   private stillTimer = 0;
   private range: Range | null = null;
   private grid = false;
+  private smooth = false;
+  private measuring_ = false;
   drawn = 0;
 
   /** Throws where there is no WebGL 2. `overlay` lies over `canvas`; `keys`: where those are listened to that move. */
@@ -112,8 +114,14 @@ export class View {
   set display(display: Display) {
     this.mode_ = display.mode;
     this.grid = display.grid;
+    this.smooth = display.smooth;
     if (this.navigator.way !== display.way) this.navigator.way = display.way;
     if (this.navigator.wantedFieldOfView !== display.fov) this.navigator.wantedFieldOfView = display.fov;
+    this.invalidate();
+  }
+  /** A person measures. */
+  set measuring(measuring: boolean) {
+    this.measuring_ = measuring;
     this.invalidate();
   }
   get mode(): Mode {
@@ -121,7 +129,8 @@ export class View {
   }
   get wants(): Wants {
     const { frame } = this.surface;
-    return wantsOf(this.mode_, frame !== null && hasPicture(frame));
+    const wants = wantsOf(this.mode_, frame !== null && hasPicture(frame));
+    return { ...wants, rims: wants.rims && this.drawsSmooth };
   }
   get shown(): DecodedFrame | null {
     return this.surface.frame;
@@ -326,6 +335,11 @@ export class View {
     return this.grid && this.surface.frame !== null && !this.isRigView;
   }
 
+  // Where numbers are read, and in the picture of the rig's camera, all is drawn that there is.
+  private get drawsSmooth(): boolean {
+    return this.smooth && !this.measuring_ && !this.isRigView;
+  }
+
   private get isRigView(): boolean {
     return this.navigator.isRigView && this.headset === null;
   }
@@ -361,6 +375,7 @@ export class View {
       ground: this.showsGround ? this.ground.ranges : null,
       rights,
       background: this.background_,
+      smooth: this.drawsSmooth,
       timed,
     };
   }
