@@ -87,6 +87,7 @@ class Viewer {
     this.shared = readShared(location.hash, loadDisplay());
     this.display = this.shared.display;
     this.view = this.makeView();
+    for (const [name, rigid] of this.shared.places) this.view?.place(name, rigid);
     document.documentElement.classList.toggle('software', this.view?.inSoftware === true);
     this.session = new Session({
       changed: () => this.refresh(),
@@ -206,7 +207,7 @@ class Viewer {
       placement: (placement) => {
         if (this.view !== null) this.view.placement = placement;
       },
-    });
+    }, this.view);
     this.streamsPanel.open = open;
     this.refresh();
   }
@@ -262,7 +263,9 @@ class Viewer {
     const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
     const playback = this.session.source?.playback;
     const moment = playback === undefined || playback.times.length === 0 ? null : momentOf(playback);
-    return shareLink(location.href, this.addressed, this.display, pose, moment);
+    const names = this.companions?.names ?? [];
+    const places = [...(this.view?.placedByHand ?? [])].filter(([name]) => names.includes(name));
+    return shareLink(location.href, this.addressed, this.display, pose, moment, new Map(places));
   }
 
   // What the decoder should bring along.

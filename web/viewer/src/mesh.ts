@@ -8,6 +8,7 @@ import { Materials } from './materials';
 import type { Range } from './palette';
 import type { Pinhole } from './protocol';
 import { confidenceColours } from './quality';
+import { kNowhere, type Rigid } from './rigid';
 import { vertexRims } from './rims';
 import { triangleEdges, vertexNormals } from './surface';
 
@@ -45,7 +46,7 @@ const indices = (): Growing =>
   }, 1);
 
 export class SurfaceMesh {
-  /** In the camera's frame (x right, y down, z forward), turned into three's (y up, z towards the viewer). */
+  /** In a camera's frame (x right, y down, z forward), turned into three's (y up, z towards the viewer). */
   readonly object = new THREE.Group();
   private readonly position = floats(3);
   private readonly uv = floats(2);
@@ -81,7 +82,8 @@ export class SurfaceMesh {
     this.mesh = new THREE.Mesh(this.solid, this.materials.textured);
     this.wires = new THREE.LineSegments(this.lines, this.materials.wire);
     this.points = new THREE.Points(this.cloud, this.materials.points);
-    this.object.rotation.x = Math.PI;
+    this.object.matrixAutoUpdate = false;
+    this.place(kNowhere);
     for (const part of [this.mesh, this.wires, this.points]) {
       part.frustumCulled = false; // bounds of a surface that changes all the time cost more than they save
       this.object.add(part);
@@ -93,6 +95,13 @@ export class SurfaceMesh {
     this.texture.minFilter = this.texture.magFilter = THREE.LinearFilter;
     this.attach();
     this.apply();
+  }
+
+  /** Its camera's frame in the scene's. */
+  place({ rotation: r, translation: [x, y, z] }: Rigid): void {
+    const [a, b, c] = [r.slice(0, 3), r.slice(3, 6), r.slice(6, 9)] as [number[], number[], number[]];
+    this.object.matrix.set(a[0]!, a[1]!, a[2]!, x, -b[0]!, -b[1]!, -b[2]!, -y, -c[0]!, -c[1]!, -c[2]!, -z, 0, 0, 0, 1);
+    this.object.matrixWorldNeedsUpdate = true;
   }
 
   /** Drawn pixels to one of the page's. */

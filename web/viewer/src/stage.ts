@@ -98,7 +98,7 @@ export class Stage {
     this.renderer.forceContextLoss(); // else the browser keeps it until it collects
   }
 
-  private prepare({ width, height, ratio, world, projection, mode, lens, range, ground, rights, background, smooth }: Drawing): void {
+  private prepare({ width, height, ratio, world, projection, mode, lens, range, ground, poses, background, smooth }: Drawing): void {
     const size = [width, height, ratio].join();
     if (size !== this.size && !this.renderer.xr.isPresenting) {
       this.size = size;
@@ -115,9 +115,9 @@ export class Stage {
     this.camera.projectionMatrixInverse.copy(this.camera.projectionMatrix).invert();
     this.ground.show(ground);
     for (const [surface, mesh] of this.meshes) {
-      const right = rights[surface] ?? NaN;
-      mesh.object.visible = !Number.isNaN(right);
-      if (mesh.object.visible) mesh.object.position.x = right;
+      const pose = poses[surface] ?? null;
+      mesh.object.visible = pose !== null;
+      if (pose !== null) mesh.place(pose);
       mesh.mode = mode;
       mesh.smooth = smooth;
       mesh.setPixelRatio(ratio);

@@ -231,7 +231,17 @@ export const text = {
     picture: (name: string) => `A picture of ${name}`,
     placement: 'Placed',
     placements,
-    unknownPlaces: 'A calibration does not say where one rig stands to another. In one frame is right where all have the same camera.',
+    unknownPlaces:
+      'A calibration does not say where one rig stands to another. In one frame is right where all have the same camera; else place a stream by what both see.',
+    place: 'Place…',
+    placeTitle: (name: string) => `Show where ${name} stands: by three places or more that it and the first both have`,
+    showPlace: (stream: string, pairs: number) => `Click a place of ${stream}${pairs === 0 ? '' : `, the ${pairs + 1}. one`}.`,
+    showSame: (stream: string) => `Click the same place of ${stream}.`,
+    wrongStream: (stream: string) => `That is no place of ${stream}.`,
+    left: (pairs: number, rms: number) => `${pairs} places fit within ${(rms * 1000).toFixed(1)} mm (RMS).`,
+    notDetermined: 'The places lie too near to one line.',
+    apply: 'Put it there',
+    cancel: 'Cancel',
   },
   record: {
     start: 'Record: on the server where it has a folder for it, else here (X)',
