@@ -33,6 +33,7 @@ export class DisplayPanel {
       max: String(kFov.most),
       oninput: () => change({ fov: Number(fov.value) < kFov.least ? 0 : Number(fov.value) }),
     });
+    fov.setAttribute('aria-label', say.fov); // a label is of the first it holds, the output
     const fovRow = make('label', { className: 'row' }, make('span', {}, say.fov, fovValue), fov);
     body.append(background.row, theme.row, fovRow, grid.row, smooth.row, split.row);
     this.set = (display) => {

@@ -165,7 +165,6 @@ export class MeasurePanel {
           this.measurements.splice(i, 1);
           this.refresh();
         });
-        remove.setAttribute('aria-label', say.remove);
         return make('li', {}, make('span', { className: 'quiet' }, say.tools[m.tool]), make('b', {}, valueText(m)), remove);
       }),
     );
