@@ -103,6 +103,9 @@ export async function still(page) {
   });
 }
 
+/** The page's parts may grow by a line before the view follows: its middle is off by no more than this. */
+export const kJitter_px = 13;
+
 /** The middle of what header, tools and time line leave free of the page: around it a view turns. */
 export const freeMiddle = (page) =>
   page.evaluate(() => {

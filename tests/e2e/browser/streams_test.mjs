@@ -5,7 +5,7 @@
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, freeMiddle, inState, isRim, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, freeMiddle, inState, isRim, kJitter_px, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
 const browser = await launchChromium();
@@ -169,8 +169,8 @@ const checks = {
     await still(page);
     const middle = await freeMiddle(page);
     const now = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
-    near(now.x, middle.x, 3, 'the pivot, to the right');
-    near(now.y, middle.y, 3, 'the pivot, down');
+    near(now.x, middle.x, kJitter_px, 'the pivot, to the right');
+    near(now.y, middle.y, kJitter_px, 'the pivot, down');
     await page.keyboard.press('r');
     await still(page);
   },

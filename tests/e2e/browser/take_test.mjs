@@ -24,7 +24,7 @@ const checks = {
     await shownPast(page, 4);
     await page.keyboard.press('i');
     await page.waitForFunction(() => window.relievo.diagnostics().stages !== null);
-    await page.waitForFunction(() => /ms/.test(document.querySelector('#panel-statistics .stage-4 + dd').textContent));
+    await page.waitForFunction(() => /ms/.test(document.querySelector('#panel-statistics .stage-4 + dd')?.textContent ?? '')); // loaded when it is opened
     const { parts, stages, latencyMs } = await look(page);
     assert.ok(parts.geometry > 1000 && parts.texture > 1000 && parts.header === 80, JSON.stringify(parts));
     const total = Object.values(stages).reduce((sum, ms) => sum + ms, 0);

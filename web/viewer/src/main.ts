@@ -7,6 +7,7 @@ import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
 import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
+import { addImmersive, addStatistics, addTake } from './laterParts';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
 import { MeasurePanel } from './measurePanel';
@@ -22,10 +23,8 @@ import { address, momentOf, readShared, shareLink, type Shared, type Shown } fro
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
-import type { StatisticsPanel } from './statisticsPanel';
 import { ServerList } from './streamList';
 import type { StreamsPanel } from './streamsPanel';
-import type { TakePanel } from './takePanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
 import { View } from './view';
@@ -106,13 +105,29 @@ class Viewer {
     this.qualityControl = new QualityControl(displayBody, (quality) => this.chooseQuality(quality));
     if (this.quality !== null) this.companions?.want(this.quality);
     this.measure = this.makeMeasure();
-    this.makeStatistics();
-    this.makeTake();
+    addStatistics(this.panels, {
+      meter: this.session.meter,
+      status: () => this.session.status,
+      kept: () => this.session.source?.kept ?? null,
+      quality: () => (this.offered === null ? null : whyText(this.offered)),
+    });
+    if (this.view !== null) {
+      addTake(this.panels, {
+        view: this.view,
+        name: () => this.stream ?? this.file,
+        link: () => this.link(),
+        playback: () => this.session.source?.playback ?? null,
+        info: () => this.session.info,
+      });
+      void addImmersive(this.view, (why) => {
+        this.note = why;
+        this.refresh();
+      });
+    }
     this.panels.action('reset', () => this.view?.navigator.reset());
     if (document.fullscreenEnabled) this.panels.action('fullscreen', toggleFullscreen);
     fillHelp(this.panels.panel('help', text.help.title));
     listenToCommands(this, this.ui.canvas);
-    void this.makeImmersive();
     this.change({});
     this.openAddressed(new URLSearchParams(location.search));
     window.setInterval(() => this.refresh(), kRefreshMs);
@@ -210,51 +225,6 @@ class Viewer {
     }, this.view);
     this.streamsPanel.open = open;
     this.refresh();
-  }
-
-  // Browsers have WebXR in secure contexts alone.
-  private async makeImmersive(): Promise<void> {
-    const { view } = this;
-    const { xr } = navigator;
-    if (view === null || xr === undefined) return;
-    const { Immersive } = await import('./immersive');
-    new Immersive(xr, view, (why) => {
-      this.note = why;
-      this.refresh();
-    });
-  }
-
-  private makeStatistics(): void {
-    let panel: StatisticsPanel | null = null;
-    let isOpen = false;
-    const body = this.panels.panel('statistics', text.statistics.title, async (open) => {
-      isOpen = open;
-      const { StatisticsPanel } = await import('./statisticsPanel');
-      panel ??= new StatisticsPanel(
-        body,
-        this.session.meter,
-        () => this.session.status,
-        () => this.session.source?.kept ?? null,
-        () => (this.offered === null ? null : whyText(this.offered)),
-      );
-      panel.open = isOpen; // by now
-    });
-  }
-
-  private makeTake(): void {
-    if (this.view === null) return;
-    const { view } = this;
-    let panel: TakePanel | null = null;
-    const body = this.panels.panel('take', text.take.title, async () => {
-      const { TakePanel } = await import('./takePanel');
-      panel ??= new TakePanel(body, {
-        view,
-        name: () => this.stream ?? this.file,
-        link: () => this.link(),
-        playback: () => this.session.source?.playback ?? null,
-        info: () => this.session.info,
-      });
-    });
   }
 
   /** To what is seen now. */
