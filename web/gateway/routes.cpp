@@ -316,6 +316,7 @@ void share_with_origin(const HttpRequest& request, const RouteContext& context, 
   if (request.origin.empty() || !listed_origin(request.origin, context)) return;
   reply.headers.emplace_back("Access-Control-Allow-Origin", std::string(request.origin));
   reply.headers.emplace_back("Access-Control-Allow-Credentials", "true");
+  reply.headers.emplace_back("Access-Control-Expose-Headers", "Content-Range, ETag");  // of recordings
   reply.headers.emplace_back("Cross-Origin-Resource-Policy", "cross-origin");
 }
 
@@ -323,7 +324,8 @@ HttpReply preflight() {
   HttpReply reply;
   reply.status = 204;
   reply.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD, POST");
-  reply.headers.emplace_back("Access-Control-Allow-Headers", "Authorization, Content-Type, Range");
+  reply.headers.emplace_back("Access-Control-Allow-Headers",
+                             "Authorization, Content-Type, If-None-Match, If-Range, Range");
   reply.headers.emplace_back("Access-Control-Max-Age", "600");
   return reply;
 }

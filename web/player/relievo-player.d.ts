@@ -16,6 +16,8 @@ export interface FrameDetail {
 export interface RelievoPlayerEventMap extends HTMLElementEventMap {
   /** `state` has changed. */
   statechange: CustomEvent<{ state: PlayerState; message: string }>;
+  /** `duration` has changed: it grows while the recording is being written, or a stream is kept. */
+  durationchange: Event;
   /** A frame was drawn. */
   frame: CustomEvent<FrameDetail>;
 }
@@ -35,15 +37,15 @@ export interface RelievoPlayerElement extends HTMLElement {
   controls: boolean;
   /** Whether floor and axes are shown, in metres. */
   grid: boolean;
-  /** Whether a recording begins again at its end. */
+  /** Whether a recording begins again at its end. One that is still being written goes on there with what comes. */
   loop: boolean;
   readonly state: PlayerState;
-  /** For a person; empty while all is well. */
+  /** For a person; empty while all is well. Also why a surface is shown without its texture. */
   readonly message: string;
   readonly paused: boolean;
   /** Seconds: of a recording from its start, of a live stream from the oldest frame kept. Setting it seeks. */
   currentTime: number;
-  /** Seconds; of a live stream, of what is kept. 0 before the first frame. */
+  /** Seconds; of a live stream, of what is kept; of a recording that a gateway is still writing it grows. 0 before the first frame. */
   readonly duration: number;
   /** 0.1 to 8. */
   playbackRate: number;

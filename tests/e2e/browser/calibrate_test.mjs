@@ -250,8 +250,8 @@ const checks = {
     }
   },
 
-  async 'a ChArUco board is chosen by name, and its views are taken'() {
-    await withRig(['--source', `sim:object,${kScene.replace('320,height=240', '640,height=480')},rate=10`], async (server) => {
+  async 'a rig is calibrated with a ChArUco board, which is chosen by name'() {
+    await withRig(['--source', `sim:object,${kScene.replace('320,height=240', '640,height=480')},rate=10`], async (server, folder, rig) => {
       const page = await open(server.address);
       await page.waitForSelector('#calibration:not([hidden])');
       await page.selectOption('#calibration select', 'geometry');
@@ -269,8 +269,18 @@ const checks = {
       await page.waitForSelector('#calibration-views li');
       assert.match(await page.textContent('#calibration-views [data-used=true]'), /24 corners/);
       await shot(page, 'charuco');
-      await press(page, 'cancel');
+      await page.check('#calibration input[type=checkbox]');
+      for (let n = 2; n <= 8; ++n) {
+        await page.waitForFunction((least) => document.querySelectorAll('#calibration-views [data-used=true]').length >= least, n);
+      }
+      await press(page, 'calculate');
+      await reaches(page, 'solved');
+      assert.ok(parseFloat(await page.textContent('#calibration-result [data-figure=stereo]')) < 0.3);
+      assert.ok(Math.abs(parseFloat(await page.textContent('#calibration-result [data-figure=baseline]')) - 200) < 4);
+      await shot(page, 'charuco-result');
+      await press(page, 'keep');
       await reaches(page, 'off');
+      assert.match(readFileSync(rig, 'utf8'), /stereo_rms_px/);
       await goesOn(server);
       await page.context().close();
     });

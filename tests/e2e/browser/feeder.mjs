@@ -103,6 +103,17 @@ export async function still(page) {
   });
 }
 
+/** The page's parts may grow by a line before the view follows: its middle is off by no more than this. */
+export const kJitter_px = 13;
+
+/** The middle of what header, tools and time line leave free of the page: around it a view turns. */
+export const freeMiddle = (page) =>
+  page.evaluate(() => {
+    const box = (of) => document.querySelector(of).getBoundingClientRect();
+    const cursor = box('#cursor').height; // comes and goes with the mouse
+    return { x: box('#rail').left / 2, y: (box('header').bottom + box('footer').top + (cursor > 0 ? cursor + 7 : 0)) / 2 };
+  });
+
 /** Runs named checks one after the other; the number of those that failed. */
 export async function runChecks(checks, page) {
   let failed = 0;

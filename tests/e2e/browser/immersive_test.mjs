@@ -31,7 +31,7 @@ async function openWithHeadset() {
     const request = xr.requestSession.bind(xr);
     xr.requestSession = async (...of) => (window.session = await request(...of));
   }, kStart);
-  await page.goto(`http://127.0.0.1:${feeder.port}/`);
+  await page.goto(`http://127.0.0.1:${feeder.port}/#smooth=0`); // corners are looked at: nothing of the surface is left out
   return page;
 }
 

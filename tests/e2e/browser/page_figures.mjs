@@ -23,6 +23,7 @@ const kSlowMs = 100; // a frame
 const kBehindMs = 300;
 const kSayS = 30; // between figures of memory
 const kKeptS = 65; // what is kept to go back to has its full length then
+const kWorkers = ['decoder', 'stage'];
 const kGrowthMB = 2; // a minute, of what is in use after a collection
 
 const browser = await launchChromium(['--js-flags=--expose-gc', '--enable-precise-memory-info']);
@@ -138,12 +139,44 @@ async function slowPage() {
   await page.context().close();
 }
 
-/** What page and decoder hold after a collection, and the page's process; the start is when all that is kept is full. */
+/** Asks each worker of the page's session, as the protocol knows them: they are targets of their own. */
+async function workersOf(session) {
+  const found = new Map(); // session id -> the worker's file
+  const waiting = new Map();
+  let last = 0;
+  session.on('Target.attachedToTarget', ({ sessionId, targetInfo }) => found.set(sessionId, /([a-z]+)[^/]*$/i.exec(targetInfo.url)?.[1] ?? targetInfo.url));
+  session.on('Target.detachedFromTarget', ({ sessionId }) => found.delete(sessionId));
+  session.on('Target.receivedMessageFromTarget', ({ message }) => {
+    const { id, result } = JSON.parse(message);
+    waiting.get(id)?.(result);
+    waiting.delete(id);
+  });
+  await session.send('Target.setAutoAttach', { autoAttach: true, waitForDebuggerOnStart: false, flatten: false });
+  const ask = (sessionId, method) =>
+    new Promise((resolve) => {
+      const id = ++last;
+      waiting.set(id, resolve);
+      session.send('Target.sendMessageToTarget', { sessionId, message: JSON.stringify({ id, method }) });
+    });
+  return async () => {
+    const heaps = {};
+    for (const [sessionId, name] of found) {
+      await ask(sessionId, 'HeapProfiler.enable');
+      await ask(sessionId, 'HeapProfiler.collectGarbage');
+      const { usedSize, backingStorageSize = 0 } = await ask(sessionId, 'Runtime.getHeapUsage');
+      heaps[name] = { heap: usedSize / 1e6, buffers: backingStorageSize / 1e6 };
+    }
+    return heaps;
+  };
+}
+
+/** What page and workers hold after a collection, and the page's process; the start is when all that is kept is full. */
 async function memory() {
   const page = await open();
   await shownPast(page, 1);
   const session = await page.context().newCDPSession(page);
   const whole = await browser.newBrowserCDPSession();
+  const workers = await workersOf(session);
   await session.send('HeapProfiler.enable');
   const usage = async () => {
     await session.send('HeapProfiler.collectGarbage');
@@ -153,9 +186,10 @@ async function memory() {
       .filter(({ type }) => type === 'renderer')
       .map(({ id }) => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${id}/status`, 'utf8'))?.[1] ?? 0) / 1000);
     const { keptBytes } = await report(page);
-    return { kept: keptBytes / 1e6, heap: heap.usedSize / 1e6, buffers: (heap.backingStorageSize ?? 0) / 1e6, resident: Math.max(...resident) };
+    return { workers: await workers(), kept: keptBytes / 1e6, heap: heap.usedSize / 1e6, buffers: (heap.backingStorageSize ?? 0) / 1e6, resident: Math.max(...resident) };
   };
-  const line = (u) => `heap ${u.heap.toFixed(2)} MB, its buffers ${u.buffers.toFixed(1)} MB, ${u.kept.toFixed(1)} of it kept to go back to, process ${u.resident.toFixed(0)} MB`;
+  const both = ({ heap, buffers }) => `${heap.toFixed(2)} MB and ${buffers.toFixed(1)} MB`;
+  const line = (u) => `heap ${u.heap.toFixed(2)} MB, its buffers ${u.buffers.toFixed(1)} MB, ${u.kept.toFixed(1)} of it kept to go back to, process ${u.resident.toFixed(0)} MB; ${Object.entries(u.workers).map(([name, w]) => `${name} ${both(w)}`).join(', ')}`;
   // Until what is kept has its length, its buffers grow as they should; the objects that hold them are few.
   const warm = minutes >= 3 ? kKeptS : 10;
   await page.waitForTimeout(warm * 1000);
@@ -173,6 +207,12 @@ async function memory() {
   const growth = (end.heap - start.heap) / minutes;
   console.log(`  the heap grows by ${growth.toFixed(2)} MB a minute`);
   expect(growth < kGrowthMB, `the heap grows by ${growth} MB a minute`);
+  expect(kWorkers.every((name) => name in end.workers), `workers: ${Object.keys(end.workers)}`);
+  for (const [name, { heap }] of Object.entries(end.workers)) {
+    const grown = (heap - (start.workers[name]?.heap ?? 0)) / minutes;
+    console.log(`  that of the worker ${name} by ${grown.toFixed(2)} MB a minute`);
+    expect(grown < kGrowthMB, `the heap of the worker ${name} grows by ${grown} MB a minute`);
+  }
   await page.context().close();
 }
 

@@ -21,7 +21,7 @@ const site = join(scratch, 'site'); // what the other site serves
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
 const kWorkers = 2; // of a player: one decodes, one draws
 const kPolicy =
-  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self'; connect-src 'self' ws://127.0.0.1:*";
+  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self'; connect-src 'self' http://127.0.0.1:* ws://127.0.0.1:*";
 
 /** When a recording's frames were recorded, in nanoseconds. */
 function frameTimes(file) {
@@ -66,6 +66,9 @@ execFileSync('cp', ['-r', join(scratch, 'package'), join(site, 'relievo-player')
 const web = await serveSite();
 const origin = `http://127.0.0.1:${web.address().port}`;
 const rig = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--allow-origin', origin]);
+const folder = join(scratch, 'folder');
+mkdirSync(folder);
+const keeper = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--stream', 'kept', '--record-dir', folder, '--allow-origin', origin]);
 writeFileSync(join(site, 'page.html'), '<!doctype html><title>Another site</title><script type="module" src="relievo-player/dist/relievo-player.js"></script><relievo-player controls></relievo-player>');
 recordObject(serverPath, join(site, 'take.mcap'), { rate: 6, frames: 13, options: ['--stream', 'take', '--key-interval', '5'] });
 const browser = await launchChromium();
@@ -178,6 +181,36 @@ void blob;
     assert.equal(await player(page, (p) => p.paused), false);
   },
 
+  async 'a recording of a gateway of another origin that is still writing it'(page) {
+    const order = (action) =>
+      fetch(`${keeper.address}/api/recording/kept`, { method: 'POST', body: JSON.stringify({ action }), headers: { 'content-type': 'application/json' } });
+    const listed = async () => (await (await fetch(`${keeper.address}/api/recordings`)).json()).recordings[0];
+    await eventually('the stream does not begin', async () => (await order('start')).ok);
+    await eventually('the recording is not listed', async () => (await listed()) !== undefined);
+    const { file } = await listed();
+    await page.evaluate((src) => {
+      const element = document.querySelector('relievo-player');
+      element.loop = true; // that waits until it is whole
+      element.src = src;
+      window.durations_ = [];
+      element.addEventListener('durationchange', () => window.durations_.push(element.duration));
+    }, `${keeper.address}/recordings/${file}`);
+    await when(page, (p) => p.state === 'file' && p.duration > 0);
+    await page.evaluate(() => (document.querySelector('relievo-player').currentTime = 1e9));
+    await page.evaluate(() => (window.first_ = document.querySelector('relievo-player').duration));
+    await when(page, (p) => p.currentTime > window.first_ + 2 && !p.paused);
+    await page.evaluate(() => (document.querySelector('relievo-player').loop = false));
+    assert.ok((await order('stop')).ok);
+    await when(page, (p) => p.paused);
+    const times = frameTimes(join(folder, file));
+    const { duration, currentTime } = await player(page, (p) => ({ duration: p.duration, currentTime: p.currentTime }));
+    assert.ok(Math.abs(duration - Number(times.at(-1) - times[0]) * 1e-9) < 1e-3, `${duration} s of ${times.length} frames`);
+    assert.ok(Math.abs(currentTime - duration) < 1e-3);
+    const said = await page.evaluate(() => window.durations_);
+    assert.equal(said.at(-1), duration);
+    assert.ok(said.length > 2);
+  },
+
   async 'what cannot be shown says why'(page) {
     await page.evaluate(() => (document.querySelector('relievo-player').src = 'http://127.0.0.1:9/'));
     await when(page, (p) => p.state === 'failed' && /names no stream/.test(p.message));
@@ -240,6 +273,7 @@ try {
 } finally {
   await browser.close();
   await rig.kill();
+  await keeper.kill();
   web.close();
   rmSync(scratch, { recursive: true, force: true });
 }

@@ -4,7 +4,7 @@
 // Run as: node see_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
-import { depthOf, Feeder, inState, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { depthOf, Feeder, freeMiddle, inState, kJitter_px, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
 import { loadsOf } from './web.mjs';
 
 const kPage = { width: 800, height: 500 };
@@ -142,11 +142,16 @@ const checks = {
     assert.equal(await page.evaluate(({ x, y }) => document.elementFromPoint(x, y).id, at), 'view');
     await page.mouse.dblclick(at.x, at.y);
     await still(page);
+    const middle = await freeMiddle(page);
+    let first = null;
     for (const key of [null, 'ArrowLeft', 'ArrowUp']) {
       if (key !== null) await press(page, key);
       const now = await toPage(page, pivot);
-      near(now.x, kPage.width / 2, 2, 'pivot x');
-      near(now.y, kPage.height / 2, 2, 'pivot y');
+      near(now.x, middle.x, kJitter_px, 'pivot x');
+      near(now.y, middle.y, kJitter_px, 'pivot y');
+      first ??= now;
+      near(now.x, first.x, 2, 'pivot x, turned');
+      near(now.y, first.y, 2, 'pivot y, turned');
     }
   },
 

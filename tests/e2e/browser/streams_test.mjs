@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: the list shows each stream with its picture, and a second stream stands beside the first
-// where the page says it does, is picked, measured and gone back in like the first, by a button and by the address, until it is taken away or another one is chosen.
+// where the page says it does, is picked, measured and gone back in like the first, by a button and by the address, until it is taken away or another one is chosen;
+// or stands where a person has placed it by what both see, also turned.
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, inState, isRim, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, freeMiddle, inState, isRim, kJitter_px, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
 const browser = await launchChromium();
@@ -20,6 +21,7 @@ async function placeOf(page, name, u, v) {
   const { x, y } = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
   return { point, right, at: [x, y] };
 }
+const moved = ({ rotation: r, translation: t }, p) => [0, 1, 2].map((i) => r[3 * i] * p[0] + r[3 * i + 1] * p[1] + r[3 * i + 2] * p[2] + t[i]);
 const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
 
 const besides = (page, count) =>
@@ -119,9 +121,15 @@ const checks = {
   },
 
   async 'lengths are measured on each, not between rigs that nobody has placed'(page) {
-    const clickOn = async (...place) => page.mouse.click(...(await placeOf(page, ...place)).at);
+    const clickOn = async (...place) => {
+      const { at } = await placeOf(page, ...place);
+      assert.equal(await page.evaluate(([x, y]) => document.elementFromPoint(x, y)?.id, at), 'view', `${place} at ${at}`);
+      await page.mouse.click(...at);
+    };
+    for (let i = 0; i < 11; ++i) await page.keyboard.press('-'); // the panel lies over what is at the right
     await page.keyboard.press('m');
     await page.click('#panel-measure .segments button:text-is("Distance")');
+    await still(page);
     for (const name of ['other', 'ball']) {
       const [a, b] = [(await placeOf(page, name, 0.15, 0.2)).point, (await placeOf(page, name, 0.5, 0.55)).point];
       const { length } = (await look(page)).measurements;
@@ -159,10 +167,10 @@ const checks = {
     await still(page);
     await page.keyboard.press('ArrowLeft');
     await still(page);
-    const { width, height } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
+    const middle = await freeMiddle(page);
     const now = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
-    near(now.x, width / 2, 3, 'the pivot, to the right');
-    near(now.y, height / 2, 3, 'the pivot, down');
+    near(now.x, middle.x, kJitter_px, 'the pivot, to the right');
+    near(now.y, middle.y, kJitter_px, 'the pivot, down');
     await page.keyboard.press('r');
     await still(page);
   },
@@ -217,6 +225,73 @@ const checks = {
     await page.waitForFunction(() => window.relievo.diagnostics().stream === 'other');
     assert.deepEqual((await look(page)).besides, []);
     await inState(page, 'live');
+    await page.close();
+  },
+
+  async 'a stream is placed by what both see, and a link keeps it'() {
+    const page = await open('/?stream=ball,other', { viewport: { width: 1200, height: 750 } });
+    await besides(page, 1);
+    feeder.say(`apart ${kApart}`);
+    feeder.say(`frame ${kFrame}`);
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame === n, kFrame + kApart);
+    await page.keyboard.press('n');
+    await page.click(`${rowOf('other')} button:text-is("Place…")`);
+    await page.focus('#view');
+    for (let i = 0; i < 11; ++i) await page.keyboard.press('-'); // the panel lies over what is at the right
+    await still(page);
+    const say = '#panel-streams .aligning';
+    const asked = (what) => page.waitForFunction(([of, words]) => new RegExp(words).test(document.querySelector(of).textContent), [say, what]);
+    const clickOn = async (...place) => page.mouse.click(...(await placeOf(page, ...place)).at);
+    await asked('Click a place of ball');
+    await clickOn('other', 0.1, 0.1);
+    await asked('That is no place of ball');
+    const places = [[0.08, 0.1], [0.92, 0.12], [0.1, 0.9], [0.9, 0.88]];
+    const pairs = [];
+    for (const [i, [u, v]] of places.entries()) {
+      pairs.push([(await placeOf(page, 'other', u, v)).point, (await placeOf(page, 'ball', u, v)).point]);
+      assert.equal(await page.isDisabled('#panel-streams button:text-is("Put it there")'), i < 3);
+      await clickOn('ball', u, v);
+      await asked('Click the same place of other');
+      await clickOn('other', u, v);
+      await asked(i < 2 ? 'Click a place of ball' : `${i + 1} places fit within`);
+    }
+    const rms = Number(/within ([\d.]+) mm/.exec(await page.textContent(say))[1]) / 1000;
+    await page.click('#panel-streams button:text-is("Put it there")');
+    await page.waitForFunction((of) => document.querySelector(of).hidden, say);
+    const { pose } = (await look(page)).besides[0];
+    const off = pairs.map(([from, to]) => Math.hypot(...moved(pose, from).map((c, axis) => c - to[axis])));
+    near(Math.sqrt(off.reduce((sum, d) => sum + d * d, 0) / off.length), rms, 0.002, 'what is left, of the true places');
+    assert.ok(rms < 0.02, `${rms} m`);
+    const link = await page.evaluate(() => window.relievo.link());
+    await page.close();
+
+    const again = await open(link.slice(link.indexOf('/', 8)), { viewport: { width: 1200, height: 750 } });
+    await besides(again, 1);
+    const kept = (await look(again)).besides[0].pose;
+    for (const i of kept.rotation.keys()) near(kept.rotation[i], pose.rotation[i], 1e-4, 'its rotation');
+    for (const i of [0, 1, 2]) near(kept.translation[i], pose.translation[i], 1e-4, 'its place');
+    await again.close();
+  },
+
+  async 'what is turned is drawn and read where it stands'() {
+    const [angle, to] = [-0.6, [1.4, 0.05, 0.1]];
+    const page = await open(`/?stream=ball,other#smooth=0&place=other_0_${angle}_0_${to.join('_')}`, { viewport: { width: 1200, height: 750 } });
+    await besides(page, 1);
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame === n, kFrame + kApart);
+    await still(page);
+    const pose = { rotation: [Math.cos(angle), 0, Math.sin(angle), 0, 1, 0, -Math.sin(angle), 0, Math.cos(angle)], translation: to };
+    for (const [u, v] of [[0.15, 0.2], [0.5, 0.5], [0.85, 0.8]]) {
+      const point = pointOf(u, v, kFrame + kApart);
+      const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, point));
+      const picked = await page.evaluate(({ x, y }) => window.relievo.pick(x, y), at);
+      assert.equal(picked?.stream, 'other', `${u}, ${v} at ${at.x}, ${at.y}`);
+      for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} at ${u}, ${v}`);
+    }
+    const [u, v] = [30 / kPicture.width, 30 / kPicture.height];
+    const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, pointOf(u, v, kFrame + kApart)));
+    const [r, g, b] = await page.evaluate(({ x, y }) => window.relievo.pixelAt(x, y), at);
+    assert.ok(r > 150 && g < 90 && b < 90, `no red at its corner: ${[r, g, b]}`);
     await page.close();
   },
 

@@ -4,9 +4,10 @@ import { kDefaultDisplay, kModes, kThemes, type Mode, type Theme } from '../../v
 import { make } from '../../viewer/src/dom';
 import { listenToKeys } from '../../viewer/src/keys';
 import { LiveSource } from '../../viewer/src/liveSource';
-import { openRemote } from '../../viewer/src/openFile';
+import { openRemote, type OpenedRecording } from '../../viewer/src/openFile';
 import { Session } from '../../viewer/src/session';
 import { present } from '../../viewer/src/state';
+import { ServerList } from '../../viewer/src/streamList';
 import { text } from '../../viewer/src/strings';
 import themeCss from '../../viewer/src/theme.css?inline';
 import timelineCss from '../../viewer/src/timeline.css?inline';
@@ -40,6 +41,13 @@ interface Parts {
   timer: number;
 }
 
+/** A recording that a gateway is still writing. */
+interface Written {
+  readonly file: string;
+  readonly recording: OpenedRecording;
+  readonly server: ServerList;
+}
+
 /** A page's colours, as an element's own: dark unless its theme says otherwise. */
 const ofHost = (css: string): string =>
   css
@@ -55,6 +63,9 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   private parts: Parts | null = null;
   private failure: string | null = null; // why src cannot be shown
   private stream: string | null = null;
+  private written: Written | null = null;
+  private notice = ''; // on the frame shown
+  private saidDuration = 0;
   private opening = 0; // counts what was opened, so that a late answer is known
   private state_: PlayerState = 'idle';
   private message_ = '';
@@ -232,6 +243,8 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     const opening = ++this.opening;
     this.failure = null;
     this.stream = null;
+    this.written = null;
+    this.notice = '';
     session.watch(null);
     view.restart(null, false);
     this.showTimeline();
@@ -242,6 +255,9 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
         const opened = await openRemote(url);
         if (opening !== this.opening) return; // something else is to be shown meanwhile
         session.watch(opened.source);
+        const file = decodeURIComponent(url.pathname.slice(url.pathname.lastIndexOf('/') + 1));
+        // A gateway's recordings are in a folder beside its list of streams.
+        if (opened.isGrowing()) this.written = { file, recording: opened, server: new ServerList(new URL('..', url).href) };
         this.applyLoop();
       } else {
         const stream = url.searchParams.get('stream') ?? '';
@@ -271,7 +287,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   private applyLoop(): void {
     const { playback } = this;
-    if (playback === null || playback.following !== null) return;
+    if (playback === null || playback.following !== null || this.written !== null) return;
     playback.setLoop(this.loop ? { from: 0, to: playback.times[playback.times.length - 1]! } : null);
   }
 
@@ -286,13 +302,31 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     const frame = session.take();
     if (frame === null) return;
     view.show(frame);
+    this.notice = frame.notice ?? '';
     view.invalidate();
     session.decoder.want = view.wants;
     const detail = { number: frame.number, vertices: frame.positions.length / 3, triangles: frame.triangles.length / 3 };
     this.dispatchEvent(new CustomEvent('frame', { detail }));
   }
 
+  /** What is written on grows here, too, until it is whole. */
+  private async follow(): Promise<void> {
+    const { written } = this;
+    if (written === null || !(await written.server.refresh()) || !written.server.arrived || written !== this.written) return;
+    const writing = written.server.streams.find(({ recorder }) => recorder?.file === written.file);
+    await this.parts?.session.source?.told?.(writing?.recorder ?? undefined);
+    if (written !== this.written || written.recording.isGrowing()) return;
+    this.written = null;
+    this.applyLoop();
+  }
+
   private refresh(): void {
+    void this.follow();
+    const { duration } = this;
+    if (duration !== this.saidDuration) {
+      this.saidDuration = duration;
+      this.dispatchEvent(new Event('durationchange'));
+    }
     const { state, message } = this.judge();
     this.messageLine.textContent = message;
     this.messageLine.hidden = message === '';
@@ -326,6 +360,6 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
       file: following === null ? playingNow : null,
       shifted: following === false ? playingNow : null,
     });
-    return { state: kStates[told.state], message: told.title === '' ? '' : `${told.title}. ${told.text}` };
+    return { state: kStates[told.state], message: told.title === '' ? this.notice : `${told.title}. ${told.text}` };
   }
 }

@@ -3,6 +3,7 @@
 import { kSplits, type Display } from './display';
 import { listenToKeys } from './keys';
 import type { Panels } from './panels';
+import { moved } from './rigid';
 import type { View } from './view';
 
 export interface Commanded {
@@ -28,8 +29,7 @@ export function listenToCommands(viewer: Commanded, canvas: HTMLElement): void {
   canvas.addEventListener('dblclick', (event) => {
     const hit = viewer.view?.pick({ x: event.offsetX, y: event.offsetY }) ?? null;
     if (hit === null) return;
-    const [x, y, z] = hit.point;
-    navigator?.setPivot([x + hit.right, y, z]);
+    navigator?.setPivot(moved(hit.pose, hit.point));
   });
 }
 

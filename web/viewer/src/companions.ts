@@ -28,11 +28,11 @@ export class Companions {
 
   /** For tests and bug reports. */
   report(): object[] {
-    const { places } = this.view;
     return [...this.shown].map(([name, { session, beside }]) => {
       const { shown, errors, frame } = session.meter.report();
       const { index = null, following = null } = session.source?.playback ?? {};
-      return { name, shown, errors, frame, right: places[name], extent: beside.extent, index, following };
+      const pose = this.view.poseOf(name);
+      return { name, shown, errors, frame, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following };
     });
   }
 

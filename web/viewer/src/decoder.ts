@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page's side of the decoding worker. A decoder that hangs is replaced.
+import type { Wants } from './display';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 
 const kPatienceMs = 10_000;
@@ -12,7 +13,7 @@ export interface DecoderEvents {
 }
 
 export class Decoder {
-  want = { normals: false, edges: false, quality: false };
+  want: Wants = { normals: false, edges: false, quality: false, rims: false };
   private worker: Worker;
   private nextId = 1;
   private spares: ArrayBuffer[] = []; // go with the next request
@@ -38,8 +39,8 @@ export class Decoder {
   /** Takes the memory of a frame that nobody looks at any more. */
   giveBack(frame: DecodedFrame): void {
     if (frame.kept === true) return;
-    const { positions, coordinates, normals, triangles, edges, quality } = frame;
-    const arrays = [positions, coordinates, normals, triangles, edges, quality?.sigmas, quality?.interpolated];
+    const { positions, coordinates, normals, triangles, edges, quality, rims } = frame;
+    const arrays = [positions, coordinates, normals, triangles, edges, rims, quality?.sigmas, quality?.interpolated];
     this.spares = [...new Set(arrays.flatMap((array) => (array == null || array.byteLength === 0 ? [] : [array.buffer])))];
   }
 

@@ -8,6 +8,7 @@ import { loadDraco } from './loadDraco';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
 import { kNoVideoHere, VideoTextures } from './videoTexture';
+import { vertexRims } from './rims';
 import { robustExtent, triangleEdges, vertexNormals } from './surface';
 
 const post = (reply: DecodeReply, transfer: Transferable[] = []): void => {
@@ -35,6 +36,7 @@ self.onmessage = (event: MessageEvent<DecodeRequest>) => {
       const arrays = [frame.positions, frame.coordinates, frame.normals, frame.triangles, frame.edges];
       const transfer: Transferable[] = arrays.flatMap((a) => (a === null ? [] : [a.buffer]));
       if (frame.quality !== null) transfer.push(frame.quality.sigmas.buffer, frame.quality.interpolated.buffer);
+      if (frame.rims != null) transfer.push(frame.rims.buffer);
       if (frame.texture !== null) transfer.push(frame.texture);
       post(frame, transfer);
     } catch (error) {
@@ -69,7 +71,7 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
   const picture = decodeTexture(frame); // the browser decodes it meanwhile, on a thread of its own
   picture.catch(() => undefined); // awaited below, unless the geometry fails first
   const geometry = decodeGeometry(draco, frame, request.want.quality);
-  const { positions } = geometry;
+  const { positions, coordinates } = geometry;
   const normals =
     geometry.normals ?? (request.want.normals ? vertexNormals(positions, geometry.triangles) : null);
   return {
@@ -77,11 +79,12 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     id: request.id,
     number: Number(frame.header.number),
     positions,
-    coordinates: geometry.coordinates,
+    coordinates,
     normals,
     triangles: geometry.triangles,
     edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
     quality: geometry.quality,
+    rims: request.want.rims && coordinates !== null ? vertexRims(coordinates, geometry.triangles, (n) => grids.spares.floats(n)) : null,
     texture: await picture,
     notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? kNoVideoHere : null,
     extent: robustExtent(positions),

@@ -24,12 +24,14 @@ export interface Wants {
   normals: boolean;
   edges: boolean;
   quality: boolean;
+  rims: boolean;
 }
 
 /** Of a mode; `textured`: the surface has a picture. */
 export function wantsOf(mode: Mode, textured: boolean): Wants {
   const unlit = (mode === 'textured' && textured) || mode === 'depth' || mode === 'wireframe' || mode === 'points';
-  return { normals: !unlit, edges: mode === 'wireframe', quality: mode === 'confidence' };
+  const rims = mode === 'textured' || mode === 'shaded';
+  return { normals: !unlit, edges: mode === 'wireframe', quality: mode === 'confidence', rims };
 }
 
 export const hasPicture = ({ texture, coordinates }: Pick<DecodedFrame, 'texture' | 'coordinates'>): boolean =>
@@ -41,6 +43,7 @@ export interface Display {
   background: Background;
   theme: Theme;
   grid: boolean;
+  smooth: boolean; // rims, where no numbers are read
   split: Split;
   fov: number; // degrees, upright, of orbit and fly; 0: the rig camera's
 }
@@ -51,6 +54,7 @@ export const kDefaultDisplay: Readonly<Display> = {
   background: 'theme',
   theme: 'auto',
   grid: true,
+  smooth: true,
   split: 'none',
   fov: 0,
 };
@@ -71,6 +75,7 @@ export function parseDisplay(text: string, fallback: Readonly<Display> = kDefaul
     background: one('background', kBackgrounds, fallback.background),
     theme: one('theme', kThemes, fallback.theme),
     grid: flag('grid', fallback.grid),
+    smooth: flag('smooth', fallback.smooth),
     split: given.get('split') === '1' ? 'picture' : one('split', kSplits, fallback.split), // 1: of older links
     fov: fov === 0 || (fov >= kFov.least && fov <= kFov.most) ? fov : fallback.fov,
   };

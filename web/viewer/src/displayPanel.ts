@@ -24,6 +24,7 @@ export class DisplayPanel {
     );
     const theme = chooser(say.theme, kThemes.map((t) => [t, text.themes[t]] as const), (value) => change({ theme: value }));
     const grid = toggle(say.grid, (on) => change({ grid: on }));
+    const smooth = toggle(say.smooth, (on) => change({ smooth: on }));
     const split = chooser(say.split, kSplits.map((s) => [s, text.splits[s]] as const), (value) => change({ split: value }));
     const fovValue = make('output', {});
     const fov = make('input', {
@@ -32,12 +33,14 @@ export class DisplayPanel {
       max: String(kFov.most),
       oninput: () => change({ fov: Number(fov.value) < kFov.least ? 0 : Number(fov.value) }),
     });
+    fov.setAttribute('aria-label', say.fov); // a label is of the first it holds, the output
     const fovRow = make('label', { className: 'row' }, make('span', {}, say.fov, fovValue), fov);
-    body.append(background.row, theme.row, fovRow, grid.row, split.row);
+    body.append(background.row, theme.row, fovRow, grid.row, smooth.row, split.row);
     this.set = (display) => {
       background.set(display.background);
       theme.set(display.theme);
       grid.set(display.grid);
+      smooth.set(display.smooth);
       split.set(display.split);
       fov.value = String(display.fov || kFov.least - 1);
       fovValue.textContent = display.fov === 0 ? say.fovOfRig : `${display.fov}°`;

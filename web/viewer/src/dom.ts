@@ -25,7 +25,9 @@ export function setText(target: HTMLElement, text: string): void {
 }
 
 export function button(text: string, title: string, onclick: () => void): HTMLButtonElement {
-  return make('button', { type: 'button', title, onclick }, text);
+  const made = make('button', { type: 'button', title, onclick }, text);
+  if (title !== '' && !/\p{L}|\d/u.test(text)) made.setAttribute('aria-label', title); // a sign says nothing to who hears it
+  return made;
 }
 
 /** A labelled <select>; `changed` gets the value chosen. */

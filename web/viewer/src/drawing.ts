@@ -6,6 +6,7 @@ import type { DecodedFrame } from './messages';
 import type { Range } from './palette';
 import type { Pixels } from './pixels';
 import type { Pinhole } from './protocol';
+import type { Rigid } from './rigid';
 
 /** All that a drawing depends on but the surfaces themselves. */
 export interface Drawing {
@@ -18,13 +19,14 @@ export interface Drawing {
   lens: Pinhole | null; // whose distortion bends what is drawn
   range: Range | null; // of the depth mode's colours
   ground: Ranges | null; // null: not drawn
-  rights: number[]; // by surface, metres to the right of its camera's frame; NaN: not drawn
+  poses: (Rigid | null)[]; // by surface, of its camera's frame in the scene; null: not drawn
   background: string | null;
+  smooth: boolean; // rims, in modes that show a picture or relief
   timed: boolean; // how long the graphics take is told
 }
 
 /** Of a frame what is drawn. */
-export type Drawn = Pick<DecodedFrame, 'positions' | 'coordinates' | 'normals' | 'triangles' | 'edges' | 'quality' | 'colours' | 'texture'>;
+export type Drawn = Pick<DecodedFrame, 'positions' | 'coordinates' | 'normals' | 'triangles' | 'edges' | 'quality' | 'rims' | 'colours' | 'texture'>;
 
 export interface PainterEvents {
   /** For the next draw(): at first, and when that before was handed to the graphics. */

@@ -5,7 +5,8 @@ import type { Extent } from './surface';
 
 const kAzimuth = (16 * Math.PI) / 180;
 const kElevation = (13 * Math.PI) / 180;
-const kMargin = 1.2;
+const kMargin = 1.1;
+const kAround = 1.25; // of a subject, so that something of what is behind it is seen
 
 export interface FirstView {
   position: Vec3; // in three's frame: y up, z towards the viewer
@@ -13,14 +14,15 @@ export interface FirstView {
   distance: number;
 }
 
-/** `fov` in radians, upright. */
-export function firstView(extent: Extent, fov: number, aspect: number): FirstView {
-  const tangent = Math.tan(fov / 2);
-  const half = [0, 1, 2].map((i) => (extent.max[i]! - extent.min[i]!) / 2) as Vec3;
-  const middle = [0, 1, 2].map((i) => (extent.max[i]! + extent.min[i]!) / 2) as Vec3;
+/** `right` and `up`: tangents from the middle of what is free on the page to its sides. */
+export function firstView(extent: Extent, right: number, up: number): FirstView {
+  const { min, max } = extent.subject ?? extent;
+  const margin = kMargin * (extent.subject === undefined ? 1 : kAround);
+  const half = [0, 1, 2].map((i) => (max[i]! - min[i]!) / 2) as Vec3;
+  const middle = [0, 1, 2].map((i) => (max[i]! + min[i]!) / 2) as Vec3;
   const width = half[0] * Math.cos(kAzimuth) + half[2] * Math.sin(kAzimuth);
   const height = half[1] * Math.cos(kElevation) + half[2] * Math.sin(kElevation);
-  const distance = kMargin * Math.max(height / tangent, width / (tangent * aspect)) + half[2] * 0.5;
+  const distance = margin * Math.max(height / up, width / right) + half[2] * 0.5;
   const target: Vec3 = [middle[0], -middle[1], -middle[2]];
   const away: Vec3 = [
     Math.cos(kElevation) * Math.sin(kAzimuth),

@@ -7,6 +7,7 @@ import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
 import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
+import { addImmersive, addStatistics, addTake } from './laterParts';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
 import { MeasurePanel } from './measurePanel';
@@ -22,10 +23,8 @@ import { address, momentOf, readShared, shareLink, type Shared, type Shown } fro
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
-import type { StatisticsPanel } from './statisticsPanel';
 import { ServerList } from './streamList';
 import type { StreamsPanel } from './streamsPanel';
-import type { TakePanel } from './takePanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
 import { View } from './view';
@@ -78,6 +77,7 @@ class Viewer {
         this.fileProblem = null;
         this.refresh();
       },
+      insets: (insets) => this.view?.navigator.setInsets(insets),
       retry: () => {
         this.session.source?.retryNow();
         this.server.retryNow();
@@ -86,6 +86,7 @@ class Viewer {
     this.shared = readShared(location.hash, loadDisplay());
     this.display = this.shared.display;
     this.view = this.makeView();
+    for (const [name, rigid] of this.shared.places) this.view?.place(name, rigid);
     document.documentElement.classList.toggle('software', this.view?.inSoftware === true);
     this.session = new Session({
       changed: () => this.refresh(),
@@ -104,13 +105,29 @@ class Viewer {
     this.qualityControl = new QualityControl(displayBody, (quality) => this.chooseQuality(quality));
     if (this.quality !== null) this.companions?.want(this.quality);
     this.measure = this.makeMeasure();
-    this.makeStatistics();
-    this.makeTake();
+    addStatistics(this.panels, {
+      meter: this.session.meter,
+      status: () => this.session.status,
+      kept: () => this.session.source?.kept ?? null,
+      quality: () => (this.offered === null ? null : whyText(this.offered)),
+    });
+    if (this.view !== null) {
+      addTake(this.panels, {
+        view: this.view,
+        name: () => this.stream ?? this.file,
+        link: () => this.link(),
+        playback: () => this.session.source?.playback ?? null,
+        info: () => this.session.info,
+      });
+      void addImmersive(this.view, (why) => {
+        this.note = why;
+        this.refresh();
+      });
+    }
     this.panels.action('reset', () => this.view?.navigator.reset());
     if (document.fullscreenEnabled) this.panels.action('fullscreen', toggleFullscreen);
     fillHelp(this.panels.panel('help', text.help.title));
     listenToCommands(this, this.ui.canvas);
-    void this.makeImmersive();
     this.change({});
     this.openAddressed(new URLSearchParams(location.search));
     window.setInterval(() => this.refresh(), kRefreshMs);
@@ -180,6 +197,7 @@ class Viewer {
     if (this.view === null) return null;
     const body = this.panels.panel('measure', text.measure.title, (open) => {
       this.measure!.open = open;
+      this.view!.measuring = open;
       this.wish();
     });
     const described = (name: string): StreamInfo | null =>
@@ -204,54 +222,9 @@ class Viewer {
       placement: (placement) => {
         if (this.view !== null) this.view.placement = placement;
       },
-    });
+    }, this.view);
     this.streamsPanel.open = open;
     this.refresh();
-  }
-
-  // Browsers have WebXR in secure contexts alone.
-  private async makeImmersive(): Promise<void> {
-    const { view } = this;
-    const { xr } = navigator;
-    if (view === null || xr === undefined) return;
-    const { Immersive } = await import('./immersive');
-    new Immersive(xr, view, (why) => {
-      this.note = why;
-      this.refresh();
-    });
-  }
-
-  private makeStatistics(): void {
-    let panel: StatisticsPanel | null = null;
-    let isOpen = false;
-    const body = this.panels.panel('statistics', text.statistics.title, async (open) => {
-      isOpen = open;
-      const { StatisticsPanel } = await import('./statisticsPanel');
-      panel ??= new StatisticsPanel(
-        body,
-        this.session.meter,
-        () => this.session.status,
-        () => this.session.source?.kept ?? null,
-        () => (this.offered === null ? null : whyText(this.offered)),
-      );
-      panel.open = isOpen; // by now
-    });
-  }
-
-  private makeTake(): void {
-    if (this.view === null) return;
-    const { view } = this;
-    let panel: TakePanel | null = null;
-    const body = this.panels.panel('take', text.take.title, async () => {
-      const { TakePanel } = await import('./takePanel');
-      panel ??= new TakePanel(body, {
-        view,
-        name: () => this.stream ?? this.file,
-        link: () => this.link(),
-        playback: () => this.session.source?.playback ?? null,
-        info: () => this.session.info,
-      });
-    });
   }
 
   /** To what is seen now. */
@@ -260,7 +233,9 @@ class Viewer {
     const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
     const playback = this.session.source?.playback;
     const moment = playback === undefined || playback.times.length === 0 ? null : momentOf(playback);
-    return shareLink(location.href, this.addressed, this.display, pose, moment);
+    const names = this.companions?.names ?? [];
+    const places = [...(this.view?.placedByHand ?? [])].filter(([name]) => names.includes(name));
+    return shareLink(location.href, this.addressed, this.display, pose, moment, new Map(places));
   }
 
   // What the decoder should bring along.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the surface is drawn with. All know the lens of the rig's camera, so that its own view is exact.
 import * as THREE from 'three';
+import { kRimCut } from './rims';
 import { lensOf } from './rigCamera';
 import { depthColour, type Range } from './palette';
 import type { Mode } from './display';
@@ -26,8 +27,33 @@ vec4 throughLens(vec4 view) {
 }
 `;
 
+const kRimVertexHead = `
+#ifdef SMOOTH_RIMS
+attribute float rim;
+varying float rimOf;
+#endif
+`;
+const kRimVertex = `
+#ifdef SMOOTH_RIMS
+rimOf = rim;
+#endif
+`;
+// Alpha is which of the card's samples are covered, where it takes several.
+const kRimFragment = `
+#ifdef SMOOTH_RIMS
+float share = clamp((rimOf - ${kRimCut.toFixed(3)}) / max(fwidth(rimOf), 1e-5) + 0.5, 0.0, 1.0);
+#ifdef ALPHA_TO_COVERAGE
+if (share == 0.0) discard;
+diffuseColor.a = share;
+#else
+if (share < 0.5) discard;
+#endif
+#endif
+`;
+
 export class Materials {
   private readonly lens = { lens: { value: new THREE.Vector4() }, lensRest: { value: new THREE.Vector2() } };
+  private smooth_ = false;
   private readonly depthRange = { value: new THREE.Vector2(0, 1) };
 
   readonly textured: THREE.MeshBasicMaterial;
@@ -53,7 +79,11 @@ export class Materials {
     'uniform vec2 range; uniform sampler2D colours;',
   );
 
-  constructor(map: THREE.Texture) {
+  /** `antialias`: the card takes several samples a pixel. */
+  constructor(
+    map: THREE.Texture,
+    private readonly antialias: boolean,
+  ) {
     this.textured = new THREE.MeshBasicMaterial({ map, side: THREE.DoubleSide });
     this.points = new THREE.PointsMaterial({ map, size: 2, sizeAttenuation: false });
     for (const material of Object.values(this)) {
@@ -70,6 +100,19 @@ export class Materials {
 
   setDepthRange(range: Range): void {
     this.depthRange.value.set(range.from, range.to);
+  }
+
+  /** Rims of surfaces with a picture and of lit ones; their geometry then has the numbers of vertexRims(). */
+  set smooth(smooth: boolean) {
+    if (smooth === this.smooth_) return;
+    this.smooth_ = smooth;
+    for (const material of [this.textured, this.shaded] as (THREE.Material & { defines?: Record<string, unknown> })[]) {
+      material.defines = { ...material.defines };
+      if (smooth) material.defines['SMOOTH_RIMS'] = '';
+      else delete material.defines['SMOOTH_RIMS'];
+      material.alphaToCoverage = smooth && this.antialias;
+      material.needsUpdate = true;
+    }
   }
 
   setPointSize(pixels: number): void {
@@ -114,10 +157,14 @@ export class Materials {
       Object.assign(shader.uniforms, this.lens);
       shader.vertexShader =
         kLensHead +
+        kRimVertexHead +
         shader.vertexShader.replace(
           '#include <project_vertex>',
-          '#include <project_vertex>\ngl_Position = projectionMatrix * throughLens(mvPosition);',
+          `#include <project_vertex>\ngl_Position = projectionMatrix * throughLens(mvPosition);${kRimVertex}`,
         );
+      shader.fragmentShader =
+        '#ifdef SMOOTH_RIMS\nvarying float rimOf;\n#endif\n' +
+        shader.fragmentShader.replace('#include <alphatest_fragment>', `#include <alphatest_fragment>${kRimFragment}`);
     };
     material.customProgramCacheKey = () => 'lens';
   }

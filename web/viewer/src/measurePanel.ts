@@ -17,6 +17,7 @@ import type { Mark } from './overlay';
 import { coordinatesAt, sigmaAt, type Vec3 } from './pick';
 import { plot } from './plot';
 import type { StreamInfo } from './protocol';
+import { inverse, moved } from './rigid';
 import { rigErrorOf } from './rigError';
 import { text } from './strings';
 import type { Hit, View } from './view';
@@ -136,14 +137,14 @@ export class MeasurePanel {
     const hit = this.view.pick(at);
     if (this.tool === null) return;
     if (hit === null) return setText(this.hint, say.nothingThere);
-    const { surface, stream, right } = hit;
+    const { surface, stream, pose } = hit;
     const other = this.spots.some((spot) => spot.stream !== stream);
     // Nothing says where one rig stands to another; and a section is of one surface.
     if (other && (!this.view.isTogether || this.tool === 'section')) return setText(this.hint, say.otherStream);
     this.spots.push(this.spot(hit));
     if (this.spots.length === kSpots[this.tool]) {
-      const [x, y, z] = this.view.navigator.ray(at)?.origin ?? [right, 0, 0];
-      const eye: Vec3 = [x - right, y, z];
+      const origin = this.view.navigator.ray(at)?.origin;
+      const eye: Vec3 = origin === undefined ? [0, 0, 0] : moved(inverse(pose), origin);
       this.measurements.push(measure(this.tool, this.spots, surface, eye));
       this.spots = [];
     }
@@ -164,7 +165,6 @@ export class MeasurePanel {
           this.measurements.splice(i, 1);
           this.refresh();
         });
-        remove.setAttribute('aria-label', say.remove);
         return make('li', {}, make('span', { className: 'quiet' }, say.tools[m.tool]), make('b', {}, valueText(m)), remove);
       }),
     );
@@ -177,11 +177,10 @@ export class MeasurePanel {
 
   private marks(): Mark[] {
     const mark = (spots: readonly Spot[], profile: Measurement['profile'], text: string): Mark[] => {
-      const rights = spots.map(({ stream }) => this.view.rightOf(stream));
-      if (rights.length === 0 || rights.includes(null)) return []; // of a stream that is not to be seen
-      const placed = ([x, y, z]: Vec3, right: number): Vec3 => [x + right, y, z];
-      const path = profile.flatMap(([a, b]) => [placed(a.point, rights[0]!), placed(b.point, rights[0]!)]);
-      return [{ points: path.length > 0 ? path : spots.map(({ point }, i) => placed(point, rights[i]!)), text }];
+      const poses = spots.map(({ stream }) => this.view.poseOf(stream));
+      if (poses.length === 0 || poses.includes(null)) return []; // of a stream that is not to be seen
+      const path = profile.flatMap(([a, b]) => [moved(poses[0]!, a.point), moved(poses[0]!, b.point)]);
+      return [{ points: path.length > 0 ? path : spots.map(({ point }, i) => moved(poses[i]!, point)), text }];
     };
     return [...this.measurements.flatMap((m) => mark(m.spots, m.profile, valueText(m))), ...mark(this.spots, [], '')];
   }

@@ -2,12 +2,14 @@
 // The surface on the graphics card. Buffers only grow, so that a mesh of changing size thirty times a second
 // allocates nothing.
 import * as THREE from 'three';
-import { hasPicture, wantsOf, type Mode } from './display';
+import { hasPicture, wantsOf, type Mode, type Wants } from './display';
 import type { Drawn } from './drawing';
 import { Materials } from './materials';
 import type { Range } from './palette';
 import type { Pinhole } from './protocol';
 import { confidenceColours } from './quality';
+import { kNowhere, type Rigid } from './rigid';
+import { vertexRims } from './rims';
 import { triangleEdges, vertexNormals } from './surface';
 
 class Growing {
@@ -44,35 +46,44 @@ const indices = (): Growing =>
   }, 1);
 
 export class SurfaceMesh {
-  /** In the camera's frame (x right, y down, z forward), turned into three's (y up, z towards the viewer). */
+  /** In a camera's frame (x right, y down, z forward), turned into three's (y up, z towards the viewer). */
   readonly object = new THREE.Group();
   private readonly position = floats(3);
   private readonly uv = floats(2);
   private readonly normal = floats(3);
   private readonly colour = floats(3); // of confidence
+  private readonly rim = floats(1);
   private readonly triangle = indices();
   private readonly edge = indices();
   private readonly solid = new THREE.BufferGeometry();
   private readonly lines = new THREE.BufferGeometry();
   private readonly cloud = new THREE.BufferGeometry();
   private readonly texture = new THREE.Texture();
-  private readonly materials = new Materials(this.texture);
-  private readonly mesh = new THREE.Mesh<THREE.BufferGeometry, THREE.Material>(this.solid, this.materials.textured);
-  private readonly wires = new THREE.LineSegments(this.lines, this.materials.wire);
-  private readonly points = new THREE.Points<THREE.BufferGeometry, THREE.Material>(this.cloud, this.materials.points);
+  private readonly materials: Materials;
+  private readonly mesh: THREE.Mesh<THREE.BufferGeometry, THREE.Material>;
+  private readonly wires: THREE.LineSegments;
+  private readonly points: THREE.Points<THREE.BufferGeometry, THREE.Material>;
   private mode_: Mode = 'textured';
+  private smooth_ = false;
   private vertices = 0;
   private triangleIndices = 0;
   private size = ''; // of the picture
   private textured = false; // the frame shown has a picture and coordinates
   private hasNormals = false;
   private hasEdges = false;
+  private hasRims = false;
   private hasQuality = false;
   private hasColours = false;
   private frame: Drawn | null = null;
 
-  constructor() {
-    this.object.rotation.x = Math.PI;
+  /** `antialias`: the card takes several samples a pixel. */
+  constructor(antialias: boolean) {
+    this.materials = new Materials(this.texture, antialias);
+    this.mesh = new THREE.Mesh(this.solid, this.materials.textured);
+    this.wires = new THREE.LineSegments(this.lines, this.materials.wire);
+    this.points = new THREE.Points(this.cloud, this.materials.points);
+    this.object.matrixAutoUpdate = false;
+    this.place(kNowhere);
     for (const part of [this.mesh, this.wires, this.points]) {
       part.frustumCulled = false; // bounds of a surface that changes all the time cost more than they save
       this.object.add(part);
@@ -84,6 +95,13 @@ export class SurfaceMesh {
     this.texture.minFilter = this.texture.magFilter = THREE.LinearFilter;
     this.attach();
     this.apply();
+  }
+
+  /** Its camera's frame in the scene's. */
+  place({ rotation: r, translation: [x, y, z] }: Rigid): void {
+    const [a, b, c] = [r.slice(0, 3), r.slice(3, 6), r.slice(6, 9)] as [number[], number[], number[]];
+    this.object.matrix.set(a[0]!, a[1]!, a[2]!, x, -b[0]!, -b[1]!, -b[2]!, -y, -c[0]!, -c[1]!, -c[2]!, -z, 0, 0, 0, 1);
+    this.object.matrixWorldNeedsUpdate = true;
   }
 
   /** Drawn pixels to one of the page's. */
@@ -103,6 +121,13 @@ export class SurfaceMesh {
     this.materials.setLens(camera);
   }
 
+  /** Whether rims are drawn without the steps of their stripes, in modes that show a picture or relief. */
+  set smooth(smooth: boolean) {
+    if (smooth === this.smooth_) return;
+    this.smooth_ = smooth;
+    this.derive();
+  }
+
   setDepthRange(range: Range): void {
     this.materials.setDepthRange(range);
   }
@@ -113,6 +138,7 @@ export class SurfaceMesh {
     grown = this.triangle.set(frame.triangles) || grown;
     if (frame.coordinates !== null) grown = this.uv.set(frame.coordinates) || grown;
     if (frame.normals !== null) grown = this.normal.set(frame.normals) || grown;
+    if (frame.rims != null) grown = this.rim.set(frame.rims) || grown;
     if (frame.edges !== null) grown = this.edge.set(frame.edges) || grown;
     this.frame = frame;
     this.hasQuality = frame.quality !== null;
@@ -122,6 +148,7 @@ export class SurfaceMesh {
     this.triangleIndices = frame.triangles.length;
     this.hasNormals = frame.normals !== null;
     this.hasEdges = frame.edges !== null;
+    this.hasRims = frame.rims != null;
     this.textured = hasPicture(frame);
     if (frame.texture !== null) this.setTexture(frame.texture);
     if (grown) this.attach();
@@ -154,11 +181,18 @@ export class SurfaceMesh {
       this.hasEdges = true;
     }
     if (this.frame !== null && (this.mode_ === 'confidence' || this.hasColours)) grown = this.setColours();
-    if (this.needsNormals && !this.hasNormals) {
+    if (this.wants.normals && !this.hasNormals) {
       const positions = (this.position.attribute.array as Float32Array).subarray(0, this.vertices * 3);
       grown = this.normal.set(vertexNormals(positions, triangles)) || grown;
       this.hasNormals = true;
     }
+    const { coordinates } = this.frame ?? { coordinates: null };
+    const smooth = this.smooth_ && this.wants.rims && coordinates !== null;
+    if (smooth && !this.hasRims) {
+      grown = this.rim.set(vertexRims(coordinates, triangles)) || grown;
+      this.hasRims = true;
+    }
+    this.materials.smooth = smooth;
     if (grown) this.attach();
   }
 
@@ -171,6 +205,7 @@ export class SurfaceMesh {
     }
     this.solid.setAttribute('normal', this.normal.attribute);
     this.solid.setAttribute('color', this.colour.attribute);
+    this.solid.setAttribute('rim', this.rim.attribute);
     this.solid.setIndex(this.triangle.attribute);
     this.lines.setIndex(this.edge.attribute);
   }
@@ -188,8 +223,8 @@ export class SurfaceMesh {
     this.mesh.material = this.materials.solid(this.mode_, has);
   }
 
-  private get needsNormals(): boolean {
-    return wantsOf(this.mode_, this.textured).normals;
+  private get wants(): Wants {
+    return wantsOf(this.mode_, this.textured);
   }
 
   // Of confidence in its mode, else the surface's own.

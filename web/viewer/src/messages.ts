@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What page and worker say to each other. Arrays and pictures are transferred, never copied.
+import type { Wants } from './display';
 import type { VertexQuality } from './quality';
 import type { Extent } from './surface';
 
@@ -8,7 +9,7 @@ export interface DecodeRequest {
   id: number;
   bytes: ArrayBuffer;
   offset: number; // of the frame in `bytes`
-  want: { normals: boolean; edges: boolean; quality: boolean };
+  want: Wants;
   spares: ArrayBuffer[]; // of frames that are not shown any more: to be filled again
 }
 
@@ -21,6 +22,7 @@ export interface DecodedFrame {
   normals: Float32Array<ArrayBuffer> | null;
   triangles: Uint32Array<ArrayBuffer>;
   edges: Uint32Array<ArrayBuffer> | null;
+  rims?: Float32Array<ArrayBuffer> | null; // how far inside each vertex is (rims.ts)
   quality: VertexQuality | null; // null: not wanted or not sent
   colours?: Float32Array<ArrayBuffer> | null; // linear RGB a vertex, of files without a picture
   texture: ImageBitmap | null;

@@ -19,6 +19,16 @@ export interface Pose {
   target: Vec3;
 }
 
+/** What lies over the sides of what is seen, pixels of the page. */
+export interface Insets {
+  top: number;
+  right: number;
+  bottom: number;
+  left: number;
+}
+
+const kJitter = 24; // pixels of the page: so much they may change before the view follows
+
 export interface NavigatorEvents {
   changed(): void;
   /** Moving by hand leaves the rig's camera. */
@@ -32,6 +42,7 @@ export class Navigator {
   private rig: Pinhole | null = null;
   private extent: Extent | null = null;
   size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
+  private insets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
   private way_: Way = 'orbit';
   private fov_ = 0;
   private placed = false; // the first view is set
@@ -122,6 +133,15 @@ export class Navigator {
     this.events.changed();
   }
 
+  /** The middle of what they leave free is what is turned around, and the first view lies within. */
+  setInsets(insets: Insets): void {
+    const { top, right, bottom, left } = this.insets;
+    const moved = [insets.top - top, insets.right - right, insets.bottom - bottom, insets.left - left];
+    if (moved.every((by) => Math.abs(by) < kJitter)) return;
+    this.insets = insets;
+    this.resize(this.size);
+  }
+
   /** Back to the first view, of the surface as it is now. */
   reset(): void {
     if (this.extent === null) return;
@@ -130,7 +150,9 @@ export class Navigator {
     this.placing = true;
     this.stopMotion();
     this.camera.fov = this.wantedFov();
-    const view = firstView(this.extent, THREE.MathUtils.degToRad(this.camera.fov), this.camera.aspect);
+    const tangent = Math.tan(THREE.MathUtils.degToRad(this.camera.fov) / 2); // of half the page's height
+    const { width, height } = this.free;
+    const view = firstView(this.extent, (tangent * width) / this.size.height, (tangent * height) / this.size.height);
     this.limits(view.distance);
     this.controls.target.set(...view.target);
     this.camera.position.set(...view.position);
@@ -252,8 +274,20 @@ export class Navigator {
   }
 
   private project(): void {
-    if (this.isRigView) this.projectRig();
-    else this.camera.updateProjectionMatrix();
+    if (this.isRigView) return this.projectRig();
+    const { width, height } = this.size;
+    const { x, y } = this.free;
+    this.camera.setViewOffset(width, height, width / 2 - x, height / 2 - y, width, height); // and the matrix
+  }
+
+  /** What nothing lies over, and its middle; at least a third of the page. */
+  private get free(): { x: number; y: number; width: number; height: number } {
+    const { size } = this;
+    const along = (before: number, behind: number, all: number): [number, number] =>
+      all - before - behind < all / 3 ? [all / 2, all] : [(before + all - behind) / 2, all - before - behind];
+    const [x, width] = along(this.insets.left, this.insets.right, size.width);
+    const [y, height] = along(this.insets.top, this.insets.bottom, size.height);
+    return { x, y, width, height };
   }
 
   private limits(distance: number): void {

@@ -8,22 +8,25 @@ export interface OpenedRecording {
   kind: 'recording';
   source(events: SourceEvents, begin?: Moment | null): FrameSource;
   note: string | null;
+  /** Whether more is being written behind what there is now. */
+  isGrowing(): boolean;
 }
 
 export type Opened =
   | OpenedRecording
   | { kind: 'surface'; frame: DecodedFrame };
 
-async function openRecording(bytes: Bytes): Promise<OpenedRecording> {
+async function openRecording(bytes: Bytes, isGrowing = (): boolean => false): Promise<OpenedRecording> {
   const [{ Recording }, { RecordingSource }] = await Promise.all([import('./recording'), import('./recordingSource')]);
   const recording = await Recording.open(bytes);
-  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage };
+  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage, isGrowing };
 }
 
 /** A recording of the server. Throws as openFile. */
 export async function openRemote(url: URL): Promise<OpenedRecording> {
   const { RemoteFile } = await import('./remoteFile');
-  return openRecording(await RemoteFile.open(url));
+  const file = await RemoteFile.open(url);
+  return openRecording(file, () => file.isGrowing);
 }
 
 /** Throws with what a person should know. */

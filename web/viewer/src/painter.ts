@@ -49,8 +49,8 @@ class FarPainter implements Painter {
     this.say({ type: 'start', canvas: offscreen, antialias }, [offscreen]);
   }
 
-  show(surface: number, { positions, coordinates, normals, triangles, edges, quality, colours = null, texture }: DecodedFrame): void {
-    const frame: Drawn = { positions, coordinates, normals, triangles, edges, quality, colours, texture };
+  show(surface: number, { positions, coordinates, normals, triangles, edges, quality, rims = null, colours = null, texture }: DecodedFrame): void {
+    const frame: Drawn = { positions, coordinates, normals, triangles, edges, quality, rims, colours, texture };
     this.say({ type: 'show', surface, frame });
   }
   remove(surface: number): void {

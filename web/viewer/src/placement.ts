@@ -1,42 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the surfaces of several rigs stand in one scene. A calibration knows its own camera's frame alone, so nothing
-// says where one rig stands to another: they stand side by side, or all in one frame where a person wants that. Pure.
-import type { Extent } from './surface';
+// Where the surfaces of several rigs stand in one scene, the first in its camera's frame. A calibration knows its own
+// camera's frame alone. Where a person has shown places that two rigs both see, the motion between them is known; else
+// surfaces stand side by side, or all in one frame where a person wants that. Pure.
+import { kNowhere, moved, toTheRight, type Rigid } from './rigid';
+import type { Vec3 } from './pick';
+import type { Box, Extent } from './surface';
 
 export const kPlacements = ['beside', 'together'] as const;
 export type Placement = (typeof kPlacements)[number];
 
 const kGap = 0.15; // of the first one's width
 
-/** How far each is moved to the right, metres; the first stays. Of a surface not seen yet: null, and nothing is kept free. */
-export function placed(extents: readonly (Extent | null)[], placement: Placement): number[] {
+/**
+ * What brings each into the first one's frame. `known`: of those that have a place, which keep it. Of a surface not seen
+ * yet: null, and nothing is kept free.
+ */
+export function placed(
+  extents: readonly (Extent | null)[],
+  placement: Placement,
+  known: readonly (Rigid | null)[] = [],
+): Rigid[] {
   const [first] = extents;
-  if (placement === 'together' || !first) return extents.map(() => 0);
+  if (placement === 'together' || !first) return extents.map((_, i) => known[i] ?? kNowhere);
   const gap = kGap * (first.max[0] - first.min[0]);
-  let right = first.max[0];
+  const standing = extents.map((extent, i) => (extent !== null && known[i] != null ? boxAround(extent, known[i]).max[0] : -Infinity));
+  let right = Math.max(first.max[0], ...standing);
   return extents.map((extent, i) => {
-    if (i === 0 || extent === null) return 0;
+    if (known[i] != null) return known[i];
+    if (i === 0 || extent === null) return kNowhere;
     const offset = right + gap - extent.min[0];
     right = extent.max[0] + offset;
-    return offset;
+    return toTheRight(offset);
   });
 }
 
 /** Around all of them where they stand; null: there is none. */
-export function around(extents: readonly (Extent | null)[], offsets: readonly number[]): Extent | null {
-  let all: Extent | null = null;
-  for (const [i, extent] of extents.entries()) {
-    if (extent === null) continue;
-    const min: Extent['min'] = [extent.min[0] + offsets[i]!, extent.min[1], extent.min[2]];
-    const max: Extent['max'] = [extent.max[0] + offsets[i]!, extent.max[1], extent.max[2]];
-    if (all !== null) {
-      for (const axis of [0, 1, 2] as const) {
-        min[axis] = Math.min(min[axis], all.min[axis]);
-        max[axis] = Math.max(max[axis], all.max[axis]);
-      }
-    }
-    const centre = min.map((low, axis) => (low + max[axis]!) / 2) as Extent['centre'];
-    all = { min, max, centre };
-  }
-  return all;
+export function around(extents: readonly (Extent | null)[], poses: readonly Rigid[]): Extent | null {
+  const boxes = extents.flatMap((extent, i) => (extent === null ? [] : [boxAround(extent, poses[i]!)]));
+  if (boxes.length === 0) return null;
+  const [min, max] = [least(boxes.map((box) => box.min)), most(boxes.map((box) => box.max))];
+  return { min, max, centre: min.map((low, axis) => (low + max[axis]!) / 2) as Vec3 };
 }
+
+function boxAround({ min, max }: Box, pose: Rigid): Box {
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((c) =>
+    moved(pose, [0, 1, 2].map((axis) => (c & (1 << axis) ? max : min)[axis]!) as Vec3),
+  );
+  return { min: least(corners), max: most(corners) };
+}
+
+const least = (points: Vec3[]): Vec3 => [0, 1, 2].map((axis) => Math.min(...points.map((p) => p[axis]!))) as Vec3;
+const most = (points: Vec3[]): Vec3 => [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis]!))) as Vec3;

@@ -95,7 +95,7 @@ class Frames {
   });
 
   constructor() {
-    this.decoder.want = { normals: false, edges: false, quality: true };
+    this.decoder.want = { normals: false, edges: false, quality: true, rims: false };
   }
 
   /** `frame` null: it is damaged. `jpeg`: its texture, where it is one. */

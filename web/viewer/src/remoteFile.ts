@@ -21,13 +21,25 @@ export class RemoteFile implements Bytes {
     private readonly fetch: Fetch,
   ) {}
 
+  /** Whether the server says that more is being written behind it. */
+  get isGrowing(): boolean {
+    return this.etag.startsWith('"growing-');
+  }
+
   get size(): number {
     return this.size_;
   }
 
   /** Throws where the server has no such file, or does not give parts of it. */
   static async open(url: URL, fetch: Fetch = (at, init) => window.fetch(at, init)): Promise<RemoteFile> {
-    const head = await fetch(url, { headers: { Range: 'bytes=0-0' }, cache: 'no-store' });
+    const first: RequestInit = { headers: { Range: 'bytes=0-0' }, cache: 'no-store' };
+    let head = await fetch(url, first);
+    if (head.status === 401 && url.origin !== window.location.origin) {
+      // Of another site a person's token is sent where that site wants one.
+      const ask = fetch;
+      fetch = (at, init) => ask(at, { ...init, credentials: 'include' });
+      head = await fetch(url, first);
+    }
     if (head.status === 404) throw new Error('it is not there (HTTP 404)');
     const { size, etag } = versionOf(head);
     return new RemoteFile(url, size, etag, fetch);

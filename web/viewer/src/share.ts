@@ -4,6 +4,7 @@ import { parseDisplay, writeDisplay, type Display } from './display';
 import type { Pose } from './navigator';
 import type { Vec3 } from './pick';
 import type { Quality } from './protocol';
+import { axisOf, rigidOf, type Rigid } from './rigid';
 import type { Moment, Playback } from './source';
 
 /** What a link is of: streams of the server, the first and those beside it, or a recording in its folder. */
@@ -25,6 +26,8 @@ export interface Shared {
   readonly display: Display;
   readonly pose: Pose | null;
   readonly moment: Moment | null;
+  /** Where streams stand in the first one's frame, by name. */
+  readonly places: ReadonlyMap<string, Rigid>;
 }
 
 /** The time that is shown. Of a live stream: none, or that of day where a person went back in it. */
@@ -42,6 +45,7 @@ export function shareLink(
   display: Display,
   pose: Pose | null,
   moment: Moment | 'live' | null,
+  places: ReadonlyMap<string, Rigid> = new Map(),
 ): string {
   const url = shown === null ? new URL(page) : address(page, shown);
   if (shown === null) url.search = '';
@@ -55,6 +59,10 @@ export function shareLink(
   if (shown !== null && moment !== null) {
     state.set('time', moment === 'live' ? 'live' : timeText(moment));
     if (moment !== 'live') state.set('play', moment.playing ? '1' : '0');
+  }
+  for (const [name, rigid] of places) {
+    const numbers = [...axisOf(rigid), ...rigid.translation].map((c) => Number(c.toFixed(5)));
+    state.append('place', [name, ...numbers].join('_'));
   }
   url.hash = state.toString();
   return url.href;
@@ -71,7 +79,20 @@ export function readShared(hash: string, fallback: Display): Shared {
   const [position, target] = [read('eye'), read('at')];
   const apart = position !== null && target !== null && position.some((c, i) => Math.abs(c - target[i]!) > 1e-6);
   const pose = apart ? { position: position!, target: target! } : null;
-  return { display: parseDisplay(text, fallback), pose, moment: readMoment(given) };
+  return { display: parseDisplay(text, fallback), pose, moment: readMoment(given), places: readPlaces(given) };
+}
+
+// A name, which may hold underscores, and six numbers: of rigidOf().
+function readPlaces(given: URLSearchParams): Map<string, Rigid> {
+  const places = new Map<string, Rigid>();
+  for (const written of given.getAll('place')) {
+    const parts = written.split('_');
+    const numbers = parts.slice(-6).map((part) => (part === '' ? NaN : Number(part)));
+    const name = parts.slice(0, -6).join('_');
+    if (name === '' || !numbers.every((n) => Math.abs(n) < 1e4)) continue;
+    places.set(name, rigidOf(numbers.slice(0, 3) as Vec3, numbers.slice(3) as Vec3));
+  }
+  return places;
 }
 
 // Rounded up: a frame is there from its time on.

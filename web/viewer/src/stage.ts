@@ -29,7 +29,7 @@ export class Stage {
   /** Throws where there is no WebGL 2. */
   constructor(
     private readonly canvas: HTMLCanvasElement | OffscreenCanvas,
-    antialias: boolean,
+    private readonly antialias: boolean,
     private readonly events: StageEvents,
   ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias, alpha: true });
@@ -45,7 +45,7 @@ export class Stage {
   show(surface: number, frame: Drawn): void {
     let mesh = this.meshes.get(surface);
     if (mesh === undefined) {
-      mesh = new SurfaceMesh();
+      mesh = new SurfaceMesh(this.antialias);
       this.meshes.set(surface, mesh);
       this.scene.add(mesh.object);
     }
@@ -98,7 +98,7 @@ export class Stage {
     this.renderer.forceContextLoss(); // else the browser keeps it until it collects
   }
 
-  private prepare({ width, height, ratio, world, projection, mode, lens, range, ground, rights, background }: Drawing): void {
+  private prepare({ width, height, ratio, world, projection, mode, lens, range, ground, poses, background, smooth }: Drawing): void {
     const size = [width, height, ratio].join();
     if (size !== this.size && !this.renderer.xr.isPresenting) {
       this.size = size;
@@ -115,10 +115,11 @@ export class Stage {
     this.camera.projectionMatrixInverse.copy(this.camera.projectionMatrix).invert();
     this.ground.show(ground);
     for (const [surface, mesh] of this.meshes) {
-      const right = rights[surface] ?? NaN;
-      mesh.object.visible = !Number.isNaN(right);
-      if (mesh.object.visible) mesh.object.position.x = right;
+      const pose = poses[surface] ?? null;
+      mesh.object.visible = pose !== null;
+      if (pose !== null) mesh.place(pose);
       mesh.mode = mode;
+      mesh.smooth = smooth;
       mesh.setPixelRatio(ratio);
       mesh.setLens(surface === 0 ? lens : null);
       if (range !== null) mesh.setDepthRange(range);

@@ -5,13 +5,19 @@ import type { ListedStream, StreamList } from './protocol';
 const kEveryMs = 2000;
 const kPatienceMs = 5000;
 
+/** `base`: the address of the server's page. */
 export class ServerList {
   streams: readonly ListedStream[] = [];
   hint = ''; // a command to type where there are none
   /** The last list arrived. */
   arrived = false;
   private failed = false;
+  private readonly url: URL;
   private nextAt = 0;
+
+  constructor(base: string = document.baseURI) {
+    this.url = new URL('api/streams', base);
+  }
 
   /** Asks where it is time for it. True where what it knows has changed, or the server does not answer any more. */
   async refresh(): Promise<boolean> {
@@ -19,7 +25,7 @@ export class ServerList {
     if (now < this.nextAt || document.hidden) return false;
     this.nextAt = now + kEveryMs;
     try {
-      const response = await fetch(new URL('api/streams', document.baseURI), {
+      const response = await fetch(this.url, {
         cache: 'no-store',
         signal: AbortSignal.timeout(kPatienceMs),
       });

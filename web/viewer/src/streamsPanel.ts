@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What there is to see: live streams and recordings of the server, with a picture each, to be shown alone or beside
 // the others.
+import { Aligner, type Aligning } from './aligner';
 import { button, chooser, make, setText } from './dom';
 import { kPlacements, type Placement } from './placement';
 import type { ListedStream } from './protocol';
 import { text } from './strings';
 import { kThumbnail, Thumbnails } from './thumbnails';
+import type { View } from './view';
 
 const say = text.streams;
 const kFreshMs = 15_000; // between pictures of a stream that is not shown
@@ -25,6 +27,7 @@ interface Row {
   show: HTMLButtonElement;
   rig: HTMLAnchorElement; // the page that shows what its camera sees
   beside: HTMLButtonElement | null; // recordings of the folder are shown alone
+  place: HTMLButtonElement | null;
   pictureAt: number; // when it was asked for
 }
 
@@ -38,23 +41,34 @@ export class StreamsPanel {
   private readonly rows = new Map<string, Row>();
   private readonly thumbnails = new Thumbnails();
   private isOpen = false;
+  private readonly aligner: Aligner | null;
+  private readonly aligning = make('p', { hidden: true, className: 'aligning' });
+  private readonly apply = button(say.apply, say.apply, () => this.aligner?.apply());
+  private readonly buttons: HTMLElement;
 
   constructor(
     body: HTMLElement,
     private readonly events: StreamsPanelEvents,
+    view: View | null,
   ) {
+    this.aligner = view === null ? null : new Aligner(view, (now) => this.showAligning(now));
+    this.buttons = make('div', { className: 'buttons', hidden: true }, this.apply, button(say.cancel, say.cancel, () => this.aligner?.begin(null)));
+    this.aligning.setAttribute('role', 'status');
     this.placement = chooser(
       say.placement,
       kPlacements.map((p) => [p, say.placements[p]] as const),
       (placement) => events.placement(placement),
     );
-    body.append(this.live, this.none, this.placement.row, this.note, this.folderTitle, this.folder);
+    body.append(this.live, this.none, this.aligning, this.buttons, this.placement.row, this.note, this.folderTitle, this.folder);
   }
 
   set open(open: boolean) {
     this.isOpen = open;
     if (open) void this.listFolder();
-    else this.thumbnails.stop();
+    else {
+      this.thumbnails.stop();
+      if (this.aligner?.of != null) this.aligner.begin(null);
+    }
   }
 
   /** `first`: shown, and `besides` it. */
@@ -75,9 +89,19 @@ export class StreamsPanel {
       row.show.setAttribute('aria-pressed', String(isFirst));
       row.beside!.setAttribute('aria-pressed', String(besides.includes(stream.name)));
       row.beside!.disabled = isFirst;
+      row.place!.hidden = this.aligner === null || !besides.includes(stream.name);
       row.rig.hidden = stream.camera !== true;
       this.draw(row, stream.name, stream.recording ?? null);
     }
+  }
+
+  private showAligning(now: Aligning | null): void {
+    this.aligning.hidden = this.buttons.hidden = now === null;
+    if (now === null) return;
+    const words = now.next === now.name ? say.showSame(now.name) : say.showPlace(now.next, now.pairs);
+    const found = now.rms !== null ? say.left(now.pairs, now.rms) : now.pairs >= 3 ? say.notDetermined : '';
+    setText(this.aligning, [now.wrong ? say.wrongStream(now.next) : '', found, words].filter((part) => part !== '').join(' '));
+    this.apply.disabled = now.rms === null;
   }
 
   private draw(row: Row, name: string, recording: string | null): void {
@@ -91,7 +115,8 @@ export class StreamsPanel {
     const beside = button(say.beside, say.besideTitle(name), () =>
       this.events.beside(name, beside.getAttribute('aria-pressed') !== 'true'),
     );
-    const row = makeRow(name, () => this.events.choose(name), beside);
+    const place = button(say.place, say.placeTitle(name), () => this.aligner?.begin(name));
+    const row = makeRow(name, () => this.events.choose(name), beside, place);
     this.rows.set(name, row);
     this.live.append(row.item);
     return row;
@@ -105,7 +130,7 @@ export class StreamsPanel {
     this.folderTitle.hidden = recordings.length === 0;
     this.folder.replaceChildren();
     for (const { file, bytes } of recordings) {
-      const row = makeRow(file, () => this.events.recording(file), null);
+      const row = makeRow(file, () => this.events.recording(file));
       setText(row.about, `${(bytes / 1e6).toFixed(1)} MB`);
       this.folder.append(row.item);
       this.thumbnails.ask({ name: file, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
@@ -113,7 +138,7 @@ export class StreamsPanel {
   }
 }
 
-function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | null): Row {
+function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | null = null, place: HTMLButtonElement | null = null): Row {
   const ratio = Math.min(window.devicePixelRatio, 2);
   const picture = make('canvas', { width: kThumbnail.width * ratio, height: kThumbnail.height * ratio });
   picture.setAttribute('role', 'img');
@@ -121,7 +146,7 @@ function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | n
   const about = make('small', { className: 'quiet' });
   const show = button(say.show, say.showTitle(name), choose);
   const rig = make('a', { href: `rig?stream=${encodeURIComponent(name)}`, title: say.rigTitle, hidden: true }, say.rig);
-  const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]), rig);
+  const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]), ...(place === null ? [] : [place]), rig);
   const item = make('li', {}, picture, make('div', {}, make('b', { title: name }, name), about, buttons));
-  return { item, picture, about, show, rig, beside, pictureAt: -Infinity };
+  return { item, picture, about, show, rig, beside, place, pictureAt: -Infinity };
 }

@@ -85,27 +85,59 @@ export function triangleEdges(triangles: Uint32Array): Uint32Array<ArrayBuffer> 
   return edges;
 }
 
-export interface Extent {
+export interface Box {
   min: [number, number, number];
   max: [number, number, number];
-  centre: [number, number, number]; // medians
 }
+
+export interface Extent extends Box {
+  centre: [number, number, number]; // medians
+  /** Of what stands apart before the rest, as a person before a wall; without it: nothing does. */
+  subject?: Box;
+}
+
+const kBins = 32; // of depth
+const kEmpty = 0.003; // of all, in a bin at most: what flies between two surfaces does not join them
+const kApart = 5; // empty bins
+const kSubject = 0.08; // of all, at least
 
 /** Robust box: what lies outside 2 % on either side does not move the first view. Nothing below 50 vertices. */
 export function robustExtent(positions: Float32Array): Extent | null {
   const vertices = positions.length / 3;
   if (vertices < 50) return null;
   const step = Math.max(1, Math.floor(vertices / 2000));
-  const axes = [0, 1, 2].map((axis) => {
-    const values = new Float32Array(Math.ceil(vertices / step));
-    for (let i = 0; i < values.length; ++i) values[i] = positions[i * step * 3 + axis]!;
-    values.sort(); // by number, without a call for each pair
-    const at = (fraction: number): number => values[Math.floor(fraction * (values.length - 1))]!;
-    return [at(0.02), at(0.98), at(0.5)] as const;
-  }) as [readonly [number, number, number], readonly [number, number, number], readonly [number, number, number]];
-  return {
-    min: [axes[0][0], axes[1][0], axes[2][0]],
-    max: [axes[0][1], axes[1][1], axes[2][1]],
-    centre: [axes[0][2], axes[1][2], axes[2][2]],
-  };
+  const some = Array.from({ length: 3 }, () => new Float32Array(Math.ceil(vertices / step)));
+  for (let i = 0; i < some[0]!.length; ++i) {
+    for (let axis = 0; axis < 3; ++axis) some[axis]![i] = positions[i * step * 3 + axis]!;
+  }
+  const { box, medians } = boxOf(some);
+  const before = gapOf(some[2]!, box.min[2], box.max[2]);
+  if (before === null) return { ...box, centre: medians };
+  const isNear = some[2]!.map((z) => (z < before ? 1 : 0));
+  const subject = boxOf(some.map((values) => values.filter((_, i) => isNear[i] === 1))).box;
+  return { ...box, centre: medians, subject };
+}
+
+function boxOf(axes: Float32Array[]): { box: Box; medians: [number, number, number] } {
+  const at = (fraction: number): [number, number, number] =>
+    axes.map((values) => values[Math.floor(fraction * (values.length - 1))]!) as [number, number, number];
+  axes = axes.map((values) => values.slice().sort()); // by number, without a call for each pair
+  return { box: { min: at(0.02), max: at(0.98) }, medians: at(0.5) };
+}
+
+/** A depth between what stands apart and the rest; null: there is no such. */
+function gapOf(depths: Float32Array, from: number, to: number): number | null {
+  if (!(to > from)) return null;
+  const bins = new Uint32Array(kBins);
+  for (const z of depths) {
+    const bin = Math.floor(((z - from) / (to - from)) * kBins);
+    if (bin >= 0 && bin < kBins) bins[bin] = bins[bin]! + 1;
+  }
+  let [before, empty, best, end] = [0, 0, 0, 0];
+  for (let bin = 0; bin < kBins; ++bin) {
+    before += bins[bin]!;
+    empty = bins[bin]! <= kEmpty * depths.length ? empty + 1 : 0;
+    if (empty > best && before >= kSubject * depths.length) [best, end] = [empty, bin + 1];
+  }
+  return best < kApart ? null : from + ((end - best / 2) / kBins) * (to - from);
 }

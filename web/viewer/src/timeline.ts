@@ -44,7 +44,6 @@ export class Timeline {
     this.speed.onchange = () => this.playback?.setSpeed(Number(this.speed.value));
     const track = make('div', { className: 'track' }, this.track, this.slider);
     const steps = [button('‹', say.back, () => this.playback?.step(-1)), button('›', say.ahead, () => this.playback?.step(1))];
-    for (const b of steps) b.setAttribute('aria-label', b.title);
     track.onpointermove = track.onpointerenter = (event) => this.point(track, event.clientX);
     track.onpointerleave = () => this.unpoint();
     this.live.id = 'follow';

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page around the picture: badge, card, list of streams, statistics line.
 import { element, setText } from './dom';
+import type { Insets } from './navigator';
 import type { ListedStream } from './protocol';
 import type { Presentation } from './state';
 import { text } from './strings';
+
+const kFactsGap = 7; // pixels, of style.css
 
 /** A cell of the statistics line. `minor` ones give way on a narrow screen. */
 export interface Statistic {
@@ -18,6 +21,7 @@ export interface UiEvents {
   stream(name: string): void;
   retry(): void;
   dismiss(): void;
+  insets(insets: Insets): void;
 }
 
 export class Ui {
@@ -38,6 +42,25 @@ export class Ui {
     const say = (name: string, size: number): void => document.body.style.setProperty(name, `${size}px`);
     new ResizeObserver(() => say('--footer', footer.offsetHeight)).observe(footer);
     new ResizeObserver(() => say('--rail', rail.offsetWidth)).observe(rail);
+    const around = new ResizeObserver(() => events.insets(this.insets));
+    for (const part of [...this.parts, this.canvas]) around.observe(part);
+  }
+
+  private get parts(): [header: HTMLElement, rail: HTMLElement, footer: HTMLElement] {
+    return [document.querySelector('header')!, element('rail'), document.querySelector('footer')!];
+  }
+
+  /** What lies over the picture's sides for good. */
+  private get insets(): Insets {
+    const picture = this.canvas.getBoundingClientRect();
+    const cursor = element('cursor'); // comes and goes with the mouse
+    const [header, rail, footer] = this.parts.map((part) => part.getBoundingClientRect()) as [DOMRect, DOMRect, DOMRect];
+    return {
+      top: Math.max(0, header.bottom - picture.top), // 0 where it is hidden
+      right: rail.width === 0 ? 0 : Math.max(0, picture.right - rail.left),
+      bottom: footer.height === 0 ? 0 : Math.max(0, picture.bottom - footer.top - (cursor.hidden ? 0 : cursor.offsetHeight + kFactsGap)),
+      left: 0,
+    };
   }
 
   showState(state: Presentation, seen: boolean, dismissible: boolean): void {

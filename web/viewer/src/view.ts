@@ -12,6 +12,7 @@ import { steadyRange, type Range } from './palette';
 import { pick, type Picked } from './pick';
 import type { Pixels } from './pixels';
 import { around, placed, type Placement } from './placement';
+import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
 import { Resolution, drawnInSoftware } from './resolution';
 import type { Stage } from './stage';
@@ -37,7 +38,7 @@ export interface Beside extends Shown {
 export interface Hit extends Picked {
   readonly stream: string;
   readonly surface: DecodedFrame;
-  readonly right: number; // metres from that frame to the scene's
+  readonly pose: Rigid; // of that frame in the scene's
 }
 
 export interface ViewEvents {
@@ -65,7 +66,8 @@ export class View {
   private readonly besides: Beside[] = [];
   private placement_: Placement = 'beside';
   private extent: Extent | null = null; // of the first surface
-  private offsets: number[] = [0]; // of the first surface and those beside it, metres to the right
+  private poses: Rigid[] = [kNowhere]; // of the first surface and those beside it
+  private readonly known = new Map<string, Rigid>(); // where a person has placed streams, by name
   /** Of the first surface, where there are others beside it. */
   name = '';
   private scheduled = false;
@@ -78,6 +80,8 @@ export class View {
   private stillTimer = 0;
   private range: Range | null = null;
   private grid = false;
+  private smooth = false;
+  private measuring_ = false;
   drawn = 0;
 
   /** Throws where there is no WebGL 2. `overlay` lies over `canvas`; `keys`: where those are listened to that move. */
@@ -112,8 +116,14 @@ export class View {
   set display(display: Display) {
     this.mode_ = display.mode;
     this.grid = display.grid;
+    this.smooth = display.smooth;
     if (this.navigator.way !== display.way) this.navigator.way = display.way;
     if (this.navigator.wantedFieldOfView !== display.fov) this.navigator.wantedFieldOfView = display.fov;
+    this.invalidate();
+  }
+  /** A person measures. */
+  set measuring(measuring: boolean) {
+    this.measuring_ = measuring;
     this.invalidate();
   }
   get mode(): Mode {
@@ -121,7 +131,8 @@ export class View {
   }
   get wants(): Wants {
     const { frame } = this.surface;
-    return wantsOf(this.mode_, frame !== null && hasPicture(frame));
+    const wants = wantsOf(this.mode_, frame !== null && hasPicture(frame));
+    return { ...wants, rims: wants.rims && this.drawsSmooth };
   }
   get shown(): DecodedFrame | null {
     return this.surface.frame;
@@ -178,9 +189,16 @@ export class View {
     this.arrange();
   }
 
-  /** Where the surfaces stand: metres to the right of their cameras' frames, by name; none where there is only one. */
-  get places(): Record<string, number> {
-    return Object.fromEntries(this.besides.map(({ name }, i) => [name, this.offsets[i + 1] ?? 0]));
+  /** Where streams stand in the first one's frame, by name, as a person has placed them. */
+  get placedByHand(): ReadonlyMap<string, Rigid> {
+    return this.known;
+  }
+
+  /** From now on; null: as others without a place. */
+  place(name: string, pose: Rigid | null): void {
+    if (pose === null) this.known.delete(name);
+    else this.known.set(name, pose);
+    this.arrange();
   }
 
   private get surfaces(): Shown[] {
@@ -194,13 +212,13 @@ export class View {
   }
 
   private arrange(): void {
-    this.offsets = placed(this.extents, this.placement_);
+    this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.known.get(name) ?? null)]);
     this.useExtent();
     this.navigator.reset();
   }
 
   private useExtent(): void {
-    const all = this.besides.length === 0 ? this.extent : around(this.extents, this.offsets);
+    const all = this.besides.length === 0 ? this.extent : around(this.extents, this.poses);
     if (all === null) return;
     this.ground.setExtent(all);
     this.range = steadyRange(all.min[2], all.max[2], this.range);
@@ -214,19 +232,19 @@ export class View {
     let first: Hit | null = null;
     for (const [i, { frame: surface }] of this.surfaces.entries()) {
       const stream = this.names[i]!;
-      const right = this.rightOf(stream);
-      if (surface === null || right === null) continue;
-      const [x, y, z] = ray.origin;
-      const picked = pick(surface, [x - right, y, z], ray.direction);
-      if (picked !== null && (first === null || picked.along < first.along)) first = { ...picked, stream, surface, right };
+      const pose = this.poseOf(stream);
+      if (surface === null || pose === null) continue;
+      const back = inverse(pose);
+      const picked = pick(surface, moved(back, ray.origin), turned(back, ray.direction));
+      if (picked !== null && (first === null || picked.along < first.along)) first = { ...picked, stream, surface, pose };
     }
     return first;
   }
 
-  /** How far a stream's surface stands to the right of its camera's frame, metres; null: it is not to be seen. */
-  rightOf(stream: string): number | null {
+  /** Of a stream's camera in the scene; null: its surface is not to be seen. */
+  poseOf(stream: string): Rigid | null {
     const i = this.names.indexOf(stream);
-    return i < 0 || (i > 0 && this.isRigView) ? null : (this.offsets[i] ?? 0);
+    return i < 0 || (i > 0 && this.isRigView) ? null : (this.poses[i] ?? kNowhere);
   }
 
   /** Whether there is none beside the first. */
@@ -326,6 +344,11 @@ export class View {
     return this.grid && this.surface.frame !== null && !this.isRigView;
   }
 
+  // Where numbers are read, and in the picture of the rig's camera, all is drawn that there is.
+  private get drawsSmooth(): boolean {
+    return this.smooth && !this.measuring_ && !this.isRigView;
+  }
+
   private get isRigView(): boolean {
     return this.navigator.isRigView && this.headset === null;
   }
@@ -346,9 +369,9 @@ export class View {
   /** `scale`: of the screen's pixels. */
   private drawing(scale: number, timed = false): Drawing {
     const { camera, size, rigCamera } = this.navigator;
-    const rights: number[] = [0];
+    const poses: (Rigid | null)[] = [kNowhere];
     // Another rig's camera sees something else.
-    for (const [i, { id }] of this.besides.entries()) rights[id] = this.isRigView ? NaN : (this.offsets[i + 1] ?? 0);
+    for (const [i, { id }] of this.besides.entries()) poses[id] = this.isRigView ? null : (this.poses[i + 1] ?? kNowhere);
     camera.updateMatrixWorld();
     return {
       ...size,
@@ -359,8 +382,9 @@ export class View {
       lens: this.isRigView ? rigCamera : null,
       range: this.range,
       ground: this.showsGround ? this.ground.ranges : null,
-      rights,
+      poses,
       background: this.background_,
+      smooth: this.drawsSmooth,
       timed,
     };
   }
@@ -396,8 +420,8 @@ export class View {
     const above = this.extents.flatMap((extent, i): Label[] => {
       if (extent === null) return [];
       const { min, max } = extent;
-      const at: Label['at'] = [(min[0] + max[0]) / 2 + this.offsets[i]!, min[1] - 0.1 * (max[1] - min[1]), (min[2] + max[2]) / 2];
-      return [{ at, text: names[i]!, colour: '--text' }];
+      const at: Label['at'] = [(min[0] + max[0]) / 2, min[1] - 0.1 * (max[1] - min[1]), (min[2] + max[2]) / 2];
+      return [{ at: moved(this.poses[i]!, at), text: names[i]!, colour: '--text' }];
     });
     return [...above, ...ground]; // the first ones have their place
   }

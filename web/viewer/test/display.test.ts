@@ -10,7 +10,7 @@ describe('display', () => {
       way: 'camera',
       background: 'white',
       theme: 'light',
-      grid: false,
+      grid: false, smooth: false,
       split: 'both',
       fov: 55,
     };

@@ -28,6 +28,28 @@ it('a few outliers do not move the box', () => {
   expect(robustExtent(new Float32Array(30))).toBeNull();
 });
 
+it('what stands apart before the rest is the subject', () => {
+  // A plate of 0.4 m at 1 m before a wall of 2 m at 1.5 m, and a few points that fly between them.
+  const positions = new Float32Array(3 * 4000);
+  for (let v = 0; v < 4000; ++v) {
+    const [x, y] = [((v % 63) / 62 - 0.5) * 2, (Math.floor(v / 63) / 62 - 0.5) * 2];
+    const [size, z] = v % 4 === 0 ? [0.2, 1 + 0.02 * x] : [1, 1.5];
+    positions.set([x * size + (size < 1 ? 0.3 : 0), y * size, z], v * 3);
+    if (v % 500 === 1) positions[v * 3 + 2] = 1.1 + v / 20000;
+  }
+  const extent = robustExtent(positions)!;
+  expect(extent.max[2]).toBeCloseTo(1.5, 6);
+  expect(extent.max[0]).toBeGreaterThan(0.9);
+  expect(extent.subject!.min[0]).toBeCloseTo(0.1, 1);
+  expect(extent.subject!.max[0]).toBeCloseTo(0.5, 1);
+  expect(extent.subject!.max[2]).toBeLessThan(1.1);
+
+  for (let v = 0; v < 4000; ++v) positions[v * 3 + 2] = 1 + v / 8000; // of all depths: one surface
+  expect(robustExtent(positions)!.subject).toBeUndefined();
+  positions.fill(1);
+  expect(robustExtent(positions)!.subject).toBeUndefined();
+});
+
 it('normals average the noise of single lines away', () => {
   // A plane of 40 lines, every second one 1 mm nearer: lines 2 mm apart, columns 10 mm.
   const [rows, columns] = [40, 10];

@@ -6,6 +6,7 @@ import { kDefaultDisplay } from '../src/display';
 import { writeGlb } from '../src/exportGlb';
 import { writePly } from '../src/exportPly';
 import type { Surface } from '../src/pick';
+import { rigidOf } from '../src/rigid';
 import { momentOf, readShared, shareLink } from '../src/share';
 import type { Moment, Playback } from '../src/source';
 
@@ -30,6 +31,17 @@ describe('a link', () => {
     expect(shared.pose).toEqual(pose);
     expect(new URLSearchParams(link.hash.slice(1)).get('time')).toBe('live');
     expect(shared.moment).toBeNull();
+  });
+
+  it('brings back where streams were placed', () => {
+    const places = new Map([['left_one', rigidOf([0.1, -0.8, 0.05], [0.9, -0.02, 0.3])]]);
+    const link = new URL(shareLink('http://host/', { kind: 'stream', name: 'face,left_one' }, kDefaultDisplay, null, null, places));
+    const back = readShared(link.hash, kDefaultDisplay).places.get('left_one')!;
+    back.rotation.forEach((c, i) => expect(c).toBeCloseTo(places.get('left_one')!.rotation[i]!, 4));
+    expect(back.translation).toEqual([0.9, -0.02, 0.3]);
+    for (const hash of ['#place=a', '#place=a_1_2_3_4_5', '#place=_1_2_3_4_5_6', '#place=a_1_2_3_4_5_x', '#place=a_1_2_3_4_5_1e9']) {
+      expect(readShared(hash, kDefaultDisplay).places.size).toBe(0);
+    }
   });
 
   const recording = { kind: 'recording', name: 'face-2026-11-22T07-05-00Z.mcap' } as const;
@@ -57,7 +69,7 @@ describe('a link', () => {
 
   it.each(['', '#', '#eye=1_2&at=0_0_0', '#eye=1_2_x&at=0_0_0', '#eye=1__2&at=0_0_0', '#eye=1_1_1&at=1_1_1', '#eye=1e99_0_0&at=0_0_0', '#eye=0_0_1'])(
     'without a whole view shows the first one: %s',
-    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null, moment: null }),
+    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null, moment: null, places: new Map() }),
   );
 });
 

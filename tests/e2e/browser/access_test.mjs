@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: who uses a keyboard or a screen reader gets at all of the page: each control of each
+// panel has a name, the tabulator reaches them and shows where it is; the sheet lists the keys; times are told since
+// the start and by the day; what was measured is copied.
+// Run as: node access_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
+import assert from 'node:assert/strict';
+import { eventually, launchChromium } from './chromium.mjs';
+import { Feeder, inState, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+
+const [feederPath] = process.argv.slice(2);
+const feeder = await Feeder.start(feederPath);
+const browser = await launchChromium();
+const complaints = [];
+const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
+const kPanels = { b: 'display', n: 'streams', m: 'measure', i: 'statistics', t: 'take', '?': 'help' };
+const kFrame = 62;
+
+/** What a person can press or set, and how it is called; those without a name. */
+const nameless = (page) =>
+  page.evaluate(() => {
+    const isShown = (e) => e.checkVisibility({ visibilityProperty: true });
+    const words = (e) => [...(e.labels ?? [])].map((l) => l.textContent).join(' ') || e.textContent;
+    const name = (e) => e.getAttribute('aria-label') ?? (words(e) || e.title);
+    const controls = [...document.querySelectorAll('button, input, select, a[href], [role=slider]')].filter(isShown);
+    return { count: controls.length, without: controls.filter((e) => !/\p{L}|\d/u.test(name(e))).map((e) => e.outerHTML.slice(0, 120)) };
+  });
+
+const checks = {
+  async 'each control of each panel has a name'(page) {
+    await shownPast(page, 3);
+    assert.equal(await page.getAttribute('html', 'lang'), 'en');
+    const bare = await nameless(page);
+    assert.ok(bare.count > 20, `${bare.count} controls`);
+    assert.deepEqual(bare.without, []);
+    for (const [key, name] of Object.entries(kPanels)) {
+      await page.keyboard.press(key);
+      await page.waitForSelector(`#panel-${name}`, { state: 'visible' });
+      assert.equal(await page.getAttribute(`#tool-${name}`, 'aria-expanded'), 'true');
+      assert.deepEqual((await nameless(page)).without, [], name);
+      await page.keyboard.press('Escape');
+      await page.waitForSelector(`#panel-${name}`, { state: 'hidden' });
+    }
+  },
+
+  async 'the tabulator reaches tools, modes and time line, and shows where it is'(page) {
+    await page.focus('#view');
+    const reached = new Set();
+    for (let i = 0; i < 60; ++i) {
+      await page.keyboard.press('Tab');
+      const at = await page.evaluate(() => {
+        const e = document.activeElement;
+        const { outlineStyle, outlineWidth, boxShadow } = getComputedStyle(e);
+        const part = e.closest('#ways, #rail, #modes, #timeline')?.id ?? '';
+        return { part, isMarked: (outlineStyle !== 'none' && parseFloat(outlineWidth) > 0) || boxShadow !== 'none', html: e.outerHTML.slice(0, 100) };
+      });
+      if (at.part === '') continue;
+      assert.ok(at.isMarked, `nothing shows that the focus is on ${at.html}`);
+      reached.add(at.part);
+    }
+    assert.deepEqual([...reached].sort(), ['modes', 'rail', 'timeline', 'ways']);
+  },
+
+  async 'a mode is chosen by the keyboard alone'(page) {
+    await page.focus('#modes button:nth-child(5)');
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => window.relievo.diagnostics().mode === 'normals');
+    assert.equal(await page.getAttribute('#modes button:nth-child(5)', 'aria-pressed'), 'true');
+    await page.focus('#view');
+    await page.keyboard.press('1');
+  },
+
+  async 'the sheet lists the keys'(page) {
+    await page.keyboard.press('?');
+    await page.waitForSelector('#panel-help', { state: 'visible' });
+    const keys = (await page.locator('#panel-help dt').allTextContents()).join(' ');
+    for (const key of ['R', 'O Y C', 'G', 'V', 'F', 'H', 'Space', '[ ]', 'Home End', 'L', 'X', 'B', 'M', 'N', 'I', 'T']) assert.ok(keys.includes(key), `${key} is not in ${keys}`);
+    await page.keyboard.press('Escape');
+  },
+
+  async 'times are since the start, and of the day'(page) {
+    await page.waitForSelector('#timeline .time', { state: 'visible' });
+    await page.focus('#view');
+    await page.keyboard.press(' ');
+    await inState(page, 'shifted');
+    assert.match(await page.textContent('#timeline .time'), /^[−-]?\d+:\d\d\.\d{3}$/);
+    await page.click('#timeline .time');
+    const shown = /(\d\d):(\d\d):(\d\d)/.exec(await page.textContent('#timeline .time'));
+    assert.ok(shown !== null, await page.textContent('#timeline .time'));
+    const since = (Number(shown[1]) * 60 + Number(shown[2])) * 60 + Number(shown[3]);
+    const now = (Date.now() / 1000) % 86_400;
+    assert.ok((now - since + 86_400) % 86_400 < 600, `${shown[0]} is not of these minutes`);
+    await page.click('#timeline .time');
+    await page.focus('#view');
+    await page.keyboard.press('l');
+    await inState(page, 'live');
+  },
+
+  async 'what was measured is copied'(page) {
+    await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+    feeder.say(`frame ${kFrame}`);
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+    await page.keyboard.press('m');
+    await page.click('#panel-measure .segments button:text-is("Point")');
+    await still(page);
+    const at = await page.evaluate((p) => window.relievo.toPage(p), pointOf(0.15, 0.2, kFrame));
+    await page.mouse.click(at.x, at.y);
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 1);
+    const { value } = (await look(page)).measurements[0];
+    await page.click('#panel-measure button:text-is("Copy")');
+    await eventually('nothing is on the clipboard', async () => /^tool\t/.test(await page.evaluate(() => navigator.clipboard.readText())));
+    const [names, cells] = (await page.evaluate(() => navigator.clipboard.readText())).trim().split('\n').map((line) => line.split('\t'));
+    assert.equal(cells[0], 'point');
+    assert.ok(Math.abs(Number(cells[names.findIndex((n) => /^value/.test(n))]) - value) < 1e-5, `${names}: ${cells}`);
+    await page.keyboard.press('Escape');
+  },
+
+  async 'no error, no request to another host'() {
+    // Chromium tells of what the server refuses: that it has no folder of recordings.
+    assert.deepEqual(complaints.filter((c) => !/status of 404/.test(c)), []);
+  },
+};
+
+let failed = 1;
+try {
+  feeder.say('start ball');
+  failed = await runChecks(checks, await open('/', { viewport: { width: 1280, height: 760 } }));
+} finally {
+  await browser.close();
+  await feeder.kill();
+}
+process.exit(failed === 0 ? 0 : 1);
