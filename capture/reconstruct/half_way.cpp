@@ -2,8 +2,10 @@
 #include "capture/reconstruct/half_way.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
+#include <cstdlib>
+#include <iterator>
 #include <numbers>
 
 namespace relievo {
@@ -12,34 +14,82 @@ namespace {
 // A boundary that moved further along its line is on another surface now: 1 m/s in depth is 5 px a frame.
 constexpr float kFurthest_px = 8;
 
+// Of one that a single frame has.
+constexpr std::size_t kLeastKnown = 6;  // neighbours that tell how far it goes,
+constexpr float kAlike_px = 2;          // at most so unlike each other
+constexpr float kRoom_px = 4;           // to those of its own surface
+constexpr float kOther_px = 16;         // and of another one, whose edge nobody saw at that instant
+constexpr int kOwn = 2;                 // boundaries: nearer ones are of its own surface
+constexpr float kMore_px = 0.1F;        // standard deviation more
+
 }  // namespace
 
-bool LastColumns::half_way(const std::vector<DecodedBoundary>& now, std::int64_t time_ns,
-                           std::int64_t longest_ns, std::vector<DecodedBoundary>& out) const {
-  out.clear();
-  if (columns_.empty() || time_ns <= time_ns_ || time_ns - time_ns_ > longest_ns) return false;
-  for (const DecodedBoundary& b : now) {
-    const auto place = static_cast<std::size_t>(b.line) * width_ + static_cast<std::size_t>(b.boundary);
-    if (static_cast<std::size_t>(b.boundary) >= width_ || place >= columns_.size()) continue;
-    const float before_px = columns_[place];
-    if (!(std::fabs(before_px - b.column_px) <= kFurthest_px)) continue;
-    // Both columns are as exact, so their mean is more so.
-    out.push_back({b.boundary, b.line, 0.5F * (before_px + b.column_px),
-                   b.sigma_px * std::numbers::sqrt2_v<float> / 2, b.slope});
-  }
-  return true;
+HalfWay::HalfWay(int boundaries, int lines) {
+  before_.reset(boundaries, lines);
+  now_.reset(boundaries, lines);
 }
 
-void LastColumns::keep(const std::vector<DecodedBoundary>& boundaries, std::int64_t time_ns) {
-  time_ns_ = time_ns;
-  std::size_t lines = 0;
-  for (const DecodedBoundary& b : boundaries) {
-    width_ = std::max(width_, static_cast<std::size_t>(b.boundary) + 1);
-    lines = std::max(lines, static_cast<std::size_t>(b.line) + 1);
+/// How far a place's neighbours go from frame to frame, where they go alike.
+std::optional<float> HalfWay::went(int line, int boundary) const {
+  std::array<float, 24> went{};
+  std::size_t count = 0;
+  for (int lines = -3; lines <= 3; ++lines) {
+    for (int boundaries = -2; boundaries <= 2; ++boundaries) {
+      if (std::abs(lines) + std::abs(boundaries) > 3) continue;
+      const float px = now_.line(line + lines)[boundary + boundaries].column_px -
+                       before_.line(line + lines)[boundary + boundaries].column_px;
+      if (std::fabs(px) <= kFurthest_px) went[count++] = px;
+    }
   }
-  columns_.assign(lines * width_, std::numeric_limits<float>::quiet_NaN());
-  for (const DecodedBoundary& b : boundaries)
-    columns_[static_cast<std::size_t>(b.line) * width_ + static_cast<std::size_t>(b.boundary)] = b.column_px;
+  if (count < kLeastKnown) return std::nullopt;
+  std::sort(went.begin(), went.begin() + static_cast<std::ptrdiff_t>(count));
+  if (went[count - 1] - went[0] > kAlike_px) return std::nullopt;
+  return went[count / 2];
+}
+
+void HalfWay::place_line(int line, std::vector<DecodedBoundary>& out) {
+  const Place* before = before_.line(line);
+  const Place* now = now_.line(line);
+  columns_.clear();
+  for (int b = 0; b < now_.boundaries(); ++b) {
+    if (!(std::fabs(before[b].column_px - now[b].column_px) <= kFurthest_px)) continue;
+    // Both columns are as exact, so their mean is more so.
+    out.push_back({b, line, 0.5F * (before[b].column_px + now[b].column_px),
+                   now[b].sigma_px * std::numbers::sqrt2_v<float> / 2, 0});
+    columns_.push_back({out.back().column_px, b});
+  }
+  std::ranges::sort(columns_, {}, &Column::px);
+  for (int b = 0; b < now_.boundaries(); ++b) {
+    if (before[b].known() == now[b].known()) continue;
+    const std::optional<float> px = went(line, b);
+    if (!px) continue;
+    const float column = now[b].known() ? now[b].column_px - 0.5F * *px : before[b].column_px + 0.5F * *px;
+    const auto right = std::ranges::lower_bound(columns_, column, {}, &Column::px);
+    const auto is_free = [&](const Column& other) {
+      const float room_px = std::abs(other.boundary - b) <= kOwn ? kRoom_px : kOther_px;
+      return std::fabs(other.px - column) >= room_px;
+    };
+    if (right != columns_.end() && !is_free(*right)) continue;
+    if (right != columns_.begin() && !is_free(*std::prev(right))) continue;
+    const float sigma = now[b].known() ? now[b].sigma_px : before[b].sigma_px;
+    out.push_back({b, line, column, std::hypot(sigma, kMore_px), 0});
+  }
+}
+
+bool HalfWay::place(const std::vector<DecodedBoundary>& now, std::int64_t time_ns, std::int64_t longest_ns,
+                    std::vector<DecodedBoundary>& out) {
+  out.clear();
+  const bool follows = time_ns_ != 0 && time_ns > time_ns_ && time_ns - time_ns_ <= longest_ns;
+  now_.reset(now_.boundaries(), now_.lines());
+  for (const DecodedBoundary& b : now) {
+    Place& place = now_.line(b.line)[b.boundary];
+    if (!place.known()) place = {b.column_px, b.sigma_px};  // the surest comes first
+  }
+  if (follows)
+    for (int line = 0; line < now_.lines(); ++line) place_line(line, out);
+  std::swap(before_, now_);
+  time_ns_ = time_ns;
+  return follows;
 }
 
 }  // namespace relievo

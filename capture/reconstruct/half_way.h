@@ -4,30 +4,40 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "capture/reconstruct/place_grid.h"
 #include "capture/reconstruct/slide_decoder.h"
 
 namespace relievo {
 
-/// Empty until keep(). One thread.
-class LastColumns {
+/// Keeps the frame before and its scratch memory. One thread.
+class HalfWay {
  public:
-  /// What keep() was given last.
+  HalfWay(int boundaries, int lines);
+
+  /// Of the frame before; 0: there is none yet.
   std::int64_t time_ns() const { return time_ns_; }
 
-  /// `out` becomes the boundaries that both frames have on a line, half way between their columns. False,
-  /// and `out` empty, where nothing was kept, or more than `longest_ns` before.
-  bool half_way(const std::vector<DecodedBoundary>& now, std::int64_t time_ns, std::int64_t longest_ns,
-                std::vector<DecodedBoundary>& out) const;
-
-  /// Replaces what was kept.
-  void keep(const std::vector<DecodedBoundary>& boundaries, std::int64_t time_ns);
+  /// `out` becomes the boundaries half way between a frame's and those of the frame before: half way between
+  /// their columns where both frames have them, and as their neighbours go where one has, unless
+  /// another surface is there. False, and `out` empty, where the frame before is none or longer ago than
+  /// `longest_ns`. Once a frame.
+  bool place(const std::vector<DecodedBoundary>& now, std::int64_t time_ns, std::int64_t longest_ns,
+             std::vector<DecodedBoundary>& out);
 
  private:
+  struct Column {
+    float px;
+    int boundary;
+  };
+  void place_line(int line, std::vector<DecodedBoundary>& out);
+  std::optional<float> went(int line, int boundary) const;
+
   std::int64_t time_ns_ = 0;
-  std::size_t width_ = 0;       // boundaries a line
-  std::vector<float> columns_;  // [line][boundary], NaN where there is none
+  PlaceGrid before_, now_;
+  std::vector<Column> columns_;  // a line's that both frames have, left to right
 };
 
 }  // namespace relievo

@@ -5,14 +5,16 @@
 
 namespace relievo {
 
+void PlaceGrid::reset(int boundaries, int lines) {
+  boundaries_ = boundaries;
+  lines_ = lines;
+  places_.assign(static_cast<std::size_t>(stride() * (lines_ + 2 * kMargin)), {});
+}
+
 void PlaceGrid::fill(int boundaries, WorkerPool& pool, const SequenceResult& result, const EdgeImage& edges,
                      const std::vector<RecoveredBoundary>& recovered) {
-  if (boundaries != boundaries_ || edges.lines != lines_) {
-    boundaries_ = boundaries;
-    lines_ = edges.lines;
-    // What lies around the lines stays as it is here.
-    places_.assign(static_cast<std::size_t>(stride() * (lines_ + 2 * kMargin)), {});
-  }
+  // What lies around the lines stays as it is here.
+  if (boundaries != boundaries_ || edges.lines != lines_) reset(boundaries, edges.lines);
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int l = begin; l < end; ++l) {
       Place* here = line(l);

@@ -26,6 +26,8 @@ class PlaceGrid {
  public:
   static constexpr int kMargin = 3;
 
+  /// Empty; memory is reused.
+  void reset(int boundaries, int lines);
   /// Those of `result` and `recovered`; memory is reused.
   void fill(int boundaries, WorkerPool& pool, const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered);

@@ -82,6 +82,7 @@ struct Reconstructor::State {
         triangulator(r, p, line_count(r), line_step(r)),
         depths(p.boundaries(), r.camera.width, line_count(r)),
         white_texture(r.colour_matrix),
+        half_way(p.boundaries(), line_count(r)),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
   }
@@ -96,11 +97,11 @@ struct Reconstructor::State {
   Triangulator triangulator;
   DepthRange depths;
   WhiteTexture white_texture;
+  HalfWay half_way;  // white-field
   SurfaceBuilder surface_builder;
 
   std::vector<DecodedBoundary> decoded;
   std::vector<DecodedBoundary> decoded_between;
-  LastColumns before;  // white-field: the frame before's
   std::vector<GridVertex> vertices;
   std::optional<Frame3D> waiting;
   Image8 last_texture;  // white-field: of the frame before
@@ -122,7 +123,7 @@ struct Reconstructor::State {
 void Reconstructor::State::forget() {
   pairs.forget();
   decoder = SlideDecoder(rig, pattern, options);
-  before = {};
+  half_way = HalfWay(pattern.boundaries(), line_count(rig));
 }
 
 /// Whatever it holds is overwritten.
@@ -180,10 +181,8 @@ void Reconstructor::State::make_texture(const CapturedFrame& frame, Image8& out)
 /// one's. Nothing where a frame was lost between.
 std::optional<Frame3D> Reconstructor::State::surface_between(const CapturedFrame& frame) {
   const std::int64_t frame_ns = std::llround(1e9 / rig.frame_rate);
-  const bool follows = before.half_way(decoded, frame.time_ns, frame_ns * 3 / 2, decoded_between);
-  const std::int64_t time_ns = before.time_ns();
-  before.keep(decoded, frame.time_ns);
-  if (!follows) return std::nullopt;
+  const std::int64_t time_ns = half_way.time_ns();
+  if (!half_way.place(decoded, frame.time_ns, frame_ns * 3 / 2, decoded_between)) return std::nullopt;
   Frame3D out = blank_frame();
   out.number = frame.number;
   out.time_ns = time_ns + (frame.time_ns - time_ns) / 2;
