@@ -281,6 +281,10 @@ Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& op
   return bytes;
 }
 
+std::string FrameEncoder::take_notice() {
+  return state_->texture ? state_->texture->take_notice() : std::string();
+}
+
 Result<FrameHeader> read_frame_header(std::span<const std::uint8_t> bytes) {
   const auto layout = read_frame_layout(bytes);
   if (!layout) return layout.error();

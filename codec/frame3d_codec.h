@@ -105,6 +105,10 @@ class FrameEncoder {
   Result<Bytes> encode(const Frame3D& frame, const EncodeOptions& options,
                        const std::function<void()>& geometry_done = {});
 
+  /// What a log should say, once, of the frames encoded so far: that another encoder than the one asked for
+  /// makes the textures from now on, and why. Else empty.
+  std::string take_notice();
+
   /// The next frame will be a key frame. Any thread.
   void request_key_frame();
 

@@ -151,6 +151,10 @@ int av_pixel_format(const VideoFormat& format) {
   return format.bits == 8 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV420P10;
 }
 
+const char* h264_encoder_name(VideoEncoderKind kind) {
+  return std::ranges::find(kRows, kind, &Row::kind)->name;
+}
+
 bool opens_for_quality(VideoEncoderKind kind) {
   return kind != VideoEncoderKind::kX264;
 }

@@ -27,6 +27,9 @@ std::string av_text(int code);
 /// An AVPixelFormat.
 int av_pixel_format(const VideoFormat& format);
 
+/// libavcodec's.
+const char* h264_encoder_name(VideoEncoderKind kind);
+
 /// Those that take another quality only when they are opened anew; x264 takes it picture by picture.
 bool opens_for_quality(VideoEncoderKind kind);
 

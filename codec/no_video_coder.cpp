@@ -29,6 +29,9 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat&, VideoSpeed, VideoE
 Result<bool> VideoEncoder::encode(const VideoView&, const VideoPictureOptions&, Bytes&) {
   return kMissing;
 }
+std::string VideoEncoder::take_notice() {
+  return {};
+}
 
 VideoDecoder::VideoDecoder(std::unique_ptr<State> state) : state_(std::move(state)) {}
 VideoDecoder::VideoDecoder(VideoDecoder&&) noexcept = default;

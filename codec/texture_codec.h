@@ -31,6 +31,8 @@ class TextureEncoder {
   /// on a picture larger than the codec takes. The same pictures in the same order give the same bytes, but
   /// of hardware encoders.
   virtual Result<bool> encode(View8 picture, const TextureEncodeOptions& options, Bytes& out) = 0;
+  /// What a log should say, once, of the pictures encoded so far: VideoEncoder::take_notice(). Else empty.
+  virtual std::string take_notice() { return {}; }
 };
 
 /// Of one stream. One thread at a time. Any bytes: they give an error, never a crash, a hang or memory beyond

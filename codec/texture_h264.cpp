@@ -135,6 +135,8 @@ class Encoder final : public TextureEncoder {
     return *key;
   }
 
+  std::string take_notice() override { return video_ ? video_->take_notice() : std::string(); }
+
  private:
   /// About the error of a JPEG of that quality.
   static double rate_factor(int quality) { return 51 - 0.35 * quality; }

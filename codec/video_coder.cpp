@@ -21,6 +21,7 @@ constexpr double kFinest = 1;  // 0 is another profile, lossless
 constexpr double kCoarsest = 51;
 constexpr double kQualityStep =
     2;  // of those that open anew for another quality, and begin with a key picture
+constexpr const char* kFellBack = "H.264 by x264 from now on: ";
 
 /// What libavcodec's decoder may call it: full range has names of its own, and it adds chroma to luma.
 bool is_format(int found, const VideoFormat& format) {
@@ -46,6 +47,7 @@ struct VideoEncoder::State {
   std::int64_t count = 0;
   double opened_for = VideoPictureOptions{}.rate_factor;
   bool is_first = true;  // since it was opened
+  std::string notice;
 
   Status open(double rate_factor) {
     auto opened = open_h264_encoder(kind, format, speed, rate_factor);
@@ -54,6 +56,38 @@ struct VideoEncoder::State {
     opened_for = rate_factor;
     is_first = true;
     return {};
+  }
+
+  /// One picture, into `unit`; opened anew where that is needed.
+  Result<bool> encode(const VideoPictureOptions& options, Bytes& unit) {
+    const double factor = std::clamp(options.rate_factor, kFinest, kCoarsest);
+    const bool is_other = opens_for_quality(kind) && std::fabs(factor - opened_for) >= kQualityStep;
+    // After an error, too: what the receivers have is not known any more.
+    if (!codec || is_other)
+      if (auto status = open(factor); !status) return status.error();
+    if (!opens_for_quality(kind)) av_opt_set_double(codec->priv_data, "crf", factor, 0);
+    const bool wants_key = options.key || is_first;
+    picture->pts = count++;
+    picture->pict_type = wants_key ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
+    const auto packet = encode_at_once(*codec, *picture);
+    if (!packet) return packet.error().in(h264_encoder_name(kind));
+    is_first = false;
+    const AVPacket& coded = **packet;
+    append_lean_unit({coded.data, static_cast<std::size_t>(coded.size)}, unit);
+    const bool is_key = (coded.flags & AV_PKT_FLAG_KEY) != 0;
+    if (kind == VideoEncoderKind::kX264) return is_key;
+    const auto checked = check_access_unit(unit, format);  // drivers differ
+    if (!checked) return checked.error().in(h264_encoder_name(kind));
+    if (*checked != is_key || (wants_key && !is_key))
+      return Error{std::string(h264_encoder_name(kind)) + " gives no key picture where one is asked for"};
+    return is_key;
+  }
+
+  /// libx264 from the next picture on, which is a key picture.
+  void fall_back(const Error& why) {
+    notice = kFellBack + why.message;
+    kind = VideoEncoderKind::kX264;
+    codec.reset();
   }
 
   Status copy(const VideoView& from) {
@@ -80,6 +114,7 @@ VideoEncoder::~VideoEncoder() = default;
 Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed speed,
                                           VideoEncoderKind kind) {
   if (auto status = check_video_format(format); !status) return status.error();
+  std::string notice;
   if (kind == VideoEncoderKind::kAuto) {
     const bool is_usual = format.bits == 8 && format.sampling != VideoSampling::kLuma;
     kind = is_usual ? chosen_video_encoder().kind : VideoEncoderKind::kX264;
@@ -87,12 +122,14 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed 
       auto made = create(format, speed, kind);
       if (made) return made;
       kind = VideoEncoderKind::kX264;
+      notice = kFellBack + made.error().message;
     }
   }
   auto state = std::make_unique<State>();
   state->format = format;
   state->speed = speed;
   state->kind = kind;
+  state->notice = std::move(notice);
   if (auto status = state->open(state->opened_for); !status) return status.error();
   state->picture->format = av_pixel_format(format);
   state->picture->width = format.width;
@@ -105,24 +142,24 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed 
 
 Result<bool> VideoEncoder::encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out) {
   State& s = *state_;
-  const double factor = std::clamp(options.rate_factor, kFinest, kCoarsest);
-  const bool is_other = opens_for_quality(s.kind) && std::fabs(factor - s.opened_for) >= kQualityStep;
-  // After an error, too: what the receivers have is not known any more.
-  if (!s.codec || is_other)
-    if (auto status = s.open(factor); !status) return status.error();
   if (auto status = s.copy(picture); !status) return status.error();
-  if (!opens_for_quality(s.kind)) av_opt_set_double(s.codec->priv_data, "crf", factor, 0);
-  s.picture->pts = s.count++;
-  s.picture->pict_type = options.key || s.is_first ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
-  const auto packet = encode_at_once(*s.codec, *s.picture);
-  if (!packet) {
-    s.codec.reset();
-    return packet.error();
+  Bytes unit;
+  auto key = s.encode(options, unit);
+  if (!key && s.kind != VideoEncoderKind::kX264) {
+    s.fall_back(key.error());
+    unit.clear();
+    key = s.encode(options, unit);
   }
-  s.is_first = false;
-  const AVPacket& coded = **packet;
-  append_lean_unit({coded.data, static_cast<std::size_t>(coded.size)}, out);
-  return (coded.flags & AV_PKT_FLAG_KEY) != 0;
+  if (!key) {
+    s.codec.reset();
+    return key.error();
+  }
+  out.insert(out.end(), unit.begin(), unit.end());
+  return key;
+}
+
+std::string VideoEncoder::take_notice() {
+  return std::exchange(state_->notice, {});
 }
 
 // ---------------------------------------------------------------- decoder

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "base/result.h"
 #include "base/stream.h"
@@ -45,8 +46,14 @@ class VideoEncoder {
   ~VideoEncoder();
 
   /// Appends one access unit, Annex B, to `out`; true: an IDR picture, which decodes alone. Every other one
-  /// needs the picture encoded before it. After an error the next picture is an IDR picture.
+  /// needs the picture encoded before it. After an error the next picture is an IDR picture. Where a hardware
+  /// encoder fails, does not open anew, or gives what decoders would not take, libx264 codes this picture, as
+  /// an IDR picture, and all that follow.
   Result<bool> encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out);
+
+  /// What a log should say of it, once: that another encoder than the one asked for makes the pictures from
+  /// now on, and why. Else empty.
+  std::string take_notice();
 
  private:
   struct State;

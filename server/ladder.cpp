@@ -128,6 +128,8 @@ void Ladder::encode(Step& step, Item& item) {
       log_warning("quality " + std::string(to_string(step.output.rung)) + ": " + error.message);
   };
   if (!bytes) return fail(bytes.error());
+  if (const std::string notice = step.encoder.take_notice(); !notice.empty())
+    log_warning("quality " + std::string(to_string(step.output.rung)) + ": " + notice);
   step.stats.encoded(milliseconds(steady_now_ns() - begin_ns));
   FrameMessage message;
   message.sequence = step.sequence++;

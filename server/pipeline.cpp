@@ -302,6 +302,7 @@ class ThreadedPipeline final : public Pipeline {
         fail(bytes.error());
         continue;
       }
+      if (const std::string notice = encoder_.take_notice(); !notice.empty()) log_warning(notice);
       stats_.encoded_parts(milliseconds(geometry_ns - begin), milliseconds(steady_now_ns() - geometry_ns));
       const bool is_key = is_key_frame(*bytes);
       if (is_key) key_ns = begin;

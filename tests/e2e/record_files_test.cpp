@@ -71,6 +71,49 @@ TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
   }
 }
 
+/// Split by time, where most frames build on the one before.
+TEST(RecordFiles, FilesOfALengthBeginWithAKeyFrameAndTheCalibration) {
+  const TempFolder folder;
+  const auto served = run({program("relievo-server"),
+                           "serve",
+                           "--source",
+                           "sim:plane,width=160,height=120,stripes=30",
+                           "--web",
+                           "none",
+                           "--domain",
+                           kDomain,
+                           "--interface",
+                           "lo",
+                           "--frames",
+                           "100",
+                           "--geometry",
+                           "grid",
+                           "--key-interval",
+                           "6",
+                           "--record",
+                           folder / "face.mcap",
+                           "--split-every",
+                           "1s"});
+  ASSERT_EQ(served.status, 0) << served.err;
+  const std::vector<fs::path> files = files_in(folder.path());
+  EXPECT_GE(files.size(), 3U);
+  int deltas = 0;
+  for (const fs::path& file : files) {
+    SCOPED_TRACE(file);
+    EXPECT_THAT(info(file)["attachments"].dump(),
+                HasSubstr(R"(["rig.yaml","pattern.yaml","stream_info.cdr"])"));
+    const std::vector<Bytes> frames = recorded_frames(file);
+    ASSERT_FALSE(frames.empty());
+    EXPECT_TRUE(holds_key_frame(frames[0]));
+    for (const Bytes& frame : frames) deltas += holds_key_frame(frame) ? 0 : 1;
+    const auto exported =
+        run({program("relievo"), "export", file, "--out", folder / "ply" / file.stem(), "--json"});
+    ASSERT_EQ(exported.status, 0) << exported.err;
+    EXPECT_EQ(nlohmann::json::parse(exported.out)["frames"], frames.size()) << "each decodes";
+  }
+  EXPECT_GT(deltas, 20);
+}
+
 /// Among frames that say of themselves that they need others, or are of an unknown version, as these are,
 /// files end at twice their size.
 TEST(RecordFiles, OldSegmentsGo) {

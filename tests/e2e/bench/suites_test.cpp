@@ -132,6 +132,7 @@ TEST(Bench, Recording) {
   ASSERT_TRUE(report.is_object());
   expect_spread(report["open_ms"], 9, "open_ms");
   expect_spread(report["seek_mb"], 14, "seek_mb");
+  expect_spread(report["seek_cpu_ms"], 14, "seek_cpu_ms");
   EXPECT_LT(report["seek_mb"]["max"], report["file_mb"]) << "not all of it";
   EXPECT_GT(report["file_mb"], 0.1);
   for (const char* from : {"cached", "from disk"}) expect_spread(row(report, from)["seek_ms"], 7, from);

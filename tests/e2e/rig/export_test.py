@@ -112,6 +112,37 @@ class Export(unittest.TestCase):
         self.assertGreater(error.min(), -0.5 * camera["depth_unit_m"] - 1e-6)
         self.assertGreater((error < 0.5 * camera["depth_unit_m"] + 1e-6).mean(), 0.98)
 
+    def test_every_format_has_the_frames_of_a_range(self):
+        recording = self.path / "long.mcap"
+        subprocess.run([SERVER, "serve", "--source", "sim:plane,width=160,height=120,stripes=30", "--frames", "31",
+                        "--geometry", "grid", "--key-interval", "7", "--texture", "h264", "--web", "none",
+                        "--domain", DOMAIN, "-q", "--record", recording], check=True, stdout=subprocess.DEVNULL)
+        described = subprocess.run([RELIEVO, "info", recording, "--json"], capture_output=True, check=True)
+        frames = json.loads(described.stdout)["frames"]
+        self.assertGreater(frames, 20)
+        for kind in ("ply", "obj", "glb", "animation", "depth", "png", "video"):
+            written = []
+            for ask in (["--frames", "9:11"], ["--to", "0.5"], ["--from", "0.5"]):
+                out = self.path / f"{kind}{'-'.join(ask)}{'.mp4' if kind == 'video' else '.glb' if kind == 'animation' else ''}"
+                done = subprocess.run([RELIEVO, "export", recording, "--format", kind, "--out", out, "--json", *ask],
+                                      capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, f"{kind} {ask}: {done.stderr}")
+                written.append(json.loads(done.stdout)["frames"])
+                suffix = {"ply": "*.ply", "obj": "*.obj", "glb": "*.glb", "depth": "*.depth.png", "png": "*.png"}
+                if kind in suffix:
+                    self.assertEqual(len(list(out.glob(suffix[kind]))), written[-1])
+                elif kind == "video":
+                    film, count = cv2.VideoCapture(str(out)), 0
+                    while film.read()[0]:
+                        count += 1
+                    self.assertEqual(count, written[-1])
+                else:
+                    root, _ = read_glb(out)
+                    self.assertEqual(len(root["nodes"]) >= written[-1], True)
+            self.assertEqual(written[0], 3, kind)
+            self.assertGreater(min(written[1:]), 5, kind)
+            self.assertEqual(written[1] + written[2], frames, kind)
+
     def test_depth_reads_back_as_the_surface(self):
         self.check_depth(1)
 

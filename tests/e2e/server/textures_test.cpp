@@ -67,6 +67,33 @@ TEST_F(TakeTest, ItIsSaidWhoMakesH264) {
   }
 }
 
+#ifdef RELIEVO_FLAKY_H264
+/// The hardware's encoder opens, makes some pictures and fails (tests/support/flaky_h264.cpp): the stream
+/// goes on, and one line says so.
+TEST_F(TakeTest, AHardwareEncoderThatFailsIsReplaced) {
+  const std::string file = (folder_.path() / "replaced.mcap").string();
+  const Finished served =
+      run(serve(source_, {"--loop", "--frames", "20", "--texture", "h264", "--record", file}), kPatience,
+          {"LD_PRELOAD=" RELIEVO_FLAKY_H264, "FLAKY_H264_PICTURES=10"});
+  ASSERT_EQ(served.status, 0) << served.err;
+  EXPECT_NE(served.err.find("H.264 by v4l2m2m"), std::string::npos) << served.err;
+  int said = 0;
+  for (const std::string& line : lines(served.err))
+    said += line.find("x264 from now on") == std::string::npos ? 0 : 1;
+  EXPECT_EQ(said, 1) << served.err;
+  EXPECT_TRUE(errors(served.err).empty()) << served.err;
+  const Finished described = run({program("relievo").string(), "info", file, "--json"});
+  ASSERT_EQ(described.status, 0) << described.err;
+  const json told = json::parse(described.out);
+  EXPECT_EQ(told["lost"], 0) << described.out;
+  EXPECT_EQ(told["unreadable"], 0) << described.out;
+  const Finished exported = run({program("relievo").string(), "export", file, "--out",
+                                 (folder_.path() / "pictures").string(), "--format", "png", "--json"});
+  ASSERT_EQ(exported.status, 0) << exported.err;
+  EXPECT_EQ(json::parse(exported.out)["frames"], told["frames"]) << exported.err;
+}
+#endif
+
 TEST_F(TakeTest, ABitRateIsKept) {
   const std::string file = (folder_.path() / "rate.mcap").string();
   const Finished served = run(serve(source_, {"--loop", "--frames", "120", "--fast", "--texture-quality",

@@ -3,6 +3,7 @@
 // and on what moves, and lag behind nothing; bounds are kept; both cost fewer bits.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -181,6 +182,42 @@ TEST(GeometryProfiles, VisualKeepsItsBoundOnEveryVertex) {
   };
   const std::size_t grid = bytes_of_ten("grid", [](const Frame3D&, const Surface&) {});
   EXPECT_LT(bytes_of_ten("visual", within), grid / 3);
+}
+
+/// Noise beyond any bound, sigmas that lie, jumps, and holes that come and go: what a certificate is for.
+TEST(GeometryProfiles, VisualKeepsItsBoundWhateverTheSceneDoes) {
+  const test::GridScene scene;
+  for (const float bound_px : {0.02F, 0.5F, 1.F, 8.F}) {
+    EncodeOptions options;
+    ASSERT_TRUE(set_geometry_profile("visual", options));
+    options.texture = TextureCodec::kNone;
+    options.bound_px = bound_px;
+    options.key_interval = 4;
+    FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
+    FrameDecoder decoder;
+    test::Random random(7);
+    for (std::uint64_t f = 0; f < 9; ++f) {
+      Frame3D frame = test::grid_frame({.noise_px = f % 3 == 0 ? 5.F : 0.3F,
+                                        .shift_px = f % 2 == 0 ? 0.F : 6.F * random.unit(),
+                                        .seed = f + 1});
+      for (GridPoint& p : frame.surface.grid)
+        p.sigma_px = std::array{0.F, 1e-4F, 0.1F, 60.F}[random.below(4)];
+      const auto coded = encoder.encode(frame, options);
+      ASSERT_TRUE(coded) << coded.error().message;
+      const auto header = read_frame_header(*coded);
+      ASSERT_TRUE(header && header->geometry == GeometryCodec::kGrid);
+      const auto back = decoder.decode(*coded);
+      ASSERT_TRUE(back) << back.error().message;
+      std::map<Place, float> sent;
+      for (const GridPoint& p : back->surface.grid) sent[{p.line, p.boundary}] = p.column_px;
+      ASSERT_EQ(sent.size(), frame.surface.grid.size());
+      for (const GridPoint& p : frame.surface.grid) {
+        const auto at = sent.find({p.line, p.boundary});
+        ASSERT_NE(at, sent.end());
+        ASSERT_LE(std::fabs(at->second - p.column_px), bound_px + 1e-4F) << f;
+      }
+    }
+  }
 }
 
 TEST(GeometryProfiles, BoundsOutOfRangeAreRefused) {

@@ -4,6 +4,10 @@
 
 #include <gtest/gtest.h>
 
+extern "C" {
+#include <libavcodec/avcodec.h>
+}
+
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -170,6 +174,36 @@ TEST(VideoCoder, WhatIsNoFormatIsRefused) {
        {VideoFormat{0, 0}, VideoFormat{14, 64}, VideoFormat{81, 50}, VideoFormat{80, 51},
         VideoFormat{8194, 16}, VideoFormat{8192, 8192}, VideoFormat{80, 50, VideoSampling::k420, 9}})
     EXPECT_FALSE(VideoEncoder::create(format).ok());
+}
+
+/// As any decoder reads it that knows nothing of us.
+TEST(VideoCoder, TheStreamSaysItsRangeAndColours) {
+  for (const VideoSampling sampling : {VideoSampling::k420, VideoSampling::kLuma}) {
+    Film film{.format = {.width = 80, .height = 50, .sampling = sampling}, .planes = {}, .bytes = {}};
+    VideoEncoder encoder = encoder_of(film.format);
+    Bytes unit;
+    ASSERT_TRUE(encoder.encode(film.picture(0), {}, unit).ok());
+    unit.resize(unit.size() + AV_INPUT_BUFFER_PADDING_SIZE);
+    AVCodecContext* codec = avcodec_alloc_context3(avcodec_find_decoder(AV_CODEC_ID_H264));
+    AVPacket* packet = av_packet_alloc();
+    AVFrame* picture = av_frame_alloc();
+    packet->data = unit.data();
+    packet->size = static_cast<int>(unit.size()) - AV_INPUT_BUFFER_PADDING_SIZE;
+    codec->flags |= AV_CODEC_FLAG_LOW_DELAY;
+    EXPECT_EQ(avcodec_open2(codec, nullptr, nullptr), 0);
+    EXPECT_EQ(avcodec_send_packet(codec, packet), 0);
+    EXPECT_EQ(avcodec_receive_frame(codec, picture), 0);
+    EXPECT_EQ(picture->color_range, AVCOL_RANGE_JPEG);
+    EXPECT_EQ(picture->color_primaries, AVCOL_PRI_BT709);
+    EXPECT_EQ(picture->color_trc, AVCOL_TRC_IEC61966_2_1);
+    if (sampling == VideoSampling::k420) {
+      EXPECT_EQ(picture->colorspace, AVCOL_SPC_SMPTE170M);
+      EXPECT_EQ(picture->chroma_location, AVCHROMA_LOC_CENTER);
+    }
+    av_frame_free(&picture);
+    av_packet_free(&packet);
+    avcodec_free_context(&codec);
+  }
 }
 
 TEST(VideoUnit, TwoPicturesInOneAreRefused) {
