@@ -3,8 +3,9 @@
 // codec. Prints "listening PORT" and obeys lines on stdin: start NAME, also NAME (a second stream of the
 // same frames), apart N (its frames are N ahead of the first one's), stop, frame NUMBER (that one, then
 // stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
-// 8th), rig RMS SCALE (how good the first one's is found to be, which it says from then on). Ends when stdin
-// does, so that no test leaves it behind.
+// 8th), rig RMS SCALE (how good the first one's is found to be, which it says from then on), sigmas METRES...
+// (of the depths, in as many bands from left to right; the lower half is interpolated). Ends when stdin does,
+// so that no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -16,6 +17,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "base/time.h"
 #include "codec/frame3d_codec.h"
@@ -64,7 +66,8 @@ void paint(Image8& texture, float t) {
   }
 }
 
-Frame3D make_frame(std::uint64_t number, float t) {
+/// `sigmas`: of bands of columns, metres; empty: nothing is said of them.
+Frame3D make_frame(std::uint64_t number, float t, const std::vector<float>& sigmas) {
   Frame3D frame;
   frame.number = number;
   frame.time_ns = utc_now_ns();
@@ -75,6 +78,10 @@ Frame3D make_frame(std::uint64_t number, float t) {
       frame.surface.positions.push_back(
           {(u - 0.5f) * kWidth / kFocal * z, (v - 0.5f) * kHeight / kFocal * z, z});
       frame.surface.texture_coordinates.push_back({u, v});
+      if (!sigmas.empty()) {
+        frame.surface.sigmas_m.push_back(sigmas[static_cast<std::size_t>(c) * sigmas.size() / kColumns]);
+        frame.surface.interpolated.push_back(v > 0.5f);
+      }
       if (r == 0 || c == 0) continue;
       const auto at = [](int row, int column) { return static_cast<std::uint32_t>(row * kColumns + column); };
       frame.surface.triangles.push_back({at(r - 1, c - 1), at(r, c - 1), at(r, c)});
@@ -125,6 +132,7 @@ struct Orders {
   std::string state, text;
   std::optional<std::uint64_t> only;  // this frame, then none
   std::optional<RigQuality> quality;
+  std::vector<float> sigmas;
   TextureCodec texture = TextureCodec::kJpeg;
 };
 
@@ -158,6 +166,9 @@ void read_orders(Orders& orders) {
       RigQuality quality;
       if (words >> quality.stereo_rms_px >> quality.scale_error) orders.quality = quality;
       orders.announce = true;
+    } else if (verb == "sigmas") {
+      orders.sigmas.clear();
+      for (float sigma = 0; words >> sigma;) orders.sigmas.push_back(sigma);
     } else if (verb == "texture") {
       words >> name;
       orders.texture = texture_codec_named(name).value_or(TextureCodec::kJpeg);
@@ -220,8 +231,8 @@ int feed(std::uint16_t port, double rate) {
     message.number = std::exchange(orders.only, {}).value_or(message.sequence);
     options.texture = orders.texture;
     const auto fill = [&](FrameEncoder& with) {
-      const auto bytes =
-          with.encode(make_frame(message.number, static_cast<float>(message.number + 1) * 0.05f), options);
+      const auto bytes = with.encode(
+          make_frame(message.number, static_cast<float>(message.number + 1) * 0.05f, orders.sigmas), options);
       if (!bytes.ok()) {
         std::fprintf(stderr, "%s\n", bytes.error().message.c_str());
         return false;

@@ -78,8 +78,9 @@ HttpReply list_recordings(const RecordingControl* control) {
     const std::string name = entry.path().filename().string();
     if (entry.symlink_status(error).type() != fs::file_type::regular || !recording_file(name, *control))
       continue;
-    std::uint64_t bytes = entry.file_size(error);
+    // Asked before the file is: what is finished in between has its whole size.
     const bool recording = control->is_open(name);
+    std::uint64_t bytes = entry.file_size(error);
     if (recording) {
       const auto growing = control->growing(name);
       const std::uint64_t whole = growing ? growing->bytes() : 0;

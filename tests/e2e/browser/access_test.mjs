@@ -84,8 +84,8 @@ const checks = {
     await inState(page, 'shifted');
     assert.match(await page.textContent('#timeline .time'), /^[−-]?\d+:\d\d\.\d{3}$/);
     await page.click('#timeline .time');
+    await page.waitForFunction(() => /\d\d:\d\d:\d\d/.test(document.querySelector('#timeline .time')?.textContent)); // on the screen's beat
     const shown = /(\d\d):(\d\d):(\d\d)/.exec(await page.textContent('#timeline .time'));
-    assert.ok(shown !== null, await page.textContent('#timeline .time'));
     const since = (Number(shown[1]) * 60 + Number(shown[2])) * 60 + Number(shown[3]);
     const now = (Date.now() / 1000) % 86_400;
     assert.ok((now - since + 86_400) % 86_400 < 600, `${shown[0]} is not of these minutes`);
@@ -97,6 +97,9 @@ const checks = {
 
   async 'what was measured is copied'(page) {
     await page.context().grantPermissions(['clipboard-read', 'clipboard-write']);
+    await page.focus('#view');
+    await page.keyboard.press('l'); // wherever the check before left it
+    await inState(page, 'live');
     feeder.say(`frame ${kFrame}`);
     await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
     await page.keyboard.press('m');

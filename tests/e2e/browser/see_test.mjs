@@ -38,6 +38,20 @@ const kFrame = 62;
 /** Shares of the picture with flat ground and with the ball. */
 const kPlaces = [[0.1, 0.15], [0.9, 0.2], [0.15, 0.85], [0.5, 0.5], [0.4, 0.6], [0.85, 0.8]];
 
+/** Towards the camera, in three's frame (y up, z to the viewer). */
+function normalOf(u, v, frame) {
+  const [p, right, down] = [pointOf(u, v, frame), pointOf(u + 0.01, v, frame), pointOf(u, v + 0.01, frame)];
+  const [a, b] = [right.map((c, i) => c - p[i]), down.map((c, i) => c - p[i])];
+  const n = [a[2] * b[1] - a[1] * b[2], a[0] * b[2] - a[2] * b[0], a[1] * b[0] - a[0] * b[1]];
+  const size = Math.hypot(...n);
+  return [n[0] / size, -n[1] / size, -n[2] / size];
+}
+const dot = (a, b) => a.reduce((sum, c, i) => sum + c * b[i], 0);
+const unit = (a) => a.map((c) => c / Math.hypot(...a));
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const linear = (c) => (c / 255 <= 0.04045 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4);
+const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
+
 const checks = {
   async 'what comes before the first picture is small'() {
     feeder.say('start ball');
@@ -106,17 +120,75 @@ const checks = {
     await press(page, '5');
     const { frame } = await look(page);
     for (const [u, v] of kPlaces) {
-      const [p, right, down] = [pointOf(u, v, frame), pointOf(u + 0.01, v, frame), pointOf(u, v + 0.01, frame)];
-      const [a, b] = [right.map((c, i) => c - p[i]), down.map((c, i) => c - p[i])];
-      const n = [a[2] * b[1] - a[1] * b[2], a[0] * b[2] - a[2] * b[0], a[1] * b[0] - a[0] * b[1]];
-      const size = Math.hypot(...n);
       const [r, g, bl] = await pixel(page, onPage(u * kPicture.width, v * kPicture.height));
       const told = [r, g, bl].map((c) => (c / 255) * 2 - 1); // right, up, to the camera
-      const truth = [n[0] / size, -n[1] / size, -n[2] / size];
-      const cosine = told.reduce((sum, c, i) => sum + c * truth[i], 0) / Math.hypot(...told);
+      const truth = normalOf(u, v, frame);
+      const cosine = dot(unit(told), truth);
       assert.ok(cosine > 0.985, `${told}, not ${truth} at ${u}, ${v}`);
     }
     assert.ok(await page.isVisible('#legend .disc'));
+  },
+
+  async 'confidence has the colour that the legend says'(page) {
+    const kSigmas = [64e-6, 362e-6, 1448e-6, 0]; // of what the format's steps are; in bands
+    await press(page, '7');
+    feeder.say(`sigmas ${kSigmas.join(' ')}`);
+    feeder.say(`frame ${kFrame + 1}`);
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame + 1);
+    await still(page);
+    const legend = await page.evaluate(() => {
+      const canvas = document.querySelector('#legend canvas');
+      const marks = [...document.querySelectorAll('#legend li')].map((li) => [li.textContent, parseFloat(li.style.top) / 100]);
+      return { rgba: [...canvas.getContext('2d').getImageData(0, 0, 1, canvas.height).data], marks, unknown: getComputedStyle(document.querySelector('#legend i')).backgroundColor };
+    });
+    const sigmaOf = (name) => parseFloat(name) * (/µm/.test(name) ? 1e-6 : 1e-3);
+    const [[least, top], [most, bottom]] = [legend.marks[0], legend.marks.at(-1)].map(([name, share]) => [sigmaOf(name), share]);
+    const expected = (sigma) => {
+      if (sigma === 0) return legend.unknown.match(/\d+/g).map(Number);
+      const share = top + ((bottom - top) * Math.log(sigma / least)) / Math.log(most / least);
+      const row = Math.round(share * (legend.rgba.length / 4 - 1));
+      return legend.rgba.slice(row * 4, row * 4 + 3);
+    };
+    for (const [band, sigma] of kSigmas.entries()) {
+      const u = (band + 0.5) / kSigmas.length;
+      for (const [v, light] of [[0.15, 1], [0.9, 0.6]]) {
+        const rgb = await pixel(page, onPage(u * kPicture.width, v * kPicture.height));
+        for (const [c, wanted] of expected(sigma).entries()) near(linear(rgb[c]), linear(wanted) * light, 0.04, `${sigma} m at ${u}, ${v}: ${'rgb'[c]} of ${rgb}`);
+      }
+    }
+    feeder.say('sigmas');
+    feeder.say(`frame ${kFrame}`);
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+  },
+
+  async "light falls on relief as its normals say, from over the viewer's shoulder"(page) {
+    const kLight = unit([-0.9, 1.1, 1.6]); // in the frame of who looks
+    await press(page, '2');
+    const { frame } = await look(page);
+    const seen = [];
+    await press(page, 'o');
+    for (const keys of [[], ['ArrowLeft', 'ArrowLeft', 'ArrowLeft'], ['ArrowUp', 'ArrowUp', 'ArrowUp', 'ArrowRight', 'ArrowRight']]) {
+      for (const key of keys) await page.keyboard.press(key);
+      await still(page);
+      const { position, target } = await page.evaluate(() => window.relievo.pose());
+      const back = unit(position.map((c, i) => c - target[i]));
+      const right = unit(cross([0, 1, 0], back));
+      const up = cross(back, right);
+      const light = [0, 1, 2].map((i) => kLight[0] * right[i] + kLight[1] * up[i] + kLight[2] * back[i]);
+      for (const [u, v] of [...kPlaces, [0.45, 0.4], [0.55, 0.6], [0.6, 0.5], [0.5, 0.35]]) {
+        const normal = normalOf(u, v, frame);
+        const [r, g, b] = await pixel(page, await toPage(page, pointOf(u, v, frame)));
+        seen.push({ told: mean([r, g, b].map(linear)), cosine: dot(normal, light), sky: normal[1] });
+      }
+    }
+    const spread = Math.max(...seen.map((s) => s.cosine)) - Math.min(...seen.map((s) => s.cosine));
+    assert.ok(spread > 0.4, `the places are lit alike: ${spread}`);
+    const truth = seen.map(({ cosine, sky }) => 2 * Math.max(0, cosine) + 0.5 * sky * 0.6);
+    const off = (values) => values.map((v) => v - mean(values));
+    const agreement = dot(unit(off(seen.map((s) => s.told))), unit(off(truth)));
+    console.log(`      light as the normals say: correlation ${agreement.toFixed(3)}, cosines over ${spread.toFixed(2)}`);
+    assert.ok(agreement > 0.95, JSON.stringify(seen));
+    await press(page, 'c');
   },
 
   async 'a drag leaves the camera, and what is picked is where it is drawn'(page) {

@@ -274,6 +274,20 @@ const checks = {
     await again.close();
   },
 
+  async 'a link\'s eye stays where it is when what is beside appears'() {
+    const page = await open('/?stream=ball,other#eye=0.6_0.3_0.4&at=0.1_-0.05_-0.9&place=other_0_0_0_1.2_0_0', { viewport: { width: 1200, height: 750 } });
+    await besides(page, 1);
+    await page.waitForFunction(() => window.relievo.diagnostics().shown > 0);
+    await still(page);
+    const said = new URLSearchParams(new URL(await page.evaluate(() => window.relievo.link())).hash.slice(1));
+    assert.equal(said.get('eye'), '0.6_0.3_0.4');
+    assert.equal(said.get('at'), '0.1_-0.05_-0.9');
+    await page.keyboard.press('n');
+    await page.selectOption('#panel-streams select', 'together'); // what a person does shows all again
+    await page.waitForFunction(() => !window.relievo.link().includes('eye=0.6_0.3_0.4'));
+    await page.close();
+  },
+
   async 'what is turned is drawn and read where it stands'() {
     const [angle, to] = [-0.6, [1.4, 0.05, 0.1]];
     const page = await open(`/?stream=ball,other#smooth=0&place=other_0_${angle}_0_${to.join('_')}`, { viewport: { width: 1200, height: 750 } });

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "codec/recording.h"
 #include "tests/support/temp_folder.h"
@@ -70,7 +71,12 @@ class OneStream final : public RecordingControl {
     growing_.reset();
   }
   std::filesystem::path folder() const override { return folder_; }
+  /// As if its writer ended it at the very moment at which it is asked for next.
+  void ends_when_asked() { ends_when_asked_ = true; }
   bool is_open(const std::string& file) const override {
+    if (std::exchange(ends_when_asked_, false)) {
+      EXPECT_TRUE(const_cast<OneStream*>(this)->stop("face"));
+    }
     return state_.activity == RecordingActivity::kRecording && state_.file == file;
   }
   std::shared_ptr<const GrowingRecording> growing(const std::string& file) const override {
@@ -80,7 +86,8 @@ class OneStream final : public RecordingControl {
 
  private:
   const std::filesystem::path folder_;
-  RecordingState state_;      // of the gateway's thread
+  RecordingState state_;  // of the gateway's thread
+  mutable bool ends_when_asked_ = false;
   mutable std::mutex mutex_;  // of what follows
   std::unique_ptr<RecordingWriter> writer_;
   std::shared_ptr<const GrowingRecording> growing_;
@@ -189,6 +196,15 @@ TEST_F(RecordingApi, AFileThatIsBeingWrittenIsReadUpToItsLastWholeChunk) {
   for (const std::string& other : {inode + "1\"", inode + "\"", inode + "ffffffffffffffffff\"",
                                    std::string("\"growing-1-1\""), std::string("\"growing\"")})
     EXPECT_EQ(get("Range: bytes=0-9\r\nIf-Range: " + other + "\r\n").status, 200) << other;
+}
+
+TEST_F(RecordingApi, WhatIsFinishedWhileItIsListedHasItsWholeSize) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  control.ends_when_asked();
+  const Json one = list()["recordings"][0];
+  EXPECT_EQ(one["recording"], false);
+  EXPECT_EQ(one["bytes"], std::filesystem::file_size(folder / "face-1.mcap"));
+  EXPECT_EQ(one["bytes"], get().body.size());
 }
 
 // Where the chunks end in a recording that has its index: the index, and what says that the data ends, is

@@ -36,8 +36,8 @@ export class Companions {
     });
   }
 
-  /** `listed`: what the server says of it, where it is known. */
-  add(name: string, listed: ListedStream | undefined): void {
+  /** `listed`: what the server says of it, where it is known. `quietly`: its coming leaves the eye where it is. */
+  add(name: string, listed: ListedStream | undefined, quietly = false): void {
     if (this.shown.has(name)) return;
     const session = new Session({
       changed: () => this.changed(),
@@ -46,7 +46,7 @@ export class Companions {
       hint: () => undefined,
       unusable: () => this.changed(),
     });
-    this.shown.set(name, { session, beside: this.view.addBeside(name) });
+    this.shown.set(name, { session, beside: this.view.addBeside(name, quietly) });
     if (typeof listed?.recording === 'string') void this.openRecording(name, session, listed.recording);
     else session.watch((events) => this.live(name, events));
     this.wish();

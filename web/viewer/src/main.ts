@@ -469,7 +469,8 @@ class Viewer {
     const missing = this.session.info === null && this.server.find(this.stream) === undefined;
     if (first !== undefined && missing && !this.chosenByPerson) this.watch(first.name);
     void this.preferRecording();
-    for (const name of this.wantedBesides) this.companions?.add(name, this.server.find(name));
+    const eyeIsGiven = (this.shared?.pose ?? null) !== null; // by the link, which was made with them in sight
+    for (const name of this.wantedBesides) this.companions?.add(name, this.server.find(name), eyeIsGiven);
     this.wantedBesides = [];
   }
 }

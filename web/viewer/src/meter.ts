@@ -4,6 +4,7 @@ import { Journal } from './journal';
 import type { DecodedFrame } from './messages';
 import type { FramePrefix, StreamStatus } from './protocol';
 import { ClockOffset, DropCounter, Rate, RollingMedian } from './statistics';
+import { text } from './strings';
 import type { Statistic } from './ui';
 
 // Older than this, a frame is from a recording and its age is no latency.
@@ -117,50 +118,46 @@ export class Meter {
       [gaps, 'gaps'],
     ].flatMap(([count, place]) => (count === 0 ? [] : [`${count} ${place}`]));
     const latency = this.latency.get();
+    const say = text.badge;
     const statistics: Statistic[] = [
-      { label: 'frame', value: String(this.number), title: 'Number of the camera frame that completed this surface' },
+      { label: say.frame[0], value: String(this.number), title: say.frame[1] },
       {
-        label: 'rate',
+        label: say.rate[0],
         value: `${this.frames.perSecond(now).toFixed(1)} /s`,
-        title: 'Surfaces drawn a second',
+        title: say.rate[1],
       },
       {
-        label: 'latency',
+        label: say.latency[0],
         value: latency === null ? '–' : `${Math.round(latency)} ms`,
-        title:
-          latency === null
-            ? 'Not known: the frames carry no time of a live camera, or the clocks are not compared yet'
-            : 'From the start of the exposure to the drawing, clocks compared with the server',
+        title: latency === null ? say.latencyUnknown : say.latency[1],
       },
       {
-        label: 'decode',
+        label: say.decode[0],
         value: `${(this.decode.get() ?? 0).toFixed(1)} ms`,
-        title: 'Median time to decode a frame in this browser',
+        title: say.decode[1],
         minor: true,
       },
       {
-        label: 'vertices',
+        label: say.vertices,
         value: grouped(this.vertices),
-        title: `${grouped(this.triangles)} triangles`,
+        title: say.triangles(grouped(this.triangles)),
         minor: true,
       },
       {
-        label: 'network',
+        label: say.network[0],
         value: bitrate(this.bytes.perSecond(now) * 8),
-        title: 'Received from the server',
+        title: say.network[1],
         minor: true,
       },
       {
-        label: 'drops',
+        label: say.drops[0],
         value: total === 0 ? '0' : `${grouped(total)} (${places.join(', ')})`,
-        title:
-          'server: between the camera and the network. link: this page was not ready for them. ' +
-          'viewer: decoded but not drawn. gaps: lost before they reached the web server.',
+        title: say.drops[1],
         kind: total === 0 ? 'plain' : 'warn',
       },
     ];
     if (this.errors > 0) {
-      statistics.push({ label: 'errors', value: String(this.errors), title: this.lastError, kind: 'bad' });
+      statistics.push({ label: say.errors, value: String(this.errors), title: this.lastError, kind: 'bad' });
     }
     return statistics;
   }

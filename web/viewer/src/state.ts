@@ -59,8 +59,9 @@ export function present(facts: Facts): Presentation {
     ...rest,
   });
   const name = facts.stream ?? '';
+  const say = text.states;
   if (facts.problem !== null) {
-    return make('unsupported', 'Not possible', { title: 'Nothing can be shown here', text: facts.problem, dim: true });
+    return make('unsupported', say.unsupported[0], { title: say.unsupported[1], text: facts.problem, dim: true });
   }
   if (facts.file !== null) {
     const { playing, paused, surface } = text.file;
@@ -69,58 +70,30 @@ export function present(facts: Facts): Presentation {
   if (facts.shifted !== null) return make('shifted', text.shifted[facts.shifted]);
   if (!facts.connected) {
     if (!facts.everConnected && facts.retryInS === null) {
-      return make('connecting', 'Connecting', { title: 'Connecting', text: 'Asking the server for its streams.' });
+      return make('connecting', say.connecting[0], { title: say.connecting[1], text: say.connecting[2] });
     }
-    const again =
-      facts.retryInS === null || facts.retryInS <= 0 ? 'Trying again now.' : `Trying again in ${facts.retryInS} s.`;
-    const files = 'Recordings and surfaces of this device open all the same. ';
-    const what = facts.seen ? 'What you see is the last picture that arrived. ' : facts.everConnected ? '' : files;
-    return make('lost', 'Offline', { title: 'Connection lost', text: what + again, dim: true });
+    const what = facts.seen ? say.lastPicture : facts.everConnected ? '' : say.filesOpen;
+    return make('lost', say.lost[0], { title: say.lost[1], text: what + say.again(facts.retryInS), dim: true });
   }
   if (facts.stream === null) {
-    return make('empty', 'No streams', {
-      title: 'No streams yet',
-      text: 'The server is running, but nothing is being captured. Drop a recording or a surface of this device here, or start a stream, which then appears by itself:',
-      hint: facts.hint || kStartHint,
-    });
+    return make('empty', say.empty[0], { title: say.empty[1], text: say.empty[2], hint: facts.hint || kStartHint });
   }
   if (!facts.announced) {
-    if (facts.seen) {
-      return make('ended', 'Ended', {
-        title: 'The stream has ended',
-        text: `“${name}” left the network. It continues here when it comes back.`,
-        dim: true,
-      });
-    }
-    return make('waiting', 'Waiting', {
-      title: `Waiting for “${name}”`,
-      text: 'There is no stream of that name yet. It appears here when it starts.',
-      hint: facts.hint,
-    });
+    if (facts.seen) return make('ended', say.ended[0], { title: say.ended[1], text: say.left(name), dim: true });
+    return make('waiting', say.waiting, { title: say.waitingFor(name), text: say.noSuch, hint: facts.hint });
   }
   if (facts.serverState === 'ended') {
-    return make('ended', 'Ended', {
-      title: 'The stream has ended',
-      text: facts.serverMessage || 'The source has no more frames. This is its last picture.',
-      dim: true,
-    });
+    return make('ended', say.ended[0], { title: say.ended[1], text: facts.serverMessage || say.noMore, dim: true });
   }
   if (!facts.seen) {
-    return make('starting', 'Starting', {
-      title: 'Waiting for the first frame',
-      text: facts.serverMessage || `“${name}” is announced; its first surface needs two camera frames.`,
-    });
+    return make('starting', say.starting[0], { title: say.starting[1], text: facts.serverMessage || say.announced(name) });
   }
   const silent = facts.quietMs > patienceMs(facts.frameRate);
   if (facts.serverState === 'stalled' || silent) {
-    const since = silent ? `No frame for ${Math.floor(facts.quietMs / 1000)} s. ` : '';
-    return make('stalled', 'Stalled', {
-      title: 'The stream has stalled',
-      text: since + (facts.serverMessage || 'It continues by itself when the camera does.'),
-      dim: true,
-    });
+    const since = silent ? say.silent(Math.floor(facts.quietMs / 1000)) : '';
+    return make('stalled', say.stalled[0], { title: say.stalled[1], text: since + (facts.serverMessage || say.comesBack), dim: true });
   }
-  return make('live', 'Live');
+  return make('live', say.live);
 }
 
 /** Seconds to wait before attempt n (0, 1, ...) to connect again. */

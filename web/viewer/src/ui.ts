@@ -89,7 +89,7 @@ export class Ui {
     if (chosen !== null && !names.includes(chosen)) names.push(chosen);
     names.sort();
     const key = JSON.stringify([names, chosen]);
-    document.title = chosen === null ? 'Relievo' : `Relievo · ${chosen}`;
+    document.title = chosen === null ? text.product : `${text.product} · ${chosen}`;
     setText(element('source'), note === '' ? source : text.file.note(source, note));
     if (key === this.shownStreams) return;
     this.shownStreams = key;

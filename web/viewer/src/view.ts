@@ -32,6 +32,7 @@ interface Shown {
 export interface Beside extends Shown {
   readonly name: string;
   extent: Extent | null; // of its first frame
+  readonly comesQuietly: boolean; // the eye stays where it is
 }
 
 /** A place of one of the surfaces, in the frame of its own camera. */
@@ -160,9 +161,9 @@ export class View {
     this.useExtent();
   }
 
-  /** The surface of another stream; what it shows comes by showBeside(). */
-  addBeside(name: string): Beside {
-    const beside: Beside = { id: this.nextId++, name, frame: null, picture: null, extent: null };
+  /** The surface of another stream; what it shows comes by showBeside(). All are seen when it appears, unless it `comesQuietly`. */
+  addBeside(name: string, comesQuietly = false): Beside {
+    const beside: Beside = { id: this.nextId++, name, frame: null, picture: null, extent: null, comesQuietly };
     this.besides.push(beside);
     return beside;
   }
@@ -180,7 +181,7 @@ export class View {
     this.paint(beside, frame);
     if (beside.extent !== null || frame.extent === null) return;
     beside.extent = frame.extent;
-    this.arrange();
+    this.arrange(beside.comesQuietly);
   }
 
   set placement(placement: Placement) {
@@ -211,10 +212,10 @@ export class View {
     return [this.extent, ...this.besides.map(({ extent }) => extent)];
   }
 
-  private arrange(): void {
+  private arrange(quietly = false): void {
     this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.known.get(name) ?? null)]);
     this.useExtent();
-    this.navigator.reset();
+    if (!quietly) this.navigator.reset();
   }
 
   private useExtent(): void {
