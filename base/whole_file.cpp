@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <system_error>
@@ -41,6 +42,26 @@ Status write_whole_file(const std::filesystem::path& path, std::span<const std::
 
 Status write_whole_file(const std::filesystem::path& path, std::string_view text) {
   return write_whole_file(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+}
+
+Result<std::string> read_whole_file(const std::filesystem::path& path, std::size_t most) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  int error = file < 0 ? errno : 0;
+  std::string all;
+  std::array<char, 4096> part{};
+  for (ssize_t got = 1; error == 0 && got != 0 && all.size() <= most;) {
+    got = ::read(file, part.data(), part.size());
+    if (got > 0)
+      all.append(part.data(), static_cast<std::size_t>(got));
+    else if (got < 0 && errno != EINTR)
+      error = errno;
+  }
+  if (file >= 0) ::close(file);
+  if (error != 0)
+    return Error{"cannot read " + path.string() + ": " + std::generic_category().message(error)};
+  if (all.size() > most)
+    return Error{path.string() + " has more than the " + std::to_string(most) + " bytes it may have"};
+  return all;
 }
 
 }  // namespace relievo

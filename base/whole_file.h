@@ -2,6 +2,7 @@
 // Files that appear whole or not at all, and errors of files in words.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -16,6 +17,10 @@ namespace relievo {
 /// behind on failure. The error names the file.
 Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 Status write_whole_file(const std::filesystem::path& path, std::string_view text);
+
+/// All of a file or pipe, nothing of what is larger than `most` bytes: a device may have no end. The error
+/// names the file.
+Result<std::string> read_whole_file(const std::filesystem::path& path, std::size_t most);
 
 /// Why a file could not be written, from errno, with what to do about it where that is known.
 std::string write_failure(int error);

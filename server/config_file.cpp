@@ -3,13 +3,12 @@
 #include <toml++/toml.h>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
-#include <sstream>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "base/whole_file.h"
 #include "cli/quantities.h"
 #include "cli/size_option.h"
 #include "cli/web_flags.h"
@@ -21,6 +20,8 @@
 
 namespace relievo {
 namespace {
+
+constexpr std::size_t kLargestConfig = 1 << 20;
 
 std::string place(const std::filesystem::path& file, const toml::source_region& at) {
   return file.string() + ":" + std::to_string(at.begin.line) + ": ";
@@ -357,15 +358,11 @@ void read_gateway(Reader& reader, WebOptions& gateway) {
 }  // namespace
 
 Status read_config(const std::filesystem::path& file, ServeConfig& config) {
-  std::ifstream in(file);
-  std::error_code ignored;
-  if (!in || std::filesystem::is_directory(file, ignored))  // a folder opens, and reads as an empty file
-    return Error{"cannot read the configuration " + file.string() + ": does it exist and may you read it?"};
-  std::stringstream text;
-  text << in.rdbuf();
+  const auto text = read_whole_file(file, kLargestConfig);
+  if (!text) return text.error().in("the configuration cannot be used");
   toml::table table;
   try {
-    table = toml::parse(text.str(), file.string());
+    table = toml::parse(*text, file.string());
   } catch (const toml::parse_error& error) {
     return Error{place(file, error.source()) + std::string(error.description())};
   }

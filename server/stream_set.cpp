@@ -4,20 +4,20 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <utility>
 
 #include "base/log.h"
 #include "base/thread_name.h"
+#include "base/whole_file.h"
 #include "idl/recording_segments.h"
 
 namespace relievo {
 namespace {
 
 constexpr std::chrono::seconds kRetry{5};
+constexpr std::size_t kLargestRigFile = 1 << 20;  // they have a few kilobytes
 
-/// What is in the files that a camera's stream names. They are a few kilobytes; one that cannot be read has
+/// What is in the files that a camera's stream names; one that cannot be read has
 /// its own words when the stream is opened.
 std::string files_of(const StreamConfig& config) {
   std::string all;
@@ -26,8 +26,7 @@ std::string files_of(const StreamConfig& config) {
   if (config.camera.pattern.empty())  // then it is beside the rig
     files[1] = std::filesystem::path(config.camera.rig).replace_filename("pattern.yaml");
   for (const auto& file : files) {
-    std::ifstream in(file, std::ios::binary);
-    all.append(std::istreambuf_iterator<char>(in), {});
+    if (const auto text = read_whole_file(file, kLargestRigFile)) all += *text;
     all += '\0';
   }
   return all;

@@ -7,9 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <boost/asio/ssl/context.hpp>
-#include <fstream>
+#include <sstream>
 
 #include "base/log.h"
+#include "base/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -18,6 +19,7 @@ namespace ssl = boost::asio::ssl;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::size_t kLeastToken = 16, kMostToken = 256;
+constexpr std::size_t kLargestTokenFile = 1 << 20;
 constexpr std::size_t kMadeToken = 24;  // bytes of chance
 constexpr const char* kHowToMake = "make one with: openssl rand -hex 24 > FILE";
 
@@ -34,9 +36,11 @@ std::string trimmed(const std::string& line) {
 
 Result<std::vector<std::string>> read_tokens(const std::filesystem::path& file) {
   std::error_code ignored;
-  std::ifstream in(file);
-  if (!in || !std::filesystem::is_regular_file(file, ignored))
+  if (!std::filesystem::is_regular_file(file, ignored))
     return Error{"cannot read the token file " + file.string() + "; " + kHowToMake};
+  const auto text = read_whole_file(file, kLargestTokenFile);
+  if (!text) return Error{text.error().message + "; " + kHowToMake};
+  std::istringstream in(*text);
   std::vector<std::string> tokens;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {

@@ -123,6 +123,7 @@ void HttpSession::on_bad_request(ErrorCode error) {
 void HttpSession::on_request() {
   any_request_ = true;
   const auto& request = parser_->get();
+  if (request.count(http::field::host) > 1) return on_bad_request(http::error::bad_field);
   const auto value = [&](http::field name) {
     const auto text = request[name];
     return std::string_view(text.data(), text.size());

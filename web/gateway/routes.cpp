@@ -172,11 +172,12 @@ bool same_origin(std::string_view origin, std::string_view host) {
 bool loopback_host(std::string_view host) {
   if (host.empty()) return true;
   const std::string name = lower(without_port(host));
+  if (name.empty()) return false;  // a port alone
   if (name == "localhost" || (name.size() > 10 && name.ends_with(".localhost"))) return true;
   if (name.front() == '[') return true;
   // A last label of digits only makes a name an IPv4 address to every browser.
-  return !name.empty() && std::all_of(name.begin(), name.end(),
-                                      [](unsigned char c) { return std::isdigit(c) != 0 || c == '.'; });
+  return std::all_of(name.begin(), name.end(),
+                     [](unsigned char c) { return std::isdigit(c) != 0 || c == '.'; });
 }
 
 namespace {

@@ -50,6 +50,7 @@ TEST_F(ServerFault, UnknownSources) {
   expect_one_error(run(serve("webcam:0", {})), "webcam:0");
   expect_one_error(run(serve("take:" + (folder_.path() / "none").string(), {})), "none");
   expect_one_error(run(serve("sim:nowhere", {})), "nowhere");
+  expect_one_error(run(serve("v4l2:/dev/null", {"--rig", "/dev/zero"})), "/dev/zero");
   expect_one_error(run(server({"reconstruct", (folder_.path() / "none").string(), "--out", out_.string()})),
                    "none");
   EXPECT_FALSE(fs::exists(out_));

@@ -238,6 +238,25 @@ TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   EXPECT_TRUE(server.stream("third").is_null());
 }
 
+TEST_F(SeveralStreams, AStormOfReloadsOfABrokenFileCostsNothing) {
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2) && server.goes_on("right", 2)) << server.process().err();
+  const auto holds = [&](const char* what) {
+    const fs::path folder = "/proc/" + std::to_string(server.process().pid()) + "/" + what;
+    return std::distance(fs::directory_iterator(folder), {});
+  };
+  const auto threads = holds("task"), descriptors = holds("fd");
+  write("[[stream]\n");
+  for (int i = 0; i < 50; ++i) ASSERT_TRUE(reloaded(server, "nothing was changed")) << server.process().err();
+  EXPECT_TRUE(eventually([&] { return holds("task") <= threads && holds("fd") <= descriptors; }));
+  write(table("left", "one") + table("third", "two"));
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_TRUE(server.goes_on("third", 2)) << server.process().err();
+  EXPECT_EQ(left.starts().size(), 1U);
+  EXPECT_EQ(left.gaps(), 0U);
+}
+
 TEST_F(SeveralStreams, AReloadAppliesTokensAndSaysWhatNeedsARestart) {
   WebServer server(command());
   ASSERT_TRUE(server.goes_on("left", 2)) << server.process().err();

@@ -38,5 +38,22 @@ TEST(WholeFile, AFolderInItsPlaceStaysWhatItIs) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }
 
+TEST(WholeFile, IsReadUpToTheSizeItMayHave) {
+  const TempFolder folder;
+  const std::string text(5000, 'x');  // more than is read at once
+  ASSERT_TRUE(write_whole_file(folder / "text", text).ok());
+  const auto all = read_whole_file(folder / "text", text.size());
+  ASSERT_TRUE(all) << all.error().message;
+  EXPECT_EQ(*all, text);
+  for (const auto& [file, most] : {std::pair(folder / "text", text.size() - 1),
+                                   {std::filesystem::path("/dev/zero"), 100000UL},
+                                   {folder / "none", 10UL},
+                                   {folder.path(), 10UL}}) {
+    const auto read = read_whole_file(file, most);
+    ASSERT_FALSE(read) << file;
+    EXPECT_NE(read.error().message.find(file.string()), std::string::npos) << read.error().message;
+  }
+}
+
 }  // namespace
 }  // namespace relievo

@@ -416,6 +416,13 @@ TEST(Config, MissingFileAndFolder) {
   EXPECT_NE(status.error().message.find(folder.path().string()), std::string::npos);
 }
 
+TEST(Config, WhatHasNoEndIsRefused) {
+  ServeConfig config;
+  const Status status = read_config("/dev/zero", config);
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message.find("/dev/zero"), std::string::npos) << status.error().message;
+}
+
 TEST(Config, AGeometryProfileSaysWhatIsNotSaidOtherwise) {
   ServeConfig config;
   EXPECT_EQ(encode_options(config).key_interval, 1);

@@ -149,6 +149,8 @@ TEST(Tokens, FilesThatCannotBeUsedAreOneClearLine) {
     EXPECT_NE(loaded.error().message.find(file), std::string::npos);
     EXPECT_NE(loaded.error().message.find("openssl rand"), std::string::npos) << loaded.error().message;
   }
+  std::ofstream(file) << std::string(2 << 20, '#');
+  EXPECT_FALSE(Tokens::load(file).ok()) << "it is no list of tokens";
   const auto made = Tokens::make(), other = Tokens::make();
   ASSERT_TRUE(made.ok() && other.ok());
   EXPECT_TRUE(made->accepts(made->first()));

@@ -178,6 +178,13 @@ TEST(Origin, Rules) {
   EXPECT_FALSE(loopback_host(":8080"));
 }
 
+// Which of them counts a proxy in front may see otherwise (RFC 9112, 3.2).
+TEST_F(GatewayHttp, TwoNamesAtOnceAreRefused) {
+  TcpClient client(port);
+  client.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n");
+  EXPECT_EQ(read_response(client).status, 400);
+}
+
 TEST_F(GatewayHttp, ANameThatWasPointedAtLoopbackIsRefused) {
   TcpClient client(port);
   client.send("GET /api/streams HTTP/1.1\r\nHost: evil.example\r\n\r\n");
