@@ -158,7 +158,7 @@ TEST_F(RecordedOnRequest, OneAfterTheOtherEachWithItsPreRoll) {
 }
 
 TEST_F(RecordedOnRequest, IsSplitAndKeptAsIsSaidOfRecordings) {
-  start({.recording = {.segments = {.split_bytes = 40'000, .keep_bytes = 100'000}}});
+  start({.recording = {.segments = {.split_bytes = 40'000, .keep_bytes = 250'000}}});
   ASSERT_TRUE(recorder_->start());
   const std::string first = recorder_->state().file;
   EXPECT_THAT(first, MatchesRegex("face-[0-9TZ-]+_000000.mcap"));
