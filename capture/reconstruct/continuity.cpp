@@ -2,11 +2,12 @@
 #include "capture/reconstruct/continuity.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <utility>
+
+#include "capture/reconstruct/neighbours.h"
 
 namespace relievo {
 namespace {
@@ -43,27 +44,9 @@ const float* Continuity::row(const std::vector<float>& grid, int line) const {
 
 /// Median of how far a place's neighbours moved since the frame before.
 Continuity::Motion Continuity::motion(int line, int boundary) const {
-  constexpr std::array<std::array<int, 2>, 14> kNeighbours{{{-1, 0},
-                                                            {1, 0},
-                                                            {-2, 0},
-                                                            {2, 0},
-                                                            {-3, 0},
-                                                            {3, 0},
-                                                            {0, -1},
-                                                            {0, 1},
-                                                            {0, -2},
-                                                            {0, 2},
-                                                            {-1, -1},
-                                                            {1, -1},
-                                                            {-1, 1},
-                                                            {1, 1}}};
-  std::array<float, kNeighbours.size()> moved{};
-  std::size_t count = 0;
-  for (const auto& [lines, boundaries] : kNeighbours) {
-    const float px =
-        row(now_, line + lines)[boundary + boundaries] - row(before_, line + lines)[boundary + boundaries];
-    if (known(px)) moved[count++] = px;
-  }
+  auto [moved, count] = neighbours_went([&](int lines, int boundaries) {
+    return row(now_, line + lines)[boundary + boundaries] - row(before_, line + lines)[boundary + boundaries];
+  });
   if (count == 0) return {0, 0};
   const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(count / 2);
   std::nth_element(moved.begin(), middle, moved.begin() + static_cast<std::ptrdiff_t>(count));

@@ -2,8 +2,9 @@
 #include "capture/reconstruct/persistence.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "capture/reconstruct/neighbours.h"
 
 namespace relievo {
 namespace {
@@ -31,31 +32,14 @@ bool has_room(const PlaceGrid& places, int line, int boundary, float column_px) 
 
 void Persistence::carry_line(const MovingPlaces& moving, const PlaceGrid& places, int line,
                              std::vector<RecoveredBoundary>& out) const {
-  constexpr std::array<std::array<int, 2>, 14> kNeighbours{{{-1, 0},
-                                                            {1, 0},
-                                                            {-2, 0},
-                                                            {2, 0},
-                                                            {-3, 0},
-                                                            {3, 0},
-                                                            {0, -1},
-                                                            {0, 1},
-                                                            {0, -2},
-                                                            {0, 2},
-                                                            {-1, -1},
-                                                            {1, -1},
-                                                            {-1, 1},
-                                                            {1, 1}}};
   const Place* now = places.line(line);
   const Place* before = before_.line(line);
   for (int b = 0; b < places.boundaries(); ++b) {
     if (now[b].known() || !(before[b].known() && before[b].sigma_px < kSure_px)) continue;
-    std::array<float, kNeighbours.size()> went{};
-    std::size_t count = 0;
-    for (const auto& [lines, boundaries] : kNeighbours) {
+    auto [went, count] = neighbours_went([&](int lines, int boundaries) {
       const std::ptrdiff_t step = lines * places.stride() + boundaries;
-      const float px = now[b + step].column_px - before[b + step].column_px;
-      if (px == px) went[count++] = px;
-    }
+      return now[b + step].column_px - before[b + step].column_px;
+    });
     if (count < kLeastKnown) continue;
     std::sort(went.begin(), went.begin() + static_cast<std::ptrdiff_t>(count));
     const float middle = went[count / 2];

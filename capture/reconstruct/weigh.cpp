@@ -33,8 +33,8 @@ float square(float x) {
 
 }  // namespace
 
-void Weighing::measure_gaps(const PlaceGrid& places, WorkerPool& pool) {
-  gaps_.reset(pool.threads());
+void Weighing::measure_gaps(const PlaceGrid& places) {
+  gaps_.reset(1);
   std::vector<float>& gaps = gaps_.of(0);
   for (int line = 0; line < places.lines(); line += kGapsEvery) {
     const Place* here = places.line(line);
@@ -113,7 +113,7 @@ bool Weighing::settle(const PlaceGrid& places, int line, int boundary, float& co
 
 WeighingCounts Weighing::weigh(const PlaceGrid& places, WorkerPool& pool, SequenceResult& result,
                                EdgeImage& edges, std::vector<RecoveredBoundary>& recovered) {
-  measure_gaps(places, pool);
+  measure_gaps(places);
   counts_.assign(static_cast<std::size_t>(pool.threads()), {});
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];

@@ -33,7 +33,7 @@ class Weighing {
                        std::vector<RecoveredBoundary>& recovered);
 
  private:
-  void measure_gaps(const PlaceGrid& places, WorkerPool& pool);
+  void measure_gaps(const PlaceGrid& places);
   std::optional<Place> weighed(const Place* own, std::ptrdiff_t stride) const;
   bool settle(const PlaceGrid& places, int line, int boundary, float& column_px, float& sigma_px) const;
 
