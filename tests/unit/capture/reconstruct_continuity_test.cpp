@@ -8,6 +8,7 @@
 
 #include "capture/reconstruct/continuity.h"
 #include "capture/reconstruct/sharp_luma.h"
+#include "tests/unit/capture/decoded_frame.h"
 
 namespace relievo {
 namespace {
@@ -16,34 +17,14 @@ constexpr int kLines = 20;
 constexpr int kBoundaries = 12;
 constexpr float kSpacing_px = 8;
 
-struct Frame {
-  EdgeImage edges;
-  SequenceResult result;
-};
-
 float place(int boundary, float moved_px) {
   return 30 + kSpacing_px * static_cast<float>(boundary) + moved_px;
 }
 
-/// Every boundary on every line, all of them `moved_px` to the right.
-Frame surface(float moved_px) {
-  Frame f;
-  f.edges.lines = kLines;
-  f.edges.line_start.push_back(0);
-  for (int line = 0; line < kLines; ++line) {
-    for (int b = 0; b < kBoundaries; ++b) {
-      Edge edge;
-      edge.column_px = place(b, moved_px);
-      edge.sigma_px = 0.05F;
-      edge.contrast = 0.2F;
-      f.edges.edges.push_back(edge);
-      f.result.boundary.push_back(static_cast<std::int16_t>(b));
-      f.result.doubted.push_back(-1);
-      f.result.still.push_back(1);
-    }
-    f.edges.line_start.push_back(static_cast<std::uint32_t>(f.edges.edges.size()));
-  }
-  return f;
+/// All of them `moved_px` to the right.
+DecodedFrame surface(float moved_px) {
+  return decoded_frame(kLines, kBoundaries, {.sigma_px = 0.05F, .contrast = 0.2F},
+                       [&](int, int b) { return place(b, moved_px); });
 }
 
 std::size_t at(int line, int boundary) {
@@ -53,9 +34,9 @@ std::size_t at(int line, int boundary) {
 TEST(Continuity, AnUndecodedEdgeIsTheBoundaryThatMovedThere) {
   WorkerPool pool(1);
   Continuity continuity(kBoundaries, kLines);
-  Frame before = surface(0);
+  DecodedFrame before = surface(0);
   EXPECT_EQ(continuity.check({}, pool, before.result, before.edges).carried, 0U);
-  Frame now = surface(1.5F);
+  DecodedFrame now = surface(1.5F);
   now.result.boundary[at(7, 5)] = -1;
   now.edges.edges[at(7, 5)].column_px += 0.3F;
   now.result.boundary[at(12, 3)] = -1;
@@ -71,10 +52,10 @@ TEST(Continuity, AnUndecodedEdgeIsTheBoundaryThatMovedThere) {
 TEST(Continuity, WhatWasCarriedOnceIsNotSeenAgain) {
   WorkerPool pool(1);
   Continuity continuity(kBoundaries, kLines);
-  Frame first = surface(0);
+  DecodedFrame first = surface(0);
   continuity.check({}, pool, first.result, first.edges);
   for (const std::size_t carried : {1U, 0U}) {
-    Frame next = surface(0);
+    DecodedFrame next = surface(0);
     next.result.boundary[at(7, 5)] = -1;
     EXPECT_EQ(continuity.check({}, pool, next.result, next.edges).carried, carried);
   }
@@ -83,9 +64,9 @@ TEST(Continuity, WhatWasCarriedOnceIsNotSeenAgain) {
 TEST(Continuity, AnEndThatMovesUnlikeItsSurfaceIsGivenUp) {
   WorkerPool pool(1);
   Continuity continuity(kBoundaries, kLines);
-  Frame before = surface(0);
+  DecodedFrame before = surface(0);
   continuity.check({}, pool, before.result, before.edges);
-  Frame now = surface(1);
+  DecodedFrame now = surface(1);
   now.edges.edges[at(9, kBoundaries - 1)].column_px += 0.9F;  // at the surface's end
   now.edges.edges[at(9, 4)].column_px += 0.9F;                // amid it: other stages judge that
   now.edges.edges[at(15, 0)].column_px -= 0.9F;               // at an end where the scene moves

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "tests/unit/capture/decoded_frame.h"
+
 namespace relievo {
 namespace {
 
@@ -14,27 +16,8 @@ constexpr int kBoundaries = 12;
 
 /// Boundaries 8 px apart that lean by 0.3 px a line, all decoded, at the edge of a contrasty scene that holds
 /// still.
-struct Frame {
-  EdgeImage edges;
-  SequenceResult result;
-
-  Frame() {
-    edges.lines = kLines;
-    edges.line_start.push_back(0);
-    for (int line = 0; line < kLines; ++line) {
-      for (int b = 0; b < kBoundaries; ++b) {
-        Edge edge;
-        edge.column_px = place(line, b);
-        edge.sigma_px = 0.1F;
-        edge.contrast = 0.4F;
-        edges.edges.push_back(edge);
-        result.boundary.push_back(static_cast<std::int16_t>(b));
-        result.doubted.push_back(-1);
-        result.still.push_back(1);
-      }
-      edges.line_start.push_back(static_cast<std::uint32_t>(edges.edges.size()));
-    }
-  }
+struct Frame : DecodedFrame {
+  Frame() : DecodedFrame(decoded_frame(kLines, kBoundaries, {.sigma_px = 0.1F, .contrast = 0.4F}, place)) {}
 
   static float place(int line, int boundary) {
     return 30 + 8 * static_cast<float>(boundary) + 0.3F * static_cast<float>(line);

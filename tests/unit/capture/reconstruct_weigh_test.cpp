@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "capture/reconstruct/persistence.h"
+#include "tests/unit/capture/decoded_frame.h"
 
 namespace relievo {
 namespace {
@@ -17,28 +18,14 @@ constexpr int kBoundaries = 12;
 constexpr int kWidth_px = 200;
 
 /// Boundaries 8 px apart that lean by 0.3 px a line, all decoded and sure of their places.
-struct Frame {
-  EdgeImage edges;
-  SequenceResult result;
+struct Frame : DecodedFrame {
   std::vector<RecoveredBoundary> recovered;
   WorkerPool pool{2};
   PlaceGrid places;
 
-  explicit Frame(float moved_px = 0) {
-    edges.lines = kLines;
-    edges.line_start.push_back(0);
-    for (int line = 0; line < kLines; ++line) {
-      for (int b = 0; b < kBoundaries; ++b) {
-        Edge edge;
-        edge.column_px = place(line, b) + moved_px;
-        edge.sigma_px = 0.02F;
-        edges.edges.push_back(edge);
-        result.boundary.push_back(static_cast<std::int16_t>(b));
-        result.still.push_back(1);
-      }
-      edges.line_start.push_back(static_cast<std::uint32_t>(edges.edges.size()));
-    }
-  }
+  explicit Frame(float moved_px = 0)
+      : DecodedFrame(decoded_frame(kLines, kBoundaries, {.sigma_px = 0.02F},
+                                   [&](int line, int b) { return place(line, b) + moved_px; })) {}
 
   static float place(int line, int boundary) {
     return 30 + 8 * static_cast<float>(boundary) + 0.3F * static_cast<float>(line);
