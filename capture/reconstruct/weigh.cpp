@@ -25,7 +25,9 @@ constexpr float kOwn = 1.3F;         // times its standard deviation: blur acros
 constexpr float kOwnLeast_px = 0.02F;
 constexpr float kOut_px = 0.15F;    // outwards, at the end of a surface
 constexpr float kStrong_px = 0.5F;  // standard deviation of what is foretold and nothing agrees with
-constexpr float kMost_px = 0.85F;   // standard deviation, after weighing, times how far neighbours pulled
+constexpr float kMost_px = 0.85F;   // standard deviation, after weighing, times how far neighbours pulled,
+constexpr float kMostMoving_px = 0.55F;  // and where so many boundaries around were elsewhere: there it is
+constexpr int kMoves = 4;                // the silhouette's, and errors are several times as large
 
 float square(float x) {
   return x * x;
@@ -48,7 +50,7 @@ void Weighing::measure_gaps(const PlaceGrid& places) {
 
 /// A place's own column and all that is foretold of it and agrees, by their variances. Nothing where it is to
 /// be given up.
-std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride) const {
+std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, float most_px) const {
   const float own_variance = square(kOwn * own->sigma_px) + square(kOwnLeast_px);
   float weights = 1 / own_variance;
   float sum = weights * own->column_px;
@@ -95,24 +97,26 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride) 
   if (!own[1].known()) column_px = std::min(column_px, own->column_px + kOut_px);
   const float sigma_px = 1 / std::sqrt(weights);
   const float doubt = count == 0 ? 0 : off / static_cast<float>(count);
-  if (sigma_px * (1 + doubt) > kMost_px * scale_) return std::nullopt;
+  if (sigma_px * (1 + doubt) > most_px * scale_) return std::nullopt;
   return Place{column_px, sigma_px};
 }
 
 /// Weighs a place; false where it is to be given up.
-bool Weighing::settle(const PlaceGrid& places, int line, int boundary, float& column_px,
-                      float& sigma_px) const {
+bool Weighing::settle(const PlaceGrid& places, const MovingPlaces& moving, int line, int boundary,
+                      float& column_px, float& sigma_px) const {
   const Place* own = places.line(line) + boundary;
   if (own->column_px != column_px) return true;  // the grid has another one of that boundary
-  const std::optional<Place> now = weighed(own, places.stride());
+  const float most_px = moving.around(line, column_px) >= kMoves ? kMostMoving_px : kMost_px;
+  const std::optional<Place> now = weighed(own, places.stride(), most_px);
   if (!now) return false;
   column_px = now->column_px;
   sigma_px = now->sigma_px;
   return true;
 }
 
-WeighingCounts Weighing::weigh(const PlaceGrid& places, WorkerPool& pool, SequenceResult& result,
-                               EdgeImage& edges, std::vector<RecoveredBoundary>& recovered) {
+WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, WorkerPool& pool,
+                               SequenceResult& result, EdgeImage& edges,
+                               std::vector<RecoveredBoundary>& recovered) {
   measure_gaps(places);
   counts_.assign(static_cast<std::size_t>(pool.threads()), {});
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
@@ -123,7 +127,7 @@ WeighingCounts Weighing::weigh(const PlaceGrid& places, WorkerPool& pool, Sequen
         Edge& edge = edges.edges[e];
         std::int16_t& boundary = result.boundary[e];
         if (boundary < 0 || edge.sigma_px < kUnsure_px) continue;
-        if (settle(places, line, boundary, edge.column_px, edge.sigma_px)) {
+        if (settle(places, moving, line, boundary, edge.column_px, edge.sigma_px)) {
           ++counts.moved;
         } else {
           boundary = -1;
@@ -142,7 +146,7 @@ WeighingCounts Weighing::weigh(const PlaceGrid& places, WorkerPool& pool, Sequen
   std::erase_if(recovered, [&](RecoveredBoundary& r) {
     const bool is_sure = r.sigma_px < kUnsure_px;
     sure += is_sure;
-    return !is_sure && !settle(places, r.line, r.boundary, r.column_px, r.sigma_px);
+    return !is_sure && !settle(places, moving, r.line, r.boundary, r.column_px, r.sigma_px);
   });
   total.moved += recovered.size() - sure;
   total.rejected += found - recovered.size();

@@ -2,7 +2,7 @@
 // Places that are not sure, after all boundaries are found: those of a silhouette, of a shadow's edge, of
 // what moves. Each is weighed against what the boundaries around foretell, on the line and along it, which
 // the checks before could not do where these were found later. What is still unsure then, or is only held by
-// neighbours that pull it far, is given up.
+// neighbours that pull it far, is given up; sooner where things move.
 #pragma once
 
 #include <cstddef>
@@ -11,6 +11,7 @@
 
 #include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/place_grid.h"
 #include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/recover.h"
@@ -29,13 +30,14 @@ class Weighing {
  public:
   /// Moves columns of `edges` and `recovered`, and updates their standard deviations; gives up boundaries of
   /// `result` (-1), and takes them out of `recovered`. `places` are those of both, of one instant.
-  WeighingCounts weigh(const PlaceGrid& places, WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
-                       std::vector<RecoveredBoundary>& recovered);
+  WeighingCounts weigh(const PlaceGrid& places, const MovingPlaces& moving, WorkerPool& pool,
+                       SequenceResult& result, EdgeImage& edges, std::vector<RecoveredBoundary>& recovered);
 
  private:
   void measure_gaps(const PlaceGrid& places);
-  std::optional<Place> weighed(const Place* own, std::ptrdiff_t stride) const;
-  bool settle(const PlaceGrid& places, int line, int boundary, float& column_px, float& sigma_px) const;
+  std::optional<Place> weighed(const Place* own, std::ptrdiff_t stride, float most_px) const;
+  bool settle(const PlaceGrid& places, const MovingPlaces& moving, int line, int boundary, float& column_px,
+              float& sigma_px) const;
 
   RankedSample gaps_;                   // from one boundary to the next
   float scale_ = 1;                     // of what is tolerated, from the stripes' width

@@ -215,7 +215,7 @@ TEST_P(Walking, IsDecoded) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Walks, Walking,
-                         ::testing::Values(Walk{"Complementary", "walk", 0.973, 0.0017, 570},
+                         ::testing::Values(Walk{"Complementary", "walk", 0.97, 0.0015, 425},
                                            Walk{"OneSlide", "walk,scheme=one-slide", 0.97, 0.0025, 720}),
                          [](const auto& walk) { return std::string(walk.param.name); });
 

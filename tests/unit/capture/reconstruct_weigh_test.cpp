@@ -40,15 +40,18 @@ struct Frame : DecodedFrame {
     edge(line, boundary).sigma_px = sigma_px;
   }
   void fill() { places.fill(kBoundaries, pool, result, edges, recovered); }
+  MovingPlaces moving() const {
+    MovingPlaces out;
+    out.find(kWidth_px, result, edges);
+    return out;
+  }
   WeighingCounts weigh() {
     fill();
-    return Weighing().weigh(places, pool, result, edges, recovered);
+    return Weighing().weigh(places, moving(), pool, result, edges, recovered);
   }
   std::size_t carry(Persistence& persistence) {
     fill();
-    MovingPlaces moving;
-    moving.find(kWidth_px, result, edges);
-    return persistence.carry(moving, pool, places, recovered);
+    return persistence.carry(moving(), pool, places, recovered);
   }
 };
 
@@ -98,6 +101,25 @@ TEST(Weighing, WhatStaysUnsureIsGivenUp) {
   EXPECT_EQ(f.weigh().rejected, 2U);
   EXPECT_EQ(f.result.boundary[Frame::at(7, 5)], -1);
   EXPECT_TRUE(f.recovered.empty());
+}
+
+TEST(Weighing, WhereThingsMoveMoreSo) {
+  Frame still, moving;
+  for (int line = 0; line < kLines; ++line) {
+    for (int b = 0; b < kBoundaries; ++b) {
+      if (b == 5 && line == 7) continue;
+      // The left of the picture, too far away to say anything of this place but that its surroundings move.
+      if (b < 4 && line > 4 && line < 10) {
+        moving.result.still[Frame::at(line, b)] = 0;
+        continue;
+      }
+      still.lose(line, b);
+      moving.lose(line, b);
+    }
+  }
+  still.edge(7, 5).sigma_px = moving.edge(7, 5).sigma_px = 0.65F;
+  EXPECT_EQ(still.weigh().rejected, 0U);
+  EXPECT_EQ(moving.weigh().rejected, 1U);
 }
 
 TEST(Weighing, SoIsWhatNeighboursPullFar) {
