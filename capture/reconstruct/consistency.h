@@ -30,6 +30,9 @@ class ConsistencyCheck {
   /// counts and the others are given up.
   ConsistencyCounts check(int boundaries, WorkerPool& pool, SequenceResult& result, EdgeImage& edges);
 
+  /// Of what is tolerated in pixels, in the frame checked last: more where stripes are wide. At least 1.
+  float scale() const { return scale_; }
+
  private:
   struct Estimate {
     float column_px;
@@ -51,7 +54,7 @@ class ConsistencyCheck {
 
   int boundaries_ = 0;
   int lines_ = 0;
-  float scale_ = 1;                  // of what is tolerated, from the stripes' width
+  float scale_ = 1;
   std::size_t stride_ = 0;           // of the grids below, which have kMargin more on all sides
   std::vector<float> measured_;      // [line][boundary]: column, NaN where there is none
   std::vector<float> noise_;         // the same: standard deviation that noise alone gives

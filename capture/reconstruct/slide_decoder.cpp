@@ -305,7 +305,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const std::size_t carried = s.persistence.carry(s.moving, pool, s.places, s.recovered);
     report.filters.recovered += carried;
     report.matched += carried;
-    const WeighingCounts weighed = s.weighing.weigh(s.places, s.moving, pool, s.result, s.edges, s.recovered);
+    const WeighingCounts weighed =
+        s.weighing.weigh(s.places, s.moving, s.consistency.scale(), pool, s.result, s.edges, s.recovered);
     report.filters.rejected += weighed.rejected;
     report.filters.moved += weighed.moved;
   }

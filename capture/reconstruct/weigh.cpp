@@ -7,9 +7,6 @@
 namespace relievo {
 namespace {
 
-constexpr float kStripe_px = 10.5F;  // stripes wider than this allow for as much more
-constexpr int kGapsEvery = 8;        // lines
-
 // Standard deviations of what is foretold, measured on simulated scenes.
 constexpr float kStraight_px = 0.06F;  // from three neighbours in line
 constexpr float kBend = 1.4F;          // more for each pixel that the three are out of line
@@ -34,19 +31,6 @@ float square(float x) {
 }
 
 }  // namespace
-
-void Weighing::measure_gaps(const PlaceGrid& places) {
-  gaps_.reset(1);
-  std::vector<float>& gaps = gaps_.of(0);
-  for (int line = 0; line < places.lines(); line += kGapsEvery) {
-    const Place* here = places.line(line);
-    for (int b = 0; b + 1 < places.boundaries(); ++b) {
-      const float gap = here[b + 1].column_px - here[b].column_px;
-      if (gap > 0) gaps.push_back(gap);
-    }
-  }
-  scale_ = std::max(1.F, gaps_.median(0) / kStripe_px);
-}
 
 /// A place's own column and all that is foretold of it and agrees, by their variances. Nothing where it is to
 /// be given up.
@@ -114,10 +98,10 @@ bool Weighing::settle(const PlaceGrid& places, const MovingPlaces& moving, int l
   return true;
 }
 
-WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, WorkerPool& pool,
-                               SequenceResult& result, EdgeImage& edges,
+WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale,
+                               WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
                                std::vector<RecoveredBoundary>& recovered) {
-  measure_gaps(places);
+  scale_ = scale;
   counts_.assign(static_cast<std::size_t>(pool.threads()), {});
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];

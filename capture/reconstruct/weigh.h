@@ -13,7 +13,6 @@
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/place_grid.h"
-#include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
 
@@ -29,18 +28,17 @@ struct WeighingCounts {
 class Weighing {
  public:
   /// Moves columns of `edges` and `recovered`, and updates their standard deviations; gives up boundaries of
-  /// `result` (-1), and takes them out of `recovered`. `places` are those of both, of one instant.
-  WeighingCounts weigh(const PlaceGrid& places, const MovingPlaces& moving, WorkerPool& pool,
+  /// `result` (-1), and takes them out of `recovered`. `places` are those of both, of one instant. `scale` is
+  /// ConsistencyCheck's of the frame.
+  WeighingCounts weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale, WorkerPool& pool,
                        SequenceResult& result, EdgeImage& edges, std::vector<RecoveredBoundary>& recovered);
 
  private:
-  void measure_gaps(const PlaceGrid& places);
   std::optional<Place> weighed(const Place* own, std::ptrdiff_t stride, float most_px) const;
   bool settle(const PlaceGrid& places, const MovingPlaces& moving, int line, int boundary, float& column_px,
               float& sigma_px) const;
 
-  RankedSample gaps_;                   // from one boundary to the next
-  float scale_ = 1;                     // of what is tolerated, from the stripes' width
+  float scale_ = 1;                     // of the frame at hand
   std::vector<WeighingCounts> counts_;  // one a worker
 };
 

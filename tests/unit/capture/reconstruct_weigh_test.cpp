@@ -47,7 +47,7 @@ struct Frame : DecodedFrame {
   }
   WeighingCounts weigh() {
     fill();
-    return Weighing().weigh(places, moving(), pool, result, edges, recovered);
+    return Weighing().weigh(places, moving(), 1, pool, result, edges, recovered);
   }
   std::size_t carry(Persistence& persistence) {
     fill();
