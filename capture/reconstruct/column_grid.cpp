@@ -116,12 +116,12 @@ void fill_holes(int size, const ColumnScale& scale, ColumnGrid& grid, std::vecto
     for (int b = 0; b < grid.boundaries(); ++b) {
       const float* here = grid.line(l);
       if (known(here[b])) continue;
-      const auto across = between(
-          [&](int i) { return b + i < 0 || b + i >= grid.boundaries() ? ColumnGrid::kNone : here[b + i]; },
-          surface_goes_on_across);
-      const auto along = between(
-          [&](int i) { return l + i < 0 || l + i >= grid.lines() ? ColumnGrid::kNone : grid.line(l + i)[b]; },
-          surface_goes_on_along);
+      const auto across =
+          between([&](int i) { return b + i < 0 || b + i >= grid.boundaries() ? kNoColumn : here[b + i]; },
+                  surface_goes_on_across);
+      const auto along =
+          between([&](int i) { return l + i < 0 || l + i >= grid.lines() ? kNoColumn : grid.line(l + i)[b]; },
+                  surface_goes_on_along);
       if (!across && !along) continue;
       const bool use_along = along && (!across || along->gap <= across->gap);
       out.push_back({static_cast<std::uint16_t>(b), static_cast<std::uint16_t>(l),

@@ -8,38 +8,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/margin_grid.h"
 
 namespace relievo {
 
-/// [line][boundary], NaN where nothing was decoded, with a margin of two on all sides that holds nothing, so
-/// that neighbours can be asked for without a test.
-class ColumnGrid {
- public:
-  static constexpr int kMargin = 2;
-  static constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-
-  /// Empty; memory is reused.
-  void reset(int boundaries, int lines) {
-    boundaries_ = boundaries;
-    lines_ = lines;
-    columns_.assign(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(lines + 2 * kMargin),
-                    kNone);
-  }
-  int boundaries() const { return boundaries_; }
-  int lines() const { return lines_; }
-  std::ptrdiff_t stride() const { return boundaries_ + 2 * kMargin; }
-  float* line(int l) { return columns_.data() + (l + kMargin) * stride() + kMargin; }
-  const float* line(int l) const { return columns_.data() + (l + kMargin) * stride() + kMargin; }
-
- private:
-  int boundaries_ = 0;
-  int lines_ = 0;
-  std::vector<float> columns_;
-};
+/// kNoColumn where nothing was decoded.
+using ColumnGrid = MarginGrid<float, 2>;
 
 /// What is known of the columns as a whole.
 struct ColumnScale {

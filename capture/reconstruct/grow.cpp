@@ -12,8 +12,6 @@
 namespace relievo {
 namespace {
 
-constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-constexpr int kMargin = 2;
 constexpr std::array kBeside{-1, 1};  // boundaries
 
 constexpr int kMoves = 4;        // boundaries around that were elsewhere
@@ -88,16 +86,9 @@ struct Growth::Neighbours {
 };
 
 Growth::Growth(const std::array<double, 9>& colour_matrix, int boundaries, int lines)
-    : steps_(colour_matrix),
-      backdrop_(boundaries, lines),
-      boundaries_(boundaries),
-      lines_(lines),
-      stride_(static_cast<std::size_t>(boundaries) + 2 * kMargin),
-      now_(stride_ * static_cast<std::size_t>(lines + 2 * kMargin), kNone),
-      before_(now_) {}
-
-float* Growth::row(std::vector<float>& grid, int line) const {
-  return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
+    : steps_(colour_matrix), backdrop_(boundaries, lines), boundaries_(boundaries), lines_(lines) {
+  now_.reset(boundaries, lines, kNoColumn);
+  before_ = now_;
 }
 
 void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edges,
@@ -109,9 +100,9 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   std::size_t decoded = 0;
   std::size_t still = 0;
   for (int line = 0; line < lines_; ++line) {
-    float* here = row(now_, line);
+    float* here = now_.line(line);
     std::uint8_t* moving = moving_.data() + static_cast<std::size_t>(line * cells_);
-    std::fill_n(here, boundaries_, kNone);
+    std::fill_n(here, boundaries_, kNoColumn);
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
          e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
       const float column = edges.edges[e].column_px;
@@ -128,7 +119,7 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
       std::fill(moving + first, moving + last + 1, std::uint8_t{1});
     }
   }
-  for (const RecoveredBoundary& r : recovered) row(now_, r.line)[r.boundary] = r.column_px;
+  for (const RecoveredBoundary& r : recovered) now_.line(r.line)[r.boundary] = r.column_px;
   mostly_still_ = 2 * still > decoded;
   measure_pitch();
 }
@@ -138,7 +129,7 @@ void Growth::measure_pitch() {
   float sum = 0;
   std::size_t count = 0;
   for (int line = 0; line < lines_; line += kEvery) {
-    const float* here = row(now_, line);
+    const float* here = now_.line(line);
     for (int b = 0; b + 1 < boundaries_; ++b) {
       const float apart = here[b + 1] - here[b];
       if (!(apart > 0)) continue;
@@ -151,7 +142,7 @@ void Growth::measure_pitch() {
 
 void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
                            const SequenceResult& result) {
-  const float* before = row(before_, line);
+  const float* before = before_.line(line);
   for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
        e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
     const int b = result.boundary[e];
@@ -167,7 +158,7 @@ void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage
 /// of the field where that alone does.
 std::size_t Growth::restore_line(const SlideFieldView& view, int line, const EdgeImage& edges,
                                  SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
-  float* here = row(now_, line);
+  float* here = now_.line(line);
   std::size_t restored = 0;
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
@@ -176,7 +167,7 @@ std::size_t Growth::restore_line(const SlideFieldView& view, int line, const Edg
     if (!(backdrop_.difference(view, line, b, column).value_or(1) < kSameLook)) continue;
     const std::optional<std::uint32_t> near = edge_near(edges, line, column);
     if (near && std::fabs(edges.edges[*near].column_px - column) < kSameEdge_px) {
-      if (result.boundary[*near] >= 0) here[result.boundary[*near]] = kNone;
+      if (result.boundary[*near] >= 0) here[result.boundary[*near]] = kNoColumn;
       result.boundary[*near] = static_cast<std::int16_t>(b);
       here[b] = edges.edges[*near].column_px;
     } else if (near && result.boundary[*near] >= 0) {
@@ -197,7 +188,7 @@ bool Growth::moves(int line, float column_px) const {
 }
 
 Growth::Neighbours Growth::neighbours(int line, float column_px) {
-  const float* here = row(now_, line);
+  const float* here = now_.line(line);
   Neighbours out{-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(), -1,
                  boundaries_};
   for (int b = 0; b < boundaries_; ++b) {
@@ -219,7 +210,7 @@ float Growth::pitch_beside(int line, int boundary, int side) {
     float sum = 0;
     int count = 0;
     for (const int direction : {-lines, lines}) {
-      const float* there = row(now_, line + direction);
+      const float* there = now_.line(line + direction);
       const float apart = there[boundary] - there[boundary + side];
       if (!known(apart)) continue;
       sum += apart;
@@ -227,12 +218,12 @@ float Growth::pitch_beside(int line, int boundary, int side) {
     }
     if (count > 0) return sum / static_cast<float>(count);
   }
-  return kNone;
+  return kNoColumn;
 }
 
 /// As far from the next one on the line as on the lines around, or as that one is from its next.
 std::optional<Growth::Prediction> Growth::predict_beside(int line, int boundary) {
-  const float* here = row(now_, line);
+  const float* here = now_.line(line);
   for (const int side : kBeside) {
     const float from = here[boundary + side];
     if (!known(from)) continue;
@@ -258,7 +249,7 @@ Growth::Around Growth::around(int line, int boundary) {
   Around out;
   for (const int direction : {-1, 1}) {
     for (const int lines : {direction, 2 * direction}) {
-      const float px = row(now_, line + lines)[boundary];
+      const float px = now_.line(line + lines)[boundary];
       if (!known(px)) continue;
       out.column_px[out.count++] = px;
       out.sources |= direction < 0 ? kAbove : kBelow;
@@ -271,7 +262,7 @@ Growth::Around Growth::around(int line, int boundary) {
 /// Between the lines above and below, or, where the scene holds still but for what moves there, from one of
 /// them.
 std::optional<Growth::Prediction> Growth::predict_between(int line, int boundary, const Around& places) {
-  const float* here = row(now_, line);
+  const float* here = now_.line(line);
   unsigned sources = places.sources;
   if (known(here[boundary - 1])) sources |= kLeft;
   if (known(here[boundary + 1])) sources |= kRight;
@@ -279,7 +270,7 @@ std::optional<Growth::Prediction> Growth::predict_between(int line, int boundary
   const bool beside = (sources & (kLeft | kRight)) != 0;
   if (!both && (!beside || !mostly_still_)) return std::nullopt;
   // What the frame before had there and this one does not may be covered by now.
-  if (!both && known(row(before_, line)[boundary])) return std::nullopt;
+  if (!both && known(before_.line(line)[boundary])) return std::nullopt;
   std::uint8_t& tried = tried_[static_cast<std::size_t>(line * boundaries_ + boundary)];
   if (std::exchange(tried, static_cast<std::uint8_t>(sources)) == sources) return std::nullopt;
   const float column = both ? 0.5F * (places.column_px[0] + places.column_px[1]) : places.column_px[0];
@@ -299,7 +290,7 @@ bool Growth::fits_before(const SlideFieldView& view, int line, int boundary, con
                          bool beside) {
   const float column = found.column_px;
   if (std::fabs(found.moved_px) > kMostMoved_px) return false;
-  const float since = std::fabs(row(before_, line)[boundary] - column);
+  const float since = std::fabs(before_.line(line)[boundary] - column);
   const bool stood = since < kStood_px || since > kElsewhere * pitch_px_;
   if (backdrop_.stands(line, boundary, column)) {
     const auto difference = backdrop_.difference(view, line, boundary, column);
@@ -307,7 +298,7 @@ bool Growth::fits_before(const SlideFieldView& view, int line, int boundary, con
   }
   if (!beside || stood) return true;
   if (view.moving != nullptr && view.moving->around(line, column) >= MovingPlaces::kMost) return true;
-  const float* here = row(now_, line);
+  const float* here = now_.line(line);
   return std::none_of(kBeside.begin(), kBeside.end(), [&](int side) {
     const int next = boundary + side;
     return next >= 0 && next < boundaries_ && backdrop_.stands(line, next, here[next]);
@@ -323,7 +314,7 @@ std::optional<FoundStep> Growth::look(const SlideFieldView& view, int line, int 
 
 std::size_t Growth::grow_line(const SlideFieldView& view, int line,
                               std::vector<RecoveredBoundary>& recovered) {
-  float* here = row(now_, line);
+  float* here = now_.line(line);
   std::size_t added = 0;
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
@@ -345,7 +336,7 @@ bool Growth::confirm(const SlideFieldView& view, const Doubted& doubted, const E
   const auto [line, e] = doubted;
   if (line >= view.field.height) return false;
   const int b = result.doubted[e];
-  float& here = row(now_, line)[b];
+  float& here = now_.line(line)[b];
   const float column = edges.edges[e].column_px;
   if (result.boundary[e] >= 0 || known(here) || !moves(line, column)) return false;
   const Neighbours near = neighbours(line, column);
@@ -353,7 +344,7 @@ bool Growth::confirm(const SlideFieldView& view, const Doubted& doubted, const E
   const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
   if (!found || !fits_before(view, line, b, *found, false)) return false;
   const auto goes_on = [&](int other) {
-    return std::fabs(row(now_, other)[b] - found->column_px) < kGoesOn_px;
+    return std::fabs(now_.line(other)[b] - found->column_px) < kGoesOn_px;
   };
   if (!goes_on(line - 1) && !goes_on(line + 1)) return false;
   here = found->column_px;
@@ -364,7 +355,7 @@ bool Growth::confirm(const SlideFieldView& view, const Doubted& doubted, const E
 /// Gives up moving boundaries that the field does not show: a silhouette came over their place between the
 /// fields, or their code is another's.
 void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result) {
-  float* here = row(now_, line);
+  float* here = now_.line(line);
   for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
        e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
     const int b = result.boundary[e];
@@ -381,7 +372,7 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
     if (!steps_.shows_another(view, line, b, column, room(column - here[b - 1]), room(here[b + 1] - column)))
       continue;
     result.boundary[e] = -1;
-    here[b] = kNone;
+    here[b] = kNoColumn;
   }
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "capture/reconstruct/backdrop.h"
+#include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_step.h"
 #include "capture/reconstruct/recover.h"
@@ -51,7 +52,6 @@ class Growth {
     std::size_t count = 0;
     unsigned sources = 0;
   };
-  float* row(std::vector<float>& grid, int line) const;
   void fill(int width, const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered);
   void measure_pitch();
@@ -76,7 +76,6 @@ class Growth {
   StepFinder steps_;
   Backdrop backdrop_;
   int boundaries_, lines_;
-  std::size_t stride_;
   bool mostly_still_ = false;         // the scene, but for what moves in it
   float pitch_px_ = 0;                // from one boundary to the next, on average
   int frame_ = 0;                     // counts
@@ -84,7 +83,7 @@ class Growth {
   std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
   std::vector<Doubted> doubted_;
-  std::vector<float> now_, before_;  // [line][boundary] with a margin: column, NaN where there is none
+  ColumnGrid now_, before_;
 };
 
 }  // namespace relievo

@@ -25,8 +25,8 @@ constexpr float kMore_px = 0.1F;        // standard deviation more
 }  // namespace
 
 HalfWay::HalfWay(int boundaries, int lines) {
-  before_.reset(boundaries, lines);
-  now_.reset(boundaries, lines);
+  before_.reset(boundaries, lines, {});
+  now_.reset(boundaries, lines, {});
 }
 
 /// How far a place's neighbours go from frame to frame, where they go alike.
@@ -80,7 +80,7 @@ bool HalfWay::place(const std::vector<DecodedBoundary>& now, std::int64_t time_n
                     std::vector<DecodedBoundary>& out) {
   out.clear();
   const bool follows = time_ns_ != 0 && time_ns > time_ns_ && time_ns - time_ns_ <= longest_ns;
-  now_.reset(now_.boundaries(), now_.lines());
+  now_.reset(now_.boundaries(), now_.lines(), {});
   for (const DecodedBoundary& b : now) {
     Place& place = now_.line(b.line)[b.boundary];
     if (!place.known()) place = {b.column_px, b.sigma_px};  // the surest comes first

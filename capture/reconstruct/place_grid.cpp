@@ -5,20 +5,14 @@
 
 namespace relievo {
 
-void PlaceGrid::reset(int boundaries, int lines) {
-  boundaries_ = boundaries;
-  lines_ = lines;
-  places_.assign(static_cast<std::size_t>(stride() * (lines_ + 2 * kMargin)), {});
-}
-
 void PlaceGrid::fill(int boundaries, WorkerPool& pool, const SequenceResult& result, const EdgeImage& edges,
                      const std::vector<RecoveredBoundary>& recovered) {
   // What lies around the lines stays as it is here.
-  if (boundaries != boundaries_ || edges.lines != lines_) reset(boundaries, edges.lines);
+  if (boundaries != this->boundaries() || edges.lines != lines()) reset(boundaries, edges.lines, {});
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int l = begin; l < end; ++l) {
       Place* here = line(l);
-      std::fill_n(here, boundaries_, Place{});
+      std::fill_n(here, boundaries, Place{});
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(l)];
            e < edges.line_start[static_cast<std::size_t>(l) + 1]; ++e)
         if (result.boundary[e] >= 0)

@@ -22,7 +22,7 @@ SurfaceBuilder::SurfaceBuilder(const Rig& rig, int boundaries, int lines, int li
 
 std::size_t SurfaceBuilder::fill_columns(const std::vector<GridVertex>& vertices) {
   std::size_t duplicates = 0;
-  columns_.reset(boundaries_, lines_);
+  columns_.reset(boundaries_, lines_, kNoColumn);
   vertex_.assign(static_cast<std::size_t>(boundaries_) * static_cast<std::size_t>(lines_), -1);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const GridPoint& at = vertices[i].at;
