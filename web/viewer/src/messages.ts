@@ -24,6 +24,7 @@ export interface DecodedFrame {
   edges: Uint32Array<ArrayBuffer> | null;
   rims?: Float32Array<ArrayBuffer> | null; // how far inside each vertex is (rims.ts)
   quality: VertexQuality | null; // null: not wanted or not sent
+  codedQuality?: Uint8Array<ArrayBuffer> | null; // what was sent and not wanted then, for decodeVertexQuality()
   colours?: Float32Array<ArrayBuffer> | null; // linear RGB a vertex, of files without a picture
   texture: ImageBitmap | null;
   notice: string | null; // for the person, while frames are like this one

@@ -11,10 +11,11 @@ import { loadStage, makePainter } from './painter';
 import { steadyRange, type Range } from './palette';
 import { pick, type Picked } from './pick';
 import type { Pixels } from './pixels';
+import { decodeVertexQuality } from './quality';
 import { around, placed, type Placement } from './placement';
 import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
-import { Resolution, drawnInSoftware } from './resolution';
+import { Resolution, findGraphics } from './resolution';
 import type { Stage } from './stage';
 import type { Extent } from './surface';
 
@@ -56,7 +57,7 @@ export class View {
   readonly navigator: Navigator;
   readonly overlay: Overlay;
   /** The processor draws, the rest of the page too. */
-  readonly inSoftware = drawnInSoftware();
+  readonly inSoftware: boolean;
   private readonly sizes = new ResizeObserver(() => this.resize());
   private ended = false;
   private readonly painter: Painter;
@@ -92,9 +93,10 @@ export class View {
     private readonly events: ViewEvents,
     keys: EventTarget = window,
   ) {
-    if (this.inSoftware === null) throw new Error('there is no WebGL 2');
-    // Four samples a pixel cost a processor that draws more than all the rest.
-    this.painter = makePainter(canvas, !this.inSoftware, {
+    const graphics = findGraphics();
+    if (graphics === null) throw new Error('there is no WebGL 2');
+    this.inSoftware = graphics.inSoftware;
+    this.painter = makePainter(canvas, graphics, {
       ready: () => this.painted(),
       took: (ms) => {
         this.timing = false;
@@ -118,6 +120,7 @@ export class View {
     this.mode_ = display.mode;
     this.grid = display.grid;
     this.smooth = display.smooth;
+    if (display.mode === 'confidence') this.tellQuality();
     if (this.navigator.way !== display.way) this.navigator.way = display.way;
     if (this.navigator.wantedFieldOfView !== display.fov) this.navigator.wantedFieldOfView = display.fov;
     this.invalidate();
@@ -125,6 +128,7 @@ export class View {
   /** A person measures. */
   set measuring(measuring: boolean) {
     this.measuring_ = measuring;
+    if (measuring) this.tellQuality();
     this.invalidate();
   }
   get mode(): Mode {
@@ -361,6 +365,20 @@ export class View {
     if (frame.texture === null) return;
     if (shown.picture !== frame.texture) shown.picture?.close();
     shown.picture = frame.texture;
+  }
+
+  // Of the frames at hand, which came before anybody wanted it: where a stream stands still no other comes.
+  private tellQuality(): void {
+    for (const shown of this.surfaces) {
+      const { frame } = shown;
+      if (frame?.codedQuality == null || frame.coordinates === null) continue;
+      try {
+        shown.frame = { ...frame, quality: decodeVertexQuality(frame.codedQuality, frame.coordinates), codedQuality: null };
+      } catch {
+        continue; // damaged, as the decoder would have told of a later one
+      }
+      this.repaint(shown, this.headset ?? this.painter);
+    }
   }
 
   private repaint({ id, frame }: Shown, by: Pick<Painter, 'show'>): void {
