@@ -7,7 +7,7 @@ import gridWasmUrl from './grid.wasm?url';
 import { loadDraco } from './loadDraco';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
-import { kNoVideoHere, VideoTextures } from './videoTexture';
+import { noVideoHere, VideoTextures } from './videoTexture';
 import { vertexRims } from './rims';
 import { robustExtent, triangleEdges, vertexNormals } from './surface';
 
@@ -89,7 +89,7 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     codedQuality: geometry.quality === null && frame.quality.length > 0 ? frame.quality.slice() : null, // for who stops here, and asks then
     rims: request.want.rims && coordinates !== null ? vertexRims(coordinates, geometry.triangles, (n) => grids.spares.floats(n)) : null,
     texture: await picture,
-    notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? kNoVideoHere : null,
+    notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? noVideoHere() : null,
     extent: robustExtent(positions),
     decodeMs: performance.now() - start,
   };

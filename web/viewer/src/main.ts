@@ -15,6 +15,7 @@ import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
+import { rigPlace } from './placement';
 import { offeredRungs, wantedQuality, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
@@ -91,7 +92,10 @@ class Viewer {
     document.documentElement.classList.toggle('software', this.view?.inSoftware === true);
     this.session = new Session({
       changed: () => this.refresh(),
-      described: (info, seen) => this.view?.restart(info.camera, seen),
+      described: (info, seen) => {
+        this.view?.restart(info.camera, seen);
+        this.view?.setRigPlace(this.view.name, rigPlace(info));
+      },
       ready: () => this.view?.invalidate(),
       hint: (hint) => (this.server.hint = hint),
       unusable: (message) => (this.problem = text.noDecoder(message)),

@@ -12,7 +12,7 @@ import { steadyRange, type Range } from './palette';
 import { pick, type Picked } from './pick';
 import type { Pixels } from './pixels';
 import { decodeVertexQuality } from './quality';
-import { around, placed, type Placement } from './placement';
+import { around, between, placed, type Placement } from './placement';
 import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
 import { Resolution, findGraphics } from './resolution';
@@ -70,6 +70,7 @@ export class View {
   private extent: Extent | null = null; // of the first surface
   private poses: Rigid[] = [kNowhere]; // of the first surface and those beside it
   private readonly known = new Map<string, Rigid>(); // where a person has placed streams, by name
+  private readonly rigPlaces = new Map<string, Rigid>(); // where their rigs say that they stand
   /** Of the first surface, where there are others beside it. */
   name = '';
   private scheduled = false;
@@ -206,6 +207,19 @@ export class View {
     this.arrange();
   }
 
+  /** Where the rig of a stream says that its camera stands in the frame of all rigs; null: it does not say. */
+  setRigPlace(name: string, place: Rigid | null): void {
+    if (JSON.stringify(place) === JSON.stringify(this.rigPlaces.get(name) ?? null)) return;
+    if (place === null) this.rigPlaces.delete(name);
+    else this.rigPlaces.set(name, place);
+    if (this.besides.length > 0) this.arrange(true);
+  }
+
+  /** Where a stream stands in the first one's frame, by a person's hand or else by both rigs; null: nothing says it. */
+  placeOf(name: string): Rigid | null {
+    return this.known.get(name) ?? between(this.rigPlaces.get(this.name), this.rigPlaces.get(name));
+  }
+
   private get surfaces(): Shown[] {
     return [this.surface, ...this.besides];
   }
@@ -217,7 +231,7 @@ export class View {
   }
 
   private arrange(quietly = false): void {
-    this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.known.get(name) ?? null)]);
+    this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.placeOf(name))]);
     this.useExtent();
     if (!quietly) this.navigator.reset();
   }
