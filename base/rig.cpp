@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/rig.h"
 
+#include <cmath>
 #include <cstdio>
 #include <span>
 
@@ -40,6 +41,19 @@ std::string_view to_string(FieldOrder order) {
   return order == FieldOrder::kTop ? "top" : "bottom";
 }
 
+bool is_rotation(const std::array<double, 9>& m) {
+  constexpr double kTolerance = 1e-4;
+  const auto dot = [&](std::size_t i, std::size_t j) {
+    return m[3 * i] * m[3 * j] + m[3 * i + 1] * m[3 * j + 1] + m[3 * i + 2] * m[3 * j + 2];
+  };
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      if (!(std::abs(dot(i, j) - (i == j ? 1.0 : 0.0)) <= kTolerance)) return false;
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+             m[2] * (m[3] * m[7] - m[4] * m[6]) >
+         0;
+}
+
 std::string to_yaml(const Rig& rig) {
   std::string out =
       "%YAML:1.0\n---\nscan: " + std::string(to_string(rig.scan)) +
@@ -53,6 +67,10 @@ std::string to_yaml(const Rig& rig) {
   out += matrix("colour_matrix", 3, 3, rig.colour_matrix);
   if (rig.stereo_rms_px > 0) out += "stereo_rms_px: " + number(rig.stereo_rms_px) + "\n";
   if (rig.scale_error > 0) out += "scale_error: " + number(rig.scale_error) + "\n";
+  if (rig.world_from_camera) {
+    out += matrix("world_from_camera_rotation", 3, 3, rig.world_from_camera->rotation);
+    out += matrix("world_from_camera_translation", 3, 1, rig.world_from_camera->translation);
+  }
   return out;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -33,6 +34,12 @@ struct PinholeModel {
   double cy() const { return matrix[5]; }
 };
 
+/// Where a camera stands: X_world = rotation * X_camera + translation.
+struct CameraPose {
+  std::array<double, 9> rotation{};     // row-major
+  std::array<double, 3> translation{};  // metres
+};
+
 struct Rig {
   Scan scan = Scan::kInterlaced;
   FieldOrder field_order = FieldOrder::kTop;  // of an interlaced scan
@@ -46,12 +53,17 @@ struct Rig {
   // How good its calibration found it; 0: not said.
   double stereo_rms_px = 0;  // what the board's corners are off by in either picture
   double scale_error = 0;    // what sizes are wrong by, relative, RMS over the places of the board
+  // In a frame that it shares with other rigs, as whoever set them up has measured it; none: not said.
+  std::optional<CameraPose> world_from_camera;
 };
 
 /// "interlaced" or "progressive".
 std::string_view to_string(Scan scan);
 /// "top" or "bottom".
 std::string_view to_string(FieldOrder order);
+
+/// Whether the rows of a row-major 3x3 matrix are orthonormal, within 1e-4, and right-handed.
+bool is_rotation(const std::array<double, 9>& matrix);
 
 /// The text of a rig.yaml (OpenCV FileStorage), with every digit needed to read the same doubles back.
 std::string to_yaml(const Rig& rig);

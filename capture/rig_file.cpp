@@ -72,16 +72,9 @@ void check_lens(const PinholeModel& model, const std::string& name) {
   if (!(m[0] > 0 && m[4] > 0)) refuse(name + "_matrix has a focal length that is not above 0");
 }
 
-void check_rotation(const std::array<double, 9>& r) {
-  double worst = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      const double dot = r[3 * i] * r[3 * j] + r[3 * i + 1] * r[3 * j + 1] + r[3 * i + 2] * r[3 * j + 2];
-      worst = std::max(worst, std::abs(dot - (i == j ? 1.0 : 0.0)));
-    }
-  }
-  if (worst > 1e-4 || determinant(r) < 0) {
-    refuse("projector_from_camera_rotation is no rotation (its rows must be orthonormal and right-handed)");
+void check_rotation(const std::array<double, 9>& rotation, const std::string& key) {
+  if (!is_rotation(rotation)) {
+    refuse(key + " is no rotation (its rows must be orthonormal and right-handed)");
   }
 }
 
@@ -97,7 +90,8 @@ void check_colour_matrix(const std::array<double, 9>& m) {
 void check_parts(const Rig& rig) {
   check_lens(rig.camera, "camera");
   check_lens(rig.projector, "projector");
-  check_rotation(rig.projector_from_camera_rotation);
+  check_rotation(rig.projector_from_camera_rotation, "projector_from_camera_rotation");
+  if (rig.world_from_camera) check_rotation(rig.world_from_camera->rotation, "world_from_camera_rotation");
   const auto& t = rig.projector_from_camera_translation;
   if (std::hypot(t[0], t[1], t[2]) < 1e-6) {
     refuse("projector_from_camera_translation is zero: depth needs a baseline");
@@ -128,6 +122,11 @@ Rig rig_of(const StorageFile& file) {
   matrix(file, "colour_matrix", 3, 3, rig.colour_matrix);
   if (file.has("stereo_rms_px")) rig.stereo_rms_px = number(file, "stereo_rms_px", 0, kMaxPixels);
   if (file.has("scale_error")) rig.scale_error = number(file, "scale_error", 0, 1);
+  if (file.has("world_from_camera_rotation") || file.has("world_from_camera_translation")) {
+    CameraPose& pose = rig.world_from_camera.emplace();
+    matrix(file, "world_from_camera_rotation", 3, 3, pose.rotation);
+    matrix(file, "world_from_camera_translation", 3, 1, pose.translation);
+  }
   check_parts(rig);
   return rig;
 }

@@ -111,6 +111,11 @@ nlohmann::json known(double quality) {
   return quality > 0 ? nlohmann::json(quality) : nlohmann::json();
 }
 
+nlohmann::json place_json(const Rig& rig) {
+  if (!rig.world_from_camera) return {};
+  return {{"rotation", rig.world_from_camera->rotation}, {"translation", rig.world_from_camera->translation}};
+}
+
 nlohmann::json info_json(const StreamInfo& info) {
   return {
       {"stream", info.stream},
@@ -125,7 +130,8 @@ nlohmann::json info_json(const StreamInfo& info) {
         {"projector_from_camera_translation", info.rig.projector_from_camera_translation},
         {"colour_matrix", info.rig.colour_matrix},
         {"stereo_rms_px", known(info.rig.stereo_rms_px)},
-        {"scale_error", known(info.rig.scale_error)}}},
+        {"scale_error", known(info.rig.scale_error)},
+        {"world_from_camera", place_json(info.rig)}}},
       {"pattern",
        {{"base", info.pattern.base}, {"slides", info.pattern.slides}, {"stripes", info.pattern.stripes()}}}};
 }

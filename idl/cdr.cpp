@@ -183,6 +183,11 @@ Rig read_rig(Cursor& in, bool& possible) {
     rig.stereo_rms_px = in.number();
     rig.scale_error = in.number();
     possible = possible && rig.stereo_rms_px >= 0 && rig.scale_error >= 0;
+    if (!in.more()) return;  // of a server that did not say where its camera stands
+    const CameraPose pose{.rotation = in.doubles<9>(), .translation = in.doubles<3>()};
+    if (std::all_of(pose.rotation.begin(), pose.rotation.end(), [](double v) { return v == 0; })) return;
+    possible = possible && is_rotation(pose.rotation);
+    rig.world_from_camera = pose;
   });
   return rig;
 }

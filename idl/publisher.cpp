@@ -52,6 +52,11 @@ relievo_Rig to_dds(const Rig& rig) {
       rig.field_order == FieldOrder::kTop ? relievo_FIELD_ORDER_TOP : relievo_FIELD_ORDER_BOTTOM;
   out.stereo_rms_px = rig.stereo_rms_px;
   out.scale_error = rig.scale_error;
+  if (rig.world_from_camera) {
+    const auto& [rotation, translation] = *rig.world_from_camera;
+    std::copy(rotation.begin(), rotation.end(), out.world_from_camera_rotation);
+    std::copy(translation.begin(), translation.end(), out.world_from_camera_translation);
+  }
   return out;
 }
 

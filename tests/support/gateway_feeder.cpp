@@ -3,14 +3,16 @@
 // codec. Prints "listening PORT" and obeys lines on stdin: start NAME, also NAME (a second stream of the
 // same frames), apart N (its frames are N ahead of the first one's), stop, frame NUMBER (that one, then
 // stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
-// 8th), rig RMS SCALE (how good the first one's is found to be, which it says from then on), sigmas METRES...
-// (of the depths, in as many bands from left to right; the lower half is interpolated). Ends when stdin does,
-// so that no test leaves it behind.
+// 8th), rig RMS SCALE (how good the first one's is found to be, which it says from then on), place NAME ANGLE
+// X Y Z (where that stream's camera stands in a frame of all: turned about y by radians, metres), sigmas
+// METRES... (of the depths, in as many bands from left to right; the lower half is interpolated). Ends when
+// stdin does, so that no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -132,6 +134,7 @@ struct Orders {
   std::string state, text;
   std::optional<std::uint64_t> only;  // this frame, then none
   std::optional<RigQuality> quality;
+  std::map<std::string, CameraPose> places;  // of streams' cameras
   std::vector<float> sigmas;
   TextureCodec texture = TextureCodec::kJpeg;
 };
@@ -165,6 +168,13 @@ void read_orders(Orders& orders) {
     } else if (verb == "rig") {
       RigQuality quality;
       if (words >> quality.stereo_rms_px >> quality.scale_error) orders.quality = quality;
+      orders.announce = true;
+    } else if (verb == "place") {  // a stream, its camera's turn about y in radians, and where it stands
+      double angle = 0;
+      words >> name >> angle;
+      CameraPose& pose = orders.places[name];
+      for (double& t : pose.translation) words >> t;
+      pose.rotation = {std::cos(angle), 0, std::sin(angle), 0, 1, 0, -std::sin(angle), 0, std::cos(angle)};
       orders.announce = true;
     } else if (verb == "sigmas") {
       orders.sigmas.clear();
@@ -213,8 +223,13 @@ int feed(std::uint16_t port, double rate) {
     const std::lock_guard lock(orders.mutex);
     if (orders.quit) return 0;
     if (std::exchange(orders.announce, false)) {
-      gateway.announce(orders.quality ? make_info(orders.stream, *orders.quality) : make_info(orders.stream));
-      if (!orders.also.empty()) gateway.announce(make_info(orders.also));
+      const auto announce = [&](StreamInfo info) {
+        if (const auto at = orders.places.find(info.stream); at != orders.places.end())
+          info.rig.world_from_camera = at->second;
+        gateway.announce(info);
+      };
+      announce(orders.quality ? make_info(orders.stream, *orders.quality) : make_info(orders.stream));
+      if (!orders.also.empty()) announce(make_info(orders.also));
     }
     if (std::exchange(orders.withdraw, false)) gateway.withdraw(orders.stream);
     if (!orders.state.empty()) {

@@ -37,6 +37,10 @@ Json rig_json(const StreamInfo& info) {
                {"projector_from_camera_translation", info.rig.projector_from_camera_translation}};
   if (info.rig.stereo_rms_px > 0) json["stereo_rms_px"] = info.rig.stereo_rms_px;
   if (info.rig.scale_error > 0) json["scale_error"] = info.rig.scale_error;
+  if (const auto& pose = info.rig.world_from_camera) {
+    json["world_from_camera_rotation"] = pose->rotation;
+    json["world_from_camera_translation"] = pose->translation;
+  }
   return json;
 }
 

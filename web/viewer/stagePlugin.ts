@@ -3,9 +3,11 @@
 // are, it would bring all of that along once more. Of three.js the worker alone has the renderer.
 import { createRequire } from 'node:module';
 import type { Plugin } from 'vite';
+import { trimmer } from './stageTrim';
 
 const kName = 'virtual:stage-url';
 const kThree = createRequire(import.meta.url).resolve('three').replace(/build\/three\.\w+$/, 'src/');
+const trim = trimmer(kThree);
 const kWorker = '/src/stage.worker.ts'; // in the viewer's folder
 
 /** `root`: the viewer's folder. Gives `virtual:stage-url`, the address of the worker's module. */
@@ -21,10 +23,9 @@ export function stageUrl(root: string): Plugin {
       if (!isBuild || id !== 'three') return null;
       return kThree + (importer.endsWith('/stage.ts') ? 'Three.js' : 'Three.Core.js');
     },
-    /** Of its shaders no minifier knows what may go. */
     transform(code, id) {
-      if (!isBuild || !id.endsWith('.glsl.js')) return null;
-      return { code: code.replace(/\/\/.*$/gm, '').replace(/\n\s+/g, '\n'), map: null };
+      const trimmed = isBuild ? trim(code, id) : null;
+      return trimmed === null ? null : { code: trimmed, map: null };
     },
     load(id) {
       if (id !== `\0${kName}`) return null;

@@ -9,6 +9,7 @@ if (executablePath === undefined) {
   console.log('skipped: no Chromium here; apt-get install chromium');
   process.exit(77);
 }
+process.env.PW_EXPERIMENTAL_SERVICE_WORKER_NETWORK_EVENTS = '1'; // a context's events are its service workers', too
 const { chromium } = createRequire(join(process.cwd(), 'package.json'))('playwright-core');
 const kFlags = [
   '--no-sandbox',

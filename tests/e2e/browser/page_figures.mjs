@@ -68,10 +68,6 @@ async function starts() {
 async function tasks() {
   const page = await open();
   await shownPast(page, 20);
-  await page.evaluate(() => {
-    window.long = [];
-    new PerformanceObserver((list) => window.long.push(...list.getEntries().map((e) => e.duration))).observe({ type: 'longtask' });
-  });
   const tracing = await browser.newBrowserCDPSession();
   const events = [];
   tracing.on('Tracing.dataCollected', ({ value }) => events.push(...value));
@@ -85,11 +81,15 @@ async function tasks() {
   const after = await report(page);
   await tracing.send('Tracing.end');
   await complete;
-  const long = await page.evaluate(() => window.long);
   const mains = events.filter((e) => e.name === 'thread_name' && e.args.name === 'CrRendererMain');
   const isMain = (e) => mains.some((m) => m.pid === e.pid && m.tid === e.tid);
   const all = events.filter((e) => e.ph === 'X' && e.tdur !== undefined && isMain(e));
-  const run = all.filter((e) => /RunTask$/.test(e.name)).sort((a, b) => b.tdur - a.tdur);
+  // The trace alone says it: the page's own observer also counts what starting and ending the trace holds up.
+  const byStart = all.filter((e) => /RunTask$/.test(e.name)).sort((a, b) => a.ts - b.ts || b.dur - a.dur);
+  let end = -Infinity; // of the task before: what lies in it is a part of it
+  const tasksOf = byStart.filter((e) => e.ts >= end && ((end = e.ts + e.dur), true));
+  const run = tasksOf.sort((a, b) => b.tdur - a.tdur);
+  const long = run.filter((e) => e.dur > kTaskMs * 1000);
   assert.ok(run.length > 100, `${run.length} tasks in the trace`);
   const [worst] = run;
   const clock = Math.max(0, ...run.map((e) => e.dur));

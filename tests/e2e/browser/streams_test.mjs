@@ -309,6 +309,34 @@ const checks = {
     await page.close();
   },
 
+  async 'rigs that say where they stand stand there, unless a link says otherwise'() {
+    const size = { viewport: { width: 1200, height: 750 } };
+    const [first, other] = [[0.3, 0.5, 0.1, 2], [-0.4, 1.6, 0.1, 2.3]];
+    for (const [name, said] of [['ball', first], ['other', other]]) feeder.say(`place ${name} ${said.join(' ')}`);
+    const rig = ([angle, ...translation]) => ({ rotation: [Math.cos(angle), 0, Math.sin(angle), 0, 1, 0, -Math.sin(angle), 0, Math.cos(angle)], translation });
+    const page = await open('/?stream=ball,other#smooth=0', size);
+    await besides(page, 1);
+    await page.waitForFunction(() => Math.abs(window.relievo.diagnostics().besides[0].pose.rotation[2]) > 0.1);
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame === n, kFrame + kApart);
+    await still(page);
+    const { pose } = (await look(page)).besides[0];
+    const point = pointOf(0.85, 0.8, kFrame + kApart);
+    const [here, there] = [moved(rig(first), moved(pose, point)), moved(rig(other), point)];
+    for (const i of [0, 1, 2]) near(here[i], there[i], 1e-6, `${'xyz'[i]} in the frame of both`);
+    const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, point));
+    const picked = await page.evaluate(({ x, y }) => window.relievo.pick(x, y), at);
+    assert.equal(picked?.stream, 'other', `at ${at.x}, ${at.y}`);
+    for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} of what is picked`);
+    await page.keyboard.press('n');
+    await page.waitForFunction(() => /Each stands where its rig, or a person, says/.test(document.querySelector('#panel-streams')?.textContent));
+    assert.doesNotMatch(await page.evaluate(() => window.relievo.link()), /place=/);
+    await page.close();
+    const linked = await open('/?stream=ball,other#place=other_0_0_0_1.2_0_0', size);
+    await besides(linked, 1);
+    assert.deepEqual((await look(linked)).besides[0].pose, { rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [1.2, 0, 0] });
+    await linked.close();
+  },
+
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder of recordings.
     assert.deepEqual(complaints.filter((c) => !/status of 404/.test(c)), []);

@@ -26,22 +26,27 @@ export async function startWeb(relievoPath, recorded, options = []) {
 /** What `page` opens from now on finds no WebGL. */
 export const withoutWebGl = (page) =>
   page.addInitScript(() => {
-    const original = HTMLCanvasElement.prototype.getContext;
-    HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
-      return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
-    };
+    for (const { prototype } of [HTMLCanvasElement, OffscreenCanvas]) {
+      const original = prototype.getContext;
+      prototype.getContext = function (kind, ...rest) {
+        return String(kind).startsWith('webgl') ? null : original.call(this, kind, ...rest);
+      };
+    }
   });
 
 /**
- * What `page` loads from now on: its result gives the gzipped bytes by address. What the page and its workers both ask for
- * comes from the network once where the server says that the browser may keep it.
+ * What `page` and its service worker ask for from now on until its first picture: the result, called behind that, gives the
+ * gzipped bytes by address. What the page and its workers both ask for comes from the network once where the server says that
+ * the browser may keep it.
  */
 export function loadsOf(page) {
   const loads = [];
-  page.on('response', (response) => loads.push(response));
+  page.context().on('response', (response) => loads.push(response)); // of its service worker, too: see chromium.mjs
   return async () => {
+    const until = await page.evaluate(() => performance.timeOrigin + performance.getEntriesByName('first-picture')[0].startTime);
     const bytes = new Map();
     for (const response of loads) {
+      if (response.request().timing().startTime > until) continue;
       const before = bytes.get(response.url()) ?? 0;
       if (before > 0 && /immutable/.test(response.headers()['cache-control'])) continue;
       bytes.set(response.url(), before + gzipSync(await response.body().catch(() => '')).length);

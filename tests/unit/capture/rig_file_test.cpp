@@ -238,6 +238,35 @@ TEST(RigFile, SaysHowGoodItsCalibrationFoundItWhereThatIsKnown) {
   }
 }
 
+TEST(RigFile, SaysWhereItsCameraStandsWhereThatIsKnown) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  Rig rig = test::small_rig(Scan::kInterlaced);
+  const std::string without = to_yaml(rig);
+  EXPECT_THAT(without, testing::Not(HasSubstr("world_from_camera")));
+  test::write_text(file, without);
+  EXPECT_FALSE(read_rig(file).value().world_from_camera);
+
+  rig.world_from_camera = {.rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}, .translation = {1.0 / 3, -0.25, 2}};
+  const std::string with = to_yaml(rig);
+  test::write_text(file, with);
+  Result<Rig> read = read_rig(file);
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_TRUE(read->world_from_camera);
+  EXPECT_EQ(read->world_from_camera->rotation, rig.world_from_camera->rotation);
+  EXPECT_EQ(read->world_from_camera->translation, rig.world_from_camera->translation);
+
+  test::write_text(file, with.substr(0, with.find("world_from_camera_translation")));
+  read = read_rig(file);
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr("world_from_camera_translation is missing"));
+  rig.world_from_camera->rotation[8] = -1;
+  test::write_text(file, to_yaml(rig));
+  read = read_rig(file);
+  ASSERT_FALSE(read);
+  EXPECT_THAT(read.error().message, HasSubstr("world_from_camera_rotation is no rotation"));
+}
+
 TEST(PatternFile, SchemeIsComplementaryUnlessItSaysOtherwise) {
   test::TempFolder folder;
   const auto file = folder.path() / "pattern.yaml";

@@ -199,6 +199,25 @@ TEST(Cdr, ReadsHowGoodTheRigIs) {
   EXPECT_FALSE(read_info_cdr(description({1, 2}, {0.25}).finish()).ok());
 }
 
+TEST(Cdr, ReadsWhereTheCameraStands) {
+  const auto read = [](std::vector<double> pose) {
+    pose.insert(pose.begin(), {0.25, 5e-4});
+    return read_info_cdr(description({1, 2}, pose).finish());
+  };
+  const auto info = read({0, -1, 0, 1, 0, 0, 0, 0, 1, 1.5, -0.25, 2});
+  ASSERT_TRUE(info.ok()) << info.error().message;
+  ASSERT_TRUE(info->rig.world_from_camera);
+  EXPECT_EQ(info->rig.world_from_camera->rotation, (std::array<double, 9>{0, -1, 0, 1, 0, 0, 0, 0, 1}));
+  EXPECT_EQ(info->rig.world_from_camera->translation, (std::array<double, 3>{1.5, -0.25, 2}));
+  EXPECT_EQ(info->pattern.scheme, Scheme::kWhiteFrame);
+  EXPECT_FALSE(read({}).value().rig.world_from_camera);
+  EXPECT_FALSE(read(std::vector<double>(12, 0)).value().rig.world_from_camera);  // not said
+  EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0}).ok());
+  EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, -1, 0, 0, 0}).ok());
+  EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, 1}).ok());
+  EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, std::numeric_limits<double>::infinity()}).ok());
+}
+
 TEST(Cdr, SchemaIsTheWholeIdl) {
   using testing::HasSubstr;
   EXPECT_EQ(topic_type(Topic::kFrame).type_name, "relievo::Frame");

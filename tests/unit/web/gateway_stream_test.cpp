@@ -34,6 +34,7 @@ TEST_F(GatewayStream, InfoComesFirstAndDescribesTheRig) {
   EXPECT_EQ(info["camera"]["width"], 640);
   EXPECT_EQ(info["camera"]["cx"], 319.5);
   EXPECT_FALSE(info.contains("stereo_rms_px") || info.contains("scale_error"));
+  EXPECT_FALSE(info.contains("world_from_camera_rotation") || info.contains("world_from_camera_translation"));
 }
 
 TEST_F(GatewayStream, InfoSaysHowGoodTheRigIs) {
@@ -47,6 +48,19 @@ TEST_F(GatewayStream, InfoSaysHowGoodTheRigIs) {
   const auto info = Json::parse(message->data);
   EXPECT_EQ(info["stereo_rms_px"], 0.25);
   EXPECT_EQ(info["scale_error"], 5e-4);
+}
+
+TEST_F(GatewayStream, InfoSaysWhereTheCameraStands) {
+  StreamInfo described = make_info();
+  described.rig.world_from_camera = {.rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1},
+                                     .translation = {1.5, -0.25, 2}};
+  gateway->announce(described);
+  WsClient client(port, "face");
+  const auto message = client.next();
+  ASSERT_TRUE(message);
+  const auto info = Json::parse(message->data);
+  EXPECT_EQ(info["world_from_camera_rotation"], Json::parse("[0,-1,0,1,0,0,0,0,1]"));
+  EXPECT_EQ(info["world_from_camera_translation"], Json::parse("[1.5,-0.25,2]"));
 }
 
 TEST_F(GatewayStream, AFrameCarriesItsTimesAndBytes) {

@@ -302,7 +302,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     const frame = session.take();
     if (frame === null) return;
     view.show(frame);
-    this.notice = frame.notice ?? '';
+    this.notice = frame.notice === null ? '' : text.notices[frame.notice];
     view.invalidate();
     session.decoder.want = view.wants;
     const detail = { number: frame.number, vertices: frame.positions.length / 3, triangles: frame.triangles.length / 3 };

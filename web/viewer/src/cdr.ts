@@ -110,7 +110,10 @@ export function readStreamInfo(bytes: Uint8Array): StreamInfo {
     if (more()) cursor.u32(); // field order
     const [stereo_rms_px = 0, scale_error = 0] = more() ? cursor.doubles(2) : [];
     const pose = { projector, projector_from_camera_rotation, projector_from_camera_translation };
-    return { stream, source, frame_rate, scan, stripes: 0, camera, ...pose, stereo_rms_px, scale_error };
+    const [rotation, translation] = more() ? [cursor.doubles(9), cursor.doubles(3)] : [[], []];
+    const isPlaced = rotation.some((v) => v !== 0); // else it is not said
+    const place = isPlaced ? { world_from_camera_rotation: rotation, world_from_camera_translation: translation } : {};
+    return { stream, source, frame_rate, scan, stripes: 0, camera, ...pose, stereo_rms_px, scale_error, ...place };
   });
 }
 

@@ -2,6 +2,7 @@
 // Streams that are shown beside the first one, in the same scene. Each has a decoder and a rate of its own.
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
+import { rigPlace } from './placement';
 import type { ListedStream, Quality, StreamInfo } from './protocol';
 import { Session } from './session';
 import type { Playback, SourceEvents } from './source';
@@ -41,7 +42,7 @@ export class Companions {
     if (this.shown.has(name)) return;
     const session = new Session({
       changed: () => this.changed(),
-      described: () => undefined,
+      described: (info) => this.view.setRigPlace(name, rigPlace(info)),
       ready: () => this.view.invalidate(),
       hint: () => undefined,
       unusable: () => this.changed(),

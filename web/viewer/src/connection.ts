@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One WebSocket to one stream, kept up: clock exchange, silence as loss, retries with backoff.
+import { openSocket, socketUrl, take } from './early';
 import { parseFramePrefix, parseServerMessage, type Quality } from './protocol';
 import type { SourceEvents } from './source';
 import { backoffS } from './state';
@@ -82,11 +83,8 @@ export class Connection {
   private connect(): void {
     this.detach();
     this.retryAt = null;
-    const url = new URL(`ws/${encodeURIComponent(this.stream)}`, this.server);
-    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
-    url.search = url.hash = '';
-    const socket = new WebSocket(url);
-    socket.binaryType = 'arraybuffer';
+    const url = socketUrl(this.stream, this.server);
+    const socket = take<WebSocket>(url) ?? openSocket(url);
     this.socket = socket;
     this.lastHeard = performance.now();
     socket.onopen = () => {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page's side of the decoding worker. A decoder that hangs is replaced.
 import type { Wants } from './display';
+import { take } from './early';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
+import { startDecoder } from './workers';
 
 const kPatienceMs = 10_000;
 
@@ -52,7 +54,7 @@ export class Decoder {
   }
 
   private start(): Worker {
-    const worker = new Worker(new URL('./decoder.worker.ts', import.meta.url), { type: 'module' });
+    const worker = take<Worker>('decoder') ?? startDecoder();
     this.ready = false;
     worker.onmessage = (event: MessageEvent<DecodeReply>) => {
       const reply = event.data;

@@ -7,7 +7,7 @@ import gridWasmUrl from './grid.wasm?url';
 import { loadDraco } from './loadDraco';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { decodeVertexQuality, type VertexQuality } from './quality';
-import { kNoVideoHere, VideoTextures } from './videoTexture';
+import { noVideoHere, VideoTextures } from './videoTexture';
 import { vertexRims } from './rims';
 import { robustExtent, triangleEdges, vertexNormals } from './surface';
 
@@ -19,7 +19,8 @@ const kStills: Record<number, string> = { [kTextureJpeg]: 'image/jpeg', [kTextur
 
 const grids = new GridFrames();
 const videos = new VideoTextures();
-let kernelAsked = false;
+const kKernelWithinMs = 300; // the first grid takes about as long without, as code that has never run
+const kernel = Promise.race([loadKernel(), new Promise((resolve) => setTimeout(resolve, kKernelWithinMs))]);
 const kOfDraco = [kGeometryDraco, kGeometryDracoGrid];
 const kDracoTries = 3;
 const kDracoAgainMs = 1000;
@@ -67,6 +68,7 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
   const frame = parseFrame(new Uint8Array(request.bytes, request.offset));
   const needsDraco = frame.header.vertices > 0 && kOfDraco.includes(frame.geometryCodec);
   const draco = needsDraco ? await theDraco() : null;
+  if (frame.geometryCodec === kGeometryGrid) await kernel;
   const start = performance.now();
   const picture = decodeTexture(frame); // the browser decodes it meanwhile, on a thread of its own
   picture.catch(() => undefined); // awaited below, unless the geometry fails first
@@ -84,23 +86,23 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     triangles: geometry.triangles,
     edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
     quality: geometry.quality,
+    codedQuality: geometry.quality === null && frame.quality.length > 0 ? frame.quality.slice() : null, // for who stops here, and asks then
     rims: request.want.rims && coordinates !== null ? vertexRims(coordinates, geometry.triangles, (n) => grids.spares.floats(n)) : null,
     texture: await picture,
-    notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? kNoVideoHere : null,
+    notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? noVideoHere() : null,
     extent: robustExtent(positions),
     decodeMs: performance.now() - start,
   };
 }
 
-/** Where there are grids; until it is there, and where the browser cannot run it, they are decoded without. */
-function askForKernel(): void {
-  if (kernelAsked) return;
-  kernelAsked = true;
-  Promise.all([fetch(gridWasmUrl), import('./gridKernel')])
-    .then(async ([response, { GridKernel }]) => {
-      if (response.ok) grids.kernel = await GridKernel.create(await response.arrayBuffer());
-    })
-    .catch(() => undefined);
+/** What decodes grids is there, or will not be in time: they are decoded without until it is, and where the browser cannot run it. */
+async function loadKernel(): Promise<void> {
+  try {
+    const [response, { GridKernel }] = await Promise.all([fetch(gridWasmUrl), import('./gridKernel')]);
+    if (response.ok) grids.kernel = await GridKernel.create(await response.arrayBuffer());
+  } catch {
+    // decoded without
+  }
 }
 
 const kNoSurface = (): Geometry & { quality: null } => ({
@@ -113,10 +115,7 @@ const kNoSurface = (): Geometry & { quality: null } => ({
 
 /** Of a grid the quality is there with the positions; of Draco it is decoded where it is wanted. */
 function decodeGeometry(draco: DracoDecoder | null, frame: Frame, wantQuality: boolean): Geometry & { quality: VertexQuality | null } {
-  if (frame.geometryCodec === kGeometryGrid) {
-    askForKernel();
-    return { normals: null, ...grids.decode(frame) };
-  }
+  if (frame.geometryCodec === kGeometryGrid) return { normals: null, ...grids.decode(frame) };
   if (frame.header.vertices === 0 && kOfDraco.includes(frame.geometryCodec)) return kNoSurface();
   if (draco === null) throw new Error(`geometry codec ${frame.geometryCodec} is not known here`);
   if (frame.geometryCodec === kGeometryDracoGrid) return { normals: null, ...grids.decodeInDraco(frame, draco) };

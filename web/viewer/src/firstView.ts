@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From where a surface is first seen: the rig's own camera, moved aside and up far enough that relief reads. Pure.
 import type { Vec3 } from './pick';
-import type { Extent } from './surface';
+import type { Box, Extent } from './surface';
 
 const kAzimuth = (16 * Math.PI) / 180;
 const kElevation = (13 * Math.PI) / 180;
@@ -12,6 +12,23 @@ export interface FirstView {
   position: Vec3; // in three's frame: y up, z towards the viewer
   target: Vec3;
   distance: number;
+}
+
+/** Whether the view is of the subject or of all is chosen once: what comes and goes in the stream must not make it jump. */
+export class Framing {
+  private isOfSubject = false;
+  private subject: Box | null = null; // the last there was
+
+  /** By the surface as it is, for the calls of frame() from here on. */
+  choose({ subject }: Extent): void {
+    this.isOfSubject = subject !== undefined;
+  }
+
+  /** Of the surface as it is now, what the view is of. */
+  frame({ subject, ...whole }: Extent): Extent {
+    this.subject = subject ?? this.subject;
+    return this.isOfSubject && this.subject !== null ? { ...whole, subject: this.subject } : whole;
+  }
 }
 
 /** `right` and `up`: tangents from the middle of what is free on the page to its sides. */

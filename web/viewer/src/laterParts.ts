@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts of the page that are loaded when they are needed first: what is taken away, statistics, headsets.
+// Parts of the page that are loaded when they are needed first, or behind the first picture: measuring, what is taken away,
+// statistics, headsets.
+import type { Measurement } from './measure';
+import type { MeasurePanel } from './measurePanel';
 import type { Meter } from './meter';
 import type { Panels } from './panels';
-import type { StreamStatus } from './protocol';
+import type { StreamInfo, StreamStatus } from './protocol';
 import type { Kept } from './source';
 import type { StatisticsPanel } from './statisticsPanel';
 import { text } from './strings';
@@ -36,10 +39,80 @@ export function addTake(panels: Panels, of: Takeable): void {
   });
 }
 
+export interface Measured {
+  readonly view: View;
+  /** Where in the camera's picture the cursor is. */
+  pointed(at: [number, number] | null): void;
+  /** What is known of a stream. */
+  described(stream: string): StreamInfo | null;
+  /** The panel was opened, or closed. */
+  opened(open: boolean): void;
+}
+
+/** Measuring, and what is said of the place under the cursor. */
+export class Measuring {
+  private panel: MeasurePanel | null = null;
+  private readonly body: HTMLElement;
+  isOpen = false;
+
+  constructor(
+    panels: Panels,
+    private readonly of: Measured,
+  ) {
+    this.body = panels.panel('measure', text.measure.title, async (open) => {
+      this.isOpen = open;
+      of.opened(open);
+      await this.load();
+      this.panel!.open = this.isOpen; // by now
+    });
+  }
+
+  /** From now on what is under the cursor is said. */
+  async load(): Promise<void> {
+    const { MeasurePanel } = await import('./measurePanel');
+    const { view, pointed, described } = this.of;
+    this.panel ??= new MeasurePanel(this.body, view, pointed, described);
+  }
+
+  get measurements(): readonly Measurement[] {
+    return this.panel?.measurements ?? [];
+  }
+  /** After each drawing of a new surface. */
+  readCursor(): void {
+    this.panel?.readCursor();
+  }
+}
+
 /** Browsers have WebXR in secure contexts alone. `failed` is told why it could not be entered. */
 export async function addImmersive(view: View, failed: (why: string) => void): Promise<void> {
   const { xr } = navigator;
   if (xr === undefined) return;
   const { Immersive } = await import('./immersive');
   new Immersive(xr, view, failed);
+}
+
+const kRestAfterMs = 5000; // where no picture comes
+const kIdleWithinMs = 2000;
+
+/** Loads what nobody has asked for yet, and keeps the page for when its server is not there; behind the first picture, or where none comes. */
+export class Rest {
+  private begun = false;
+
+  constructor(private readonly measuring: Measuring | null) {
+    window.setTimeout(() => this.begin(), kRestAfterMs);
+  }
+
+  /** There is a picture. */
+  begin(): void {
+    if (this.begun) return;
+    this.begun = true;
+    if ('requestIdleCallback' in window) requestIdleCallback(() => this.load(), { timeout: kIdleWithinMs });
+    else setTimeout(() => this.load());
+  }
+
+  private load(): void {
+    void this.measuring?.load().catch(() => undefined); // its panel says so and tries again
+    // Only in secure contexts; without it the page needs its server.
+    if (import.meta.env.PROD && 'serviceWorker' in navigator) void navigator.serviceWorker.register('sw.js').catch(() => undefined);
+  }
 }

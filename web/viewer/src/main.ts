@@ -5,17 +5,18 @@ import { listenToCommands, toggleFullscreen } from './commands';
 import { Companions } from './companions';
 import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
+import { endHeld } from './early';
 import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
-import { addImmersive, addStatistics, addTake } from './laterParts';
+import { addImmersive, addStatistics, addTake, Measuring, Rest } from './laterParts';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
-import { MeasurePanel } from './measurePanel';
 import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
-import { offeredRungs, wantedQuality, type Quality, type StreamInfo } from './protocol';
+import { rigPlace } from './placement';
+import { offeredRungs, wantedQuality, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
@@ -38,7 +39,8 @@ class Viewer {
   private readonly pictures = new Pictures();
   private readonly displayPanel: DisplayPanel;
   private readonly qualityControl: QualityControl;
-  private readonly measure: MeasurePanel | null;
+  private readonly measure: Measuring | null;
+  private readonly rest: Rest;
   private readonly companions: Companions | null;
   private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
   readonly timeline = new Timeline(
@@ -90,7 +92,10 @@ class Viewer {
     document.documentElement.classList.toggle('software', this.view?.inSoftware === true);
     this.session = new Session({
       changed: () => this.refresh(),
-      described: (info, seen) => this.view?.restart(info.camera, seen),
+      described: (info, seen) => {
+        this.view?.restart(info.camera, seen);
+        this.view?.setRigPlace(this.view.name, rigPlace(info));
+      },
       ready: () => this.view?.invalidate(),
       hint: (hint) => (this.server.hint = hint),
       unusable: (message) => (this.problem = text.noDecoder(message)),
@@ -105,6 +110,7 @@ class Viewer {
     this.qualityControl = new QualityControl(displayBody, (quality) => this.chooseQuality(quality));
     if (this.quality !== null) this.companions?.want(this.quality);
     this.measure = this.makeMeasure();
+    this.rest = new Rest(this.measure);
     addStatistics(this.panels, {
       meter: this.session.meter,
       status: () => this.session.status,
@@ -193,16 +199,18 @@ class Viewer {
     }
   }
 
-  private makeMeasure(): MeasurePanel | null {
-    if (this.view === null) return null;
-    const body = this.panels.panel('measure', text.measure.title, (open) => {
-      this.measure!.open = open;
-      this.view!.measuring = open;
-      this.wish();
+  private makeMeasure(): Measuring | null {
+    const { view } = this;
+    if (view === null) return null;
+    return new Measuring(this.panels, {
+      view,
+      pointed: (at) => this.pictures.point(at),
+      described: (name) => (name === view.name ? this.session.info : (this.companions?.info(name) ?? null)),
+      opened: (open) => {
+        view.measuring = open;
+        this.wish();
+      },
     });
-    const described = (name: string): StreamInfo | null =>
-      name === this.view!.name ? this.session.info : (this.companions?.info(name) ?? null);
-    return new MeasurePanel(body, this.view, (at) => this.pictures.point(at), described);
   }
 
   private makeStreams(): void {
@@ -382,7 +390,9 @@ class Viewer {
     const frame = this.view === null ? null : this.session.take();
     if (frame === null) return;
     this.show(frame);
-    if (first) this.refresh();
+    if (!first) return;
+    performance.mark('first-picture');
+    this.refresh();
   }
 
   private show(frame: DecodedFrame): void {
@@ -398,6 +408,7 @@ class Viewer {
     this.pictures.set(this.display.split, this.pictureAlone);
     this.wish();
     this.measure?.readCursor();
+    this.rest.begin();
     this.showDisplay();
   }
 
@@ -472,13 +483,10 @@ class Viewer {
     const eyeIsGiven = (this.shared?.pose ?? null) !== null; // by the link, which was made with them in sight
     for (const name of this.wantedBesides) this.companions?.add(name, this.server.find(name), eyeIsGiven);
     this.wantedBesides = [];
+    endHeld();
   }
 }
 
 const sentence = (words: string): string => `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
 
 report(new Viewer());
-// Only in secure contexts; without it the page needs its server, as before.
-if (import.meta.env.PROD && 'serviceWorker' in navigator) {
-  window.addEventListener('load', () => void navigator.serviceWorker.register('sw.js').catch(() => undefined));
-}

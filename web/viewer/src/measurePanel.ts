@@ -63,7 +63,8 @@ export class MeasurePanel {
     const clear = button(say.clear, say.clear, () => this.clear());
     body.append(group, this.hint, this.list, this.sigmas, this.plot, make('div', { className: 'buttons' }, copied, csv, section, clear));
     this.listen(view.canvas);
-    view.overlay.marks = () => this.marks();
+    const others = view.overlay.marks; // loaded before or behind this
+    view.overlay.marks = () => [...others(), ...this.marks()];
     this.refresh();
   }
 

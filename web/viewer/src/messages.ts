@@ -13,6 +13,9 @@ export interface DecodeRequest {
   spares: ArrayBuffer[]; // of frames that are not shown any more: to be filled again
 }
 
+/** What a person is to know of frames; in words: strings.ts. */
+export type Notice = 'videoInsecure' | 'videoUnknown';
+
 export interface DecodedFrame {
   type: 'frame';
   id: number;
@@ -24,9 +27,10 @@ export interface DecodedFrame {
   edges: Uint32Array<ArrayBuffer> | null;
   rims?: Float32Array<ArrayBuffer> | null; // how far inside each vertex is (rims.ts)
   quality: VertexQuality | null; // null: not wanted or not sent
+  codedQuality?: Uint8Array<ArrayBuffer> | null; // what was sent and not wanted then, for decodeVertexQuality()
   colours?: Float32Array<ArrayBuffer> | null; // linear RGB a vertex, of files without a picture
   texture: ImageBitmap | null;
-  notice: string | null; // for the person, while frames are like this one
+  notice: Notice | null; // while frames are like this one
   extent: Extent | null;
   decodeMs: number;
   kept?: boolean; // somebody holds on to its arrays

@@ -7,7 +7,7 @@ import { Fly } from './fly';
 import type { Vec3 } from './pick';
 import type { Pinhole } from './protocol';
 import { lensOf, rigFrustum, rigRay, type Size } from './rigCamera';
-import { firstView } from './firstView';
+import { firstView, Framing } from './firstView';
 import { distortPoint } from './lens';
 import type { Extent } from './surface';
 
@@ -41,6 +41,7 @@ export class Navigator {
   private readonly fly: Fly;
   private rig: Pinhole | null = null;
   private extent: Extent | null = null;
+  private readonly framing = new Framing();
   size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
   private insets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
   private way_: Way = 'orbit';
@@ -129,7 +130,7 @@ export class Navigator {
     this.size = size;
     this.camera.aspect = size.width / size.height;
     this.project();
-    if (this.placed && !this.moved) this.reset();
+    if (this.placed && !this.moved) this.setFirstView();
     this.events.changed();
   }
 
@@ -145,6 +146,12 @@ export class Navigator {
   /** Back to the first view, of the surface as it is now. */
   reset(): void {
     if (this.extent === null) return;
+    this.framing.choose(this.extent);
+    this.setFirstView();
+  }
+
+  private setFirstView(): void {
+    if (this.extent === null) return;
     this.placed = true;
     this.moved = false;
     this.placing = true;
@@ -152,7 +159,8 @@ export class Navigator {
     this.camera.fov = this.wantedFov();
     const tangent = Math.tan(THREE.MathUtils.degToRad(this.camera.fov) / 2); // of half the page's height
     const { width, height } = this.free;
-    const view = firstView(this.extent, (tangent * width) / this.size.height, (tangent * height) / this.size.height);
+    const framed = this.framing.frame(this.extent);
+    const view = firstView(framed, (tangent * width) / this.size.height, (tangent * height) / this.size.height);
     this.limits(view.distance);
     this.controls.target.set(...view.target);
     this.camera.position.set(...view.position);

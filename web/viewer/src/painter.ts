@@ -2,10 +2,13 @@
 // Where the picture is drawn: by a worker, where the browser lets workers draw, else by this page.
 import type { Drawing, Drawn, Painter, PainterEvents } from './drawing';
 import type { DecodedFrame } from './messages';
+import { take } from './early';
 import type { Pixels } from './pixels';
+import type { Graphics } from './resolution';
 import type { Stage } from './stage';
 import stageUrl from 'virtual:stage-url';
 import type { StageReply, StageRequest } from './stageMessages';
+import { startStage } from './workers';
 
 /** On this page's thread, from the worker's own file. Loaded when it is needed. */
 export async function loadStage(): Promise<typeof Stage> {
@@ -13,19 +16,16 @@ export async function loadStage(): Promise<typeof Stage> {
   return module.Stage;
 }
 
-export function makePainter(canvas: HTMLCanvasElement, antialias: boolean, events: PainterEvents): Painter {
-  return workersDraw() ? new FarPainter(canvas, antialias, events) : new NearPainter(canvas, antialias, events);
-}
-
-function workersDraw(): boolean {
-  if (typeof OffscreenCanvas === 'undefined' || !('transferControlToOffscreen' in HTMLCanvasElement.prototype)) return false;
-  const gl = new OffscreenCanvas(1, 1).getContext('webgl2');
-  gl?.getExtension('WEBGL_lose_context')?.loseContext();
-  return gl !== null;
+export function makePainter(canvas: HTMLCanvasElement, graphics: Graphics, events: PainterEvents): Painter {
+  // Four samples a pixel cost a processor that draws more than all the rest.
+  const antialias = !graphics.inSoftware;
+  if (graphics.ofWorkers) return new FarPainter(canvas, antialias, events);
+  take<Worker>('stage')?.terminate();
+  return new NearPainter(canvas, antialias, events);
 }
 
 class FarPainter implements Painter {
-  private readonly worker = new Worker(stageUrl, { type: 'module' });
+  private readonly worker = take<Worker>('stage') ?? startStage();
   private readonly asked = new Map<number, (answer: unknown) => void>();
   private nextId = 1;
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the surfaces of several rigs stand in one scene, the first in its camera's frame. A calibration knows its own
-// camera's frame alone. Where a person has shown places that two rigs both see, the motion between them is known; else
+// camera's frame alone, unless rig.yaml says where that stands in a frame of all rigs. Where it does, or a person has shown places
+// that two rigs both see, the motion between them is known; else
 // surfaces stand side by side, or all in one frame where a person wants that. Pure.
-import { kNowhere, moved, toTheRight, type Rigid } from './rigid';
+import { combined, inverse, kNowhere, moved, toTheRight, type Rigid } from './rigid';
+import type { StreamInfo } from './protocol';
 import type { Vec3 } from './pick';
 import type { Box, Extent } from './surface';
 
@@ -32,6 +34,18 @@ export function placed(
     right = extent.max[0] + offset;
     return toTheRight(offset);
   });
+}
+
+/** Where its rig says that its camera stands in the frame of all rigs; null: it does not. */
+export function rigPlace(info: StreamInfo): Rigid | null {
+  const { world_from_camera_rotation: rotation, world_from_camera_translation: translation } = info;
+  const isPlace = rotation?.length === 9 && translation?.length === 3 && [...rotation, ...translation].every(Number.isFinite);
+  return isPlace ? { rotation, translation: translation as Vec3 } : null;
+}
+
+/** What brings one camera's frame into the first one's, of their places in the frame of all rigs. */
+export function between(first: Rigid | null | undefined, other: Rigid | null | undefined): Rigid | null {
+  return first && other ? combined(inverse(first), other) : null;
 }
 
 /** Around all of them where they stand; null: there is none. */

@@ -25,6 +25,9 @@ export interface StreamInfo {
   // How good its calibration found the rig, where it says so.
   stereo_rms_px?: number; // of the board's corners, in either picture
   scale_error?: number; // relative, of sizes
+  // Where its camera stands in a frame shared with other rigs, where the rig says it.
+  world_from_camera_rotation?: number[]; // row-major
+  world_from_camera_translation?: number[]; // metres
   // What only a recording needs; not said by older servers.
   started_ns?: number;
   field_order?: string;

@@ -2,6 +2,8 @@
 // How many of the screen's pixels are drawn. Where the graphics are weak, or there are none and the processor
 // draws, a coarser picture at the stream's rate serves better than a fine one that stutters.
 
+import { hasOffscreen } from './workers';
+
 const kSlow_ms = 22; // a frame of 30 a second, less what the rest of the page needs
 const kFast_ms = 9; // one step up costs 1.6 times as much and stays below kSlow_ms
 const kStep = 0.8;
@@ -34,12 +36,18 @@ export class Resolution {
   }
 }
 
-/** True where the processor draws, as far as the browser tells; null: there is no WebGL 2. */
-export function drawnInSoftware(): boolean | null {
-  const gl = document.createElement('canvas').getContext('webgl2');
+export interface Graphics {
+  inSoftware: boolean; // the processor draws, as far as the browser tells
+  ofWorkers: boolean; // workers may draw
+}
+
+/** Null: there is no WebGL 2. */
+export function findGraphics(): Graphics | null {
+  const far = hasOffscreen() ? new OffscreenCanvas(1, 1).getContext('webgl2') : null;
+  const gl = far ?? document.createElement('canvas').getContext('webgl2');
   if (gl === null) return null;
   const names = gl.getExtension('WEBGL_debug_renderer_info');
   const name = String(gl.getParameter(names?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
   gl.getExtension('WEBGL_lose_context')?.loseContext();
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+  return { inSoftware: /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name), ofWorkers: far !== null };
 }

@@ -26,6 +26,12 @@ export function inverse({ rotation: r, translation }: Rigid): Rigid {
   return { rotation, translation: [-x, -y, -z] };
 }
 
+/** First `second`, then `first`. */
+export function combined(first: Rigid, second: Rigid): Rigid {
+  const columns = [0, 1, 2].map((i) => turned(first, [second.rotation[i]!, second.rotation[3 + i]!, second.rotation[6 + i]!]));
+  return { rotation: [0, 1, 2].flatMap((row) => columns.map((column) => column[row]!)), translation: moved(first, second.translation) };
+}
+
 /** By a unit quaternion w, x, y, z. */
 function rotationOf([w, x, y, z]: readonly number[]): number[] {
   const [a, b, c, d] = [w!, x!, y!, z!];

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the server has to show, asked for again and again.
-import type { ListedStream, StreamList } from './protocol';
+import { fetchList, takeList } from './early';
+import type { ListedStream } from './protocol';
 
 const kEveryMs = 2000;
-const kPatienceMs = 5000;
 
 /** `base`: the address of the server's page. */
 export class ServerList {
@@ -12,12 +12,9 @@ export class ServerList {
   /** The last list arrived. */
   arrived = false;
   private failed = false;
-  private readonly url: URL;
   private nextAt = 0;
 
-  constructor(base: string = document.baseURI) {
-    this.url = new URL('api/streams', base);
-  }
+  constructor(private readonly base: string = document.baseURI) {}
 
   /** Asks where it is time for it. True where what it knows has changed, or the server does not answer any more. */
   async refresh(): Promise<boolean> {
@@ -25,12 +22,8 @@ export class ServerList {
     if (now < this.nextAt || document.hidden) return false;
     this.nextAt = now + kEveryMs;
     try {
-      const response = await fetch(this.url, {
-        cache: 'no-store',
-        signal: AbortSignal.timeout(kPatienceMs),
-      });
-      if (!response.ok) throw new Error(`HTTP ${response.status}`);
-      ({ streams: this.streams, hint: this.hint } = (await response.json()) as StreamList);
+      const early = this.base === document.baseURI ? takeList() : null;
+      ({ streams: this.streams, hint: this.hint } = await (early ?? fetchList(this.base)));
       this.arrived = true;
     } catch {
       this.arrived = false;

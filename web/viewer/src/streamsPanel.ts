@@ -49,7 +49,7 @@ export class StreamsPanel {
   constructor(
     body: HTMLElement,
     private readonly events: StreamsPanelEvents,
-    view: View | null,
+    private readonly view: View | null,
   ) {
     this.aligner = view === null ? null : new Aligner(view, (now) => this.showAligning(now));
     this.buttons = make('div', { className: 'buttons', hidden: true }, this.apply, button(say.cancel, say.cancel, () => this.aligner?.begin(null)));
@@ -76,6 +76,8 @@ export class StreamsPanel {
     if (!this.isOpen) return;
     this.none.hidden = streams.length > 0;
     this.placement.row.hidden = this.note.hidden = besides.length === 0;
+    const isKnown = besides.every((name) => this.view !== null && this.view.placeOf(name) !== null);
+    setText(this.note, isKnown ? say.knownPlaces : say.unknownPlaces);
     for (const [name, row] of this.rows) {
       if (streams.some((s) => s.name === name)) continue;
       row.item.remove();

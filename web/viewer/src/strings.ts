@@ -231,6 +231,7 @@ export const text = {
     picture: (name: string) => `A picture of ${name}`,
     placement: 'Placed',
     placements,
+    knownPlaces: 'Each stands where its rig, or a person, says. Place… says it anew by what both see.',
     unknownPlaces:
       'A calibration does not say where one rig stands to another. In one frame is right where all have the same camera; else place a stream by what both see.',
     place: 'Place…',
@@ -333,6 +334,12 @@ export const text = {
         'viewer: decoded but not drawn. gaps: lost before they reached the web server.',
     ],
     errors: 'errors',
+  },
+  notices: {
+    videoInsecure:
+      'Shaded, without its picture: that is H.264 video, which browsers decode on https and on localhost alone. Open this page there, or take a copy with JPEG pictures (relievo convert --texture jpeg).',
+    videoUnknown:
+      'Shaded, without its picture: this browser does not decode H.264 video. Use another one, or take a copy with JPEG pictures (relievo convert --texture jpeg).',
   },
   states: {
     unsupported: ['Not possible', 'Nothing can be shown here'],

@@ -2,6 +2,7 @@
 // The page around the picture: badge, card, list of streams, statistics line.
 import { element, setText } from './dom';
 import type { Insets } from './navigator';
+import type { Notice } from './messages';
 import type { ListedStream } from './protocol';
 import type { Presentation } from './state';
 import { text } from './strings';
@@ -78,10 +79,10 @@ export class Ui {
   }
 
   /** A line over the picture, which stays visible; null: none. */
-  showNotice(text: string | null): void {
+  showNotice(notice: Notice | null): void {
     const line = element('notice');
-    line.hidden = text === null;
-    if (text !== null) setText(line, `${text}.`);
+    line.hidden = notice === null;
+    if (notice !== null) setText(line, text.notices[notice]);
   }
 
   showStreams(streams: readonly ListedStream[], chosen: string | null, source: string, note: string): void {

@@ -2,14 +2,15 @@
 // Texture codec 4 of codec/FORMAT.md, picture after picture, by the browser's own decoder. Runs in the worker;
 // the page asks whether it can.
 import { gridId } from './gridHead';
+import type { Notice } from './messages';
 
 const kHeadBytes = 4;
 const kUsualCodec = 'avc1.640028'; // High profile, up to 1920x1080
 const kLeastSide = 16;
 const kPatienceMs = 2000; // a decoder that keeps a picture back for longer is of no use
 
-export const kNoVideoHere =
-  'H.264 textures need WebCodecs, which browsers have on https and localhost alone, and its H.264: the surface is shown without its texture';
+/** Why this browser decodes no H.264: it does so on https and localhost alone, or not at all. */
+export const noVideoHere = (): Notice => (self.isSecureContext ? 'videoUnknown' : 'videoInsecure');
 
 /** Whether the section builds on no other. Any bytes. */
 export function videoTextureIsKey(section: Uint8Array): boolean {

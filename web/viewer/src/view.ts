@@ -11,10 +11,11 @@ import { loadStage, makePainter } from './painter';
 import { steadyRange, type Range } from './palette';
 import { pick, type Picked } from './pick';
 import type { Pixels } from './pixels';
-import { around, placed, type Placement } from './placement';
+import { decodeVertexQuality } from './quality';
+import { around, between, placed, type Placement } from './placement';
 import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
-import { Resolution, drawnInSoftware } from './resolution';
+import { Resolution, findGraphics } from './resolution';
 import type { Stage } from './stage';
 import type { Extent } from './surface';
 
@@ -56,7 +57,7 @@ export class View {
   readonly navigator: Navigator;
   readonly overlay: Overlay;
   /** The processor draws, the rest of the page too. */
-  readonly inSoftware = drawnInSoftware();
+  readonly inSoftware: boolean;
   private readonly sizes = new ResizeObserver(() => this.resize());
   private ended = false;
   private readonly painter: Painter;
@@ -69,6 +70,7 @@ export class View {
   private extent: Extent | null = null; // of the first surface
   private poses: Rigid[] = [kNowhere]; // of the first surface and those beside it
   private readonly known = new Map<string, Rigid>(); // where a person has placed streams, by name
+  private readonly rigPlaces = new Map<string, Rigid>(); // where their rigs say that they stand
   /** Of the first surface, where there are others beside it. */
   name = '';
   private scheduled = false;
@@ -92,9 +94,10 @@ export class View {
     private readonly events: ViewEvents,
     keys: EventTarget = window,
   ) {
-    if (this.inSoftware === null) throw new Error('there is no WebGL 2');
-    // Four samples a pixel cost a processor that draws more than all the rest.
-    this.painter = makePainter(canvas, !this.inSoftware, {
+    const graphics = findGraphics();
+    if (graphics === null) throw new Error('there is no WebGL 2');
+    this.inSoftware = graphics.inSoftware;
+    this.painter = makePainter(canvas, graphics, {
       ready: () => this.painted(),
       took: (ms) => {
         this.timing = false;
@@ -118,6 +121,7 @@ export class View {
     this.mode_ = display.mode;
     this.grid = display.grid;
     this.smooth = display.smooth;
+    if (display.mode === 'confidence') this.tellQuality();
     if (this.navigator.way !== display.way) this.navigator.way = display.way;
     if (this.navigator.wantedFieldOfView !== display.fov) this.navigator.wantedFieldOfView = display.fov;
     this.invalidate();
@@ -125,6 +129,7 @@ export class View {
   /** A person measures. */
   set measuring(measuring: boolean) {
     this.measuring_ = measuring;
+    if (measuring) this.tellQuality();
     this.invalidate();
   }
   get mode(): Mode {
@@ -202,6 +207,19 @@ export class View {
     this.arrange();
   }
 
+  /** Where the rig of a stream says that its camera stands in the frame of all rigs; null: it does not say. */
+  setRigPlace(name: string, place: Rigid | null): void {
+    if (JSON.stringify(place) === JSON.stringify(this.rigPlaces.get(name) ?? null)) return;
+    if (place === null) this.rigPlaces.delete(name);
+    else this.rigPlaces.set(name, place);
+    if (this.besides.length > 0) this.arrange(true);
+  }
+
+  /** Where a stream stands in the first one's frame, by a person's hand or else by both rigs; null: nothing says it. */
+  placeOf(name: string): Rigid | null {
+    return this.known.get(name) ?? between(this.rigPlaces.get(this.name), this.rigPlaces.get(name));
+  }
+
   private get surfaces(): Shown[] {
     return [this.surface, ...this.besides];
   }
@@ -213,7 +231,7 @@ export class View {
   }
 
   private arrange(quietly = false): void {
-    this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.known.get(name) ?? null)]);
+    this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.placeOf(name))]);
     this.useExtent();
     if (!quietly) this.navigator.reset();
   }
@@ -361,6 +379,20 @@ export class View {
     if (frame.texture === null) return;
     if (shown.picture !== frame.texture) shown.picture?.close();
     shown.picture = frame.texture;
+  }
+
+  // Of the frames at hand, which came before anybody wanted it: where a stream stands still no other comes.
+  private tellQuality(): void {
+    for (const shown of this.surfaces) {
+      const { frame } = shown;
+      if (frame?.codedQuality == null || frame.coordinates === null) continue;
+      try {
+        shown.frame = { ...frame, quality: decodeVertexQuality(frame.codedQuality, frame.coordinates), codedQuality: null };
+      } catch {
+        continue; // damaged, as the decoder would have told of a later one
+      }
+      this.repaint(shown, this.headset ?? this.painter);
+    }
   }
 
   private repaint({ id, frame }: Shown, by: Pick<Painter, 'show'>): void {

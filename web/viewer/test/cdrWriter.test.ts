@@ -20,6 +20,8 @@ const kInfo: StreamInfo = {
   field_order: 'top',
   stereo_rms_px: 0.25,
   scale_error: 5e-4,
+  world_from_camera_rotation: [0, -1, 0, 1, 0, 0, 0, 0, 1],
+  world_from_camera_translation: [1.5, -0.25, 2],
   colour_matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1],
   pattern: { base: 6, slides: 2, palette: [1, 2, 4, 6, 5, 3], sequence: [0, 7, 14], scheme: 'complementary' },
 };
@@ -43,8 +45,9 @@ describe('a description', () => {
     expect(readStreamInfo(writeStreamInfo(kInfo)!)).toEqual({ ...kept, stripes: 0 });
   });
   it('of a server that did not say how good its rig is', () => {
-    const { stereo_rms_px: _rms, scale_error: _scale, ...older } = kInfo;
+    const { stereo_rms_px: _rms, scale_error: _scale, world_from_camera_rotation: _r, world_from_camera_translation: _t, ...older } = kInfo;
     expect(readStreamInfo(writeStreamInfo(older)!)).toMatchObject({ stereo_rms_px: 0, scale_error: 0 });
+    expect(readStreamInfo(writeStreamInfo(older)!)).not.toHaveProperty('world_from_camera_rotation');
   });
   it('is none where the server did not say enough', () => {
     const { pattern: _, ...older } = kInfo;

@@ -2,7 +2,7 @@
 // Proves: the first view shows all of the surface, or of what stands apart before it, within what is free of the page.
 import { expect, it } from 'vitest';
 import * as THREE from 'three';
-import { firstView } from '../src/firstView';
+import { firstView, Framing } from '../src/firstView';
 import type { Box } from '../src/surface';
 
 /** The largest share of the free sides that a corner of the box takes. */
@@ -39,4 +39,19 @@ it.each([
     expect(taken).toBeLessThan(1.05); // a box's corners are further out than what is in it
     expect(taken).toBeGreaterThan(0.6);
   }
+});
+
+it('is of the subject, or of all, from when it was chosen on, whatever comes and goes', () => {
+  const wall = { min: [-2, -1, 3] as [number, number, number], max: [2, 1, 3.2] as [number, number, number], centre: [0, 0, 3.1] as [number, number, number] };
+  const person = { min: [-0.4, -0.9, 1] as [number, number, number], max: [0.4, 0.9, 1.4] as [number, number, number] };
+  const both = { ...wall, subject: person };
+  const framing = new Framing();
+  framing.choose(both);
+  expect(framing.frame(both).subject).toEqual(person);
+  expect(framing.frame(wall).subject, 'it is not told apart for a moment').toEqual(person);
+  framing.choose(wall);
+  expect(framing.frame(wall).subject).toBeUndefined();
+  expect(framing.frame(both).subject, 'someone walked in').toBeUndefined();
+  framing.choose(both);
+  expect(framing.frame(both).subject).toEqual(person);
 });

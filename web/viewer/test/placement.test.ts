@@ -2,8 +2,9 @@
 // Proves: surfaces of several rigs stand side by side without touching, or where they were placed, and the box around
 // them holds them all.
 import { describe, expect, it } from 'vitest';
-import { around, placed } from '../src/placement';
-import { kNowhere, rigidOf } from '../src/rigid';
+import { around, between, placed, rigPlace } from '../src/placement';
+import type { StreamInfo } from '../src/protocol';
+import { kNowhere, moved, rigidOf } from '../src/rigid';
 import type { Extent } from '../src/surface';
 
 const extent = (from: number, to: number, near = 1): Extent => ({
@@ -13,6 +14,26 @@ const extent = (from: number, to: number, near = 1): Extent => ({
 });
 const kThree = [extent(-0.5, 0.5), extent(-0.1, 0.1, 2), extent(-1, 0)];
 const right = (poses: ReturnType<typeof placed>): number[] => poses.map(({ translation }) => translation[0]);
+
+describe('of rigs that say where they stand', () => {
+  const [first, other] = [rigidOf([0, 0.4, 0.1], [1, -2, 0.5]), rigidOf([0.2, -0.9, 0], [3, 0.1, 4])];
+  it('one is brought into the frame of the other', () => {
+    const point = [0.1, 0.2, 1.3] as const;
+    const there = moved(first, moved(between(first, other)!, [...point]));
+    moved(other, [...point]).forEach((c, axis) => expect(there[axis]).toBeCloseTo(c, 12));
+    expect(between(first, null)).toBeNull();
+    expect(between(undefined, other)).toBeNull();
+  });
+  it('what is no place is none', () => {
+    const { rotation, translation } = first;
+    const said = (r: unknown, t: unknown): ReturnType<typeof rigPlace> =>
+      rigPlace({ world_from_camera_rotation: r, world_from_camera_translation: t } as StreamInfo);
+    expect(said(rotation, translation)).toEqual(first);
+    for (const [r, t] of [[undefined, translation], [rotation, undefined], [rotation.slice(1), translation], [rotation, [1, 2, NaN]]]) {
+      expect(said(r, t)).toBeNull();
+    }
+  });
+});
 
 describe('placed', () => {
   it('stands side by side with a gap, the first where its camera sees it', () => {

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Takes the pictures of docs/viewer.md that no test takes. To be looked at: they prove nothing.
+// Run as: in_own_domain node viewer_pictures.mjs RELIEVO_SERVER FOLDER, in web/viewer. Exit 77: no Chromium here.
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { kPatienceMs, launchChromium } from './chromium.mjs';
+import { inState, shownPast, still } from './feeder.mjs';
+import { recordObject } from './recorded.mjs';
+import { Server } from './server.mjs';
+
+const [serverPath, folder] = process.argv.slice(2);
+const kRate = 8; // what a processor that draws can follow
+const kFrames = 60; // until the time line has something to show
+const [kDesktop, kWide, kPhone] = [{ width: 1100, height: 680 }, { width: 1280, height: 800 }, { width: 390, height: 780 }];
+
+const scratch = mkdtempSync(join(tmpdir(), 'relievo-pictures-'));
+const config = join(scratch, 'server.toml');
+const streams = ['face', 'object'].map((scene) => `[[stream]]\nname = "${scene}"\nsource = "sim:${scene},rate=${kRate}"\n`);
+writeFileSync(config, streams.join('\n'));
+recordObject(serverPath, join(scratch, 'object.mcap'), { rate: kRate, frames: 40 });
+const browser = await launchChromium();
+const server = await Server.start(serverPath, ['--config', config, '--record-dir', scratch, '--pre-roll', '2s']);
+
+async function picture(name, path, { viewport = kDesktop, colorScheme = 'dark', hasTouch = false } = {}, act = async () => {}) {
+  const context = await browser.newContext({ viewport, colorScheme, hasTouch });
+  const page = await context.newPage();
+  page.setDefaultTimeout(kPatienceMs);
+  await page.goto(server.address + path);
+  await shownPast(page, 3);
+  await act(page);
+  await page.screenshot({ path: join(folder, `viewer-${name}.png`) });
+  await context.close();
+  console.log(name);
+}
+const presses = (...keys) => async (page) => {
+  for (const key of keys) await page.keyboard.press(key);
+  await page.waitForTimeout(1500); // for the look of it
+};
+
+try {
+  await picture('camera', '/?stream=object', {}, presses('c', 'v'));
+  await picture('split', '/?stream=face', { viewport: kWide }, presses('v', 'v', 'v'));
+  await picture('streams', '/?stream=face,object', { viewport: kWide }, async (page) => {
+    await page.waitForFunction(() => window.relievo.diagnostics().besides[0].shown > 3);
+    await presses('n')(page);
+    await page.waitForFunction(() => document.querySelectorAll('.streams canvas[data-drawn]').length >= 2);
+    await presses('r')(page);
+  });
+  await picture('statistics', '/?stream=object', {}, async (page) => {
+    await page.keyboard.press('i');
+    await shownPast(page, kFrames);
+  });
+  await picture('timeshift', '/?stream=face', { viewport: kWide }, async (page) => {
+    await page.keyboard.press('x');
+    await shownPast(page, kFrames);
+    await page.keyboard.press(' ');
+    for (let i = 0; i < 12; ++i) await page.keyboard.press(',');
+    await inState(page, 'shifted');
+    await still(page);
+    await page.waitForTimeout(3000);
+    await page.keyboard.press('x');
+  });
+  await picture('recording', '/?recording=object.mcap', { colorScheme: 'light' }, async (page) => {
+    await page.keyboard.press(' ');
+    await still(page);
+  });
+  await picture('phone', '/?stream=face', { viewport: kPhone, hasTouch: true });
+  await picture('phone-light', '/?stream=object', { viewport: kPhone, colorScheme: 'light', hasTouch: true }, presses('m'));
+} finally {
+  await browser.close();
+  await server.kill();
+  rmSync(scratch, { recursive: true });
+}
