@@ -238,6 +238,26 @@ TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   EXPECT_TRUE(server.stream("third").is_null());
 }
 
+// Where one could be read for ever, the thread that takes signals would be the one that waits.
+TEST_F(SeveralStreams, PipesInPlaceOfItsFilesAreRefusedAndItStillStops) {
+  const fs::path rig = folder_ / "rig.yaml";
+  const std::string camera = "[[stream]]\nname = \"camera\"\nsource = \"v4l2:/dev/no-such-camera\"\n" +
+                             ("[stream.camera]\nrig = \"" + rig.string() + "\"\n");
+  ASSERT_TRUE(make_pipe(rig));
+  write(table("left", "one") + camera);
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2)) << server.process().err();
+  EXPECT_THAT(server.process().err(), HasSubstr(rig.string() + ": it is a pipe"));
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  ASSERT_TRUE(make_pipe(config_));
+  ASSERT_TRUE(reloaded(server, config_.string() + ": it is a pipe")) << server.process().err();
+  EXPECT_TRUE(left.gets(2));
+  EXPECT_EQ(left.gaps(), 0U);
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+}
+
 TEST_F(SeveralStreams, AStormOfReloadsOfABrokenFileCostsNothing) {
   WebServer server(command());
   const Reader left("left");

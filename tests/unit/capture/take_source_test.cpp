@@ -101,6 +101,18 @@ TEST(TakeSource, ADamagedPictureCostsOneFrameAlone) {
   EXPECT_FALSE(*source->next());
 }
 
+TEST(TakeSource, PipesInPlaceOfItsFilesAreRefusedWithoutWaiting) {
+  test::TempFolder folder;
+  test::write_small_take(folder.path(), Scan::kInterlaced, 2);
+  ASSERT_TRUE(test::make_pipe(folder.path() / "frames" / "000000.png"));
+  const auto source = open(folder.path());
+  EXPECT_THAT(source->next().error().message, HasSubstr("000000.png: it is a pipe"));
+  EXPECT_TRUE(source->next());
+  ASSERT_TRUE(test::make_pipe(folder.path() / "timestamps.csv"));
+  EXPECT_THAT(open_source("take:" + folder.path().string(), {}).error().message,
+              HasSubstr("timestamps.csv: it is a pipe"));
+}
+
 TEST(TakeSource, ALoopWithoutOneGoodPictureEnds) {
   test::TempFolder folder;
   test::write_small_take(folder.path(), Scan::kInterlaced, 2);
