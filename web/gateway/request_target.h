@@ -15,8 +15,8 @@ struct RequestTarget {
 /// "name", "name:port", "[v6]" or "[v6]:port", as far as characters say; also without a name.
 bool valid_host(std::string_view host);
 
-/// The name in an absolute target ("http://name/path") goes before `host`. Nothing where either is none. Points
-/// into both.
+/// The name in an absolute target ("http://name/path") goes before `host`. Nothing where either is none.
+/// Points into both.
 std::optional<RequestTarget> request_target(std::string_view target, std::string_view host);
 
 }  // namespace relievo

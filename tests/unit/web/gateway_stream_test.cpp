@@ -70,7 +70,7 @@ TEST_F(GatewayStream, AnUpgradeThatIsNoneIsAnsweredAndCounted) {
     return read_response(client).status;
   };
   const std::string key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
-  EXPECT_EQ(upgrade("Sec-WebSocket-Version: 13\r\n"), 426) << "without a key it asks for no WebSocket";
+  EXPECT_EQ(upgrade("Sec-WebSocket-Version: 13\r\n"), 400) << "no key";
   EXPECT_EQ(upgrade("Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + std::string(100, 'x') + "\r\n"),
             400);
   EXPECT_EQ(upgrade("Sec-WebSocket-Version: 7\r\n" + key), 426);
