@@ -59,6 +59,14 @@ class Reader {
   std::unique_ptr<Subscriber> subscriber_;
 };
 
+/// Whether SIGHUP would not end it.
+bool takes_hangup(const Process& process) {
+  std::istringstream status(read_text("/proc/" + std::to_string(process.pid()) + "/status"));
+  std::string name, mask;
+  while (status >> name && name != "SigCgt:") continue;
+  return status >> mask && (std::stoul(mask, nullptr, 16) >> (SIGHUP - 1) & 1) != 0;
+}
+
 /// Two takes of 5 frames a second: a reader on a busy machine has time.
 class SeveralStreams : public ::testing::Test {
  protected:
@@ -223,6 +231,24 @@ TEST_F(SeveralStreams, MetricsSayWhatItsClientsDecode) {
             value("relievo_client_decode_seconds_sum" + of));
   EXPECT_EQ(value("relievo_client_lost_total" + of), 0);
   EXPECT_EQ(value("relievo_stage_seconds_count{stream=\"right\",stage=\"decode\"}"), 0);
+}
+
+// As of scripts that start a server and change its configuration: until it served, SIGHUP ended it.
+TEST_F(SeveralStreams, AReloadWhileItStartsIsDoneOnceItServes) {
+  std::string tables;
+  for (int i = 0; i < 12; ++i) tables += table("s" + std::to_string(i), "one");
+  for (int tries = 0; tries < 5; ++tries) {
+    write(tables);
+    Process server(command());
+    ASSERT_TRUE(eventually([&] { return takes_hangup(server); })) << server.err();
+    if (!server.out().empty()) continue;  // this thread was kept so long that it serves already
+    server.signal(SIGHUP);
+    EXPECT_TRUE(server.wait_for_text("was read again")) << server.err();
+    server.signal(SIGTERM);
+    EXPECT_EQ(server.wait(), 0) << server.err();
+    return;
+  }
+  FAIL() << "it takes SIGHUP only once it serves";
 }
 
 TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
