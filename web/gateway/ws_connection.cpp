@@ -148,6 +148,12 @@ void WsConnection::start() {
     if (!protocol.empty()) response.set(beast::http::field::sec_websocket_protocol, protocol);
   }));
   ws_.read_message_max(kMessageLimit);
+  // Pings count as messages do. Nothing can be said from within.
+  ws_.control_callback([this](ws::frame_type kind, beast::string_view) {
+    if (kind != ws::frame_type::ping || finished_ || messages_.take(steady_now_ns())) return;
+    host_.counts().refuse(Refusal::kMessage);
+    net::post(host_.loop(), [self = shared_from_this()] { self->finish(); });
+  });
   ws_.auto_fragment(false);  // a frame leaves as one, straight from the bytes all clients share
   // Given as bytes it may have 1.5 kB at most, which cookies of others exceed.
   request_.header_limit(static_cast<std::uint32_t>(head_.size()));
