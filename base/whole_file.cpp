@@ -2,12 +2,13 @@
 #include "base/whole_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <system_error>
+#include <vector>
 
 namespace relievo {
 
@@ -44,21 +45,44 @@ Status write_whole_file(const std::filesystem::path& path, std::string_view text
   return write_whole_file(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
 }
 
+namespace {
+
+Error cannot_read(const std::filesystem::path& path, const std::string& why) {
+  return {"cannot read " + path.string() + ": " + why};
+}
+
+Error cannot_read(const std::filesystem::path& path, int error) {
+  if (error == ENOENT) return {path.string() + " is missing"};
+  return cannot_read(path, std::generic_category().message(error));
+}
+
+}  // namespace
+
+Result<int> open_file_to_read(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  if (file < 0) return cannot_read(path, errno);
+  struct stat info {};
+  if (::fstat(file, &info) == 0 && S_ISREG(info.st_mode)) return file;
+  ::close(file);
+  const std::string what = S_ISDIR(info.st_mode) ? "folder" : S_ISFIFO(info.st_mode) ? "pipe" : "device";
+  return cannot_read(path, "it is a " + what + ", not a file");
+}
+
 Result<std::string> read_whole_file(const std::filesystem::path& path, std::size_t most) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  int error = file < 0 ? errno : 0;
+  const auto file = open_file_to_read(path);
+  if (!file) return file.error();
+  int error = 0;
   std::string all;
-  std::array<char, 4096> part{};
+  std::vector<char> part(64 * 1024);
   for (ssize_t got = 1; error == 0 && got != 0 && all.size() <= most;) {
-    got = ::read(file, part.data(), part.size());
+    got = ::read(*file, part.data(), part.size());
     if (got > 0)
       all.append(part.data(), static_cast<std::size_t>(got));
     else if (got < 0 && errno != EINTR)
       error = errno;
   }
-  if (file >= 0) ::close(file);
-  if (error != 0)
-    return Error{"cannot read " + path.string() + ": " + std::generic_category().message(error)};
+  ::close(*file);
+  if (error != 0) return cannot_read(path, error);
   if (all.size() > most)
     return Error{path.string() + " has more than the " + std::to_string(most) + " bytes it may have"};
   return all;

@@ -18,8 +18,11 @@ namespace relievo {
 Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 Status write_whole_file(const std::filesystem::path& path, std::string_view text);
 
-/// All of a file or pipe, nothing of what is larger than `most` bytes: a device may have no end. The error
-/// names the file.
+/// A descriptor of a file opened for reading, which the caller closes. A pipe, device or folder is refused at
+/// once: opening or reading one may take for ever. The error names the file.
+Result<int> open_file_to_read(const std::filesystem::path& path);
+
+/// All of a file, nothing of what is larger than `most` bytes. Errors as of open_file_to_read().
 Result<std::string> read_whole_file(const std::filesystem::path& path, std::size_t most);
 
 /// Why a file could not be written, from errno, with what to do about it where that is known.

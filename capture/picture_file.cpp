@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cctype>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "base/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -138,17 +138,16 @@ std::optional<std::uint64_t> declared_pixels(Bytes file) {
 
 Result<Image8> read_rgb(const std::filesystem::path& path) {
   const std::string name = path.string();
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) return Error{name + " is missing"};
-  std::ifstream in(path, std::ios::binary);
-  std::vector<std::uint8_t> file{std::istreambuf_iterator<char>(in), {}};
-  if (!in) return Error{name + " cannot be read: check its permissions"};
+  const auto content = read_whole_file(path, kMostPictureBytes);
+  if (!content) return content.error();
+  const std::span file(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
   const auto declared = declared_pixels(file);
   if (!declared) return Error{name + " cannot be read as a picture: it is no PNG, JPEG, BMP, PNM or TIFF"};
   if (*declared > kMostPicturePixels || *declared > kMostPicturePixelsPerByte * file.size())
     return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
   try {
-    const cv::Mat bgr = cv::imdecode(file, cv::IMREAD_COLOR);
+    const cv::Mat bgr =
+        cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())), cv::IMREAD_COLOR);
     if (bgr.empty()) return Error{name + " cannot be read as a picture: is it damaged?"};
     Image8 rgb(bgr.cols, bgr.rows, 3);
     cv::Mat out(rgb.height(), rgb.width(), CV_8UC3, rgb.data());

@@ -14,6 +14,7 @@
 namespace relievo {
 
 inline constexpr std::uint64_t kMostPicturePixels = 100'000'000;
+inline constexpr std::size_t kMostPictureBytes = 1 << 30;           // of a file
 inline constexpr std::uint64_t kMostPicturePixelsPerByte = 10'000;  // of a file: emptier ones are none
 
 /// What a file's head says of the memory that decoding takes: the picture's pixels, or where it is TIFF those

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <opencv2/core.hpp>
 #include <sstream>
 #include <string_view>
+
+#include "base/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -159,13 +159,10 @@ std::string trouble(const std::string& content, StorageForm form) {
 
 /// Fails where the parser may not have it.
 Result<std::string> read_text(const std::filesystem::path& file, StorageForm form) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(file, code)) return Error{"is missing"};
-  if (std::filesystem::file_size(file, code) > kMaxFileBytes || code) return Error{"is too large"};
-  std::ifstream in(file, std::ios::binary);
-  std::string content{std::istreambuf_iterator<char>(in), {}};
-  if (!in) return Error{"cannot be read: check its permissions"};
-  if (const std::string wrong = trouble(content, form); !wrong.empty()) return Error{wrong};
+  auto content = read_whole_file(file, kMaxFileBytes);
+  if (!content) return content;
+  if (const std::string wrong = trouble(*content, form); !wrong.empty())
+    return Error{file.string() + " " + wrong};
   return content;
 }
 
@@ -187,7 +184,7 @@ StorageFile::~StorageFile() = default;
 Result<StorageFile> StorageFile::open(const std::filesystem::path& file, StorageForm form) {
   const std::string name = file.string();
   const auto content = read_text(file, form);
-  if (!content) return Error{name + " " + content.error().message};
+  if (!content) return content.error();
   silence_opencv();
   try {
     auto parsed = std::make_unique<Parsed>(

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/checks.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <system_error>
+#include <utility>
 
 #include "cli/listen_address.h"
 
@@ -46,6 +48,15 @@ ValueCheck number(double least, double most) {
     double value = 0;
     if (parse(text, value) && std::isfinite(value) && value >= least && value <= most) return {};
     return refusal(text, "number", short_text(least), std::isfinite(most) ? short_text(most) : "");
+  };
+}
+
+ValueCheck one_of(std::vector<std::string> words) {
+  return [words = std::move(words)](const std::string& text) {
+    if (std::find(words.begin(), words.end(), text) != words.end()) return std::string();
+    std::string all;
+    for (const std::string& word : words) all += (all.empty() ? "" : ", ") + word;
+    return "'" + text + "' is none of " + all;
   };
 }
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace relievo {
 
@@ -16,6 +17,8 @@ using ValueCheck = std::function<std::string(const std::string&)>;
 ValueCheck whole_number(std::uint64_t least, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
 /// A finite number, `least` and `most` included.
 ValueCheck number(double least, double most = std::numeric_limits<double>::infinity());
+/// One of these words.
+ValueCheck one_of(std::vector<std::string> words);
 /// HOST:PORT; "none" too where `optional`.
 ValueCheck listen_address(bool optional = false);
 

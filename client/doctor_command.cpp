@@ -83,7 +83,7 @@ Status run(const Options& options, StopSignal& stop) {
       check_interface(interface),   check_multicast(interface),
       check_receive_buffer("/"),    check_lost_datagrams("/"),
       check_streams(options, stop), check_keys(options.domain->keys),
-      check_disk(options.folder),   check_clock(),
+      check_disk(options.folder),   check_clock("/"),
       check_cameras("/"),           check_processor("/"),
   };
   options.json ? print_json(findings) : print(findings);

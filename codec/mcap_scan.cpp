@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/mcap_scan.h"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/mcap_walk.h"
 
@@ -85,16 +85,14 @@ bool Contents::add(const std::optional<Channel>& channel) {
 }
 
 Result<std::unique_ptr<File>> File::open(const std::filesystem::path& path) {
-  const int handle = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (handle < 0)
-    return Error{"cannot open " + path.string() + ": " + std::generic_category().message(errno)};
+  const auto handle = open_file_to_read(path);
+  if (!handle) return handle.error();
   struct stat info {};
-  const bool known = ::fstat(handle, &info) == 0;
-  if (!known || !S_ISREG(info.st_mode)) {
-    ::close(handle);
-    return Error{"cannot open " + path.string() + ": it is not a file"};
+  if (::fstat(*handle, &info) != 0) {
+    ::close(*handle);
+    return Error{"cannot read " + path.string() + ": " + std::generic_category().message(errno)};
   }
-  return std::unique_ptr<File>(new File(handle, path.string(), static_cast<std::uint64_t>(info.st_size)));
+  return std::unique_ptr<File>(new File(*handle, path.string(), static_cast<std::uint64_t>(info.st_size)));
 }
 
 File::~File() {

@@ -11,21 +11,28 @@
 #include <ctime>
 
 #include "base/time.h"
+#include "base/whole_file.h"
 
 namespace relievo::openssl {
 namespace {
 
-Result<Bio> open_file(const std::filesystem::path& file) {
-  Bio bio(BIO_new_file(file.c_str(), "rb"));
-  if (!bio) return failure("cannot read " + file.string());
-  return bio;
+constexpr std::size_t kLargestFile = 1 << 20;  // lists of revoked keys grow, by some 40 bytes each
+
+/// Of bytes that outlive it.
+Bio reader_of(const std::string& bytes) {
+  return Bio(BIO_new_mem_buf(bytes.data(), static_cast<int>(bytes.size())));
+}
+
+/// What OpenSSL would ask a person at the terminal for.
+int no_password(char*, int, int, void*) {
+  return -1;
 }
 
 template <typename Owned, typename Read>
 Result<Owned> read_pem(const std::filesystem::path& file, Read read, const char* what) {
-  auto bio = open_file(file);
-  if (!bio) return bio.error();
-  Owned object(read(bio->get()));
+  const auto bytes = read_whole_file(file, kLargestFile);
+  if (!bytes) return bytes.error();
+  Owned object(read(reader_of(*bytes).get()));
   if (!object) return failure(file.string() + " holds no " + what);
   return object;
 }
@@ -57,7 +64,8 @@ Error failure(const std::string& what) {
 
 Result<Key> read_key(const std::filesystem::path& file) {
   return read_pem<Key>(
-      file, [](BIO* bio) { return PEM_read_bio_PrivateKey(bio, nullptr, nullptr, nullptr); }, "private key");
+      file, [](BIO* bio) { return PEM_read_bio_PrivateKey(bio, nullptr, no_password, nullptr); },
+      "private key without a password");
 }
 
 Result<Certificate> read_certificate(const std::filesystem::path& file) {
@@ -72,10 +80,10 @@ Result<RevocationList> read_revocation_list(const std::filesystem::path& file) {
 }
 
 Result<std::string> read_signed(const std::filesystem::path& file, X509* signer) {
-  auto bio = open_file(file);
-  if (!bio) return bio.error();
+  const auto bytes = read_whole_file(file, kLargestFile);
+  if (!bytes) return bytes.error();
   BIO* content = nullptr;
-  const Signed document(SMIME_read_PKCS7(bio->get(), &content));
+  const Signed document(SMIME_read_PKCS7(reader_of(*bytes).get(), &content));
   const Bio owned_content(content);
   if (!document || content == nullptr) return failure(file.string() + " is no signed document");
   const std::unique_ptr<STACK_OF(X509), Deleter<[](STACK_OF(X509) * s) { sk_X509_free(s); }>> certificates(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "idl/recorder.h"
 
+#include <cmath>
 #include <utility>
 
 #include "base/log.h"
@@ -171,7 +172,8 @@ Status Recorder::open_file() {
 bool Recorder::segment_ends_before(const RawSample& sample) const {
   if (!options_.recording.segments.split()) return false;
   const std::uint64_t bytes = writer_->size();
-  const double duration_s = seconds(sample.receive_time_ns - segment_ns_);
+  const double duration_s =
+      std::abs(seconds(sample.receive_time_ns - segment_ns_));  // the clock may be set back
   return segments_.is_full(bytes, duration_s) &&
          (holds_key_frame(sample.cdr) || segments_.is_full(bytes / 2, duration_s / 2));
 }

@@ -49,12 +49,12 @@ void add_camera_flags(CLI::App& app, CameraOptions& camera) {
       ->check(number(kLeastRate, kMostRate))
       ->group(kGroup);
   app.add_option("--field", camera.field, "How the fields lie in the device's buffers")
-      ->check(CLI::IsMember({"progressive", "interlaced", "seq-tb", "seq-bt", "alternate"}))
+      ->check(CLI::IsMember(kFieldLayouts))
       ->type_name("NAME")
       ->group(kGroup);
   app.add_option("--field-order", camera.field_order,
                  "The field exposed first, where the device's statement is wrong")
-      ->check(CLI::IsMember({"top", "bottom"}))
+      ->check(CLI::IsMember(kFieldOrders))
       ->type_name("NAME")
       ->group(kGroup);
   app.add_flag("--odd-pairs", camera.odd_pairs,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "capture/source/camera_options.h"
@@ -15,6 +16,9 @@ namespace relievo {
 
 constexpr double kLeastRate = 0.1, kMostRate = 1000;  // pictures a second
 constexpr int kLeastBuffers = 2, kMostBuffers = 32;
+inline const std::vector<std::string> kFieldLayouts{"progressive", "interlaced", "seq-tb", "seq-bt",
+                                                    "alternate"};
+inline const std::vector<std::string> kFieldOrders{"top", "bottom"};
 
 /// --input, --standard, --format, --size, --rate, --field, --field-order, --odd-pairs, --control, --dmabuf
 /// and

@@ -2,6 +2,7 @@
 // The TOML file of config.h.
 #include <toml++/toml.h>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <string_view>
@@ -34,18 +35,15 @@ class Reader {
 
   void text(std::string_view key, std::string& out) {
     if (const toml::node* node = take(key)) {
-      if (const auto value = node->value_exact<std::string>())
-        out = *value;
-      else
-        refuse(*node, key, "must be a string in quotes");
+      if (auto value = string_in(*node, key, "must be a string in quotes")) out = *std::move(value);
     }
   }
   /// Text that the flag of that name takes.
   void checked(std::string_view key, const ValueCheck& check, std::string& out) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
-    const auto value = node->value_exact<std::string>();
-    if (!value) return refuse(*node, key, "must be a string in quotes");
+    const auto value = string_in(*node, key, "must be a string in quotes");
+    if (!value) return;
     if (const std::string wrong = check(*value); !wrong.empty())
       return refuse(*node, key, "is wrong: " + wrong);
     out = *value;
@@ -58,8 +56,8 @@ class Reader {
     if (list == nullptr) return refuse(*node, key, "must be a list of strings in quotes");
     out.clear();
     for (const toml::node& entry : *list) {
-      const auto value = entry.value_exact<std::string>();
-      if (!value) return refuse(entry, key, "must be a list of strings in quotes");
+      const auto value = string_in(entry, key, "must be a list of strings in quotes");
+      if (!value) return;
       if (const std::string wrong = check(*value); !wrong.empty())
         return refuse(entry, key, "is wrong: " + wrong);
       out.push_back(*value);
@@ -245,6 +243,18 @@ class Reader {
   }
 
  private:
+  /// What has control characters names no file, stream or host: at a zero the system would take another one.
+  std::optional<std::string> string_in(const toml::node& node, std::string_view key, const char* otherwise) {
+    auto value = node.value_exact<std::string>();
+    if (!value) {
+      refuse(node, key, otherwise);
+    } else if (std::any_of(value->begin(), value->end(),
+                           [](unsigned char c) { return std::iscntrl(c) != 0; })) {
+      refuse(node, key, "must have no control characters");
+      value.reset();
+    }
+    return value;
+  }
   const toml::node* take(std::string_view key) {
     known_.push_back(key);
     return table_.get(key);
@@ -267,8 +277,8 @@ void read_camera(Reader& reader, CameraOptions& camera) {
   reader.text("format", camera.format);
   reader.size("size", camera.width, camera.height);
   reader.rate("rate", camera.rate);
-  reader.text("field", camera.field);
-  reader.text("field_order", camera.field_order);
+  reader.checked("field", one_of(kFieldLayouts), camera.field);
+  reader.checked("field_order", one_of(kFieldOrders), camera.field_order);
   reader.flag("odd_pairs", camera.odd_pairs);
   reader.flag("dmabuf", camera.dmabuf);
   reader.integer("buffers", kLeastBuffers, kMostBuffers, camera.buffers);
@@ -371,13 +381,13 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   reader.integer("domain", 0, 230, config.domain);
   reader.text("interface", config.interface);
   reader.text("keys", config.keys);
-  reader.text("web", config.web);
+  reader.checked("web", listen_address(true), config.web);
   reader.table("recording", [&](Reader& recording) { read_recording(recording, config); });
   reader.table("projector", [&](Reader& projector) { read_projector(projector, config.projector); });
   reader.table("gateway", [&](Reader& gateway) { read_gateway(gateway, config.gateway); });
   // Last, since what is said outside of them holds for all.
   if (!reader.has_tables("stream"))
-    reader.text("stream", config.stream);
+    reader.checked("stream", stream_name(), config.stream);
   else
     reader.tables("stream", [&](Reader& stream) { read_one_of_many(stream, config); });
   return reader.finish();

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/bounded_queue.h"
+#include "base/clock_steps.h"
 #include "base/log.h"
 #include "base/thread_name.h"
 #include "base/time.h"
@@ -162,16 +163,17 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   /// False once stopping.
-  bool sleep_until(std::int64_t utc_ns) {
+  bool sleep_until(std::int64_t steady_ns) {
     std::unique_lock lock(mutex_);
-    const auto wait = std::chrono::nanoseconds(utc_ns - utc_now_ns());
+    const auto wait = std::chrono::nanoseconds(steady_ns - steady_now_ns());
     return !stopped_.wait_for(lock, wait, [&] { return stopping_; });
   }
 
   Status capture_stage() {
     const SourceInfo& info = source_.info();
     const bool paced = options_.paced && !info.live;
-    std::optional<std::int64_t> epoch_ns;  // UTC of the source's time 0
+    ClockSteps clock;
+    std::optional<std::int64_t> epoch_ns;  // of the source's time 0, by the monotonic clock
     std::uint64_t delivered = 0;
     int errors_in_a_row = 0;
     Error last_error;
@@ -192,17 +194,16 @@ class ThreadedPipeline final : public Pipeline {
       errors_in_a_row = 0;
       set_state(StreamState::kRunning, "");
       CapturedFrame frame = *std::move(*next);
-      std::int64_t capture_time_ns = frame.time_ns;
-      if (!info.live) {
-        const std::int64_t now = utc_now_ns();
+      std::int64_t capture_time_ns = utc_now_ns();
+      if (info.live) {
+        capture_time_ns = frame.time_ns + clock.set_by_ns();
+      } else if (paced) {
+        const std::int64_t now = steady_now_ns();
         // A source that cannot keep its own pace is played as fast as it comes, not in bursts to catch up.
         if (!epoch_ns || *epoch_ns + frame.time_ns < now - kMaxLate_ns) epoch_ns = now - frame.time_ns;
-        capture_time_ns = *epoch_ns + frame.time_ns;
-        if (!paced) {
-          capture_time_ns = now;
-        } else if (!sleep_until(capture_time_ns)) {
-          return {};
-        }
+        const std::int64_t due_ns = *epoch_ns + frame.time_ns;
+        if (!sleep_until(due_ns)) return {};
+        capture_time_ns = due_ns + clock.utc_from_steady_ns();
       }
       stats_.captured();
       stats_.lost_in_capture(frame.lost_before);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -104,9 +105,39 @@ Status reload(const ServeConfig& now, const ReadAgain& again, Gateway* gateway, 
   return {};
 }
 
+/// What SIGHUP asks for, also before there is anything that could be read again.
+class Reloads {
+ public:
+  explicit Reloads(StopSignal& stop) : stop_(stop) {
+    stop.on_reload([this] {
+      const std::lock_guard lock(mutex_);
+      reload_ ? reload_() : void(wanted_ = true);
+    });
+  }
+  ~Reloads() { stop_.clear_on_reload(); }
+  Reloads(const Reloads&) = delete;
+  Reloads& operator=(const Reloads&) = delete;
+
+  /// Calls `reload` at each SIGHUP until destruction, on the thread that takes signals; now, where there was
+  /// one.
+  void begin(std::function<void()> reload) {
+    const std::lock_guard lock(mutex_);
+    reload_ = std::move(reload);
+    if (std::exchange(wanted_, false)) reload_();
+  }
+
+ private:
+  StopSignal& stop_;
+  std::mutex mutex_;
+  std::function<void()> reload_;
+  bool wanted_ = false;
+};
+
 }  // namespace
 
 Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop) {
+  std::optional<Reloads> reloads;
+  if (again) reloads.emplace(stop);
   KeyFrameWishes wishes;  // outlives the gateway and the streams
   ServiceBoard board;
   std::optional<RecordingDesk> desk;
@@ -139,8 +170,8 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
   if (!opened.empty() || !config.streams.empty()) {
     print_addresses(config, opened, gateway->get());
     tell_ready();
-    if (again) {
-      stop.on_reload([&] {
+    if (reloads) {
+      reloads->begin([&] {
         const Status reloaded = reload(config, again, gateway->get(), streams);
         if (!reloaded) log_error("nothing was changed: " + reloaded.error().message);
       });
@@ -148,7 +179,7 @@ Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop
   }
   const Status done = streams.wait();
   calibrations.close();
-  stop.clear_on_reload();
+  reloads.reset();
   stop.clear_on_stop();
   wishes.answer_with({});
   return done;

@@ -7,17 +7,22 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <string>
+
+#include "base/whole_file.h"
+#include "capture/picture_file.h"
 
 namespace relievo {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
+
+constexpr std::size_t kMostTimestampBytes = 1 << 28;  // of a take of days
 
 std::string numbered(std::uint64_t number, const char* extension) {
   char name[40];
@@ -67,7 +72,7 @@ struct PngHeader {
 };
 
 /// Walks the chunks before the decoder sees them: libpng would print to stderr and hand back half a picture.
-Result<PngHeader> check_png(const Bytes& file) {
+Result<PngHeader> check_png(std::span<const std::uint8_t> file) {
   static constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
   if (file.size() < 8 || std::memcmp(file.data(), kSignature, 8) != 0) return Error{"is no PNG file"};
   std::optional<PngHeader> header;
@@ -102,8 +107,9 @@ std::filesystem::path take_truth(const std::filesystem::path& take, std::uint64_
 
 Result<std::vector<TakeStamp>> read_timestamps(const std::filesystem::path& file) {
   const std::string name = file.string();
-  std::ifstream in(file);
-  if (!in) return Error{name + " is missing or cannot be read"};
+  const auto text = read_whole_file(file, kMostTimestampBytes);
+  if (!text) return text.error();
+  std::istringstream in(*text);
   std::vector<TakeStamp> stamps;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
@@ -121,16 +127,15 @@ Result<std::vector<TakeStamp>> read_timestamps(const std::filesystem::path& file
     if (!stamps.empty() && stamp->time_ns <= stamps.back().time_ns) return refuse("times must increase");
     stamps.push_back(*stamp);
   }
-  if (in.bad()) return Error{name + " cannot be read"};
   if (stamps.empty()) return Error{name + " lists no frame"};
   return stamps;
 }
 
 Result<Image8> read_picture(const std::filesystem::path& file, int width, int height) {
   const std::string name = file.string();
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return Error{name + " is missing or cannot be read"};
-  const Bytes bytes{std::istreambuf_iterator<char>(in), {}};
+  const auto content = read_whole_file(file, kMostPictureBytes);
+  if (!content) return content.error();
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
   const Result<PngHeader> header = check_png(bytes);
   if (!header) return Error{name + " " + header.error().message};
   if (header->bits != 8 || header->colour_type != 2) return Error{name + " must be 8-bit RGB"};
@@ -140,7 +145,8 @@ Result<Image8> read_picture(const std::filesystem::path& file, int width, int he
                  ", but rig.yaml says " + std::to_string(width) + " x " + std::to_string(height)};
   }
   try {
-    const cv::Mat bgr = cv::imdecode(bytes, cv::IMREAD_COLOR);
+    const cv::Mat bgr =
+        cv::imdecode(cv::_InputArray(bytes.data(), static_cast<int>(bytes.size())), cv::IMREAD_COLOR);
     if (bgr.cols != width || bgr.rows != height || bgr.type() != CV_8UC3)
       return Error{name + " cannot be decoded"};
     Image8 image(width, height, 3);

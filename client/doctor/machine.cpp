@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -78,23 +79,54 @@ Finding check_disk(const std::filesystem::path& folder) {
   return judge_disk(error ? 0 : space.available, *rate, folder);
 }
 
-Finding check_clock() {
+Finding judge_clock(const ClockState& clock) {
+  const auto list = [](const char* what, const std::vector<std::string>& names) {
+    std::string all;
+    for (const std::string& name : names) all += " " + name;
+    return names.empty() ? all : std::string("; ") + what + all;
+  };
+  const std::string seen = list("running:", clock.keepers) + list("PTP clocks:", clock.ptp_clocks);
+  const bool has_ptp = !clock.ptp_clocks.empty();
+  if (!clock.in_step)
+    return {Grade::kAdvice, "clock",
+            (clock.keepers.empty() ? "nothing keeps it right" : "it is not in step yet") + seen,
+            has_ptp ? "latencies between machines need clocks in step: apt-get install linuxptp, then ptp4l "
+                      "and phc2sys "
+                      "keep it within microseconds (or chrony)"
+                    : "latencies between machines need clocks in step: apt-get install chrony"};
+  return {Grade::kGood, "clock",
+          "in step, off by " + number_text(clock.error_ms, "%.1f") + " ms or so; TAI is ahead of UTC by " +
+              std::to_string(clock.tai_s) + " s" + seen,
+          ""};
+}
+
+Finding check_clock(const std::filesystem::path& root) {
   timex now{};
   const int state = adjtimex(&now);
-  std::string ptp;
+  ClockState clock{.in_step = state >= 0 && state != TIME_ERROR && (now.status & STA_UNSYNC) == 0,
+                   .error_ms = static_cast<double>(now.esterror) / 1e3,
+                   .tai_s = now.tai};
   std::error_code none;
-  for (const auto& entry : std::filesystem::directory_iterator("/dev", none))
-    if (const std::string name = entry.path().filename().string(); name.starts_with("ptp")) ptp += " " + name;
-  if (!ptp.empty()) ptp = "; PTP clocks:" + ptp;
-  if (state == TIME_ERROR || (now.status & STA_UNSYNC) != 0)
-    return {Grade::kAdvice, "clock", "nothing keeps it right" + ptp,
-            "latencies between machines need clocks in step: apt-get install chrony (or ptp4l and phc2sys of "
-            "linuxptp, for microseconds)"};
-  return {Grade::kGood, "clock",
-          "in step with a time server, off by " +
-              number_text(static_cast<double>(now.esterror) / 1e3, "%.1f") +
-              " ms or so; TAI is ahead of UTC by " + std::to_string(now.tai) + " s" + ptp,
-          ""};
+  const auto first_line = [](const std::filesystem::path& file) {
+    std::string line;
+    std::ifstream in(file);
+    std::getline(in, line);
+    return line;
+  };
+  for (const auto& entry : std::filesystem::directory_iterator(root / "sys/class/ptp", none)) {
+    const std::string name = first_line(entry.path() / "clock_name");
+    clock.ptp_clocks.push_back(entry.path().filename().string() + (name.empty() ? "" : " (" + name + ")"));
+  }
+  std::set<std::string> keepers;
+  for (const auto& entry : std::filesystem::directory_iterator(root / "proc", none)) {
+    const std::string program = first_line(entry.path() / "comm");
+    for (const char* known :
+         {"ptp4l", "phc2sys", "chronyd", "ntpd", "systemd-timesyn"})  // as the kernel cuts it
+      if (program == known) keepers.insert(program);
+  }
+  clock.keepers = {keepers.begin(), keepers.end()};
+  std::ranges::sort(clock.ptp_clocks);
+  return judge_clock(clock);
 }
 
 Finding check_cameras(const std::filesystem::path& root) {

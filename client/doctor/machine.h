@@ -22,11 +22,23 @@ Finding check_receive_buffer(const std::filesystem::path& root);
 Finding check_lost_datagrams(const std::filesystem::path& root);
 /// Free room, and how fast a file gets to the disk: writes 32 MB there, and removes them.
 Finding check_disk(const std::filesystem::path& folder);
-/// Whether the clock is kept right, so that latencies across machines mean something.
-Finding check_clock();
+/// Whether the clock is kept right, so that latencies across machines mean something; by whom, and which PTP
+/// clocks there are.
+Finding check_clock(const std::filesystem::path& root);
 /// Cameras, and whether this user may open them.
 Finding check_cameras(const std::filesystem::path& root);
 Finding check_processor(const std::filesystem::path& root);
+
+/// What the kernel says of the system's clock, and what was seen beside it.
+struct ClockState {
+  bool in_step = false;
+  double error_ms = 0;
+  int tai_s = 0;                        // TAI less UTC; 0: not known
+  std::vector<std::string> ptp_clocks;  // "ptp0 (igb)"
+  std::vector<std::string> keepers;     // programs that run: "chronyd"
+};
+/// Of check_clock().
+Finding judge_clock(const ClockState& clock);
 
 /// Of check_disk(), apart from the writing: `free` bytes, `rate` in bytes a second.
 Finding judge_disk(std::uint64_t free, double rate, const std::filesystem::path& folder);

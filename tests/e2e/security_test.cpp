@@ -126,6 +126,8 @@ TEST_F(Security, DamagedKeysAreNamed) {
   fs::copy_file(fs::path(keys_of("second")) / "identity.key", keys / "identity.key",
                 fs::copy_options::overwrite_existing);
   EXPECT_THAT(streams(keys).err, HasSubstr("does not belong to identity.pem"));
+  ASSERT_TRUE(test::make_pipe(keys / "identity.pem"));
+  EXPECT_THAT(streams(keys).err, HasSubstr("identity.pem: it is a pipe"));
   fs::remove(keys / "governance.p7s");
   EXPECT_THAT(streams(keys).err, HasSubstr("governance.p7s is missing"));
   EXPECT_EQ(streams(folder_ / "nowhere").status, 1);

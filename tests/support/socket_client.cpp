@@ -137,27 +137,7 @@ Response post_json(std::uint16_t port, const std::string& target, const std::str
   return read_response(client);
 }
 
-WsClient::WsClient(std::uint16_t port, const std::string& stream, const std::string& headers,
-                   int receive_buffer_bytes)
-    : WsClient(std::make_unique<TcpClient>(port, receive_buffer_bytes), port, "/ws/" + stream, headers) {}
-
-WsClient::WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std::string& target,
-                   const std::string& headers)
-    : tcp_(std::move(tcp)) {
-  if (!tcp_->connected()) return;
-  tcp_->send(
-      "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
-      "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n" +
-      headers + "\r\n");
-  const Response response = read_response(*tcp_);
-  status_ = response.status;
-  if (const auto agreed = response.headers.find("sec-websocket-protocol"); agreed != response.headers.end())
-    subprotocol_ = agreed->second;
-  if (response.headers.count("sec-websocket-extensions") != 0) status_ = -1;  // nobody asked for deflate here
-}
-
-bool WsClient::send(const std::string& text, int opcode) {
+std::string ws_message(const std::string& text, int opcode) {
   std::string frame(1, static_cast<char>(0x80 | opcode));
   if (text.size() < 126) {
     frame += static_cast<char>(0x80 | text.size());
@@ -169,7 +149,31 @@ bool WsClient::send(const std::string& text, int opcode) {
   const char mask[4] = {0x11, 0x22, 0x33, 0x44};
   frame.append(mask, 4);
   for (std::size_t i = 0; i < text.size(); ++i) frame += static_cast<char>(text[i] ^ mask[i % 4]);
-  return tcp_->send(frame);
+  return frame;
+}
+
+WsClient::WsClient(std::uint16_t port, const std::string& stream, const std::string& headers,
+                   int receive_buffer_bytes)
+    : WsClient(std::make_unique<TcpClient>(port, receive_buffer_bytes), port, "/ws/" + stream, headers) {}
+
+WsClient::WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std::string& target,
+                   const std::string& headers, const std::string& early)
+    : tcp_(std::move(tcp)) {
+  if (!tcp_->connected()) return;
+  tcp_->send(
+      "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) +
+      "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n" +
+      headers + "\r\n" + early);
+  const Response response = read_response(*tcp_);
+  status_ = response.status;
+  if (const auto agreed = response.headers.find("sec-websocket-protocol"); agreed != response.headers.end())
+    subprotocol_ = agreed->second;
+  if (response.headers.count("sec-websocket-extensions") != 0) status_ = -1;  // nobody asked for deflate here
+}
+
+bool WsClient::send(const std::string& text, int opcode) {
+  return tcp_->send(ws_message(text, opcode));
 }
 
 std::optional<WsMessage> WsClient::next(std::chrono::milliseconds timeout) {

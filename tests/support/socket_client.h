@@ -72,14 +72,17 @@ struct WsMessage {
   }
 };
 
+/// A whole message of a client, as it goes over the wire.
+std::string ws_message(const std::string& text, int opcode = 1);
+
 class WsClient {
  public:
   /// Connects and upgrades; see status().
   WsClient(std::uint16_t port, const std::string& stream, const std::string& headers = {},
            int receive_buffer_bytes = 0);
-  /// Upgrades a connection at any address of `port`.
+  /// Upgrades a connection at any address of `port`, and sends `early` without waiting for the answer.
   WsClient(std::unique_ptr<TcpClient> tcp, std::uint16_t port, const std::string& target,
-           const std::string& headers = {});
+           const std::string& headers = {}, const std::string& early = {});
   int status() const { return status_; }                           // 101 where upgraded
   const std::string& subprotocol() const { return subprotocol_; }  // that the server agreed on
   bool send(const std::string& text, int opcode = 1);

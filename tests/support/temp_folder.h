@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stdlib.h>
+#include <sys/stat.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -31,6 +32,12 @@ class TempFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// A pipe without a writer, in place of what has the name: opening it to read waits for ever.
+inline bool make_pipe(const std::filesystem::path& at) {
+  std::filesystem::remove(at);
+  return mkfifo(at.c_str(), 0600) == 0;
+}
 
 /// Waits until another process has written that much of it.
 inline bool wait_for_size(const std::filesystem::path& file, std::uintmax_t bytes) {

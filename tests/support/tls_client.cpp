@@ -30,7 +30,7 @@ std::string common_name(X509* certificate) {
 }  // namespace
 
 bool make_certificate(const std::filesystem::path& cert, const std::filesystem::path& key,
-                      const std::string& common_name) {
+                      const std::string& common_name, const std::string& password) {
   const Owned<EVP_PKEY> pair(EVP_EC_gen("P-256"));
   const Owned<X509> made(X509_new());
   if (!pair || !made) return false;
@@ -46,7 +46,9 @@ bool make_certificate(const std::filesystem::path& cert, const std::filesystem::
   if (X509_sign(made.get(), pair.get(), EVP_sha256()) == 0) return false;
   const Owned<std::FILE> cert_file(std::fopen(cert.c_str(), "w")), key_file(std::fopen(key.c_str(), "w"));
   return cert_file && key_file && PEM_write_X509(cert_file.get(), made.get()) == 1 &&
-         PEM_write_PrivateKey(key_file.get(), pair.get(), nullptr, nullptr, 0, nullptr, nullptr) == 1;
+         PEM_write_PrivateKey(key_file.get(), pair.get(), password.empty() ? nullptr : EVP_aes_128_cbc(),
+                              reinterpret_cast<const unsigned char*>(password.data()),
+                              static_cast<int>(password.size()), nullptr, nullptr) == 1;
 }
 
 struct TlsClient::State {

@@ -10,9 +10,10 @@
 
 namespace relievo::test {
 
-/// Writes a new key and a certificate that it signs itself, as PEM; false where that fails.
+/// Writes a new key, locked by `password` where that is not empty, and a certificate that it signs itself, as
+/// PEM; false where that fails.
 bool make_certificate(const std::filesystem::path& cert, const std::filesystem::path& key,
-                      const std::string& common_name);
+                      const std::string& common_name, const std::string& password = {});
 
 /// Trusts whatever certificate it is shown.
 class TlsClient : public TcpClient {

@@ -19,7 +19,7 @@ namespace ssl = boost::asio::ssl;
 using ErrorCode = boost::system::error_code;
 
 constexpr std::size_t kLeastToken = 16, kMostToken = 256;
-constexpr std::size_t kLargestTokenFile = 1 << 20;
+constexpr std::size_t kLargestTokenFile = 1 << 20, kLargestPem = 1 << 20;
 constexpr std::size_t kMadeToken = 24;  // bytes of chance
 constexpr const char* kHowToMake = "make one with: openssl rand -hex 24 > FILE";
 
@@ -35,9 +35,6 @@ std::string trimmed(const std::string& line) {
 }
 
 Result<std::vector<std::string>> read_tokens(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(file, ignored))
-    return Error{"cannot read the token file " + file.string() + "; " + kHowToMake};
   const auto text = read_whole_file(file, kLargestTokenFile);
   if (!text) return Error{text.error().message + "; " + kHowToMake};
   std::istringstream in(*text);
@@ -135,11 +132,17 @@ Status TlsFiles::read() {
   context->set_options(ssl::context::default_workarounds | ssl::context::no_sslv2 | ssl::context::no_sslv3 |
                            ssl::context::no_tlsv1 | ssl::context::no_tlsv1_1,
                        error);
-  if (!error) context->use_certificate_chain_file(cert_.string(), error);
+  // What OpenSSL would ask a person at the terminal for.
+  if (!error) context->set_password_callback([](auto...) { return std::string(); }, error);
+  const auto cert = read_whole_file(cert_, kLargestPem);
+  if (!cert) return cert.error();
+  const auto key = read_whole_file(key_, kLargestPem);
+  if (!key) return key.error();
+  if (!error) context->use_certificate_chain(boost::asio::buffer(*cert), error);
   if (error)
     return Error{"cannot use the certificate " + cert_.string() + ": " + error.message() +
                  "; it must be a PEM file, the server's own certificate first"};
-  context->use_private_key_file(key_.string(), ssl::context::pem, error);
+  context->use_private_key(boost::asio::buffer(*key), ssl::context::pem, error);
   if (error)
     return Error{"cannot use the key " + key_.string() + ": " + error.message() +
                  "; it must be the certificate's own, a PEM file without a password"};

@@ -83,7 +83,8 @@ class HttpConnection : public Connection {
 /// A request to upgrade that was granted.
 struct WsUpgrade {
   std::shared_ptr<Transport> transport;
-  std::string request;      // its head, and what came behind it
+  std::string request;      // its head
+  std::string early;        // what came behind it: the client did not wait for the answer
   std::string subprotocol;  // the one agreed on, may be empty
   std::unique_ptr<WsFeed> feed;
 };

@@ -10,6 +10,7 @@
 #include "base/time.h"
 #include "web/gateway/connection.h"
 #include "web/gateway/recording_route.h"
+#include "web/gateway/request_target.h"
 
 namespace relievo {
 namespace {
@@ -23,6 +24,12 @@ constexpr std::uint32_t kHeaderLimit = 8 * 1024;
 constexpr std::uint64_t kBodyLimit = 4 * 1024;
 constexpr std::size_t kReadAtOnce = 4096;
 constexpr std::size_t kFileAtOnce = 256 * 1024;
+
+constexpr std::string_view kGoOn = "HTTP/1.1 100 Continue\r\n\r\n";
+
+std::string_view view(beast::string_view text) {
+  return {text.data(), text.size()};
+}
 
 std::span<const std::uint8_t> bytes_of(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
@@ -43,6 +50,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   void await_request();
   void parse();
   void read();
+  void on_head();
   void on_bad_request(ErrorCode error);
   void on_request();
   void upgrade(const HttpReply& granted);
@@ -62,6 +70,8 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   std::string head_;
   std::vector<std::uint8_t> file_bytes_;  // on their way, from the disk or to the client
   std::int64_t waiting_since_ns_ = steady_now_ns();
+  RequestTarget target_;  // of the request at hand
+  bool head_read_ = false;
   bool any_request_ = false;
   bool awaits_request_ = false;
   bool finished_ = false;
@@ -80,6 +90,7 @@ void HttpSession::await_request() {
   parser_->eager(true);
   parser_->header_limit(kHeaderLimit);
   parser_->body_limit(kBodyLimit);
+  head_read_ = false;
   waiting_since_ns_ = steady_now_ns();
   awaits_request_ = true;
   transport_->expire_after(host_.request_time());  // for all of it, however it trickles
@@ -103,9 +114,37 @@ void HttpSession::parse() {
   buffer_.consume(parser_->put(buffer_.data(), error));
   if (error == http::error::need_more) error = {};
   if (error) return on_bad_request(error);
+  if (parser_->is_header_done() && !std::exchange(head_read_, true)) return on_head();
   if (parser_->is_done()) return on_request();
   if (buffer_.size() + kReadAtOnce > buffer_.max_size()) return on_bad_request(http::error::header_limit);
   read();
+}
+
+/// What of a request's head leaves no doubt where it goes and where it ends, for which Beast does not look.
+void HttpSession::on_head() {
+  const auto& request = parser_->get();
+  const auto hosts = request.count(http::field::host);
+  const auto target = request_target(view(request.target()), view(request[http::field::host]));
+  if (!target || hosts > 1 || (hosts == 0 && request.version() >= 11))
+    return on_bad_request(http::error::bad_field);
+  target_ = *target;
+  // Of any other encoding the end cannot be known (RFC 9112, 6.3): what comes would be taken for a request.
+  if (request.count(http::field::transfer_encoding) > 0 &&
+      !beast::iequals(request[http::field::transfer_encoding], "chunked"))
+    return on_bad_request(http::error::bad_transfer_encoding);
+  const auto expects = request[http::field::expect];
+  if (expects.empty() || request.version() < 11) return parse();
+  if (!beast::iequals(expects, "100-continue")) {
+    HttpReply content = text_reply(417, "no such expectation is met");
+    return reply(std::move(content), false, request.version(), false);
+  }
+  if (parser_->is_done()) return on_request();
+  const std::array parts{bytes_of(kGoOn)};
+  transport_->write(parts, [self = shared_from_this()](Io io, std::size_t) {
+    if (self->finished_) return;
+    if (io != Io::kDone) return self->on_failed(io, Refusal::kSlow);
+    self->read();
+  });
 }
 
 void HttpSession::on_bad_request(ErrorCode error) {
@@ -123,15 +162,11 @@ void HttpSession::on_bad_request(ErrorCode error) {
 void HttpSession::on_request() {
   any_request_ = true;
   const auto& request = parser_->get();
-  if (request.count(http::field::host) > 1) return on_bad_request(http::error::bad_field);
-  const auto value = [&](http::field name) {
-    const auto text = request[name];
-    return std::string_view(text.data(), text.size());
-  };
-  const std::string_view method(request.method_string().data(), request.method_string().size());
+  const auto value = [&](http::field name) { return view(request[name]); };
+  const std::string_view method = view(request.method_string());
   HttpReply content = host_.answer({.method = method,
-                                    .target = {request.target().data(), request.target().size()},
-                                    .host = value(http::field::host),
+                                    .target = target_.path,
+                                    .host = target_.host,
                                     .origin = value(http::field::origin),
                                     .if_none_match = value(http::field::if_none_match),
                                     .authorization = value(http::field::authorization),
@@ -154,9 +189,9 @@ void HttpSession::upgrade(const HttpReply& granted) {
   std::ostringstream request;
   request << parser_->get().base();
   const auto behind = buffer_.cdata();
-  request.write(static_cast<const char*>(behind.data()), static_cast<std::streamsize>(behind.size()));
   start_websocket(host_, {.transport = transport_,
                           .request = request.str(),
+                          .early = {static_cast<const char*>(behind.data()), behind.size()},
                           .subprotocol = granted.websocket->subprotocol,
                           .feed = host_.make_feed(granted)});
   finished_ = true;  // the transport is the WebSocket's now

@@ -50,6 +50,7 @@ std::uint64_t growing_bytes(std::string_view etag, const struct stat& file) {
 struct Version {
   FilePart::Whole whole;
   std::string etag;
+  bool finished = false;
 };
 
 /// What is to be read of a recording; nothing where it has only just been begun.
@@ -62,7 +63,13 @@ std::optional<Version> version_of(const OfferedRecording& recording, const struc
   };
   if (auto version = as_of(growing_bytes(if_range, file))) return version;
   if (!recording.has_index) return as_of(recording.growing ? recording.growing->bytes() : 0);
-  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file)};
+  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), true};
+}
+
+/// A cache may keep it and asks here each time whether it still is the same. One that many share need not,
+/// for five minutes, where anybody may have what it keeps.
+std::string_view cache_control(bool finished, bool needs_token) {
+  return needs_token ? "private, no-cache" : finished ? "max-age=0, s-maxage=300" : "no-cache";
 }
 
 std::optional<OfferedRecording> recording_of_folder(const std::string& name,
@@ -118,12 +125,14 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
   const std::string& etag = version->etag;
   HttpReply reply;
   reply.content_type = "application/octet-stream";
-  // A cache may keep it, and asks here whether it still is the same.
-  reply.headers = {{"Accept-Ranges", "bytes"}, {"Cache-Control", "no-cache"}, {"ETag", etag}};
   ByteRange range{0, size};
   RangeKind kind = RangeKind::kWhole;
   if (request.if_range.empty() || request.if_range == etag) kind = parse_range(request.range, size, range);
   const std::string of = "/" + std::to_string(size);
+  const bool finished = version->finished && kind != RangeKind::kUnsatisfiable;
+  reply.headers = {{"Accept-Ranges", "bytes"},
+                   {"Cache-Control", std::string(cache_control(finished, context.tokens.needed()))},
+                   {"ETag", etag}};
   if (request.if_none_match == etag || kind == RangeKind::kUnsatisfiable) {
     close(descriptor);
     reply.status = kind == RangeKind::kUnsatisfiable ? 416 : 304;

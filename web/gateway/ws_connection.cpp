@@ -16,6 +16,7 @@ namespace {
 
 namespace net = boost::asio;
 namespace beast = boost::beast;
+namespace http = beast::http;
 namespace ws = beast::websocket;
 using ErrorCode = boost::system::error_code;
 using namespace std::chrono_literals;
@@ -30,8 +31,9 @@ class BeastStream {
  public:
   using executor_type = net::io_context::executor_type;
 
-  BeastStream(net::io_context& loop, std::shared_ptr<Transport> transport)
-      : loop_(&loop), transport_(std::move(transport)) {}
+  /// `early` was read already.
+  BeastStream(net::io_context& loop, std::shared_ptr<Transport> transport, std::string early)
+      : loop_(&loop), transport_(std::move(transport)), early_(std::move(early)) {}
   executor_type get_executor() const { return loop_->get_executor(); }
   Transport& transport() { return *transport_; }
 
@@ -40,6 +42,11 @@ class BeastStream {
     return net::async_initiate<Handler, void(ErrorCode, std::size_t)>(
         [this](auto done, const auto& where) {
           const net::mutable_buffer first = beast::buffers_front(where);
+          if (!early_.empty()) {
+            const std::size_t n = net::buffer_copy(first, net::buffer(early_));
+            early_.erase(0, n);
+            return net::post(*loop_, beast::bind_front_handler(std::move(done), ErrorCode(), n));
+          }
           transport_->read_some({static_cast<std::uint8_t*>(first.data()), first.size()},
                                 callback(std::move(done)));
         },
@@ -74,6 +81,7 @@ class BeastStream {
 
   net::io_context* loop_;
   std::shared_ptr<Transport> transport_;
+  std::string early_;
 };
 
 // Beast finds these three by their argument.
@@ -96,8 +104,8 @@ class WsConnection : public Connection, public std::enable_shared_from_this<WsCo
   WsConnection(ConnectionHost& host, WsUpgrade upgrade)
       : host_(host),
         transport_(upgrade.transport),
-        ws_(host.loop(), upgrade.transport),
-        request_(std::move(upgrade.request)),
+        ws_(host.loop(), upgrade.transport, std::move(upgrade.early)),
+        head_(std::move(upgrade.request)),
         subprotocol_(std::move(upgrade.subprotocol)),
         feed_(std::move(upgrade.feed)),
         messages_(kMessageRate, steady_now_ns()) {}
@@ -108,6 +116,7 @@ class WsConnection : public Connection, public std::enable_shared_from_this<WsCo
 
  private:
   void open();
+  void on_no_upgrade();
   void read();
   void on_message();
   void pump();
@@ -118,7 +127,8 @@ class WsConnection : public Connection, public std::enable_shared_from_this<WsCo
   ConnectionHost& host_;
   const std::shared_ptr<Transport> transport_;
   ws::stream<BeastStream> ws_;
-  const std::string request_;
+  const std::string head_;
+  http::request_parser<http::empty_body> request_;
   const std::string subprotocol_;
   std::unique_ptr<WsFeed> feed_;  // until finished
   Bucket messages_;
@@ -138,11 +148,30 @@ void WsConnection::start() {
     if (!protocol.empty()) response.set(beast::http::field::sec_websocket_protocol, protocol);
   }));
   ws_.read_message_max(kMessageLimit);
+  // Pings count as messages do. Nothing can be said from within.
+  ws_.control_callback([this](ws::frame_type kind, beast::string_view) {
+    if (kind != ws::frame_type::ping || finished_ || messages_.take(steady_now_ns())) return;
+    host_.counts().refuse(Refusal::kMessage);
+    net::post(host_.loop(), [self = shared_from_this()] { self->finish(); });
+  });
   ws_.auto_fragment(false);  // a frame leaves as one, straight from the bytes all clients share
-  ws_.async_accept(net::buffer(request_), [self = shared_from_this()](ErrorCode error) {
-    if (error || self->finished_) return self->finish();
+  // Given as bytes it may have 1.5 kB at most, which cookies of others exceed.
+  request_.header_limit(static_cast<std::uint32_t>(head_.size()));
+  ErrorCode error;
+  request_.put(net::buffer(head_), error);
+  if (error) return finish();
+  ws_.async_accept(request_.get(), [self = shared_from_this()](ErrorCode failed) {
+    if (self->finished_) return;
+    if (failed == ws::condition::handshake_failed) return self->on_no_upgrade();
+    if (failed) return self->fail(failed);
     self->open();
   });
+}
+
+/// Beast has answered it, with 400 or 426.
+void WsConnection::on_no_upgrade() {
+  host_.counts().refuse(Refusal::kMessage);
+  transport_->linger([self = shared_from_this()] { self->finish(); });
 }
 
 void WsConnection::open() {

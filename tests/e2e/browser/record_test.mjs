@@ -206,6 +206,35 @@ const checks = {
     await page.close();
   },
 
+  async 'what is being written goes on beside another recording, and is repeated once it is whole'() {
+    const before = readdirSync(folder);
+    await order('start');
+    let file;
+    await eventually('nothing of it can be read', async () => {
+      const { recordings } = await (await fetch(`${recordingServer.address}/api/recordings`)).json();
+      file = recordings.find((r) => r.recording && !before.includes(r.file))?.file;
+      return file !== undefined;
+    });
+    const web = await Server.startWeb(relievoPath, [saved, join(folder, file)]);
+    const { open: openBeside } = pagesOf(browser, web.address, complaints);
+    const page = await openBeside('/?stream=object,kept');
+    const beside = (what, n) =>
+      page.waitForFunction(([key, least]) => window.relievo.diagnostics().besides[0]?.[key] >= least, [what, n]);
+    await beside('shown', 1);
+    const [{ frames }] = (await look(page)).besides;
+    await beside('frames', frames + 12);
+    await beside('index', frames + 6);
+    const { index, frames: now } = (await look(page)).besides[0];
+    assert.ok(index < now, 'it does not begin again while more comes');
+    await order('stop');
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].index < n, frames);
+    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, file)], { encoding: 'utf8' }));
+    const [{ frames: all, errors }] = (await look(page)).besides;
+    assert.deepEqual([all, errors], [told.frames, 0]);
+    await page.close();
+    await web.kill();
+  },
+
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder, where the list did not say so before.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);

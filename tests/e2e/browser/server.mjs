@@ -6,12 +6,20 @@ import { createInterface } from 'node:readline';
 
 export class Server {
   /** `options`: of serve, beside those for the network; `environment`: beside this process's own. */
-  static async start(path, options, environment = {}) {
+  static start(path, options, environment = {}) {
+    return Server.run(path, ['serve', ...options, '--web', '127.0.0.1:0'], environment);
+  }
+
+  /** `relievo web` of files and streams. */
+  static startWeb(path, inputs) {
+    return Server.run(path, ['web', ...inputs, '--listen', '127.0.0.1:0'], {});
+  }
+
+  static async run(path, options, environment) {
     const domain = process.env.RELIEVO_TEST_DOMAIN;
     assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
-    const network = ['--web', '127.0.0.1:0', '--domain', domain, '--interface', 'lo'];
     const server = new Server();
-    server.process = spawn(path, ['serve', ...options, ...network], {
+    server.process = spawn(path, [...options, '--domain', domain, '--interface', 'lo'], {
       stdio: ['ignore', 'pipe', 'pipe'],
       env: { ...process.env, ...environment },
     });

@@ -59,6 +59,14 @@ class Reader {
   std::unique_ptr<Subscriber> subscriber_;
 };
 
+/// Whether SIGHUP would not end it.
+bool takes_hangup(const Process& process) {
+  std::istringstream status(read_text("/proc/" + std::to_string(process.pid()) + "/status"));
+  std::string name, mask;
+  while (status >> name && name != "SigCgt:") continue;
+  return status >> mask && (std::stoul(mask, nullptr, 16) >> (SIGHUP - 1) & 1) != 0;
+}
+
 /// Two takes of 5 frames a second: a reader on a busy machine has time.
 class SeveralStreams : public ::testing::Test {
  protected:
@@ -225,6 +233,24 @@ TEST_F(SeveralStreams, MetricsSayWhatItsClientsDecode) {
   EXPECT_EQ(value("relievo_stage_seconds_count{stream=\"right\",stage=\"decode\"}"), 0);
 }
 
+// As of scripts that start a server and change its configuration: until it served, SIGHUP ended it.
+TEST_F(SeveralStreams, AReloadWhileItStartsIsDoneOnceItServes) {
+  std::string tables;
+  for (int i = 0; i < 12; ++i) tables += table("s" + std::to_string(i), "one");
+  for (int tries = 0; tries < 5; ++tries) {
+    write(tables);
+    Process server(command());
+    ASSERT_TRUE(eventually([&] { return takes_hangup(server); })) << server.err();
+    if (!server.out().empty()) continue;  // this thread was kept so long that it serves already
+    server.signal(SIGHUP);
+    EXPECT_TRUE(server.wait_for_text("was read again")) << server.err();
+    server.signal(SIGTERM);
+    EXPECT_EQ(server.wait(), 0) << server.err();
+    return;
+  }
+  FAIL() << "it takes SIGHUP only once it serves";
+}
+
 TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   WebServer server(command());
   const Reader left("left");
@@ -236,6 +262,26 @@ TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   EXPECT_TRUE(left.gets(2));
   EXPECT_EQ(left.gaps(), 0U);
   EXPECT_TRUE(server.stream("third").is_null());
+}
+
+// Where one could be read for ever, the thread that takes signals would be the one that waits.
+TEST_F(SeveralStreams, PipesInPlaceOfItsFilesAreRefusedAndItStillStops) {
+  const fs::path rig = folder_ / "rig.yaml";
+  const std::string camera = "[[stream]]\nname = \"camera\"\nsource = \"v4l2:/dev/no-such-camera\"\n" +
+                             ("[stream.camera]\nrig = \"" + rig.string() + "\"\n");
+  ASSERT_TRUE(make_pipe(rig));
+  write(table("left", "one") + camera);
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2)) << server.process().err();
+  EXPECT_THAT(server.process().err(), HasSubstr(rig.string() + ": it is a pipe"));
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  ASSERT_TRUE(make_pipe(config_));
+  ASSERT_TRUE(reloaded(server, config_.string() + ": it is a pipe")) << server.process().err();
+  EXPECT_TRUE(left.gets(2));
+  EXPECT_EQ(left.gaps(), 0U);
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 0) << server.process().err();
 }
 
 TEST_F(SeveralStreams, AStormOfReloadsOfABrokenFileCostsNothing) {

@@ -1,5 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Wrong usage: exit status 2 and one line that says where help is.
+// Wrong usage: exit status 2 and one line that says where help is. Flags and settings are the same.
+#include <gmock/gmock.h>
+
+#include <map>
+#include <regex>
+
 #include "tests/e2e/server/server_process.h"
 
 namespace relievo::test {
@@ -55,6 +60,49 @@ TEST(ServerUsage, HelpAndVersion) {
       EXPECT_NE(done.out, "");
     }
   }
+}
+
+/// "camera.controls", of each table of the installed configuration, whose examples name those of [[stream]].
+std::set<std::string> settings() {
+  std::set<std::string> out;
+  std::string table;
+  std::smatch found;
+  for (const std::string& line :
+       lines(read_text(std::string(RELIEVO_SOURCE_DIR) + "/packaging/server.toml"))) {
+    if (std::regex_match(line, found, std::regex(R"(#? *\[+(\w+)\]+)"))) table = found[1].str() + ".";
+    if (!line.starts_with("# ") && table == "stream.") table.clear();
+    if (std::regex_match(line, found, std::regex(R"(#?(?:   )?(\w+) = .*)")))
+      out.insert(table + found[1].str());
+  }
+  return out;
+}
+
+std::set<std::string> flags() {
+  const std::string help = run(server({"serve", "--help"})).out;
+  std::set<std::string> out;
+  const std::regex flag(R"((?:^|\n)  (?:-\w,)?--([a-z-]+))");
+  for (std::sregex_iterator it(help.begin(), help.end(), flag), end; it != end; ++it) out.insert((*it)[1]);
+  return out;
+}
+
+TEST(ServerUsage, EverySettingIsAFlagAndEveryFlagASetting) {
+  // Where a table says what a flag's name has to, and what is several settings or one flag again and again.
+  const std::map<std::string, std::string> otherwise{
+      {"recording.folder", "record-dir"},   {"projector.output", "projector"},
+      {"projector.size", "projector-size"}, {"gateway.allow_origins", "allow-origin"},
+      {"camera.controls", "control"},       {"stream.name", "stream"}};
+  std::set<std::string> wanted;
+  for (const std::string& setting : settings()) {
+    const auto known = otherwise.find(setting);
+    std::string name = known == otherwise.end() ? setting.substr(setting.find('.') + 1) : known->second;
+    std::replace(name.begin(), name.end(), '_', '-');
+    wanted.insert(name);
+  }
+  // Of a run, not of what is served: where the settings are, what is printed.
+  for (const char* alone : {"config", "help", "version", "verbose", "quiet", "log-json"})
+    wanted.insert(alone);
+  ASSERT_GT(wanted.size(), 50U);
+  EXPECT_THAT(flags(), testing::ContainerEq(wanted));
 }
 
 }  // namespace

@@ -18,7 +18,9 @@ class WebServer {
  public:
   using Json = nlohmann::json;
 
-  explicit WebServer(const std::vector<std::string>& command) : process_(command) {
+  explicit WebServer(const std::vector<std::string>& command,
+                     const std::vector<std::string>& environment = {})
+      : process_(command, environment) {
     port_ = viewer_port(process_);
   }
   Process& process() { return process_; }

@@ -55,5 +55,19 @@ TEST(WholeFile, IsReadUpToTheSizeItMayHave) {
   }
 }
 
+// Whoever opens a pipe that nobody writes to waits for ever, and so does who joins its thread.
+TEST(WholeFile, WhatIsNoFileIsRefusedWithoutWaiting) {
+  const TempFolder folder;
+  ASSERT_TRUE(test::make_pipe(folder / "pipe"));
+  for (const auto& [file, what] : {std::pair(folder / "pipe", "a pipe"),
+                                   {std::filesystem::path("/dev/zero"), "a device"},
+                                   {folder.path(), "a folder"}}) {
+    const auto read = read_whole_file(file, 10);
+    ASSERT_FALSE(read) << file;
+    EXPECT_EQ(read.error().message, "cannot read " + file.string() + ": it is " + what + ", not a file");
+  }
+  EXPECT_EQ(read_whole_file(folder / "none", 10).error().message, (folder / "none").string() + " is missing");
+}
+
 }  // namespace
 }  // namespace relievo

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "small_take.h"
 
@@ -115,6 +116,8 @@ TEST(RigFile, RefusesWhatIsMisshapenOrOutOfRange) {
 TEST(RigFile, RefusesFilesThatAreNone) {
   test::TempFolder folder;
   EXPECT_THAT(read_rig(folder.path() / "rig.yaml").error().message, HasSubstr("rig.yaml is missing"));
+  ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(read_rig(folder.path() / "pipe").error().message, HasSubstr("it is a pipe"));
   for (const std::string& content : {std::string(), std::string("%YAML:1.0"), std::string("%YAML:1.0\n---\n"),
                                      std::string(3000, 'x'), std::string("%YAML:1.0\n---\n\x01\x02{{{{[[[["),
                                      std::string("%YAML:1.0\n---\nscan: !!binary |\n  @@@\n")}) {

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 
@@ -99,6 +100,21 @@ TEST(TakeSource, ADamagedPictureCostsOneFrameAlone) {
     }
   }
   EXPECT_FALSE(*source->next());
+}
+
+TEST(TakeSource, PipesInPlaceOfItsFilesAreRefusedWithoutWaiting) {
+  test::TempFolder folder;
+  test::write_small_take(folder.path(), Scan::kInterlaced, 2);
+  const auto put_pipe = [](const std::filesystem::path& at) {
+    return std::filesystem::remove(at) && mkfifo(at.c_str(), 0600) == 0;
+  };
+  ASSERT_TRUE(put_pipe(folder.path() / "frames" / "000000.png"));
+  const auto source = open(folder.path());
+  EXPECT_THAT(source->next().error().message, HasSubstr("000000.png: it is a pipe"));
+  EXPECT_TRUE(source->next());
+  ASSERT_TRUE(put_pipe(folder.path() / "timestamps.csv"));
+  EXPECT_THAT(open_source("take:" + folder.path().string(), {}).error().message,
+              HasSubstr("timestamps.csv: it is a pipe"));
 }
 
 TEST(TakeSource, ALoopWithoutOneGoodPictureEnds) {

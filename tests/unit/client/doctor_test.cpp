@@ -89,6 +89,32 @@ TEST(Doctor, ProcessorThatIsKeptSlowIsSaid) {
   EXPECT_EQ(check_processor(machine.root.path()).grade, Grade::kAdvice);
 }
 
+TEST(Doctor, WhatKeepsTheClockAndPtpClocksAreSaid) {
+  const Finding alone = judge_clock({});
+  EXPECT_EQ(alone.grade, Grade::kAdvice);
+  EXPECT_THAT(alone.found, HasSubstr("nothing keeps it right"));
+  EXPECT_THAT(alone.mend, HasSubstr("chrony"));
+  const Finding with_card = judge_clock({.ptp_clocks = {"ptp0 (igb)"}});
+  EXPECT_THAT(with_card.found, HasSubstr("PTP clocks: ptp0 (igb)"));
+  EXPECT_THAT(with_card.mend, HasSubstr("ptp4l"));
+  EXPECT_THAT(judge_clock({.keepers = {"ptp4l"}}).found, HasSubstr("not in step yet; running: ptp4l"));
+  const Finding kept = judge_clock({.in_step = true, .error_ms = 0.25, .tai_s = 37, .keepers = {"chronyd"}});
+  EXPECT_EQ(kept.grade, Grade::kGood);
+  EXPECT_THAT(kept.found, HasSubstr("37 s; running: chronyd"));
+}
+
+TEST(Doctor, PtpClocksAndTimeServersAreFound) {
+  const Machine machine;
+  EXPECT_EQ(check_clock(machine.root.path()).found.find("PTP"), std::string::npos);
+  machine.says("sys/class/ptp/ptp0/clock_name", "igb\n");
+  machine.says("sys/class/ptp/ptp1/clock_name", "mlx5_ptp\n");
+  machine.says("proc/712/comm", "phc2sys\n");
+  machine.says("proc/711/comm", "ptp4l\n");
+  machine.says("proc/1/comm", "systemd\n");
+  EXPECT_THAT(check_clock(machine.root.path()).found,
+              HasSubstr("; running: phc2sys ptp4l; PTP clocks: ptp0 (igb) ptp1 (mlx5_ptp)"));
+}
+
 TEST(Doctor, CamerasAreListed) {
   const Machine machine;
   std::filesystem::create_directories(machine.root / "dev");

@@ -28,6 +28,8 @@ TEST(RecordingFault, WhatIsNoRecordingIsRefused) {
   test::TempFolder folder;
   EXPECT_FALSE(RecordingReader::open(folder / "none.mcap").ok());
   EXPECT_FALSE(RecordingReader::open(folder.path()).ok());
+  ASSERT_TRUE(test::make_pipe(folder / "pipe"));
+  EXPECT_FALSE(RecordingReader::open(folder / "pipe").ok()) << "nobody waits for who writes to it";
   write_file(folder / "text", Bytes{'h', 'e', 'l', 'l', 'o', ' ', 'w', 'o', 'r', 'l', 'd'});
   const auto reader = RecordingReader::open(folder / "text");
   ASSERT_FALSE(reader.ok());

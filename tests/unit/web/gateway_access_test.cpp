@@ -151,6 +151,8 @@ TEST(Tokens, FilesThatCannotBeUsedAreOneClearLine) {
   }
   std::ofstream(file) << std::string(2 << 20, '#');
   EXPECT_FALSE(Tokens::load(file).ok()) << "it is no list of tokens";
+  ASSERT_TRUE(make_pipe(file));
+  EXPECT_FALSE(Tokens::load(file).ok());
   const auto made = Tokens::make(), other = Tokens::make();
   ASSERT_TRUE(made.ok() && other.ok());
   EXPECT_TRUE(made->accepts(made->first()));

@@ -146,5 +146,28 @@ TEST_F(GatewayCrowd, AClientHasItsShareOfMessages) {
   EXPECT_EQ(refused("message"), 1);
 }
 
+TEST_F(GatewayCrowd, PingsAreMessages) {
+  gateway->announce(make_info());
+  WsClient watcher(port, "face");
+  ASSERT_TRUE(watcher.next_of("info"));
+  watcher.credit(8);
+  watcher.send("a ping now and then", 9);
+  TcpClient flood(port);
+  std::string pings;
+  for (int i = 0; i < 1000; ++i) pings += ws_message("ping", 9);
+  flood.send(
+      "GET /ws/face HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n");
+  ASSERT_EQ(read_response(flood).status, 101);
+  ASSERT_TRUE(eventually([&] {
+    flood.send(pings);
+    flood.receive(1ms);
+    return refused("message") > 0;
+  }));
+  EXPECT_TRUE(eventually([&] { return metric("relievo_gateway_clients") == 1; }));
+  EXPECT_EQ(refused("message"), 1);
+  expect_frame(watcher);
+}
+
 }  // namespace
 }  // namespace relievo::test

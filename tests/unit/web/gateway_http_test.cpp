@@ -191,6 +191,65 @@ TEST_F(GatewayHttp, ANameThatWasPointedAtLoopbackIsRefused) {
   EXPECT_EQ(read_response(client).status, 421);
 }
 
+// RFC 9112, 3.2; the name in an absolute address goes before it (3.2.2).
+TEST_F(GatewayHttp, AHostThatIsMissingOrNoneIsRefused) {
+  const auto status = [&](const std::string& head) {
+    TcpClient client(port);
+    client.send(head + "\r\n\r\n");
+    return read_response(client).status;
+  };
+  EXPECT_EQ(status("GET /healthz HTTP/1.1"), 400);
+  EXPECT_EQ(status("GET /healthz HTTP/1.0"), 200) << "which did not have it";
+  for (const char* wrong :
+       {"localhost/evil.example", "a b", "localhost:80x", "user@localhost", "[::1", "a:1:2"})
+    EXPECT_EQ(status(std::string("GET /healthz HTTP/1.1\r\nHost: ") + wrong), 400) << wrong;
+  for (const char* right : {"localhost", "127.0.0.1:80", "[::1]", "[::1]:8080", "x.localhost:1"})
+    EXPECT_EQ(status(std::string("GET /healthz HTTP/1.1\r\nHost: ") + right), 200) << right;
+  EXPECT_EQ(status("GET http://localhost/healthz HTTP/1.1\r\nHost: evil.example"), 200);
+  EXPECT_EQ(status("GET http://evil.example/healthz HTTP/1.1\r\nHost: localhost"), 421);
+  EXPECT_EQ(status("GET http://a@localhost/healthz HTTP/1.1\r\nHost: localhost"), 400);
+  EXPECT_EQ(status("GET http:///healthz HTTP/1.1\r\nHost: localhost"), 400);
+}
+
+// A proxy in front and this server must see the same end of a request (RFC 9112, 6.3).
+TEST_F(GatewayHttp, LengthsThatContradictEachOtherAreRefused) {
+  for (const char* lengths :
+       {"Content-Length: 4\r\nTransfer-Encoding: chunked", "Content-Length: 4\r\nContent-Length: 5",
+        "Content-Length: +4", "Content-Length: 4, 5", "Content-Length: -1",
+        "Content-Length: 99999999999999999999", "Transfer-Encoding: chunked, identity", "Content-Length : 4",
+        " Content-Length: 4"}) {
+    TcpClient client(port);
+    client.send(std::string("POST /healthz HTTP/1.1\r\nHost: localhost\r\n") + lengths +
+                "\r\n\r\n0\r\n\r\nGET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    const int status = read_response(client).status;
+    EXPECT_TRUE(status == 400 || status == 413 || status == 501) << lengths << ": " << status;
+    while (client.receive()) continue;
+    EXPECT_EQ(client.buffer(), "") << lengths << ": what comes behind it is no request";
+  }
+}
+
+// RFC 9110, 10.1.1.
+TEST_F(GatewayHttp, WhoAsksBeforeItSendsIsToldToGoOn) {
+  const auto head = [](const std::string& more) {
+    return "POST /api/streams HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + more + "\r\n\r\n";
+  };
+  TcpClient client(port);
+  client.send(head("4\r\nExpect: 100-Continue"));
+  EXPECT_EQ(read_response(client).status, 100);
+  client.send("body" + head("4\r\nExpect: 100-continue"));
+  EXPECT_EQ(read_response(client).status, 405) << "the answer proper";
+  EXPECT_EQ(read_response(client).status, 100) << "and so the next";
+  client.send("body" + head("4\r\nExpect: 200-maybe"));
+  EXPECT_EQ(read_response(client).status, 405);
+  EXPECT_EQ(read_response(client).status, 417);
+  TcpClient large(port);
+  large.send(head("5000\r\nExpect: 100-continue"));
+  EXPECT_EQ(read_response(large).status, 413) << "before anything of it is sent";
+  TcpClient old(port);
+  old.send("POST /api/streams HTTP/1.0\r\nContent-Length: 4\r\nExpect: 100-continue\r\n\r\nbody");
+  EXPECT_EQ(read_response(old).status, 405) << "HTTP/1.0 does not know it";
+}
+
 TEST_F(GatewayHttp, PortInUseIsOneClearLine) {
   const auto second = Gateway::start({.port = port});
   ASSERT_FALSE(second.ok());

@@ -37,6 +37,48 @@ TEST_F(GatewayStream, InfoComesFirstAndDescribesTheRig) {
   EXPECT_FALSE(info.contains("world_from_camera_rotation") || info.contains("world_from_camera_translation"));
 }
 
+// RFC 6455, 4.1 has clients wait for the answer; nothing is gained by refusing those that do not.
+TEST_F(GatewayStream, WhatAClientSaysWithItsRequestCounts) {
+  gateway->announce(make_info());
+  gateway->publish("face", make_frame(3));
+  for (const int credits : {1, 400}) {  // also more than fits beside the head into one read
+    std::string early;
+    for (int i = 0; i < credits; ++i) early += ws_message(R"({"type":"credit","n":1})");
+    WsClient client(std::make_unique<TcpClient>(port), port, "/ws/face", {}, early);
+    ASSERT_EQ(client.status(), 101);
+    EXPECT_TRUE(client.next_of("info"));
+    const auto frame = client.next_of("frame");
+    ASSERT_TRUE(frame) << credits;
+    EXPECT_EQ(u64_at(frame->data, 8), 3u);
+  }
+  EXPECT_EQ(metric(refused_for("message")), 0);
+}
+
+// Cookies of other programs at localhost come along.
+TEST_F(GatewayStream, ARequestMayHaveAsManyHeadersAsAnyOther) {
+  gateway->announce(make_info());
+  WsClient client(port, "face", "Cookie: other=" + std::string(7000, 'x') + "\r\n");
+  ASSERT_EQ(client.status(), 101);
+  EXPECT_TRUE(client.next_of("info"));
+}
+
+TEST_F(GatewayStream, AnUpgradeThatIsNoneIsAnsweredAndCounted) {
+  gateway->announce(make_info());
+  const auto upgrade = [&](const std::string& more) {
+    TcpClient client(port);
+    client.send("GET /ws/face HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n" +
+                more + "\r\n");
+    return read_response(client).status;
+  };
+  const std::string key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+  EXPECT_EQ(upgrade("Sec-WebSocket-Version: 13\r\n"), 400) << "no key";
+  EXPECT_EQ(upgrade("Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + std::string(100, 'x') + "\r\n"),
+            400);
+  EXPECT_EQ(upgrade("Sec-WebSocket-Version: 7\r\n" + key), 426);
+  EXPECT_EQ(metric(refused_for("message")), 3);
+  EXPECT_EQ(metric("relievo_gateway_clients"), 0);
+}
+
 TEST_F(GatewayStream, InfoSaysHowGoodTheRigIs) {
   StreamInfo described = make_info();
   described.rig.stereo_rms_px = 0.25;

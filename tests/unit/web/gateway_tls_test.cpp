@@ -91,6 +91,8 @@ TEST_F(GatewayTls, ANewCertificateReachesNewClientsAndDisturbsNoOther) {
   EXPECT_EQ(TlsClient(port).peer_name(), "second");
   std::ofstream(cert) << "no certificate";
   EXPECT_EQ(TlsClient(port).peer_name(), "second");
+  ASSERT_TRUE(make_pipe(cert));
+  EXPECT_EQ(TlsClient(port).peer_name(), "second") << "nobody waits for who writes to it";
 
   gateway->publish("face", make_frame(0));
   EXPECT_TRUE(client.next_of("frame"));
@@ -100,11 +102,17 @@ TEST_F(GatewayTls, FilesThatCannotBeUsedAreOneClearLine) {
   std::ofstream(folder / "text") << "no certificate";
   const std::string text = folder / "text";
   ASSERT_TRUE(make_certificate(folder / "c2", folder / "k2", "another"));
+  ASSERT_TRUE(make_pipe(folder / "pipe"));
+  // Of which OpenSSL asks the password at the terminal, where there is one.
+  ASSERT_TRUE(make_certificate(folder / "c3", folder / "k3", "a third", "password"));
   const struct {
     std::string cert, key, named;
   } cases[] = {{folder / "missing", key, "missing"},
                {text, key, text},
                {cert, text, text},
+               {folder / "pipe", key, folder / "pipe"},
+               {cert, folder / "pipe", folder / "pipe"},
+               {folder / "c3", folder / "k3", folder / "k3"},
                {cert, folder / "k2", folder / "k2"}};
   for (const auto& c : cases) {
     const auto made = Gateway::start({.port = 0, .web = {.tls_cert = c.cert, .tls_key = c.key}});

@@ -89,6 +89,24 @@ class Recordings : public GatewayTest {
   std::string content;
 };
 
+// A cache that many share need not ask about a finished file for each of them; a browser's own asks each
+// time.
+TEST_F(Recordings, ASharedCacheMayKeepWhatIsFinishedAndNeedsNoToken) {
+  const std::string kept = "max-age=0, s-maxage=300";
+  EXPECT_EQ(get().headers.at("cache-control"), kept);
+  const Response part = get("Range: bytes=0-9\r\n");
+  EXPECT_EQ(part.headers.at("cache-control"), kept);
+  const std::string etag = part.headers.at("etag");
+  EXPECT_EQ(get("If-None-Match: " + etag + "\r\n").headers.at("cache-control"), kept);
+  EXPECT_EQ(get("Range: bytes=2000000-\r\n").headers.at("cache-control"), "no-cache") << "of no part";
+  std::ofstream(folder / "tokens") << "correct-horse-battery\n";
+  ASSERT_TRUE(gateway->apply({.token_file = folder / "tokens"}));
+  ASSERT_TRUE(eventually([&] { return get().status == 401; }));
+  const Response own = get("Authorization: Bearer correct-horse-battery\r\n");
+  EXPECT_EQ(own.status, 200);
+  EXPECT_EQ(own.headers.at("cache-control"), "private, no-cache");
+}
+
 // A disk that stands still (pread below) keeps who reads from it waiting, and nobody else.
 TEST_F(Recordings, ASlowDiskHoldsNobodyElseUp) {
   stuck_disk.lock();

@@ -3,7 +3,7 @@
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
 import { rigPlace } from './placement';
-import type { ListedStream, Quality, StreamInfo } from './protocol';
+import { writtenOf, type ListedStream, type Quality, type StreamInfo } from './protocol';
 import { Session } from './session';
 import type { Playback, SourceEvents } from './source';
 import type { Beside, View } from './view';
@@ -15,6 +15,7 @@ interface Companion {
 
 export class Companions {
   private readonly shown = new Map<string, Companion>();
+  private readonly repeated = new WeakSet<Playback>();
   private quality: Quality | null = null;
   private wishedQuality = false;
 
@@ -31,9 +32,9 @@ export class Companions {
   report(): object[] {
     return [...this.shown].map(([name, { session, beside }]) => {
       const { shown, errors, frame } = session.meter.report();
-      const { index = null, following = null } = session.source?.playback ?? {};
+      const { index = null, following = null, times = null } = session.source?.playback ?? {};
       const pose = this.view.poseOf(name);
-      return { name, shown, errors, frame, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following };
+      return { name, shown, errors, frame, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following, frames: times?.length ?? null };
     });
   }
 
@@ -48,10 +49,23 @@ export class Companions {
       unusable: () => this.changed(),
     });
     this.shown.set(name, { session, beside: this.view.addBeside(name, quietly) });
-    if (typeof listed?.recording === 'string') void this.openRecording(name, session, listed.recording);
+    if (typeof listed?.recording === 'string') void this.openRecording(name, session, listed);
     else session.watch((events) => this.live(name, events));
     this.wish();
     this.changed();
+  }
+
+  /** What the server says of them now: what is played from a file that is being written goes on with what comes. */
+  listed(find: (name: string) => ListedStream | undefined): void {
+    for (const [name, { session }] of this.shown) {
+      const { source } = session;
+      if (source?.told === undefined) continue;
+      const written = writtenOf(find(name));
+      const playing = source.playback.playing;
+      void source.told(written).then(() => {
+        if (written === undefined && session.source === source) this.repeat(source.playback, playing);
+      });
+    }
   }
 
   /** What a time line of it drives. */
@@ -104,12 +118,19 @@ export class Companions {
     return source;
   }
 
-  // A file plays on and on beside the others.
-  private async openRecording(name: string, session: Session, address: string): Promise<void> {
-    const opened = await openRemote(new URL(address, document.baseURI)).catch(() => null);
+  // A file that is whole plays on and on beside the others, unless somebody has said otherwise since.
+  private repeat(playback: Playback, playing: boolean): void {
+    if (this.repeated.has(playback)) return;
+    this.repeated.add(playback);
+    playback.setLoop({ from: 0, to: playback.times[playback.times.length - 1]! });
+    if (playing && !playback.playing) playback.play(); // it was at its end
+  }
+
+  private async openRecording(name: string, session: Session, listed: ListedStream): Promise<void> {
+    const grows = writtenOf(listed) !== undefined;
+    const opened = await openRemote(new URL(listed.recording!, document.baseURI)).catch(() => null);
     if (this.shown.get(name)?.session !== session) return;
     session.watch(opened === null ? (events) => this.live(name, events) : opened.source);
-    const playback = opened === null ? null : session.source!.playback;
-    playback?.setLoop({ from: 0, to: playback.times[playback.times.length - 1]! });
+    if (opened !== null && !grows) this.repeat(session.source!.playback, false); // it plays by itself
   }
 }

@@ -16,7 +16,7 @@ import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
 import { rigPlace } from './placement';
-import { offeredRungs, wantedQuality, type Quality } from './protocol';
+import { offeredRungs, wantedQuality, writtenOf, type Quality, type StreamInfo } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
@@ -473,8 +473,7 @@ class Viewer {
       const writing = streams.find(({ recorder }) => recorder?.file === this.serverFile);
       void this.session.source?.told?.(writing?.recorder ?? undefined);
     } else if (this.stream !== null) {
-      const bytes = this.server.find(this.stream)?.growing_bytes ?? null;
-      void this.session.source?.told?.(bytes === null ? undefined : { state: 'recording', whole_bytes: bytes, message: '' });
+      void this.session.source?.told?.(writtenOf(this.server.find(this.stream)));
     }
     const first = streams[0];
     const missing = this.session.info === null && this.server.find(this.stream) === undefined;
@@ -483,6 +482,7 @@ class Viewer {
     const eyeIsGiven = (this.shared?.pose ?? null) !== null; // by the link, which was made with them in sight
     for (const name of this.wantedBesides) this.companions?.add(name, this.server.find(name), eyeIsGiven);
     this.wantedBesides = [];
+    this.companions?.listed((name) => this.server.find(name));
     endHeld();
   }
 }

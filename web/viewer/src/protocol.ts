@@ -161,6 +161,12 @@ export interface ServerRecording {
 /** What is said of a file that is being written. */
 export type Written = Pick<ServerRecording, 'state' | 'whole_bytes' | 'message'>;
 
+/** Of the file that a stream is played from; undefined: it does not grow. */
+export function writtenOf(listed: ListedStream | undefined): Written | undefined {
+  const bytes = listed?.growing_bytes ?? null;
+  return bytes === null ? undefined : { state: 'recording', whole_bytes: bytes, message: '' };
+}
+
 export interface StreamList {
   version: string;
   hint: string;
