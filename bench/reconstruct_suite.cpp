@@ -101,7 +101,7 @@ Status run(const Options& options, StopSignal& stop) {
                    {"scan", std::string(to_string(rig.scan))},
                    {"stripes", static_cast<double>(frames.info().pattern.stripes())},
                    {"threads", static_cast<double>(options.threads)},
-                   {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")},
+                   {"decoder", std::string(decoder_name(options.decoder))},
                    {"distinct_frames", static_cast<double>(frames.size())}},
       .figures = {{"frame_ms", frame_ms},
                   {"cpu_ms", spread_of(samples.cpu)},
