@@ -17,7 +17,7 @@ constexpr int kBeside_px = 3;           // from a boundary to where its sides' c
 constexpr float kLeastStep = 12;        // grey levels of a primary that a boundary must switch
 constexpr std::size_t kLeastSeen = 50;  // boundaries that must tell of a primary
 constexpr std::size_t kEvery = 4;       // boundaries looked at,
-constexpr std::size_t kEveryQuickly = 16;
+constexpr std::size_t kEveryQuickly = 64;
 constexpr float kSame = 0.01F;  // gains nearer 1 are noise
 constexpr float kMostGain = 2;
 
