@@ -286,7 +286,7 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
                    {"clients", count(options.clients)},
                    {"web_clients", count(options.web_clients)},
                    {"threads", count(options.threads)},
-                   {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")},
+                   {"decoder", std::string(decoder_name(options.decoder))},
                    {"geometry", options.geometry},
                    {"texture", options.texture},
                    {"domain", count(options.domain.domain)},

@@ -281,7 +281,7 @@ Status run(const Options& options, StopSignal& stop) {
          .settings = {{"source", options.source},
                       {"frames", static_cast<double>(jobs.size())},
                       {"rounds", static_cast<double>(options.repeats.rounds)},
-                      {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")}},
+                      {"decoder", std::string(decoder_name(options.decoder))}},
          .figures = std::move(figures),
          .rows = std::move(rows),
          .notes =

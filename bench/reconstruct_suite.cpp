@@ -10,6 +10,8 @@
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
+#include "capture/reconstruct/quick_difference.h"
+#include "capture/reconstruct/quick_sequence.h"
 #include "cli/size_option.h"
 #include "server/options.h"
 
@@ -19,6 +21,7 @@ namespace {
 constexpr int kDistinctFrames = 24;
 constexpr std::uint64_t kWarmUp = 4;  // frames, untimed: both slides seen, memory allocated
 constexpr std::uint64_t kFrames = 100;
+constexpr std::uint64_t kFloorFrames = 40;
 constexpr std::int64_t kTime_ns = 3 * kNanosecondsPerSecond;
 
 struct Options {
@@ -59,6 +62,35 @@ struct Samples {
   }
 };
 
+/// What no decoder does without: the cheapest passes that there are here.
+struct Floor {
+  std::vector<double> difference, edges;
+
+  /// Both fields' difference and luma, low-passed and by the colour matrix, of all pixels; and the same with
+  /// the boundaries' places.
+  Status measure(Reconstructor& reconstructor, const FrameLoop& frames, int threads) {
+    WorkerPool pool(threads);
+    QuickDifferencer differencer(frames.info().rig.colour_matrix);
+    QuickSequence sequence(frames.info().pattern);
+    QuadImage image;
+    for (std::uint64_t n = 0; n < kFloorFrames; ++n) {
+      auto frame = reconstructor.add(frames.at(n));
+      if (!frame) return frame.error();
+      if (*frame) reconstructor.recycle(*std::move(*frame));
+      const CapturedFrame* pair = reconstructor.decoded();
+      if (pair == nullptr) continue;
+      const std::int64_t begin = process_cpu_ns();
+      differencer.difference(*pair, pool, image, [](int, int, int) {});
+      const std::int64_t middle = process_cpu_ns();
+      sequence.find_edges(*pair, differencer, pool, image);
+      if (n < kWarmUp) continue;
+      difference.push_back(milliseconds(middle - begin));
+      edges.push_back(milliseconds(process_cpu_ns() - middle));
+    }
+    return {};
+  }
+};
+
 Status run(const Options& options, StopSignal& stop) {
   const auto uri = source_of(options);
   if (!uri) return uri.error();
@@ -89,6 +121,9 @@ Status run(const Options& options, StopSignal& stop) {
   }
   if (samples.frame.empty()) return Error{"no frame of " + *uri + " could be reconstructed"};
 
+  Floor floor;
+  if (auto measured = floor.measure(*reconstructor, frames, options.threads); !measured)
+    return measured.error();
   const Spread bandwidth = measure_read_bandwidth(options.threads);
   const double bound_ms = 1e3 * static_cast<double>(frames.frame_bytes()) / bandwidth.max;
   const Spread frame_ms = spread_of(samples.frame);
@@ -101,7 +136,7 @@ Status run(const Options& options, StopSignal& stop) {
                    {"scan", std::string(to_string(rig.scan))},
                    {"stripes", static_cast<double>(frames.info().pattern.stripes())},
                    {"threads", static_cast<double>(options.threads)},
-                   {"decoder", std::string(options.decoder == Decoder::kPaper ? "paper" : "ordered")},
+                   {"decoder", std::string(decoder_name(options.decoder))},
                    {"distinct_frames", static_cast<double>(frames.size())}},
       .figures = {{"frame_ms", frame_ms},
                   {"cpu_ms", spread_of(samples.cpu)},
@@ -110,6 +145,8 @@ Status run(const Options& options, StopSignal& stop) {
                   {"stage_ms.triangulate", spread_of(samples.triangulate)},
                   {"stage_ms.surface", spread_of(samples.surface)},
                   {"stage_ms.texture", spread_of(samples.texture)},
+                  {"floor_ms.difference", spread_of(floor.difference)},
+                  {"floor_ms.edges", spread_of(floor.edges)},
                   {"points", spread_of(samples.points)},
                   {"boundaries", spread_of(samples.boundaries)},
                   {"boundaries_decoded", spread_of(samples.decoded)},
@@ -118,7 +155,9 @@ Status run(const Options& options, StopSignal& stop) {
                   {"read_bytes_per_s", bandwidth},
                   {"frame_bytes", static_cast<double>(frames.frame_bytes())}},
       .notes = {
-          "bound_ms: reading the frame's two fields once at the best of the measured read_bytes_per_s."}};
+          "bound_ms: reading the frame's two fields once at the best of the measured read_bytes_per_s.",
+          "floor_ms: processor time of the cheapest passes: the fields' difference and luma, low-passed; and "
+          "that with every boundary's place."}};
   print(report, options.json);
   return {};
 }

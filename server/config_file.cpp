@@ -67,13 +67,9 @@ class Reader {
     const toml::node* node = take(key);
     if (node == nullptr) return;
     const auto value = node->value_exact<std::string>();
-    if (value == "ordered") {
-      out = Decoder::kOrdered;
-    } else if (value == "paper") {
-      out = Decoder::kPaper;
-    } else {
-      refuse(*node, key, "must be \"ordered\" or \"paper\"");
-    }
+    const auto named = decoder_named(value.value_or(""));
+    if (!named) return refuse(*node, key, "must be \"ordered\", \"quick\" or \"paper\"");
+    out = *named;
   }
   void scheme(std::string_view key, std::string& out) {
     const toml::node* node = take(key);

@@ -18,22 +18,24 @@ constexpr int kSamples = 9;             // columns at which a boundary's depth i
 
 }  // namespace
 
-DepthRange::DepthRange(int boundaries, int width, int lines)
-    : width_(width), lines_(lines), columns_(static_cast<std::size_t>(boundaries)) {}
+DepthRange::DepthRange(int boundaries, int width, int lines, int every)
+    : width_(width), lines_(lines), every_(every), columns_(static_cast<std::size_t>(boundaries)) {}
 
 void DepthRange::update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator,
                         WorkerPool& pool) {
   if (vertices.size() < kLeastPoints) return;
   inverse_depths_.reset(pool.threads());
-  pool.for_ranges(static_cast<int>(vertices.size()), [&](int begin, int end, int worker) {
+  const std::size_t asked = vertices.size() / static_cast<std::size_t>(every_);
+  pool.for_ranges(static_cast<int>(asked), [&](int begin, int end, int worker) {
     std::vector<float>& own = inverse_depths_.of(worker);
     own.resize(static_cast<std::size_t>(end - begin));
     for (int i = begin; i < end; ++i)
-      own[static_cast<std::size_t>(i - begin)] = 1 / vertices[static_cast<std::size_t>(i)].position[2];
+      own[static_cast<std::size_t>(i - begin)] =
+          1 / vertices[static_cast<std::size_t>(i * every_)].position[2];
   });
-  const std::size_t rank = vertices.size() / kOutliers;
+  const std::size_t rank = asked / kOutliers;
   float far = inverse_depths_.at(rank);
-  float near = inverse_depths_.at(vertices.size() - 1 - rank);
+  float near = inverse_depths_.at(asked - 1 - rank);
   const float wider = kWider * (near - far);
   far -= wider + kWiderShare * far;
   near += wider + kWiderShare * near;

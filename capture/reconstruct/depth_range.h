@@ -19,8 +19,8 @@ using ColumnRange = std::array<float, 2>;
 /// Keeps its scratch memory from frame to frame. One thread.
 class DepthRange {
  public:
-  /// `width` of the camera's picture, `lines` of detection.
-  DepthRange(int boundaries, int width, int lines);
+  /// `width` of the camera's picture, `lines` of detection. One point in `every` is asked.
+  DepthRange(int boundaries, int width, int lines, int every = 1);
 
   /// From a frame's points; few of them change nothing.
   void update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator, WorkerPool& pool);
@@ -32,7 +32,7 @@ class DepthRange {
   ColumnRange range_of(int boundary, std::array<float, 2> range, const Triangulator& triangulator) const;
 
   bool known_ = false;
-  int width_, lines_;
+  int width_, lines_, every_;
   std::vector<ColumnRange> columns_;
   RankedSample inverse_depths_;
 };

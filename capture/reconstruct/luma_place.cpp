@@ -12,11 +12,6 @@ namespace {
 
 constexpr float kBreak = 0.12F;  // change of luma over two columns, of its sum, at which a surface ends
 
-/// Of a column that is not negative; a call of std::lround takes ten times as long.
-int column_of(float column_px) {
-  return static_cast<int>(column_px + 0.5F);
-}
-
 }  // namespace
 
 std::array<float, 3> luma_weights(const std::array<double, 9>& colour_matrix) {
@@ -71,24 +66,27 @@ void LumaPlacer::places(const LumaLine& line, float share, const LumaQuery* quer
 
 LumaPlace LumaPlacer::place(const DifferenceImage& image, int line, float share,
                             const LumaQuery& query) const {
-  constexpr int kColumns = 16;
+  const int width = image.width;
+  const int first = first_around(query.own_px, width);
+  const float* red = image.line(line) + first;
+  return place({red, red + width, red + 2 * width, image.white_line(line) + first}, first, width, share,
+               query);
+}
+
+LumaPlace LumaPlacer::place(const LightRows& rows, int first, int width, float share,
+                            const LumaQuery& query) const {
   constexpr int kMargin = LumaView::kMargin;
   static_assert(kColumns > 2 * kLumaReach_px);
   std::array<std::array<float, kColumns + 2 * kMargin>, 4> ratios;
   std::array<std::uint8_t, kColumns + 2 * kMargin> ends;
   ends.fill(1);
   for (auto& row : ratios) row.fill(0);
-  const int width = image.width;
-  const int first = std::clamp(column_of(query.own_px) - kColumns / 2, 0, width - kColumns);
-  const float* red = image.line(line) + first;
-  const float* white = image.white_line(line) + first;
   const LumaKernels& kernels = luma_kernels();
   const auto row = [&](std::size_t i) { return ratios[i].data() + kMargin; };
-  kernels.ratios({red, red + width, red + 2 * width, white}, kColumns, weights_, kDarkSum,
-                 {row(0), row(1), row(2), row(3)});
+  kernels.ratios(rows, kColumns, weights_, kDarkSum, {row(0), row(1), row(2), row(3)});
   const int begin = first == 0 ? 1 : 0;
   const int end = first + kColumns == width ? kColumns - 1 : kColumns;
-  kernels.ends(white + begin, end - begin, kBreak, kDarkSum, ends.data() + kMargin + begin);
+  kernels.ends(rows.white + begin, end - begin, kBreak, kDarkSum, ends.data() + kMargin + begin);
   LumaPlace out;
   kernels.places({first, row(0), row(1), row(2), row(3), ends.data() + kMargin}, {weights_, share}, &query, 1,
                  &out);

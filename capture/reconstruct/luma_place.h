@@ -61,14 +61,25 @@ class LumaPlacer {
   void places(const LumaLine& line, float share, const LumaQuery* queries, std::size_t count,
               LumaPlace* out) const;
 
-  /// The same for one on any line of 16 columns or more, of which only those around are read.
+  /// The same for one on any line of kColumns or more, of which only those around are read.
   LumaPlace place(const DifferenceImage& image, int line, float share, const LumaQuery& query) const;
+
+  static constexpr int kColumns = 16;
+  /// The first of kColumns about a column of a line of `width`.
+  static int first_around(float column_px, int width) {
+    return std::clamp(static_cast<int>(column_px + 0.5F) - kColumns / 2, 0, width - kColumns);
+  }
+  /// The same of rows that have only those columns, from `first` = first_around() on.
+  LumaPlace place(const LightRows& rows, int first, int width, float share, const LumaQuery& query) const;
 
   /// Standard deviation of a place, from noise.
   float sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const {
     const int x = std::clamp(static_cast<int>(place.column_px + 0.5F), 0, image.width - 1);
-    const float noise = image.noise_at(line, x) * size_ / (image.white_line(line)[x] + kDarkSum);
-    return kLumaFactor * noise / place.slope;
+    return sigma_px(image.noise_at(line, x), image.white_line(line)[x], place);
+  }
+  /// The same where a value of the difference has the standard deviation `noise` and the sum is `white`.
+  float sigma_px(float noise, float white, const LumaPlace& place) const {
+    return kLumaFactor * (noise * size_ / (white + kDarkSum)) / place.slope;
   }
 
  private:

@@ -21,6 +21,7 @@ namespace relievo {
 namespace {
 
 constexpr Vec3f kNoPoint{0, 0, 0};       // no point has it: all lie in front of the camera
+constexpr int kDepthsQuickly = 8;        // one point in so many tells the range of depths
 constexpr std::size_t kSpareFrames = 4;  // a stage's queue and what its neighbours hold
 
 int line_step(const Rig& rig) {
@@ -70,6 +71,24 @@ class StageClock {
 
 }  // namespace
 
+std::string_view decoder_name(Decoder decoder) {
+  switch (decoder) {
+    case Decoder::kOrdered:
+      return "ordered";
+    case Decoder::kQuick:
+      return "quick";
+    case Decoder::kPaper:
+      return "paper";
+  }
+  return "";
+}
+
+std::optional<Decoder> decoder_named(std::string_view name) {
+  for (const Decoder d : {Decoder::kOrdered, Decoder::kQuick, Decoder::kPaper})
+    if (name == decoder_name(d)) return d;
+  return std::nullopt;
+}
+
 struct Reconstructor::State {
   State(const Rig& r, const Pattern& p, const ReconstructOptions& o)
       : rig(r),
@@ -80,8 +99,9 @@ struct Reconstructor::State {
         pairs(p.scheme, r),
         decoder(r, p, o),
         triangulator(r, p, line_count(r), line_step(r)),
-        depths(p.boundaries(), r.camera.width, line_count(r)),
-        white_texture(r.colour_matrix),
+        depths(p.boundaries(), r.camera.width, line_count(r),
+               o.decoder == Decoder::kQuick ? kDepthsQuickly : 1),
+        white_texture(r.colour_matrix, o.decoder == Decoder::kQuick),
         half_way(p.boundaries(), line_count(r)),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
     spare.reserve(kSpareFrames);
@@ -212,8 +232,7 @@ Result<Reconstructor> Reconstructor::create(const Rig& rig, const Pattern& patte
   if (pattern.scheme == Scheme::kOneSlide && options.decoder == Decoder::kPaper) {
     return Error{
         "the paper's decoder reads each code by itself, and those of scheme one-slide repeat: use the "
-        "decoder "
-        "ordered"};
+        "decoder ordered or quick"};
   }
   return Reconstructor(std::make_unique<State>(rig, pattern, options));
 }

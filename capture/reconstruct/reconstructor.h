@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 #include "base/filter_counts.h"
 #include "base/frame3d.h"
@@ -19,8 +20,14 @@ namespace relievo {
 
 enum class Decoder {
   kOrdered,  // by the sequence's order along and across lines (capture/reconstruct/sequence.h)
-  kPaper,    // as the paper writes it (5.2, 5.3): the readable reference
+  kQuick,  // the same with less care, for live use where time is short (capture/reconstruct/quick_sequence.h)
+  kPaper,  // as the paper writes it (5.2, 5.3): the readable reference
 };
+
+/// "ordered", "quick" or "paper".
+std::string_view decoder_name(Decoder decoder);
+/// Nothing where no decoder is called so.
+std::optional<Decoder> decoder_named(std::string_view name);
 
 struct ReconstructOptions {
   Decoder decoder = Decoder::kOrdered;

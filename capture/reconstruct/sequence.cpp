@@ -5,53 +5,13 @@
 #include <cmath>
 #include <cstring>
 
+#include "capture/reconstruct/sequence_rules.h"
+
 namespace relievo {
+
+using namespace sequence_rules;
+
 namespace {
-
-// Gains of the path search. Evidence of one side is a colour's agreement with three channels, -1..1; a clear
-// edge of a still scene has 2 from its own frame and 2 from the other slide's.
-constexpr GainRules kGains{
-    .transition_slack = 0.9F,  // of the best pair of colours: further off is no candidate
-    .other_floor = -0.6F,      // what the other slide's frame can take away: the scene may have moved
-    .contradiction = 0.0F,     // but where it held still, a side that disagrees
-    .contradicted = 1.5F,      // costs this much more
-    .threshold = 1.3F,         // an edge that gains less is better left out
-};
-constexpr OrderRules kOrder{
-    .in_order = 1.0F,     // bonus for the boundary that follows in the sequence
-    .per_missing = 0.5F,  // less for each boundary missed in between
-    .max_missing = 3,
-};
-constexpr float kJump = -1.6F;       // a depth step: anything may follow
-constexpr float kUnexpected = 1.0F;  // less for a boundary where no depth seen before would put it
-constexpr int kMaxSkipped = 3;       // false edges between two that follow each other
-constexpr float kClear = 0.5F;       // of a channel's evidence: leaves no doubt about its sign
-constexpr float kNoStripe = -100;    // agreement with what no stripe is
-
-// How far an edge may have moved in two frames: 1 m/s in depth is 10 px where a stripe is 8 wide.
-constexpr float kSearch_px = 14;
-constexpr float kSearchStep_px = 2;
-constexpr float kSearchMoving_px = 4;  // around where its motion between the fields puts it
-
-// What a decoded edge must show by itself, whatever its neighbours are.
-constexpr float kLeastSide = 0.4F;  // of agreement on each side: no channel may clearly disagree
-constexpr float kLeastOwn = 1.1F;   // of both sides
-constexpr float kLeastGain = 2.0F;  // with the other slide's frame, where the scene held still
-
-float agreement(Primary colour, const SideEvidence& e) {
-  return ((colour & 1 ? e[0] : -e[0]) + (colour & 2 ? e[1] : -e[1]) + (colour & 4 ? e[2] : -e[2])) *
-         (1.F / 3);
-}
-
-/// Of every primary; its complement's is the opposite.
-PerPrimary agreements(const SideEvidence& e) {
-  PerPrimary out;
-  for (std::size_t c = 4; c < 8; ++c) {
-    out[c] = agreement(static_cast<Primary>(c), e);
-    out[7 - c] = -out[c];
-  }
-  return out;
-}
 
 /// Where the edge stood two frames ago, under the same slide, from where it is now: the nearest place with
 /// the same colours on both sides. `found` is false where there is none.
@@ -59,14 +19,6 @@ struct Displacement {
   bool found;
   float px;
 };
-
-/// `b` has three numbers or more.
-template <std::size_t N>
-bool alike(const SideEvidence& a, const std::array<float, N>& b) {
-  const float dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const float size = std::fabs(a[0]) + std::fabs(a[1]) + std::fabs(a[2]);
-  return dot > 0.5F * size;
-}
 
 /// Where it is not where it was, but may have been `expected_px` from there.
 Displacement displacement(const DifferenceImage& same, int line, const Edge& edge, float expected_px) {
@@ -82,12 +34,6 @@ Displacement displacement(const DifferenceImage& same, int line, const Edge& edg
     if (matches(expected_px - px)) return {true, expected_px - px};
   }
   return {false, expected_px};
-}
-
-/// Gain from the other slide's frame, where the colours on the two sides agree with it by `left` and `right`.
-float other_gain(float left, float right, bool tracked) {
-  if (!tracked) return std::max(kGains.other_floor, left + right);
-  return left + right - (std::min(left, right) < kGains.contradiction ? kGains.contradicted : 0);
 }
 
 }  // namespace

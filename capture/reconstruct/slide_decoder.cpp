@@ -17,6 +17,9 @@
 #include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/persistence.h"
 #include "capture/reconstruct/place_grid.h"
+#include "capture/reconstruct/quick_difference.h"
+#include "capture/reconstruct/quick_place.h"
+#include "capture/reconstruct/quick_sequence.h"
 #include "capture/reconstruct/readmit.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
@@ -38,6 +41,7 @@ struct Observation {
   std::int64_t time_ns = 0;
   Detection detection;         // the paper's
   DifferenceImage difference;  // the ordered one's
+  QuadImage quads;             // the quick one's
 };
 
 }  // namespace
@@ -47,12 +51,16 @@ struct SlideDecoder::State {
       : pattern(p),
         field_ns(0.5e9 / rig.frame_rate),
         paper(options.decoder == Decoder::kPaper),
+        quick(options.decoder == Decoder::kQuick),
         detector(rig.colour_matrix, DetectOptions{}),
         table(p),
         differencer(rig.colour_matrix),
+        quick_differencer(rig.colour_matrix),
         sequence(p),
+        quick_sequence(p),
         front_edges(rig),
         refiner(rig.colour_matrix),
+        quick_placer(rig.colour_matrix),
         continuity(p.boundaries(),
                    rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
         readmission(p.boundaries(),
@@ -66,16 +74,19 @@ struct SlideDecoder::State {
 
   Pattern pattern;
   double field_ns;  // between a slide's exposure and its complement's
-  bool paper;
+  bool paper, quick;
   Detector detector;
   TransitionTable table;
   Differencer differencer;
+  QuickDifferencer quick_differencer;
   EdgeFinder edge_finder;
   SequenceDecoder sequence;
+  QuickSequence quick_sequence;
   WeakSignal weak_signal;
   Tracer tracer;
   FrontEdges front_edges;
   Refiner refiner;
+  QuickPlacer quick_placer;
   ConsistencyCheck consistency;
   Recovery recovery;
   Continuity continuity;
@@ -113,11 +124,14 @@ struct SlideDecoder::State {
   bool match_paper(SlideOrder tried, Match& out);
   SequenceContext context(SlideOrder tried) const;
   bool match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out);
+  QuickContext quick_context(SlideOrder tried) const;
+  void decode_quickly(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
   void match_in_order(SlideOrder predicted, WorkerPool& pool);
   void list(WorkerPool& pool, std::vector<DecodedBoundary>& out);
 };
 
 bool SlideDecoder::State::shows_same_slide() const {
+  if (quick) return same_slide(newer.quads, previous.quads);
   return paper ? same_slide(newer.detection, previous.detection)
                : same_slide(newer.difference, previous.difference);
 }
@@ -154,7 +168,21 @@ SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
   return out;
 }
 
+QuickContext SlideDecoder::State::quick_context(SlideOrder tried) const {
+  QuickContext out{.order = tried, .expected = expected};
+  if (have_older) out.other = &older.quads;
+  if (have_same) out.same = &same.quads;
+  const auto back = static_cast<float>(newer.time_ns - same.time_ns);
+  if (have_older && have_same && back > 0)
+    out.other_share = static_cast<float>(newer.time_ns - older.time_ns) / back;
+  return out;
+}
+
 bool SlideDecoder::State::match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out) {
+  if (quick) {
+    quick_sequence.decode(newer.quads, quick_context(tried), pool, edges, out);
+    return out.counts.in_order * 2 > edges.edges.size();
+  }
   sequence.decode(edges, context(tried), pool, out);
   return out.counts.in_order * 2 > edges.edges.size();
 }
@@ -173,6 +201,29 @@ void SlideDecoder::State::match_in_order(SlideOrder predicted, WorkerPool& pool)
     std::swap(result, other_result);
     order = other(order);
   }
+}
+
+/// After match_in_order().
+void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& pool,
+                                         ReconstructReport& report) {
+  const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();
+  recovered.clear();
+  quick_placer.place(newer.quads, rows, result, quick_sequence.shown_colours(order), pool, edges);
+  const ConsistencyCounts checked = consistency.check(pattern.boundaries(), pool, result, edges);
+  const ContinuityCounts by_before = continuity.check(recovered, pool, result, edges);
+  if (pattern.scheme != Scheme::kWhiteField)
+    instant.adjust({pair.time_ns, newer.difference.motion}, result, edges, recovered, pool);
+  moving.find(newer.quads.width, result, edges);
+  places.fill(pattern.boundaries(), pool, result, edges, recovered);
+  const std::size_t carried = persistence.carry(moving, pool, places, recovered);
+  const WeighingCounts weighed = weighing.weigh(places, pool, result, edges, recovered);
+  report.filters.unsupported = result.counts.unsupported;
+  report.filters.completed = result.counts.completed;
+  report.filters.rejected = checked.rejected + by_before.rejected + weighed.rejected;
+  report.filters.moved = checked.moved + weighed.moved;
+  report.filters.recovered = by_before.carried + carried;
+  report.matched =
+      result.counts.in_order - result.counts.unsupported + result.counts.completed + report.filters.recovered;
 }
 
 /// Decoded boundaries by line, and behind them what was recovered.
@@ -225,6 +276,8 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
   if (s.paper) {
     s.detector.detect(pair, pool, s.newer.detection);
     report.boundaries = s.newer.detection.boundaries.size();
+  } else if (s.quick) {
+    report.boundaries = s.quick_sequence.find_edges(pair, s.quick_differencer, pool, s.newer.quads);
   } else {
     s.differencer.aligned_difference(pair, pool, s.newer.difference);
     s.weak_signal.average(pool, s.newer.difference);
@@ -256,6 +309,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   s.match_in_order(report.same_slide ? s.order : other(s.order), pool);
   if (s.paper) {
     report.matched = s.match.valid;
+  } else if (s.quick) {
+    s.decode_quickly(pair, pool, report);
   } else {
     // A row a line, whichever of the two fields that is.
     const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();

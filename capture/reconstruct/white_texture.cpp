@@ -16,8 +16,9 @@ namespace {
 constexpr int kBeside_px = 3;           // from a boundary to where its sides' colours are pure
 constexpr float kLeastStep = 12;        // grey levels of a primary that a boundary must switch
 constexpr std::size_t kLeastSeen = 50;  // boundaries that must tell of a primary
-constexpr std::size_t kEvery = 4;       // boundaries looked at
-constexpr float kSame = 0.01F;          // gains nearer 1 are noise
+constexpr std::size_t kEvery = 4;       // boundaries looked at,
+constexpr std::size_t kEveryQuickly = 64;
+constexpr float kSame = 0.01F;  // gains nearer 1 are noise
 constexpr float kMostGain = 2;
 
 float mix(const std::array<float, 9>& m, std::size_t row, const float* rgb) {
@@ -106,7 +107,8 @@ const Loops& loops() {
 
 }  // namespace
 
-WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix) {
+WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly)
+    : quickly_(quickly), every_(quickly ? kEveryQuickly : kEvery) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
   for (std::size_t i = 0; i < 9; ++i) {
@@ -121,7 +123,7 @@ WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix) {
 void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices,
                                  WorkerPool& pool) {
   for (RankedSample& r : ratios_) r.reset(pool.threads());
-  const std::size_t looked_at = (vertices.size() + kEvery - 1) / kEvery;
+  const std::size_t looked_at = (vertices.size() + every_ - 1) / every_;
   pool.for_ranges(static_cast<int>(looked_at), [&](int begin, int end, int worker) {
     measure_ratios(frame, vertices, begin, end, worker);
   });
@@ -144,13 +146,13 @@ void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<G
   }
 }
 
-/// Of every kEvery-th vertex, [begin, end) of them.
+/// Of every every_-th vertex, [begin, end) of them.
 void WhiteTexture::measure_ratios(const CapturedFrame& frame, const std::vector<GridVertex>& vertices,
                                   int begin, int end, int worker) {
   const bool interlaced = frame.scan == Scan::kInterlaced;
   const int height = frame.picture.height();
   for (int i = begin; i < end; ++i) {
-    const GridPoint& at = vertices[static_cast<std::size_t>(i) * kEvery].at;
+    const GridPoint& at = vertices[static_cast<std::size_t>(i) * every_].at;
     const int x = static_cast<int>(at.column_px + 0.5F);
     const int y = interlaced ? 2 * at.line : at.line;
     if (at.interpolated || x < kBeside_px || x + kBeside_px >= frame.picture.width() || y + 1 >= height)
@@ -219,7 +221,7 @@ void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex
   measure_gains(frame, vertices, pool);
   const int width = frame.picture.width();
   const int height = frame.picture.height();
-  if (height < 2 || (frame.scan == Scan::kProgressive && !level_)) {
+  if (height < 2 || (!level_ && (quickly_ || frame.scan == Scan::kProgressive))) {
     add_fields(frame, pool, out);
     return;
   }

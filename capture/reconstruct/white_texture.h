@@ -20,8 +20,9 @@ namespace relievo {
 /// Keeps its scratch memory from frame to frame. One thread.
 class WhiteTexture {
  public:
-  /// `colour_matrix` is M of Eq. 1.
-  explicit WhiteTexture(const std::array<double, 9>& colour_matrix);
+  /// `colour_matrix` is M of Eq. 1. `quickly`: by fewer boundaries, and where nothing is to be brought level
+  /// by adding the fields.
+  explicit WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly = false);
 
   /// RGB, the size of the camera's picture; values saturate at 255. `vertices` are decoded boundaries, in any
   /// order: across each, what the slide loses of a primary its complement gains, so they tell how bright one
@@ -51,6 +52,8 @@ class WhiteTexture {
       levelled_{};  // of captured colours, those of the complement made as bright as the slide's
   std::array<float, 3> gains_{1, 1, 1};
   bool level_ = false;
+  bool quickly_;
+  std::size_t every_;  // boundaries looked at
   std::vector<Scratch> scratch_;
   std::array<RankedSample, 3> ratios_;  // of each primary, at boundaries
 };

@@ -63,7 +63,7 @@ const Json& row(const Json& report, const std::string& name) {
 }
 
 TEST(Bench, Reconstruct) {
-  for (const std::string decoder : {"paper", "ordered"}) {
+  for (const std::string decoder : {"paper", "quick", "ordered"}) {
     const Json report = report_of({"reconstruct", "--size", "160x120", "--stripes", "30", "--threads", "2",
                                    "--frames", "5", "--decoder", decoder});
     ASSERT_TRUE(report.is_object());

@@ -108,7 +108,7 @@ TEST_P(Scores, ShellAsWellAsThePapersDecoder) {
   std::printf("%s: %s\n", *GetParam() != 0 ? GetParam() : "default", score.dump().c_str());
 }
 
-INSTANTIATE_TEST_SUITE_P(Decoders, Scores, ::testing::Values("", "paper"),
+INSTANTIATE_TEST_SUITE_P(Decoders, Scores, ::testing::Values("", "quick", "paper"),
                          [](const auto& p) { return *p.param == 0 ? "chosen" : p.param; });
 
 }  // namespace

@@ -73,10 +73,10 @@ TEST_P(WarmStream, AllocatesNothing) {
   EXPECT_EQ(surfaces, 10U);
 }
 
-INSTANTIATE_TEST_SUITE_P(, WarmStream,
-                         testing::Combine(testing::Values(Decoder::kOrdered, Decoder::kPaper),
-                                          testing::Values(Scan::kInterlaced, Scan::kProgressive),
-                                          testing::Values(1, 3)));
+INSTANTIATE_TEST_SUITE_P(
+    , WarmStream,
+    testing::Combine(testing::Values(Decoder::kOrdered, Decoder::kQuick, Decoder::kPaper),
+                     testing::Values(Scan::kInterlaced, Scan::kProgressive), testing::Values(1, 3)));
 
 TEST(Recycle, MemoryThatCameBackChangesNothing) {
   const test::StripedScene scene = test::striped_scene();

@@ -244,10 +244,11 @@ TEST(Reconstructor, RefusesPatternsItCannotDecode) {
 
 INSTANTIATE_TEST_SUITE_P(All, ReconstructorTest,
                          ::testing::Combine(::testing::Values(Scan::kInterlaced, Scan::kProgressive),
-                                            ::testing::Values(Decoder::kOrdered, Decoder::kPaper)),
+                                            ::testing::Values(Decoder::kOrdered, Decoder::kQuick,
+                                                              Decoder::kPaper)),
                          [](const auto& p) {
-                           return std::string(to_string(std::get<0>(p.param))) +
-                                  (std::get<1>(p.param) == Decoder::kPaper ? "_paper" : "_ordered");
+                           return std::string(to_string(std::get<0>(p.param))) + "_" +
+                                  std::string(decoder_name(std::get<1>(p.param)));
                          });
 
 }  // namespace

@@ -99,7 +99,7 @@ frames = 900
 loop = true
 fast = true
 threads = 3
-decoder = "paper"
+decoder = "quick"
 texture = "webp"
 texture_quality = 91
 texture_encoder = "x264"
@@ -125,7 +125,7 @@ fill_holes = 3
   EXPECT_TRUE(r.config.loop);
   EXPECT_TRUE(r.config.fast);
   EXPECT_EQ(r.config.threads, 3);
-  EXPECT_EQ(r.config.decoder, Decoder::kPaper);
+  EXPECT_EQ(r.config.decoder, Decoder::kQuick);
   EXPECT_EQ(r.config.texture, TextureCodec::kWebp);
   EXPECT_EQ(r.config.texture_quality, 91);
   EXPECT_EQ(r.config.texture_encoder, VideoEncoderKind::kX264);
@@ -349,7 +349,7 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"fast_number", "fast = 0", "fast must be true or false"},
         Wrong{"scheme_unknown", "scheme = \"striped\"",
               "scheme must be complementary, white-field, white-frame or one-slide in quotes"},
-        Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\" or \"paper\""},
+        Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\", \"quick\" or \"paper\""},
         Wrong{"threads_none", "threads = 0", "threads must be a whole number from 1 to 64"},
         Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},
         Wrong{"encoder", "texture_encoder = \"quicksync\"",

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/quick_difference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "capture/reconstruct/rows.h"
+
+namespace relievo {
+namespace {
+
+constexpr float kLeastWeight = -32768;
+constexpr float kMostWeight = 32767;  // a colour matrix may multiply by four
+
+std::int16_t weight_of(double w) {
+  return static_cast<std::int16_t>(
+      std::clamp(static_cast<float>(std::round(w * 8192)), kLeastWeight, kMostWeight));
+}
+
+}  // namespace
+
+QuickDifferencer::QuickDifferencer(const std::array<double, 9>& colour_matrix) {
+  for (std::size_t i = 0; i < 9; ++i) weights_.colour[i] = weight_of(colour_matrix[i]);
+  weights_.luma = {weight_of(0.299), weight_of(0.587), weight_of(0.114)};  // Rec. 601
+}
+
+void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin, int end,
+                                           std::vector<std::int16_t>& scratch, QuadImage& out) const {
+  const RowKernels& rows = row_kernels();
+  const QuickKernels& kernels = quick_kernels();
+  const bool interlaced = frame.scan == Scan::kInterlaced;
+  // Lines lie at the even rows of an interlaced picture, whichever field was first.
+  const View8 own = interlaced ? frame.picture.view().field(0) : frame.picture.view();
+  const View8 other = interlaced ? frame.picture.view().field(1) : frame.complement.view();
+  if (other.empty()) {  // an interlaced picture of one row has no complement
+    std::fill(out.quads.begin(), out.quads.end(), std::int16_t{0});
+    std::fill(out.luma.begin(), out.luma.end(), std::int16_t{0});
+    return;
+  }
+  QuadWeights weights = weights_;
+  if (interlaced && frame.field_order == FieldOrder::kBottom)  // the complement is on the even rows
+    for (std::int16_t& w : weights.colour) w = static_cast<std::int16_t>(-std::max<int>(w, -32767));
+  const int samples = 3 * out.width;
+  const auto row = static_cast<std::size_t>(samples);
+  scratch.resize(9 * row);
+  const auto scratch_row = [&](int i) { return scratch.data() + row * static_cast<std::size_t>(i); };
+  // The three lines about the current one, each in the place that the one three lines above it had.
+  const auto fields_at = [&](int line) {
+    const int place = std::clamp(line, 0, out.lines - 1) % 3;
+    return FieldRows{scratch_row(2 * place), scratch_row(2 * place + 1)};
+  };
+  const auto read = [&](int line) {
+    if (line < 0 || line >= out.lines) return;
+    // An interlaced picture's other rows lie half a line off: their mean is what they show at this row.
+    const int before = interlaced ? line - 1 : line;
+    rows.combine_fields(own.row(line), other.row(std::clamp(before, 0, other.height - 1)),
+                        other.row(std::min(line, other.height - 1)), samples, fields_at(line));
+  };
+  std::int16_t* across = scratch_row(6);
+  std::int16_t* difference = scratch_row(7);
+  std::int16_t* sum = scratch_row(8);
+  read(begin - 1);
+  read(begin);
+  for (int line = begin; line < end; ++line) {
+    read(line + 1);
+    const FieldRows above = fields_at(line - 1);
+    const FieldRows here = fields_at(line);
+    const FieldRows below = fields_at(line + 1);
+    rows.low_pass(above.difference, here.difference, below.difference, samples, across, difference);
+    rows.low_pass(above.sum, here.sum, below.sum, samples, across, sum);
+    const std::size_t at = static_cast<std::size_t>(line) * static_cast<std::size_t>(out.width);
+    kernels.to_quads(difference, sum, out.width, weights, out.quads.data() + 4 * at, out.luma.data() + at);
+  }
+}
+
+/// As estimate_noise() of field_difference.cpp, of fewer lines.
+float QuickDifferencer::estimate_noise(const QuadImage& image) {
+  constexpr int kApart = 3;
+  constexpr int kBins = 1024;
+  constexpr int kPerBin = QuickKernels::kScale / 4;
+  constexpr float kQuantile30 = 0.3853F;  // of |N(0, 1)|
+  constexpr float kGain = 2.4495F;        // of [1 -2 1], the square root of 6
+  std::array<std::uint32_t, kBins> histogram{};
+  std::uint32_t total = 0;
+  for (int line = 0; line + 2 * kApart < image.lines; line += 17) {
+    const std::int16_t* above = image.line(line);
+    const std::int16_t* here = image.line(line + kApart);
+    const std::int16_t* below = image.line(line + 2 * kApart);
+    for (int i = 0; i < 4 * image.width; i += 5) {
+      if (i % 4 == 3) continue;
+      const int second = std::abs(above[i] - 2 * here[i] + below[i]);
+      ++histogram[static_cast<std::size_t>(std::min(kBins - 1, second / kPerBin))];
+      ++total;
+    }
+  }
+  std::uint32_t seen = 0;
+  for (int i = 0; i < kBins; ++i) {
+    seen += histogram[static_cast<std::size_t>(i)];
+    if (seen * 10 >= total * 3 && total > 0)
+      return (static_cast<float>(i) + 0.5F) * kPerBin / (kQuantile30 * kGain);
+  }
+  return 0;
+}
+
+void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, QuadImage& out) {
+  const View8 slide = frame.scan == Scan::kInterlaced ? frame.picture.view().field(0) : frame.picture.view();
+  out.width = slide.width;
+  out.lines = slide.height;
+  const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
+  out.quads.resize(4 * pixels);
+  out.luma.resize(pixels);
+  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  if (noise_ < 0) {
+    pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
+      difference_of_lines(frame, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
+    });
+    noise_ = estimate_noise(out);
+  }
+  out.noise = noise_;
+}
+
+bool same_slide(const QuadImage& a, const QuadImage& b) {
+  constexpr int kEveryLine = 13;
+  constexpr int kEvery = 3;  // a column in so many; all channels come by turns, since a quad has four numbers
+  if (a.quads.size() != b.quads.size()) return false;
+  const float threshold_a = 4 * a.noise + QuickKernels::kScale;
+  const float threshold_b = 4 * b.noise + QuickKernels::kScale;
+  std::uint32_t both = 0;
+  std::uint32_t equal = 0;
+  for (int line = 0; line < a.lines; line += kEveryLine) {
+    const std::int16_t* va = a.line(line);
+    const std::int16_t* vb = b.line(line);
+    for (int i = 0; i < 4 * a.width; i += kEvery) {
+      const bool stand_out = (std::abs(va[i]) >= threshold_a) & (std::abs(vb[i]) >= threshold_b);
+      both += stand_out;
+      equal += stand_out & ((va[i] > 0) == (vb[i] > 0));
+    }
+  }
+  // Channels of two slides agree about every second time; of the same slide, but for what moved, always.
+  return both > 0 && std::uint64_t{equal} * 10 > std::uint64_t{both} * 8;
+}
+
+}  // namespace relievo
