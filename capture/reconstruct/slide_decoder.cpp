@@ -216,7 +216,8 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
   moving.find(newer.quads.width, result, edges);
   places.fill(pattern.boundaries(), pool, result, edges, recovered);
   const std::size_t carried = persistence.carry(moving, pool, places, recovered);
-  const WeighingCounts weighed = weighing.weigh(places, pool, result, edges, recovered);
+  const WeighingCounts weighed =
+      weighing.weigh(places, moving, consistency.scale(), pool, result, edges, recovered);
   report.filters.unsupported = result.counts.unsupported;
   report.filters.completed = result.counts.completed;
   report.filters.rejected = checked.rejected + by_before.rejected + weighed.rejected;

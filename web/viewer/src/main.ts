@@ -16,7 +16,7 @@ import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
 import { rigPlace } from './placement';
-import { offeredRungs, wantedQuality, writtenOf, type Quality, type StreamInfo } from './protocol';
+import { offeredRungs, wantedQuality, writtenOf, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
