@@ -227,6 +227,91 @@ const checks = {
     }
   },
 
+  async 'what is dragged aside stays under the cursor, and nothing turns'(page) {
+    const { frame } = await look(page);
+    const point = pointOf(0.4, 0.4, frame); // the pivot's distance: what is dragged follows the cursor there
+    for (const [button, key] of [['right', null], ['left', 'Shift']]) {
+      const [from, before] = [await toPage(page, point), await page.evaluate(() => window.relievo.pose())];
+      if (key !== null) await page.keyboard.down(key);
+      await page.mouse.move(from.x, from.y);
+      await page.mouse.down({ button });
+      await page.mouse.move(from.x + 50, from.y - 30, { steps: 5 });
+      await page.mouse.up({ button });
+      if (key !== null) await page.keyboard.up(key);
+      await still(page);
+      const [to, after] = [await toPage(page, point), await page.evaluate(() => window.relievo.pose())];
+      near(to.x - from.x, 50, 3, `to the right by the ${button} button`);
+      near(to.y - from.y, -30, 3, `up by the ${button} button`);
+      const gaze = ({ position, target }) => target.map((t, i) => t - position[i]);
+      for (const i of [0, 1, 2]) near(gaze(after)[i], gaze(before)[i], 1e-6, 'where it looks');
+    }
+    await press(page, 'r');
+  },
+
+  async 'the field of view is the one that was chosen'(page) {
+    const half = kPage.height / 2;
+    const shown = async () => {
+      // Two places as far away as each other, along the page's height: how far apart they are says the angle.
+      const { position, target } = await page.evaluate(() => window.relievo.pose());
+      const back = unit(position.map((c, i) => c - target[i]));
+      const up = cross(back, unit(cross([0, 1, 0], back)));
+      const far = Math.hypot(...position.map((c, i) => c - target[i]));
+      const place = (share) => target.map((c, i) => (c + share * far * up[i]) * (i === 0 ? 1 : -1));
+      const [low, high] = [await toPage(page, place(-0.1)), await toPage(page, place(0.1))];
+      return (2 * Math.atan((half * 0.2) / Math.hypot(high.x - low.x, high.y - low.y)) * 180) / Math.PI;
+    };
+    near(await shown(), (2 * Math.atan(kPicture.height / 2 / kPicture.focal) * 180) / Math.PI, 0.05, "the rig camera's");
+    await press(page, 'b');
+    const slider = page.getByRole('slider', { name: 'Field of view' });
+    for (const degrees of [25, 70]) {
+      await slider.fill(String(degrees));
+      await still(page);
+      near(await shown(), degrees, 0.05, 'degrees');
+      assert.match(await page.textContent('#panel-display'), new RegExp(`Field of view${degrees}°`));
+    }
+    await slider.fill(await slider.getAttribute('min'));
+    await press(page, 'Escape');
+  },
+
+  async 'floor and axes stand in metres'() {
+    const page = await open('/'); // its ranges are of this surface alone
+    await eventually('no surface is shown', async () => {
+      feeder.say(`frame ${kFrame}`);
+      return page.evaluate((n) => window.relievo.diagnostics().frame === n, kFrame);
+    });
+    for (let i = 0; i < 4; ++i) await page.keyboard.press('-');
+    await still(page);
+    near((await look(page)).gridStep, 0.1, 1e-9, 'metres a square');
+    const { min, max } = await page.evaluate(() => window.relievo.extent());
+    // Axes are of whole steps around the surface, of which there are 5 to 10; their corner is at its lower left, far side.
+    const ends = [0, 1, 2].map((axis) => {
+      const step = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5].find((s) => (max[axis] - min[axis]) / s <= 10);
+      return [Math.floor(min[axis] / step) * step, Math.ceil(max[axis] / step) * step];
+    });
+    const lit = async (point) => {
+      const { x, y } = await toPage(page, point);
+      // A line is a pixel wide, and its place not the middle of one.
+      const around = [];
+      for (const dx of [-1, 0, 1]) for (const dy of [-1, 0, 1]) around.push(await pixel(page, { x: x + dx, y: y + dy }));
+      return around.reduce((best, rgba) => (rgba[3] > best[3] ? rgba : best));
+    };
+    const corner = [ends[0][0], ends[1][1], ends[2][1]];
+    const along = (axis, share) => corner.map((c, i) => (i === axis ? c + share * (ends[i][axis === 0 ? 1 : 0] - c) : c));
+    for (const [axis, name] of ['x', 'y', 'z'].entries()) {
+      const seen = [];
+      for (const share of [0.02, 0.97, 0.99]) seen.push(await lit(along(axis, share)));
+      // Red to the right, green up, blue away; the surface may stand before a part of one.
+      const own = ([r, g, b, a]) => a > 40 && [r, g, b][axis] === Math.max(r, g, b);
+      assert.ok(seen.filter(own).length >= 2, `the ${name} axis: ${JSON.stringify(seen)}`);
+    }
+    const behind = await lit(along(0, -0.02));
+    assert.equal(behind[3], 0, `it goes on behind its end: ${behind}`);
+    await press(page, 'g');
+    assert.equal((await lit(along(0, 0.02)))[3], 0, 'an axis that was switched off');
+    await page.evaluate(() => localStorage.clear());
+    await page.close();
+  },
+
   async 'flying moves ahead and looks around'(page) {
     await press(page, 'y');
     const before = await page.evaluate(() => window.relievo.pose());
@@ -264,7 +349,7 @@ const checks = {
     await still(page);
   },
 
-  async 'fingers turn and zoom'() {
+  async 'fingers turn, zoom, move, and set the pivot'() {
     const page = await open('/', { hasTouch: true });
     feeder.say('start ball');
     await shownPast(page, 2);
@@ -288,6 +373,25 @@ const checks = {
     await touch('touchEnd');
     await still(page);
     assert.ok(distance(await pose()) < 0.8 * distance(first), 'spreading two fingers does not zoom');
+    const closer = await pose();
+    await touch('touchStart', [380, 250], [420, 250]);
+    for (let i = 1; i <= 5; ++i) await touch('touchMove', [380 + i * 10, 250], [420 + i * 10, 250]);
+    await touch('touchEnd');
+    await still(page);
+    const aside = await pose();
+    assert.ok(aside.target[0] < closer.target[0] - 0.01, `two fingers do not move it: ${closer.target}, then ${aside.target}`);
+    near(distance(aside), distance(closer), 0.02 * distance(closer), 'distance after moving');
+    await page.keyboard.press('r');
+    await still(page);
+    const { frame } = await look(page);
+    const pivot = pointOf(0.35, 0.35, frame);
+    const at = await toPage(page, pivot);
+    await page.touchscreen.tap(at.x, at.y);
+    await page.touchscreen.tap(at.x, at.y);
+    await still(page);
+    const [middle, now] = [await freeMiddle(page), await toPage(page, pivot)];
+    near(now.x, middle.x, kJitter_px, 'what was tapped twice, to the right');
+    near(now.y, middle.y, kJitter_px, 'what was tapped twice, down');
     await page.close();
   },
 
