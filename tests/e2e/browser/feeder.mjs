@@ -103,6 +103,16 @@ export async function still(page) {
   });
 }
 
+/** Shares of the picture with flat ground and with the ball. */
+export const kPlaces = [[0.1, 0.15], [0.9, 0.2], [0.15, 0.85], [0.5, 0.5], [0.4, 0.6], [0.85, 0.8]];
+
+export const pick = (page, { x, y }) => page.evaluate(([px, py]) => window.relievo.pick(px, py), [x, y]);
+export const toPage = (page, point) => page.evaluate((p) => window.relievo.toPage(p), point);
+export async function press(page, key) {
+  await page.keyboard.press(key);
+  await still(page);
+}
+
 /** The page's parts may grow by a line before the view follows: its middle is off by no more than this. */
 export const kJitter_px = 13;
 
