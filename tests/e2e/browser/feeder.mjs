@@ -80,18 +80,21 @@ export function pagesOf(browser, origin, complaints) {
       if (!socket.url().startsWith(origin.replace('http', 'ws'))) complaints.push(`socket to ${socket.url()}`);
     });
     await page.goto(origin + path);
+    await loaded(page);
     return page;
   }
 
   return { newPage, open };
 }
 
+/** Until the page's own code is there, which comes behind the document. */
+export const loaded = (page) => page.waitForFunction(() => window.relievo !== undefined);
 export const look = (page) =>
   page.evaluate(async () => ({ ...window.relievo.diagnostics(), pixels: await window.relievo.readPixels() }));
 export const inState = (page, state) =>
   page.waitForFunction((wanted) => window.relievo?.diagnostics().state === wanted, state);
 export const shownPast = (page, count) =>
-  page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
+  page.waitForFunction((least) => window.relievo?.diagnostics().shown >= least, count);
 /** Until nothing is drawn any more: what was under way has arrived, and no motion is left. */
 export async function still(page) {
   await eventually('the picture does not come to rest', async () => {
