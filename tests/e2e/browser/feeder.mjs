@@ -80,18 +80,21 @@ export function pagesOf(browser, origin, complaints) {
       if (!socket.url().startsWith(origin.replace('http', 'ws'))) complaints.push(`socket to ${socket.url()}`);
     });
     await page.goto(origin + path);
+    await loaded(page);
     return page;
   }
 
   return { newPage, open };
 }
 
+/** Until the page's own code is there, which comes behind the document. */
+export const loaded = (page) => page.waitForFunction(() => window.relievo !== undefined);
 export const look = (page) =>
   page.evaluate(async () => ({ ...window.relievo.diagnostics(), pixels: await window.relievo.readPixels() }));
 export const inState = (page, state) =>
   page.waitForFunction((wanted) => window.relievo?.diagnostics().state === wanted, state);
 export const shownPast = (page, count) =>
-  page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
+  page.waitForFunction((least) => window.relievo?.diagnostics().shown >= least, count);
 /** Until nothing is drawn any more: what was under way has arrived, and no motion is left. */
 export async function still(page) {
   await eventually('the picture does not come to rest', async () => {
@@ -101,6 +104,16 @@ export async function still(page) {
     const after = await look(page);
     return !after.busy && after.drawn === before.drawn;
   });
+}
+
+/** Shares of the picture with flat ground and with the ball. */
+export const kPlaces = [[0.1, 0.15], [0.9, 0.2], [0.15, 0.85], [0.5, 0.5], [0.4, 0.6], [0.85, 0.8]];
+
+export const pick = (page, { x, y }) => page.evaluate(([px, py]) => window.relievo.pick(px, py), [x, y]);
+export const toPage = (page, point) => page.evaluate((p) => window.relievo.toPage(p), point);
+export async function press(page, key) {
+  await page.keyboard.press(key);
+  await still(page);
 }
 
 /** The page's parts may grow by a line before the view follows: its middle is off by no more than this. */

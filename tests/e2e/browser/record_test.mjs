@@ -114,6 +114,15 @@ const checks = {
   async 'a link to a recording in the folder shows it at its time'() {
     const page = await openRecording();
     await page.click('#tool-streams');
+    await page.waitForSelector('#panel-streams li:has-text(".mcap") canvas[data-drawn]');
+    const deviation = await page.evaluate(() => {
+      const canvas = document.querySelector('#panel-streams li canvas[data-drawn][aria-label*=".mcap"]');
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      const greens = data.filter((_, i) => i % 4 === 1);
+      const mean = greens.reduce((sum, v) => sum + v, 0) / greens.length;
+      return Math.sqrt(greens.reduce((sum, v) => sum + (v - mean) ** 2, 0) / greens.length);
+    });
+    assert.ok(deviation > 5, `its picture in the list is flat: ${deviation}`);
     await page.click('#panel-streams li:has-text(".mcap") button:has-text("Show")');
     await inState(page, 'file');
     assert.match(page.url(), /\/\?recording=kept-[^#&]*\.mcap$/);

@@ -10,7 +10,7 @@ import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
-import { pointAt } from './timeline.mjs';
+import { marksAt, pointAt } from './timeline.mjs';
 import { startWeb } from './web.mjs';
 
 const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
@@ -27,7 +27,7 @@ const exported = (format, index) => join(scratch, format, readdirSync(join(scrat
 const feeder = await Feeder.start(feederPath);
 const browser = await launchChromium();
 const complaints = [];
-const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
+const { newPage, open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
 
 const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
 /** Which camera frame is shown, and what its surface is: exact, as numbers are decoded alike whatever came before. */
@@ -44,12 +44,28 @@ async function seek(page, index) {
   }, times[index] + 1e-3);
 }
 
+/** Gathers what a page sends from here on: requests with a body, and more over a socket than words. */
+async function sentBy(page) {
+  const sent = [];
+  const client = await page.context().newCDPSession(page);
+  client.on('Network.requestWillBeSent', ({ request }) => {
+    if (request.method !== 'GET' || request.hasPostData) sent.push(`${request.method} ${request.url}`);
+  });
+  client.on('Network.webSocketFrameSent', ({ response }) => {
+    if (response.payloadData.length > 1000) sent.push(`${response.payloadData.length} over a socket`);
+  });
+  await client.send('Network.enable');
+  return sent;
+}
+let sent; // while files of this device are opened
+
 const surfaces = new Map(); // by camera frame, as they came one after the other
 let numbers = []; // of the camera frames, in order
 
 const checks = {
   async 'a recording is opened by the picker, and plays to its end'(page) {
     await inState(page, 'empty');
+    sent = await sentBy(page);
     const [chooser] = await Promise.all([page.waitForEvent('filechooser'), page.click('#tool-open')]);
     await chooser.setFiles(recorded);
     await shownPast(page, 1);
@@ -88,6 +104,10 @@ const checks = {
     assert.ok(at.length > 1 && at.length < keys.length, `key frames at ${at}`);
     assert.ok(at.slice(1).every((k, i) => k - at[i] === kKeyEvery), `key frames at ${at}`);
     assert.ok(gaps.every((gap) => gap === 0), `gaps ${gaps}`);
+    await eventually('the marks are not drawn where key frames are', async () => {
+      const marks = await marksAt(page, '--quiet');
+      return marks.every(({ high, ofColour }, i) => (keys[i] ? high >= 3 && high < 9 && ofColour : high === 0));
+    });
   },
 
   async 'wherever it is scrubbed to, the surface is that of this frame'(page) {
@@ -211,6 +231,16 @@ const checks = {
     await page.click('#dismiss');
     assert.equal(await page.isVisible('#card'), false);
     assert.equal((await look(page)).state, 'file');
+  },
+
+  async 'nothing of them has left the device'() {
+    assert.deepEqual(sent, []);
+    const probe = await newPage(); // it would have been seen
+    await probe.goto(`http://127.0.0.1:${feeder.port}/`);
+    const seen = await sentBy(probe);
+    await probe.evaluate(() => fetch('api/streams', { method: 'POST', body: 'of a file' }).catch(() => null));
+    assert.match(seen.join(), /^POST .*api.streams$/);
+    await probe.close();
   },
 
   async 'a stream is chosen again'(page) {

@@ -36,7 +36,7 @@ try {
   const begin = Date.now();
   await page.goto(address);
   const look = () => page.evaluate(async () => ({ ...window.relievo.diagnostics(), pixels: await window.relievo.readPixels() }));
-  const shownPast = (count) => page.waitForFunction((least) => window.relievo.diagnostics().shown >= least, count);
+  const shownPast = (count) => page.waitForFunction((least) => window.relievo?.diagnostics().shown >= least, count);
   await shownPast(1);
   console.log(`first picture ${Date.now() - begin} ms after the page was asked for`);
   const loaded = await loads();
@@ -64,7 +64,7 @@ try {
   modest.searchParams.set('quality', 'reduced');
   await page.goto(modest.href);
   await page.waitForFunction((full) => {
-    const { vertices } = window.relievo.diagnostics();
+    const { vertices } = window.relievo?.diagnostics() ?? {};
     return vertices > 0.3 * full && vertices < 0.7 * full;
   }, second.vertices);
   const reduced = await look();

@@ -21,6 +21,7 @@ async function placeOf(page, name, u, v) {
   const { x, y } = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
   return { point, right, at: [x, y] };
 }
+const kNowhere = { rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [0, 0, 0] };
 const moved = ({ rotation: r, translation: t }, p) => [0, 1, 2].map((i) => r[3 * i] * p[0] + r[3 * i + 1] * p[1] + r[3 * i + 2] * p[2] + t[i]);
 const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
 
@@ -330,10 +331,39 @@ const checks = {
     await page.keyboard.press('n');
     await page.waitForFunction(() => /Each stands where its rig, or a person, says/.test(document.querySelector('#panel-streams')?.textContent));
     assert.doesNotMatch(await page.evaluate(() => window.relievo.link()), /place=/);
+    await page.keyboard.press('Escape');
+
+    // A length from one to the other is that between the rigs' places.
+    const { frame } = await look(page);
+    const ends = [['ball', pointOf(0.1, 0.2, frame), kNowhere], ['other', pointOf(0.85, 0.8, kFrame + kApart), pose]];
+    const clickBoth = async (of) => {
+      for (let i = 0; i < 11; ++i) await of.keyboard.press('-'); // the panel lies over what is at the right
+      await of.keyboard.press('m');
+      await of.click('#panel-measure .segments button:text-is("Distance")');
+      await still(of);
+      for (const [name, from, its] of ends) {
+        const place = await of.evaluate((p) => window.relievo.toPage(p), moved(name === 'other' ? (await look(of)).besides[0].pose : its, from));
+        assert.equal(await of.evaluate(([px, py]) => window.relievo.pick(px, py)?.stream, [place.x, place.y]), name);
+        await of.mouse.click(place.x, place.y);
+      }
+    };
+    await clickBoth(page);
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 1);
+    const [{ value, spots }] = (await look(page)).measurements;
+    assert.deepEqual(spots.map((s) => s.stream), ['ball', 'other']);
+    const [a, b] = [moved(rig(first), ends[0][1]), moved(rig(other), ends[1][1])];
+    near(value, Math.hypot(...a.map((c, i) => c - b[i])), 0.004, 'from one rig to the other');
     await page.close();
     const linked = await open('/?stream=ball,other#place=other_0_0_0_1.2_0_0', size);
     await besides(linked, 1);
-    assert.deepEqual((await look(linked)).besides[0].pose, { rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [1.2, 0, 0] });
+    assert.deepEqual((await look(linked)).besides[0].pose, { ...kNowhere, translation: [1.2, 0, 0] });
+    // A person's hand is too inexact for that, in one frame with others too.
+    await linked.keyboard.press('n');
+    await linked.selectOption('#panel-streams select', 'together');
+    await linked.keyboard.press('Escape');
+    await clickBoth(linked);
+    await linked.waitForFunction(() => /of another stream/.test(document.querySelector('#panel-measure')?.textContent));
+    assert.deepEqual((await look(linked)).measurements, []);
     await linked.close();
   },
 

@@ -10,7 +10,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
-import { inState } from './feeder.mjs';
+import { inState, loaded } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
 import { startWeb } from './web.mjs';
@@ -46,6 +46,7 @@ async function open(browser, address = `http://127.0.0.1:${port}/?stream=ball`, 
   page.setDefaultTimeout(kPatienceMs);
   await page.addInitScript(script);
   await page.goto(address);
+  await loaded(page);
   return page;
 }
 const look = (page) => page.evaluate(() => window.relievo.diagnostics());

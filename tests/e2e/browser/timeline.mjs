@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cursor over the time line, and the picture that it shows.
+// The cursor over the time line, the picture that it shows, and the marks that are drawn on it.
 import { eventually } from './chromium.mjs';
 
 /**
@@ -39,3 +39,31 @@ export async function pointAt(page, index) {
     };
   });
 }
+
+/** Of each frame of the time line: how many pixels high the mark at it is, and whether it is of a colour of style.css. */
+export const marksAt = (page, colour) =>
+  page.evaluate((property) => {
+    const canvas = document.querySelector('#timeline .track canvas');
+    const { width, height } = canvas;
+    const context = canvas.getContext('2d');
+    const probe = new OffscreenCanvas(1, 1).getContext('2d');
+    probe.fillStyle = getComputedStyle(canvas).getPropertyValue(property);
+    probe.fillRect(0, 0, 1, 1);
+    const wanted = probe.getImageData(0, 0, 1, 1).data;
+    const { times } = window.relievo.diagnostics().playback;
+    return times.map((t) => {
+      const x = Math.round(((t - times[0]) / (times.at(-1) - times[0])) * width);
+      const { data, width: columns } = context.getImageData(Math.max(0, x - 2), 0, 4, height);
+      const isDrawn = (column, row) => data[(row * columns + column) * 4 + 3] > 60;
+      let high = 0;
+      let ofColour = false;
+      for (let column = 0; column < columns; ++column) {
+        let rows = 0;
+        while (rows < height && isDrawn(column, height - 1 - rows)) ++rows;
+        high = Math.max(high, rows);
+        const bottom = ((height - 1) * columns + column) * 4;
+        ofColour ||= rows > 0 && [0, 1, 2].every((c) => Math.abs(data[bottom + c] - wanted[c]) < 24);
+      }
+      return { high, ofColour };
+    });
+  }, colour);

@@ -6,7 +6,7 @@ import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
 import { depthOf, Feeder, inState, kPicture, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
 import { Server } from './server.mjs';
-import { pointAt } from './timeline.mjs';
+import { marksAt, pointAt } from './timeline.mjs';
 
 const [feederPath, serverPath, video] = process.argv.slice(2);
 const kScene = ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6'];
@@ -199,7 +199,14 @@ const onFeeder = {
       (before) => window.relievo.diagnostics().playback.gaps.reduce((a, b) => a + b, 0) > before,
       gaps.reduce((a, b) => a + b, 0),
     );
-    assert.ok((await look(page)).drops.link > 0);
+    const { link } = (await look(page)).drops;
+    assert.ok(link > 0);
+    await eventually('no red mark is drawn', async () => (await marksAt(page, '--bad')).some(({ high, ofColour }) => ofColour && high >= 8));
+    await page.keyboard.press('i');
+    const figure = (name) => page.locator('#panel-statistics dt', { hasText: new RegExp(`^${name}$`) }).locator('xpath=following-sibling::dd[1]').textContent();
+    await eventually('the panel does not say how many', async () => Number(await figure('page not ready')) >= link);
+    await eventually('the panel says no bit rate', async () => Number(/^([\d.]+) Mbit/.exec(await figure('received'))?.[1]) > 0);
+    await page.keyboard.press('i');
   },
 
   async 'what was is there when the server is gone, and a phone has room for it'(page) {

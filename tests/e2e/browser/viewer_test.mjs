@@ -7,7 +7,7 @@ import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
-import { Feeder, inState, look, pagesOf, shownPast } from './feeder.mjs';
+import { Feeder, inState, loaded, look, pagesOf, shownPast } from './feeder.mjs';
 import { withoutWebGl } from './web.mjs';
 
 const [feederPath, shotsWanted] = process.argv.slice(2);
@@ -241,6 +241,7 @@ const checks = {
     const near = await newPage({ viewport: { width: 800, height: 500 } });
     await near.addInitScript(() => delete HTMLCanvasElement.prototype.transferControlToOffscreen);
     await near.goto(origin);
+    await loaded(near);
     await more(near, 2);
     assert.equal(near.workers().length, workers - 1, 'a worker draws');
     assert.ok((await look(near)).pixels.covered > kCovered);

@@ -28,6 +28,7 @@ TEST_F(GatewayHttp, PageAndItsFilesAreServedWithPolicy) {
   EXPECT_EQ(page.headers.at("cache-control"), "no-cache");
   const std::string policy = page.headers.at("content-security-policy");
   EXPECT_NE(policy.find("script-src 'self' 'wasm-unsafe-eval'"), std::string::npos);
+  EXPECT_EQ(policy.find("unsafe-inline"), std::string::npos) << policy;
   EXPECT_EQ(policy.find("http"), std::string::npos) << "the page needs another host: " << policy;
   EXPECT_EQ(page.headers.at("x-content-type-options"), "nosniff");
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lengths, angles and cross-sections on a surface, with their standard deviations. Pure; metres, rig camera's frame.
-// An error of depth moves a vertex along its ray from the rig's camera; the errors of two places are independent, but
-// for that of the rig's scale, which all places of a stream share.
+// Lengths, angles and cross-sections on surfaces, with their standard deviations. Pure; metres, places in the frames of
+// their own rigs' cameras. An error of depth moves a vertex along its ray from its rig's camera; the errors of two places
+// are independent, but for that of the rig's scale, which all places of a stream share.
 import type { Surface, Vec3 } from './pick';
 import { rigDepthError, type RigError } from './rigError';
+import { moved, type Rigid } from './rigid';
 
 export const kTools = ['point', 'distance', 'angle', 'section'] as const;
 export type Tool = (typeof kTools)[number];
@@ -15,6 +16,7 @@ export interface Spot {
   point: Vec3;
   sigma: number | null; // of its depth, metres; null: not known
   stream: string; // whose camera's frame it is in
+  pose: Rigid; // of that frame in one that all spots of a measurement share
   rig: RigError | null; // of that stream; null: not known
 }
 
@@ -41,6 +43,7 @@ const unit = (a: Vec3): Vec3 => {
   return [a[0] / size, a[1] / size, a[2] / size];
 };
 
+/** Of places in one frame, but for a depth, which is of its own camera's. */
 const values: Record<Tool, (points: Vec3[]) => number> = {
   point: ([a]) => a![2],
   distance: ([a, b]) => length(minus(a!, b!)),
@@ -51,10 +54,11 @@ const values: Record<Tool, (points: Vec3[]) => number> = {
   },
 };
 
-/** `eye`: from where a section's line was drawn. */
+/** `surface`, of the spots of a section; `eye`: from where its line was drawn, in their camera's frame. */
 export function measure(tool: Tool, spots: Spot[], surface: Surface | null, eye: Vec3): Measurement {
   const points = spots.map((s) => s.point);
-  const value = values[tool];
+  const inOneFrame = (points: Vec3[]): Vec3[] => (tool === 'point' ? points : points.map((p, i) => moved(spots[i]!.pose, p)));
+  const value = (points: Vec3[]): number => values[tool](inOneFrame(points));
   const alone = (i: number) => (j: number) => i === j;
   const own = propagate(value, points, spots.map(({ sigma, point }, i) => [alone(i), sigma === null ? null : sigma / point[2]]));
   const rig = propagate(value, points, [
@@ -86,8 +90,8 @@ function propagate(value: (points: Vec3[]) => number, points: Vec3[], errors: Mo
   let variance = 0;
   for (const [moves, sigma] of errors) {
     if (sigma === null) return null;
-    const moved = (by: number): number => value(points.map((p, i) => (moves(i) ? (p.map((c) => c * (1 + by)) as Vec3) : p)));
-    variance += (((moved(step) - moved(-step)) / (2 * step)) * sigma) ** 2;
+    const off = (by: number): number => value(points.map((p, i) => (moves(i) ? (p.map((c) => c * (1 + by)) as Vec3) : p)));
+    variance += (((off(step) - off(-step)) / (2 * step)) * sigma) ** 2;
   }
   return Math.sqrt(variance);
 }

@@ -140,8 +140,8 @@ export class MeasurePanel {
     if (hit === null) return setText(this.hint, say.nothingThere);
     const { surface, stream, pose } = hit;
     const other = this.spots.some((spot) => spot.stream !== stream);
-    // Nothing says where one rig stands to another; and a section is of one surface.
-    if (other && (!this.view.isTogether || this.tool === 'section')) return setText(this.hint, say.otherStream);
+    const isTrue = [...this.spots.map((spot) => spot.stream), stream].every((name) => this.view.standsTrue(name));
+    if (other && (!isTrue || this.tool === 'section')) return setText(this.hint, say.otherStream);
     this.spots.push(this.spot(hit));
     if (this.spots.length === kSpots[this.tool]) {
       const origin = this.view.navigator.ray(at)?.origin;
@@ -153,8 +153,8 @@ export class MeasurePanel {
   }
 
   private spot(hit: Hit): Spot {
-    const { point, surface, stream } = hit;
-    return { point, sigma: sigmaAt(surface, hit), stream, rig: rigErrorOf(this.described(stream)) };
+    const { point, surface, stream, pose } = hit;
+    return { point, sigma: sigmaAt(surface, hit), stream, pose, rig: rigErrorOf(this.described(stream)) };
   }
 
   private refresh(): void {

@@ -27,6 +27,7 @@ export interface Insets {
   left: number;
 }
 
+const kRest = 1e-4; // of the distance, or radians a drawing: less is not seen
 const kJitter = 24; // pixels of the page: so much they may change before the view follows
 
 export interface NavigatorEvents {
@@ -229,7 +230,12 @@ export class Navigator {
   update(now: number): void {
     const step = this.fly.step(now);
     if (step !== null) this.pan(...step);
+    const { position, quaternion } = this.camera;
+    const [place, gaze] = [position.clone(), quaternion.clone()];
     this.controls.update();
+    // The controls tell of no step below a milliradian or a millimetre, and many such are left of a drag.
+    const moved = position.distanceTo(place) / position.distanceTo(this.controls.target) + quaternion.angleTo(gaze);
+    if (moved > kRest) this.events.changed();
     if (this.isRigView) this.projectRig();
   }
 

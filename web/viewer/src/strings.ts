@@ -115,7 +115,7 @@ export const text = {
     clear: 'Clear',
     remove: 'Remove this measurement',
     otherStream:
-      'That place is of another stream. Lengths between streams are true only where they are placed in one frame, of one camera; a section is of one.',
+      'That place is of another stream. Lengths between streams are true only where their rigs say where they stand, or all are of one camera and in one frame; a section is of one.',
     cursorOf: (stream: string, read: string) => `${stream} · ${read}`,
     cursor: (depth: string, x: string, y: string) => `depth ${depth} · right ${x} · up ${y}`,
   },

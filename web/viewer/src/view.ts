@@ -271,9 +271,14 @@ export class View {
     return this.besides.length === 0;
   }
 
-  /** Whether all surfaces stand in one camera's frame, so that lengths between them are true. */
-  get isTogether(): boolean {
-    return this.placement_ === 'together';
+  /**
+   * Whether lengths from this stream to another such one mean something: it stands where both rigs say, or in the first
+   * one's frame because a person has put all there. Places clicked by hand are too inexact, side by side means nothing.
+   */
+  standsTrue(name: string): boolean {
+    if (name === this.name) return true;
+    if (this.known.has(name)) return false;
+    return this.placement_ === 'together' || this.placeOf(name) !== null;
   }
 
   /** For good: gives back what it holds of the card. */

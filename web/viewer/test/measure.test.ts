@@ -5,8 +5,9 @@ import { lengthText, measure, measurementsCsv, section, sectionCsv, type Spot } 
 import type { Surface, Vec3 } from '../src/pick';
 import type { StreamInfo } from '../src/protocol';
 import { rigDepthError, rigErrorOf } from '../src/rigError';
+import { kNowhere, rigidOf } from '../src/rigid';
 
-const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma, stream: 'face', rig: null });
+const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma, stream: 'face', pose: kNowhere, rig: null });
 const eye: Vec3 = [0, 0, 0];
 
 /** A roof: z = 2 + |x| / 2 for x, y in -1..1. */
@@ -31,6 +32,19 @@ describe('measure', () => {
     const across = measure('distance', [spot([-0.5, 0, 1], 1e-3), spot([0.5, 0, 1], 1e-3)], null, eye);
     expect(across.sigma).toBeCloseTo(Math.SQRT2 * 0.5e-3, 7);
     expect(measure('distance', [spot([0, 0, 1], 1e-3), spot([1, 0, 1])], null, eye).sigma).toBeNull();
+  });
+
+  it('is true between streams, whose errors lie along the rays of either camera', () => {
+    const of = (point: Vec3, angle: number, to: Vec3): Spot => ({ ...spot(point, 4e-4), stream: 'vase', pose: rigidOf([0, angle, 0], to) });
+    const here = spot([0, 0, 1], 3e-4);
+    // A camera that looks at the first one from 3 m ahead of it.
+    const facing = measure('distance', [here, of([0, 0, 1.5], Math.PI, [0, 0, 3])], null, eye);
+    expect(facing).toMatchObject({ value: expect.closeTo(0.5, 9), sigma: expect.closeTo(5e-4, 9) });
+    // One that looks across: its errors of depth are none of the length.
+    const across = measure('distance', [here, of([0, 0, 1], Math.PI / 2, [-1, 0, 2])], null, eye);
+    expect(across).toMatchObject({ value: expect.closeTo(1, 9), sigma: expect.closeTo(3e-4, 9) });
+    expect(measure('angle', [{ ...here, point: [1, 0, 2] }, of([0, 0, 1], Math.PI / 2, [-1, 0, 2]), here], null, eye).value).toBeCloseTo(Math.PI / 2, 9);
+    expect(measure('point', [of([0, 0, 1.5], Math.PI, [0, 0, 3])], null, eye).value).toBe(1.5); // its own camera's depth
   });
 
   it('agrees with drawing errors at random', () => {
