@@ -119,6 +119,14 @@ CapturedFrame with_stamps_of(const CapturedFrame& frame, const CapturedFrame& st
   return out;
 }
 
+/// Where both pictures are those of one rendered frame, that frame; the end otherwise.
+std::vector<CapturedFrame>::const_iterator played(const Loaded& rendered, const Image8& picture,
+                                                  const Image8& complement) {
+  return std::find_if(rendered.frames.begin(), rendered.frames.end(), [&](const CapturedFrame& one) {
+    return same(one.picture, picture) && same(one.complement, complement);
+  });
+}
+
 /// True where some rendered frame has it, as either of its two pictures.
 bool was_played(const Loaded& rendered, const Image8& picture) {
   return std::any_of(rendered.frames.begin(), rendered.frames.end(), [&](const CapturedFrame& one) {
@@ -126,13 +134,38 @@ bool was_played(const Loaded& rendered, const Image8& picture) {
   });
 }
 
+/// The output and the camera have clocks of their own: a picture may come twice or not at all, and a
+/// progressive frame's two may be the second of one frame and the first of the next, for as long as nothing
+/// is lost. Its pictures, two by two as they were played; those that are not beside their other one are left
+/// out.
+std::vector<CapturedFrame> as_played(const Loaded& rendered, const Loaded& captured) {
+  const auto half_frame_ns = static_cast<std::int64_t>(0.5e9 / captured.info.rig.frame_rate);
+  std::vector<CapturedFrame> out;
+  std::vector<std::pair<const Image8*, std::int64_t>> pictures;
+  for (const CapturedFrame& frame : captured.frames) {
+    pictures.emplace_back(&frame.picture, frame.time_ns);
+    pictures.emplace_back(&frame.complement, frame.time_ns + half_frame_ns);
+  }
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    EXPECT_TRUE(was_played(rendered, *pictures[i].first)) << "picture " << i;
+    if (i + 1 == pictures.size()) break;
+    const auto found = played(rendered, *pictures[i].first, *pictures[i + 1].first);
+    if (found == rendered.frames.end()) continue;
+    out.push_back(found->clone());  // the same pictures
+    out.back().number = i / 2;
+    out.back().time_ns = pictures[i].second;
+    ++i;
+  }
+  return out;
+}
+
 /// Each captured frame is one of the rendered, and gives the surface that the rendered one gives at that
-/// time. The output and the camera have clocks of their own, so that a picture may come twice or not at all:
-/// a progressive frame's two are then those of two frames, and it tells nothing more.
-void expect_same_surfaces(const Loaded& rendered, const Loaded& captured) {
+/// time.
+void expect_same_surfaces(const Loaded& rendered, Loaded captured) {
   ASSERT_GE(captured.frames.size(), 8u);
   EXPECT_EQ(captured.info.rig.scan, rendered.info.rig.scan);
   EXPECT_EQ(captured.info.rig.field_order, rendered.info.rig.field_order);
+  if (captured.info.rig.scan == Scan::kProgressive) captured.frames = as_played(rendered, captured);
   Rig rig = rendered.info.rig;
   rig.frame_rate = captured.info.rig.frame_rate;  // the driver's, which has fewer digits
   auto from_camera = Reconstructor::create(captured.info.rig, captured.info.pattern, {});
@@ -141,15 +174,7 @@ void expect_same_surfaces(const Loaded& rendered, const Loaded& captured) {
   std::set<std::size_t> seen;
   std::size_t surfaces = 0;
   for (const CapturedFrame& frame : captured.frames) {
-    const auto found =
-        std::find_if(rendered.frames.begin(), rendered.frames.end(), [&](const CapturedFrame& one) {
-          return same(one.picture, frame.picture) && same(one.complement, frame.complement);
-        });
-    if (found == rendered.frames.end() && frame.scan == Scan::kProgressive) {
-      EXPECT_TRUE(was_played(rendered, frame.picture)) << "frame " << frame.number;
-      EXPECT_TRUE(was_played(rendered, frame.complement)) << "frame " << frame.number;
-      continue;
-    }
+    const auto found = played(rendered, frame.picture, frame.complement);
     ASSERT_NE(found, rendered.frames.end()) << "frame " << frame.number << " is none of those played";
     seen.insert(static_cast<std::size_t>(found - rendered.frames.begin()));
     const auto one = from_camera->add(frame), other = from_take->add(with_stamps_of(*found, frame));
