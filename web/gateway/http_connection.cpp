@@ -133,7 +133,7 @@ void HttpSession::on_head() {
       !beast::iequals(request[http::field::transfer_encoding], "chunked"))
     return on_bad_request(http::error::bad_transfer_encoding);
   const auto expects = request[http::field::expect];
-  if (expects.empty() || request.version() < 11) return parse();
+  if (expects.empty() || request.version() < 11) return parser_->is_done() ? on_request() : parse();
   if (!beast::iequals(expects, "100-continue")) {
     HttpReply content = text_reply(417, "no such expectation is met");
     return reply(std::move(content), false, request.version(), false);
