@@ -235,7 +235,7 @@ TEST_F(SeveralStreams, MetricsSayWhatItsClientsDecode) {
 
 // As of scripts that start a server and change its configuration: until it served, SIGHUP ended it.
 TEST_F(SeveralStreams, AReloadWhileItStartsIsDoneOnceItServes) {
-  // Two: those that run already slow the start of the rest, under a sanitizer without bound.
+  // Of two streams, not many: each that runs already slows the start of the rest.
   for (int tries = 0; tries < 5; ++tries) {
     Process server(command());
     ASSERT_TRUE(eventually([&] { return takes_hangup(server); })) << server.err();
