@@ -132,6 +132,19 @@ TEST(RefreshCount, KnowsADisplayThatDoesNotWait) {
   EXPECT_EQ(count.refresh_hz(), kHz);
 }
 
+// Pictures that the clock paces from then on come as if the display waited: no sign that it does.
+TEST(RefreshCount, ADisplayThatDoesNotWaitIsNotTakenForOneThatDoesOncePaced) {
+  constexpr std::int64_t kPaced_ns = 16'666'667;
+  RefreshCount count(kHz, 1);
+  std::int64_t now_ns = 0;
+  for (int i = 0; i < 20; ++i) count.flip({now_ns += 300'000, std::nullopt});
+  ASSERT_FALSE(count.synchronised());
+  for (int i = 0; i < 300; ++i) {
+    count.flip({now_ns += kPaced_ns, std::nullopt});
+    ASSERT_FALSE(count.synchronised()) << i;
+  }
+}
+
 TEST(RefreshCount, MeasuresTheRateThroughJitter) {
   constexpr std::int64_t kNtsc_ns = 16'683'333;
   RefreshCount count(kHz, 1);
