@@ -43,9 +43,10 @@ std::uint64_t RefreshCount::flip(const Flip& flip) {
   const std::size_t place = measured_++ % intervals_ns_.size();
   intervals_ns_[place] = interval_ns;
   passed_[place] = static_cast<std::uint64_t>(each_);
-  // Single pictures may come late and the next one early; only if all do nothing waits. For good: what is paced
-  // by the clock from then on comes in time.
-  if (told_hz_ > 0 && measured_ >= kLeastMeasured && median_interval_ns() <= kTooFast * each_ * 1e9 / told_hz_)
+  // Single pictures may come late and the next one early; only if all do nothing waits. For good: what is
+  // paced by the clock from then on comes in time.
+  if (told_hz_ > 0 && measured_ >= kLeastMeasured &&
+      median_interval_ns() <= kTooFast * each_ * 1e9 / told_hz_)
     synchronised_ = false;
   const auto each = static_cast<std::uint64_t>(each_);
   std::uint64_t passed = each;
