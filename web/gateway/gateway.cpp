@@ -111,7 +111,8 @@ class Server : public Gateway, private ConnectionHost {
   void from_disk(std::function<void()> read, std::function<void()> done) override {
     net::post(disk_, [this, read = std::move(read), done = std::move(done)]() mutable {
       read();
-      net::post(io_, std::move(done));
+      // `read` goes along: what it holds, the last of a session perhaps, ends on the loop's thread.
+      net::post(io_, [read = std::move(read), done = std::move(done)] { done(); });
     });
   }
   void add(std::shared_ptr<Connection> connection) override { connections_.insert(std::move(connection)); }
