@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/place_rules.h"
+
 namespace relievo {
 namespace {
 
@@ -24,34 +26,15 @@ float largest_of_row(const std::uint8_t* rgb, int width, const std::array<float,
   return largest;
 }
 
-/// Standard deviation of the values, from second differences over lines so far apart that the low-pass leaves
-/// them independent. Stripes run across lines, so most places look the same there; the 30 % quantile looks
-/// past those that do not.
 float estimate_noise(const DifferenceImage& image) {
-  constexpr int kApart = 3;
-  constexpr int kBins = 1024;
   constexpr float kPerBin = 1.F / 16;
-  constexpr float kQuantile30 = 0.3853F;  // of |N(0, 1)|
-  constexpr float kGain = 2.4495F;        // of [1 -2 1], the square root of 6
-  std::array<std::uint32_t, kBins> histogram{};
-  std::uint32_t total = 0;
-  for (int line = 0; line + 2 * kApart < image.lines; line += 7) {
-    const float* above = image.line(line);
-    const float* here = image.line(line + kApart);
-    const float* below = image.line(line + 2 * kApart);
-    for (int i = 0; i < 3 * image.width; i += 5) {
-      const float second = std::fabs(above[i] - 2 * here[i] + below[i]);
-      ++histogram[static_cast<std::size_t>(std::min<float>(kBins - 1, second / kPerBin))];
-      ++total;
-    }
-  }
-  std::uint32_t seen = 0;
-  for (int i = 0; i < kBins; ++i) {
-    seen += histogram[static_cast<std::size_t>(i)];
-    if (seen * 10 >= total * 3 && total > 0)
-      return (static_cast<float>(i) + 0.5F) * kPerBin / (kQuantile30 * kGain);
-  }
-  return 0;
+  return place_rules::noise_across_lines(
+      image, 7, kPerBin, [&](const float* above, const float* here, const float* below, auto& seconds) {
+        for (int i = 0; i < 3 * image.width; i += 5) {
+          const float second = std::fabs(above[i] - 2 * here[i] + below[i]);
+          seconds.add(static_cast<std::size_t>(second / kPerBin));
+        }
+      });
 }
 
 struct Rows {

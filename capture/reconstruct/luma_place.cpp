@@ -73,8 +73,10 @@ LumaPlace LumaPlacer::place(const DifferenceImage& image, int line, float share,
                query);
 }
 
+/// Of `rows` a window's columns are read, and one more of white on either side where the line has it.
 LumaPlace LumaPlacer::place(const LightRows& rows, int first, int width, float share,
                             const LumaQuery& query) const {
+  constexpr int kColumns = LumaWindow::kColumns;
   constexpr int kMargin = LumaView::kMargin;
   static_assert(kColumns > 2 * kLumaReach_px);
   std::array<std::array<float, kColumns + 2 * kMargin>, 4> ratios;

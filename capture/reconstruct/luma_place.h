@@ -39,6 +39,14 @@ class LumaLine {
   std::vector<std::uint8_t> ends_;
 };
 
+/// The columns about a place that it is told by. White has one more on either side, of no meaning where the
+/// line ends there.
+struct LumaWindow {
+  static constexpr int kColumns = 16;
+  std::array<float, kColumns> red, green, blue;
+  std::array<float, kColumns + 2> white;
+};
+
 /// Weights of the difference's channels in the luma of the captured colours. The matrix must have an inverse.
 std::array<float, 3> luma_weights(const std::array<double, 9>& colour_matrix);
 
@@ -61,16 +69,19 @@ class LumaPlacer {
   void places(const LumaLine& line, float share, const LumaQuery* queries, std::size_t count,
               LumaPlace* out) const;
 
-  /// The same for one on any line of kColumns or more, of which only those around are read.
+  /// The same for one on any line of LumaWindow::kColumns or more, of which only those around are read.
   LumaPlace place(const DifferenceImage& image, int line, float share, const LumaQuery& query) const;
 
-  static constexpr int kColumns = 16;
-  /// The first of kColumns about a column of a line of `width`.
+  /// The first column of a window about a column of a line of `width`.
   static int first_around(float column_px, int width) {
-    return std::clamp(static_cast<int>(column_px + 0.5F) - kColumns / 2, 0, width - kColumns);
+    return std::clamp(static_cast<int>(column_px + 0.5F) - LumaWindow::kColumns / 2, 0,
+                      width - LumaWindow::kColumns);
   }
-  /// The same of rows that have only those columns, from `first` = first_around() on.
-  LumaPlace place(const LightRows& rows, int first, int width, float share, const LumaQuery& query) const;
+  /// The same of those columns alone, from `first` = first_around() on.
+  LumaPlace place(const LumaWindow& window, int first, int width, float share, const LumaQuery& query) const {
+    return place({window.red.data(), window.green.data(), window.blue.data(), window.white.data() + 1}, first,
+                 width, share, query);
+  }
 
   /// Standard deviation of a place, from noise.
   float sigma_px(const DifferenceImage& image, int line, const LumaPlace& place) const {
@@ -83,6 +94,8 @@ class LumaPlacer {
   }
 
  private:
+  LumaPlace place(const LightRows& rows, int first, int width, float share, const LumaQuery& query) const;
+
   static constexpr float kLumaFactor = 1.3F;  // the middle level is itself measured
 
   std::array<float, 3> weights_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "capture/reconstruct/place_rules.h"
 #include "capture/reconstruct/rows.h"
 
 namespace relievo {
@@ -74,33 +75,17 @@ void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin
   }
 }
 
-/// As estimate_noise() of field_difference.cpp, of fewer lines.
 float QuickDifferencer::estimate_noise(const QuadImage& image) {
-  constexpr int kApart = 3;
-  constexpr int kBins = 1024;
   constexpr int kPerBin = QuickKernels::kScale / 4;
-  constexpr float kQuantile30 = 0.3853F;  // of |N(0, 1)|
-  constexpr float kGain = 2.4495F;        // of [1 -2 1], the square root of 6
-  std::array<std::uint32_t, kBins> histogram{};
-  std::uint32_t total = 0;
-  for (int line = 0; line + 2 * kApart < image.lines; line += 17) {
-    const std::int16_t* above = image.line(line);
-    const std::int16_t* here = image.line(line + kApart);
-    const std::int16_t* below = image.line(line + 2 * kApart);
-    for (int i = 0; i < 4 * image.width; i += 5) {
-      if (i % 4 == 3) continue;
-      const int second = std::abs(above[i] - 2 * here[i] + below[i]);
-      ++histogram[static_cast<std::size_t>(std::min(kBins - 1, second / kPerBin))];
-      ++total;
-    }
-  }
-  std::uint32_t seen = 0;
-  for (int i = 0; i < kBins; ++i) {
-    seen += histogram[static_cast<std::size_t>(i)];
-    if (seen * 10 >= total * 3 && total > 0)
-      return (static_cast<float>(i) + 0.5F) * kPerBin / (kQuantile30 * kGain);
-  }
-  return 0;
+  return place_rules::noise_across_lines(
+      image, 17, kPerBin,
+      [&](const std::int16_t* above, const std::int16_t* here, const std::int16_t* below, auto& seconds) {
+        for (int i = 0; i < 4 * image.width; i += 5) {
+          if (i % 4 == 3) continue;
+          const int second = std::abs(above[i] - 2 * here[i] + below[i]);
+          seconds.add(static_cast<std::size_t>(second / kPerBin));
+        }
+      });
 }
 
 void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, QuadImage& out) {

@@ -38,8 +38,6 @@ class QuickPlacer {
     std::vector<std::int16_t> brightest, darkest;
     std::vector<Seen> seen;  // of the worker's lines
   };
-  float projected_share(const QuadImage& image, const SequenceResult& result,
-                        const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) const;
   void look_at_line(const QuadImage& image, View8 slide, int line, const SequenceResult& result,
                     const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges);
   bool look_at_luma(const QuadImage& image, int line, const std::array<Primary, 2>& colours, const Edge& edge,

@@ -87,26 +87,8 @@ float reach_px(float gap_px) {
 
 }  // namespace
 
-QuickSequence::QuickSequence(const Pattern& pattern) : boundaries_(pattern.boundaries()) {
-  for (int s = 0; s < 2; ++s) {
-    Slide& slide = slides_[static_cast<std::size_t>(s)];
-    const int shown = std::min(s, pattern.slides - 1);
-    const int other = std::min(1 - s, pattern.slides - 1);
-    slide.by_code.assign(64 * 64, -1);
-    std::vector<int> uses(slide.by_code.size());
-    for (int b = 0; b < boundaries_; ++b) {
-      const Primary left = pattern.colour(b, shown);
-      const Primary right = pattern.colour(b + 1, shown);
-      const Primary other_left = pattern.colour(b, other);
-      const Primary other_right = pattern.colour(b + 1, other);
-      slide.colours.push_back({left, right});
-      slide.table.add(left, right, other_left, other_right);
-      const auto code = static_cast<std::size_t>(((left * 8 + right) * 8 + other_left) * 8 + other_right);
-      slide.by_code[code] = static_cast<std::int16_t>(++uses[code] == 1 ? b : -1);
-    }
-    slide.table.fill_up();
-  }
-}
+QuickSequence::QuickSequence(const Pattern& pattern)
+    : slides_(slide_colours(pattern)), boundaries_(pattern.boundaries()) {}
 
 std::uint32_t QuickSequence::edges_of_line(const QuadImage& image, int line, Scratch& scratch) {
   const float rise = std::max(kLeastRise * QuickKernels::kScale, kNoiseFactor * image.noise);
@@ -243,8 +225,7 @@ void QuickSequence::search(const QuickContext& context, const Line& line, int be
   const int end = std::min(behind + 1, line.count);
   PathCandidates& candidates = scratch.candidates;
   candidates.resize(static_cast<std::size_t>(end - begin));
-  float best_so_far = 0;
-  std::int32_t best_end = -1;
+  BestPath path;
   for (int e = begin; e < end; ++e) {
     const int place = e - begin;
     const int own = place * kPlaces;
@@ -257,32 +238,16 @@ void QuickSequence::search(const QuickContext& context, const Line& line, int be
       *gains = kSettledGain;
     } else {
       const Beside& beside = scratch.beside[static_cast<std::size_t>(e)];
-      EdgeAgreement seen{agreements(beside.left), agreements(beside.right), agreements(beside.other_left),
-                         agreements(beside.other_right), beside.tracked};
-      for (PerPrimary* side : {&seen.left, &seen.right}) side->front() = side->back() = kNoStripe;
+      const EdgeAgreement seen =
+          edge_agreement(beside.left, beside.right, beside.other_left, beside.other_right, beside.tracked);
       used = kernels.choose(table, seen, kGains, boundary, gains);
-      for (int i = 0; i < used && context.expected != nullptr; ++i) {
-        const auto [low, high] = (*context.expected)[static_cast<std::size_t>(boundary[i])];
-        const float column = line.found[e].column_px;
-        if (column < low || column > high) gains[i] -= kUnexpected;
-      }
+      doubt_unexpected(context.expected, line.found[e].column_px, used, boundary, gains);
     }
-    const float jump_from = best_so_far + kJump;
-    const bool jump = jump_from > 0;  // a path may start anywhere
-    kernels.extend({.first = std::max(0, place - 1 - kMaxSkipped),
-                    .edge = place,
-                    .start = jump ? jump_from : 0,
-                    .start_from = jump ? best_end : -1},
-                   kOrder, candidates);
-    for (std::int32_t a = own; a < own + used; ++a) {
-      const float best = candidates.best[static_cast<std::size_t>(a)];
-      best_end = best > best_so_far || e == behind ? a : best_end;
-      best_so_far = std::max(best, best_so_far);
-    }
+    path.extend(kernels, place, e == behind, candidates);
   }
   for (int e = begin; e < end; ++e)
     if (e != before && e != behind) scratch.boundary[static_cast<std::size_t>(e)] = -1;
-  for (std::int32_t a = best_end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
+  for (std::int32_t a = path.end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
     const auto e = static_cast<std::size_t>(begin + a / kPlaces);
     if (scratch.settled[e] != 0) continue;
     const std::int32_t b = candidates.boundary[static_cast<std::size_t>(a)];

@@ -53,11 +53,6 @@ class QuickSequence {
     std::uint8_t code;  // QuadSides' of the frame that it was found in
     bool clear;
   };
-  struct Slide {
-    std::vector<std::array<Primary, 2>> colours;  // of each boundary
-    BoundaryColours table;                        // the same, with those under the other slide
-    std::vector<std::int16_t> by_code;  // of QuadSides' codes, own * 64 + other's: -1: none or several
-  };
   /// An edge between settled ones: what is seen beside it.
   struct Beside {
     SideEvidence left, right, other_left, other_right;
@@ -86,7 +81,7 @@ class QuickSequence {
     return found_.data() + static_cast<std::size_t>(line) * most_on_line_;
   }
   Found* found_on(int line) { return found_.data() + static_cast<std::size_t>(line) * most_on_line_; }
-  const Slide& shown_slide(const QuickContext& c) const {
+  const SlideColours& shown_slide(const QuickContext& c) const {
     return slides_[c.order == SlideOrder::kNewerIsFirst ? 0 : 1];
   }
   std::uint32_t edges_of_line(const QuadImage& image, int line, Scratch& scratch);
@@ -106,7 +101,7 @@ class QuickSequence {
   void complete(const QuadImage& image, const QuickContext& context, int line, const EdgeImage& edges,
                 Scratch& scratch, SequenceResult& out) const;
 
-  std::array<Slide, 2> slides_;
+  std::array<SlideColours, 2> slides_;
   int boundaries_;
   std::size_t most_on_line_ = 0;
   std::vector<Found> found_;  // [line][most_on_line_]

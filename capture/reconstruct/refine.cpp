@@ -4,27 +4,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/place_rules.h"
+
 namespace relievo {
+
+using namespace place_rules;
+
 namespace {
 
-constexpr float kVarianceOfMedian = 2.198F;  // variance over median of the squares, of normal deviates
-// What the scene's contrast, 0..1, adds to a standard deviation. Zero crossings keep their place on texture
-// but are blurred as colour is, which the frame itself tells; luma is sharp but its levels are uncertain.
-constexpr float kLevelShare = 0.16F;          // of the luma ratio
-constexpr float kLeastColourBias_px = 0.25F;  // of a zero crossing
-constexpr float kMostColourBias_px = 2.F;
-constexpr float kDrawnTogether = 1.5F;      // what draws colour draws luma too, the same way
-constexpr float kModel_px = 0.012F;         // of any place: edges are not straight between samples
-constexpr float kAtStep_px = 0.1F;          // and where it lies on a step of the scene
-constexpr float kPlain = 0.05F;             // contrast that is none,
-constexpr float kContrasty = 0.1F;          // and one by which the bias is measured
-constexpr float kSteep = 0.15F;             // slope of the luma ratio that places a boundary well, a pixel
-constexpr float kApartShare = 0.35F;        // of the distance between luma's and colour's place
-constexpr float kApartNoise = 2.5F;         // beyond so many standard deviations of it
-constexpr float kNoLuma_px = 0.1F;          // where luma shows no step, and
-constexpr float kNoLumaContrast_px = 0.6F;  // times contrast more
-constexpr float kLeastRise = 0.12F;         // of luma, between the sides of a boundary that luma shows
-constexpr float kLeastSlope = 0.2F;         // of that, a pixel
+constexpr float kModel_px = 0.012F;  // of any place: edges are not straight between samples
+constexpr float kAtStep_px = 0.1F;   // and where it lies on a step of the scene
+constexpr float kPlain = 0.05F;      // contrast that is none,
+constexpr float kContrasty = 0.1F;   // and one by which the bias is measured
+constexpr float kSteep = 0.15F;      // slope of the luma ratio that places a boundary well, a pixel
 constexpr float kWideStripe_px = 12.F;
 constexpr float kShifting = 0.04F;    // contrast from which on zero crossings are put back
 constexpr float kNoEnd_px = 1e4F;     // of a stripe that ends nowhere near
@@ -33,42 +25,20 @@ constexpr float kMostCost_px = 0.5F;
 constexpr float kKeptOfCost = 0.9F;         // from frame to frame: the camera stays what it is
 constexpr std::uint32_t kLeastOfBlur = 40;  // edges that tell it
 constexpr std::uint32_t kMostOfBlur = 128;
-constexpr float kStepContrast = 0.12F;  // a step of the scene that is one
-constexpr int kRowReach_px = 4;         // columns compared with the lines above and below
-constexpr float kRowStep = 0.12F;       // difference, of the sum, that is another surface's
-constexpr float kRowNoise = 3.F;        // grey levels more: noise
-constexpr float kStepNear_px = 1.2F;
+constexpr int kShareEvery = 3;           // edges and lines that tell the ambient light
+constexpr int kRowReach_px = 4;          // columns compared with the lines above and below
+constexpr float kRowStep = 0.12F;        // difference, of the sum, that is another surface's
+constexpr float kRowNoise = 3.F;         // grey levels more: noise
 constexpr float kSharpContrast = 0.08F;  // from which on a low-pass would draw luma's place
 constexpr float kSharpLevelShare = 0.1F;
 constexpr float kSharpNoise = 1.63F;  // of luma without the low-pass along the line, by that with it
 
-/// Of a column that is not negative; a call of std::lround takes ten times as long.
-int column_of(float column_px) {
-  return static_cast<int>(column_px + 0.5F);
-}
-
 /// True where the steepest place of a step of `white` around `column_px` is there.
 bool steepest_at(const float* white, int centre, float column_px) {
-  float brightest = 0;
-  float darkest = 1e9F;
-  float steepest = -1;
-  int at = 0;
-  for (int x = centre - kContrastReach_px; x <= centre + kContrastReach_px; ++x) {
-    brightest = std::max(brightest, white[x]);
-    darkest = std::min(darkest, white[x]);
-    const float rise = std::fabs(white[x] - white[x - 1]);
-    if (rise > steepest) {
-      steepest = rise;
-      at = x;
-    }
-  }
-  if (brightest - darkest < kStepContrast * (brightest + darkest + kDarkSum)) return false;
-  const float before = std::fabs(white[at - 1] - white[at - 2]);
-  const float after = std::fabs(white[at + 1] - white[at]);
-  const float bend = before - 2 * steepest + after;
-  const float place = static_cast<float>(at) - 0.5F +
-                      (bend < 0 ? std::clamp(0.5F * (before - after) / bend, -0.5F, 0.5F) : 0);
-  return std::fabs(place - column_px) < kStepNear_px;
+  const auto [darkest, brightest] =
+      std::minmax_element(white + centre - kContrastReach_px, white + centre + kContrastReach_px + 1);
+  if (*brightest - *darkest < kStepContrast * (*brightest + *darkest + kDarkSum)) return false;
+  return std::fabs(steepest_place_px(white, centre, kContrastReach_px) - column_px) < kStepNear_px;
 }
 
 /// Mean distance of neighbouring boundaries that follow each other in the pattern.
@@ -286,45 +256,6 @@ void Refiner::refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge) 
   edge.noise_px = 1 / std::sqrt(pure_weight);
 }
 
-/// Share of the projector's light in what the frame shows: the rest is ambient. The median of the luma steps
-/// over those that white light alone would show.
-float Refiner::projected_share(const DifferenceImage& image, const SequenceResult& result,
-                               const std::vector<std::array<Primary, 2>>& colours,
-                               const EdgeImage& edges) const {
-  constexpr int kBins = 64;
-  constexpr int kSide_px = 3;
-  constexpr std::uint32_t kEvery = 3;
-  constexpr int kEveryLine = 3;
-  const std::array<float, 3>& luma = placer_.weights();
-  std::array<std::uint32_t, kBins> histogram{};
-  std::uint32_t total = 0;
-  for (int line = 0; line < edges.lines; line += kEveryLine) {
-    const float* d = image.line(line);
-    const float* white = image.white_line(line);
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; e += kEvery) {
-      if (result.boundary[e] < 0) continue;
-      const auto [left, right] = colours[static_cast<std::size_t>(result.boundary[e])];
-      const float step = placer_.ratio(right) - placer_.ratio(left);
-      const int centre = column_of(edges.edges[e].column_px);
-      if (std::fabs(step) < 0.5F || centre < kSide_px || centre + kSide_px >= image.width) continue;
-      const auto ratio = [&](int x) {
-        return (luma[0] * d[x] + luma[1] * d[image.width + x] + luma[2] * d[2 * image.width + x]) /
-               (white[x] + kDarkSum);
-      };
-      const float share = (ratio(centre + kSide_px) - ratio(centre - kSide_px)) / step;
-      ++histogram[static_cast<std::size_t>(std::clamp(share, 0.F, 0.999F) * kBins)];
-      ++total;
-    }
-  }
-  std::uint32_t seen = 0;
-  for (std::size_t i = 0; i < kBins; ++i) {
-    seen += histogram[i];
-    if (total > 0 && seen * 2 >= total) return (static_cast<float>(i) + 0.5F) / kBins;
-  }
-  return 1;
-}
-
 /// How far blurred chroma draws colour's place from luma's, in the frame at hand.
 Refiner::Drawn Refiner::colour_drawn() {
   return {std::sqrt(std::max(0.F, always_.median(0)) * kVarianceOfMedian),
@@ -336,7 +267,12 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
                      const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges,
                      const SharpLuma* sharp) {
   sharp_ = sharp;
-  share_ = projected_share(image, result, colours, edges);
+  const std::array<float, 3>& luma = placer_.weights();
+  share_ = projected_share(placer_, result, colours, edges, image.width, kShareEvery, [&](int line, int x) {
+    const float* d = image.line(line);
+    return (luma[0] * d[x] + luma[1] * d[image.width + x] + luma[2] * d[2 * image.width + x]) /
+           (image.white_line(line)[x] + kDarkSum);
+  });
   wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   seen_.resize(edges.edges.size());
   scratch_.resize(static_cast<std::size_t>(pool.threads()));

@@ -55,8 +55,6 @@ class Refiner {
   struct Drawn {
     float always_px, by_contrast_px;
   };
-  float projected_share(const DifferenceImage& image, const SequenceResult& result,
-                        const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) const;
   struct Scratch {
     LumaLine light;                    // of one line
     std::vector<LumaQuery> queries;    // of its edges that luma may place,
@@ -84,7 +82,7 @@ class Refiner {
   // What each would leave colour off luma, in pixels, summed.
   std::array<float, ColourShift::kBlurs> blur_cost_{};
   bool wide_stripes_ = false;         // in the last frame, so wide that two dark pixels are speckle
-  float share_ = 1;                   // projected_share of the last frame
+  float share_ = 1;                   // of the projector in the last frame's light
   const SharpLuma* sharp_ = nullptr;  // of the frame being refined
   std::vector<Scratch> scratch_;      // one a worker
   std::vector<LumaSeen> seen_;        // one an edge

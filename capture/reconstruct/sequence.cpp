@@ -38,42 +38,39 @@ Displacement displacement(const DifferenceImage& same, int line, const Edge& edg
 
 }  // namespace
 
-SequenceDecoder::SequenceDecoder(const Pattern& pattern) : boundaries_(pattern.boundaries()) {
+std::array<SlideColours, 2> slide_colours(const Pattern& pattern) {
+  std::array<SlideColours, 2> out;
   for (int s = 0; s < 2; ++s) {
-    Slide& slide = slides_[static_cast<std::size_t>(s)];
+    SlideColours& slide = out[static_cast<std::size_t>(s)];
     const int shown = std::min(s, pattern.slides - 1);
     const int other = std::min(1 - s, pattern.slides - 1);
-    for (int b = 0; b < boundaries_; ++b) {
-      const Primary left = pattern.colour(b, shown);
-      const Primary right = pattern.colour(b + 1, shown);
-      slide.colours.push_back({left, right});
-      slide.table.add(left, right, pattern.colour(b, other), pattern.colour(b + 1, other));
-    }
-    slide.table.fill_up();
     slide.by_code.assign(8 * 8 * 8 * 8, -1);
     std::vector<int> uses(slide.by_code.size());
-    for (int b = 0; b < boundaries_; ++b) {
-      const auto i = static_cast<std::size_t>(b);
-      const auto code = static_cast<std::size_t>(
-          ((slide.table.left[i] * 8 + slide.table.right[i]) * 8 + slide.table.other_left[i]) * 8 +
-          slide.table.other_right[i]);
+    for (int b = 0; b < pattern.boundaries(); ++b) {
+      const Primary left = pattern.colour(b, shown);
+      const Primary right = pattern.colour(b + 1, shown);
+      const Primary other_left = pattern.colour(b, other);
+      const Primary other_right = pattern.colour(b + 1, other);
+      slide.colours.push_back({left, right});
+      slide.table.add(left, right, other_left, other_right);
+      const auto code = static_cast<std::size_t>(((left * 8 + right) * 8 + other_left) * 8 + other_right);
       slide.by_code[code] = static_cast<std::int16_t>(++uses[code] == 1 ? b : -1);
     }
-  }
-}
-
-EdgeAgreement SequenceDecoder::agreement_of(const Edge& edge, const Beside& beside) {
-  EdgeAgreement out{agreements(edge.left), agreements(edge.right), agreements(beside.left),
-                    agreements(beside.right), beside.tracked};
-  for (PerPrimary* side : {&out.left, &out.right}) {  // no stripe is black or white
-    side->front() = kNoStripe;
-    side->back() = kNoStripe;
+    slide.table.fill_up();
   }
   return out;
 }
 
+SequenceDecoder::SequenceDecoder(const Pattern& pattern)
+    : slides_(slide_colours(pattern)), boundaries_(pattern.boundaries()) {}
+
+EdgeAgreement SequenceDecoder::agreement_of(const Edge& edge, const Beside& beside) {
+  return edge_agreement(edge.left, edge.right, beside.left, beside.right, beside.tracked);
+}
+
 /// What an edge is beyond doubt: every channel on both sides in both frames is clear.
-void SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out) {
+void SequenceDecoder::clear_boundary(const Edge& edge, const Beside& beside, const SlideColours& shown,
+                                     Clear& out) {
   out.boundary = -1;
   out.own = out.gain = 0;
   if (!beside.tracked) return;
@@ -120,15 +117,14 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
                                   Scratch& scratch, SequenceResult& out) {
   constexpr int kPlaces = kPathCandidates;
   const PathKernels& kernels = path_kernels();
-  const Slide& shown = shown_slide(context);
+  const SlideColours& shown = shown_slide(context);
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
   const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
   const int count = static_cast<int>(end - begin);
   PathCandidates& candidates = scratch.candidates;
   candidates.resize(static_cast<std::size_t>(count));
   scratch.clear.resize(static_cast<std::size_t>(count));
-  float best_so_far = 0;
-  std::int32_t best_end = -1;  // place at which the best path so far ends
+  BestPath path;
   for (int e = 0; e < count; ++e) {
     const auto index = begin + static_cast<std::uint32_t>(e);
     const int own = e * kPlaces;
@@ -149,25 +145,11 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
       used = beside_[index].tracked
                  ? kernels.choose(shown.table, agreement_of(edge, beside_[index]), kGains, boundary, gains)
                  : choose_moving(edges, line, index, context, scratch, boundary, gains);
-      for (int i = 0; i < used && context.expected != nullptr; ++i) {
-        const auto [low, high] = (*context.expected)[static_cast<std::size_t>(boundary[i])];
-        if (edge.column_px < low || edge.column_px > high) gains[i] -= kUnexpected;
-      }
+      doubt_unexpected(context.expected, edge.column_px, used, boundary, gains);
     }
-    const float jump_from = best_so_far + kJump;
-    const bool jump = jump_from > 0;  // a path may start anywhere
-    kernels.extend({.first = std::max(0, e - 1 - kMaxSkipped),
-                    .edge = e,
-                    .start = jump ? jump_from : 0,
-                    .start_from = jump ? best_end : -1},
-                   kOrder, candidates);
-    for (std::int32_t a = own; a < own + used; ++a) {
-      const float best = candidates.best[static_cast<std::size_t>(a)];
-      best_end = best > best_so_far ? a : best_end;
-      best_so_far = std::max(best, best_so_far);
-    }
+    path.extend(kernels, e, false, candidates);
   }
-  for (std::int32_t a = best_end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
+  for (std::int32_t a = path.end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
     const std::uint32_t index = begin + static_cast<std::uint32_t>(a / kPlaces);
     const std::int32_t boundary = candidates.boundary[static_cast<std::size_t>(a)];
     out.boundary[index] = static_cast<std::int16_t>(boundary);
@@ -175,7 +157,7 @@ void SequenceDecoder::decode_line(const EdgeImage& edges, int line, const Sequen
       convincing_[index] = convincing(edges.edges[index], beside_[index], context, boundary);
     ++scratch.in_order;
   }
-  scratch.score += best_so_far;
+  scratch.score += path.gain;
 }
 
 float SequenceDecoder::gain(const Edge& edge, const Beside& beside, const SequenceContext& context,

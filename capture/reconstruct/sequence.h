@@ -53,6 +53,18 @@ struct SequenceContext {
   const Backdrop* backdrop = nullptr;             // where boundaries stand still when nothing hides them
 };
 
+/// A slide's boundaries by their colours.
+struct SlideColours {
+  std::vector<std::array<Primary, 2>> colours;  // on both sides of each
+  BoundaryColours table;                        // the same, with those under the other slide
+  // Of each code, ((left * 8 + right) * 8 + other_left) * 8 + other_right: its boundary, -1 where it has none
+  // or several.
+  std::vector<std::int16_t> by_code;
+};
+
+/// As the newer frame shows them where that is of the pattern's first slide, and of its second.
+std::array<SlideColours, 2> slide_colours(const Pattern& pattern);
+
 /// Constant after construction but for scratch memory. One thread.
 class SequenceDecoder {
  public:
@@ -89,14 +101,6 @@ class SequenceDecoder {
     std::vector<Open> open;  // of the worker's lines
     std::size_t unsupported = 0;
   };
-  struct Slide {
-    std::vector<std::array<Primary, 2>> colours;  // of each boundary
-    BoundaryColours table;                        // the same, with those under the other slide
-    // Of each code, ((left * 8 + right) * 8 + other_left) * 8 + other_right: its boundary, -1 where it has
-    // none or several.
-    std::vector<std::int16_t> by_code;
-  };
-
   /// What the other slide's frame shows on an edge's sides.
   struct Beside {
     SideEvidence left, right;
@@ -112,7 +116,7 @@ class SequenceDecoder {
   void look_beside(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
   static EdgeAgreement agreement_of(const Edge& edge, const Beside& beside);
-  static void clear_boundary(const Edge& edge, const Beside& beside, const Slide& shown, Clear& out);
+  static void clear_boundary(const Edge& edge, const Beside& beside, const SlideColours& shown, Clear& out);
   void decode_line(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
                    SequenceResult& out);
   void check_motion(const EdgeImage& edges, int line, const SequenceContext& context, Scratch& scratch,
@@ -138,14 +142,14 @@ class SequenceDecoder {
   bool convincing(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
   float gain(const Edge& edge, const Beside& beside, const SequenceContext& context, int boundary) const;
 
-  const Slide& shown_slide(const SequenceContext& c) const {
+  const SlideColours& shown_slide(const SequenceContext& c) const {
     return slides_[c.order == SlideOrder::kNewerIsFirst ? 0 : 1];
   }
-  const Slide& other_slide(const SequenceContext& c) const {
+  const SlideColours& other_slide(const SequenceContext& c) const {
     return slides_[c.order == SlideOrder::kNewerIsFirst ? 1 : 0];
   }
 
-  std::array<Slide, 2> slides_;
+  std::array<SlideColours, 2> slides_;
   int boundaries_;
   SeenDepths depths_;  // by the frame before
   std::vector<Scratch> scratch_;

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
+#include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/line_path.h"
 
@@ -56,6 +58,48 @@ inline PerPrimary agreements(const SideEvidence& e) {
   }
   return out;
 }
+
+inline EdgeAgreement edge_agreement(const SideEvidence& left, const SideEvidence& right,
+                                    const SideEvidence& other_left, const SideEvidence& other_right,
+                                    bool tracked) {
+  EdgeAgreement out{agreements(left), agreements(right), agreements(other_left), agreements(other_right),
+                    tracked};
+  for (PerPrimary* side : {&out.left, &out.right})  // no stripe is black or white
+    side->front() = side->back() = kNoStripe;
+  return out;
+}
+
+/// Takes from an edge's candidates what depths seen before, if there are any, do not explain.
+inline void doubt_unexpected(const std::vector<ColumnRange>* expected, float column_px, int used,
+                             const std::int32_t* boundary, float* gains) {
+  for (int i = 0; i < used && expected != nullptr; ++i) {
+    const auto [low, high] = (*expected)[static_cast<std::size_t>(boundary[i])];
+    if (column_px < low || column_px > high) gains[i] -= kUnexpected;
+  }
+}
+
+/// The best path along a line's edges, as far as they were added.
+struct BestPath {
+  float gain = 0;
+  std::int32_t end = -1;  // the place at which it ends; -1: it is empty
+
+  /// By the next edge, whose candidates have their gains. `must_end`: the path ends at one of them.
+  void extend(const PathKernels& kernels, int edge, bool must_end, PathCandidates& candidates) {
+    const float jump_from = gain + kJump;
+    const bool jump = jump_from > 0;  // a path may start anywhere
+    kernels.extend({.first = std::max(0, edge - 1 - kMaxSkipped),
+                    .edge = edge,
+                    .start = jump ? jump_from : 0,
+                    .start_from = jump ? end : -1},
+                   kOrder, candidates);
+    const std::int32_t own = edge * kPathCandidates;
+    for (std::int32_t a = own; a < own + candidates.used[static_cast<std::size_t>(edge)]; ++a) {
+      const float best = candidates.best[static_cast<std::size_t>(a)];
+      end = best > gain || must_end ? a : end;
+      gain = std::max(best, gain);
+    }
+  }
+};
 
 /// `b` has three numbers or more.
 template <std::size_t N>

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "capture/reconstruct/luma_place.h"
@@ -187,6 +188,31 @@ TEST(LumaPlacer, ALineReadAsAWholeTellsTheSamePlaces) {
       for (std::size_t i = 0; i < queries.size(); ++i) {
         expect_equal(places[i], placer.place(image, 0, 0.8F, queries[i]), queries[i].own_px);
         found += places[i].found;
+      }
+    }
+  }
+  EXPECT_GT(found, 1000);
+}
+
+TEST(LumaPlacer, AWindowTellsTheSamePlaces) {
+  std::mt19937 random(12);
+  const LumaPlacer placer({1, 0, 0, 0, 1, 0, 0, 0, 1});
+  int found = 0;
+  for (const int width : {16, 17, 40, 200}) {
+    for (int round = 0; round < 20; ++round) {
+      const DifferenceImage image = random_stripes(random, width);
+      for (const LumaQuery& query : random_queries(random, width)) {
+        const int first = LumaPlacer::first_around(query.own_px, width);
+        LumaWindow window;
+        std::copy_n(image.line(0) + first, window.red.size(), window.red.begin());
+        std::copy_n(image.line(0) + width + first, window.green.size(), window.green.begin());
+        std::copy_n(image.line(0) + 2 * width + first, window.blue.size(), window.blue.begin());
+        window.white.fill(std::numeric_limits<float>::quiet_NaN());
+        for (int x = std::max(0, first - 1); x < std::min(width, first + LumaWindow::kColumns + 1); ++x)
+          window.white[static_cast<std::size_t>(x - first + 1)] = image.white_line(0)[x];
+        const LumaPlace place = placer.place(window, first, width, 0.8F, query);
+        expect_equal(place, placer.place(image, 0, 0.8F, query), query.own_px);
+        found += place.found;
       }
     }
   }

@@ -4,8 +4,11 @@
 
 #include <cmath>
 
+#include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/quick_difference.h"
 #include "capture/reconstruct/reconstructor.h"
+#include "capture/source/sim/renderer.h"
+#include "capture/source/sim/scene.h"
 #include "tests/support/striped_scene.h"
 
 namespace relievo {
@@ -46,6 +49,32 @@ TEST(QuickDecoder, GivesTheSameForAnyNumberOfThreads) {
     EXPECT_FALSE(s.positions.empty());
     EXPECT_EQ(s.positions, surfaces[0].positions);
     EXPECT_EQ(s.triangles, surfaces[0].triangles);
+  }
+}
+
+// What the scenes above lack: contrast, where luma is asked for the place, also beside the picture's sides.
+TEST(QuickDecoder, DecodesWhatHasContrast) {
+  const auto options = sim::parse_sim_options("object,width=320,height=240,stripes=45");
+  ASSERT_TRUE(options);
+  const auto scene = sim::make_scene(options->scene);
+  ASSERT_TRUE(scene);
+  const Rig rig = sim::make_rig(*options, (*scene)->view());
+  const auto pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
+  ASSERT_TRUE(pattern);
+  const sim::Renderer renderer(*options, rig, *pattern, *scene);
+  auto reconstructor = Reconstructor::create(rig, *pattern, {.decoder = Decoder::kQuick, .texture = false});
+  ASSERT_TRUE(reconstructor);
+  for (std::uint64_t n = 0; n < 3; ++n) {
+    CapturedFrame frame;
+    frame.number = n;
+    frame.time_ns = static_cast<std::int64_t>(n) * 33'366'667;
+    frame.scan = rig.scan;
+    frame.picture = renderer.render(n, false).picture;
+    const auto out = reconstructor->add(frame);
+    ASSERT_TRUE(out) << out.error().message;
+    if (n > 0) {
+      EXPECT_GT((*out)->surface.grid.size(), 2000U);
+    }
   }
 }
 
