@@ -127,10 +127,10 @@ StepFinder::StepFinder(const std::array<double, 9>& colour_matrix) {
                  [](double m) { return static_cast<float>(m); });
 }
 
-void StepFinder::read(const std::uint8_t* pixels, int centre, Light& out) const {
+void StepFinder::read(const SlideFieldView& view, int line, int centre, Light& out) const {
   out.first = centre - kReach_px;
   out.full = {};
-  const std::uint8_t* p = pixels + 3 * out.first;
+  const std::uint8_t* p = view.field.row(line) + 3 * out.first;
   for (std::size_t i = 0; i < Light::kColumns; ++i, p += 3) {
     for (std::size_t c = 0; c < 3; ++c) {
       const float value = std::max(0.F, colour_[3 * c] * static_cast<float>(p[0]) +
@@ -138,6 +138,13 @@ void StepFinder::read(const std::uint8_t* pixels, int centre, Light& out) const 
                                             colour_[3 * c + 2] * static_cast<float>(p[2]));
       out.primary[c][i] = value;
       out.full[c] = std::max(out.full[c], value);
+    }
+  }
+  if (view.ambient > 0) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float ambient = view.ambient * out.full[c];
+      for (float& value : out.primary[c]) value = std::max(0.F, value - ambient);
+      out.full[c] -= ambient;
     }
   }
   out.brightest = std::max({out.full[0], out.full[1], out.full[2], 2 * kDark});
@@ -243,7 +250,7 @@ std::optional<FoundStep> StepFinder::find(const SlideFieldView& view, int line, 
   const int centre = static_cast<int>(p.column_px + 0.5F);
   if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) return std::nullopt;
   Light light;
-  read(view.field.row(line), centre, light);
+  read(view, line, centre, light);
   const std::array<Primary, 2>& colours = view.colours[static_cast<std::size_t>(boundary)];
   const auto rise = steepest(light, colours, p.column_px);
   if (!rise) return std::nullopt;
@@ -275,7 +282,7 @@ std::optional<FieldPlace> StepFinder::balance(const SlideFieldView& view, int li
   const int centre = static_cast<int>(column_px + 0.5F);
   if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) return std::nullopt;
   Light light;
-  read(view.field.row(line), centre, light);
+  read(view, line, centre, light);
   return light.balance(view.colours[static_cast<std::size_t>(boundary)], column_px, left_px, right_px,
                        view.noise);
 }
@@ -285,7 +292,7 @@ bool StepFinder::shows_another(const SlideFieldView& view, int line, int boundar
   const int centre = static_cast<int>(column_px + 0.5F);
   if (centre < kReach_px + 1 || centre + kReach_px + 1 >= view.field.width) return false;
   Light light;
-  read(view.field.row(line), centre, light);
+  read(view, line, centre, light);
   const auto [left, right] =
       light.agreement(view.colours[static_cast<std::size_t>(boundary)], column_px, left_px, right_px);
   return std::min(left, right) < kDisagrees;

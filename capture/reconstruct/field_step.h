@@ -57,7 +57,7 @@ class StepFinder {
  private:
   struct Light;
   struct Rise;
-  void read(const std::uint8_t* pixels, int centre, Light& out) const;
+  void read(const SlideFieldView& view, int line, int centre, Light& out) const;
   static std::optional<Rise> steepest(const Light& light, const std::array<Primary, 2>& colours,
                                       float predicted_px);
 

@@ -26,6 +26,7 @@ constexpr float kKeptOfCost = 0.9F;         // from frame to frame: the camera s
 constexpr std::uint32_t kLeastOfBlur = 40;  // edges that tell it
 constexpr std::uint32_t kMostOfBlur = 128;
 constexpr int kShareEvery = 3;           // edges and lines that tell the ambient light
+constexpr float kShareOfNone = 0.68F;    // projected share, as blur leaves it, where no light is ambient
 constexpr int kRowReach_px = 4;          // columns compared with the lines above and below
 constexpr float kRowStep = 0.12F;        // difference, of the sum, that is another surface's
 constexpr float kRowNoise = 3.F;         // grey levels more: noise
@@ -76,6 +77,12 @@ bool same_surface(View8 slide, int line, int other, float column_px) {
 
 Refiner::Refiner(const std::array<double, 9>& colour_matrix)
     : placer_(colour_matrix), shift_(colour_matrix) {}
+
+float Refiner::ambient() const {
+  // Two fields show the projector's light once and the ambient light twice.
+  const float projected = std::min(1.F, share_ / kShareOfNone);
+  return (1 - projected) / (1 + projected);
+}
 
 Refiner::Place Refiner::find(const DifferenceImage& image, int line, float column_px,
                              const Sides& sides) const {

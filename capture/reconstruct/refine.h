@@ -34,6 +34,9 @@ class Refiner {
               const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges,
               const SharpLuma* sharp = nullptr);
 
+  /// Share of ambient light, 0..1, in what the field refined last shows where a stripe is lit.
+  float ambient() const;
+
   using Sides = LumaSides;
   struct Place {
     float column_px;

@@ -352,7 +352,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const bool first_slide = s.pattern.slides == 1 || s.order == SlideOrder::kNewerIsFirst;
     const SlideFieldView field{pair.slide_field(),         s.sequence.shown_colours(s.order),
                                &s.newer.difference.motion, first_slide ? 0 : 1,
-                               s.newer.difference.noise,   &s.moving};
+                               s.newer.difference.noise,   &s.moving,
+                               s.refiner.ambient()};
     s.field_placer.place(field, s.result, pool, s.edges);
     const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
     report.filters.recovered += grown;

@@ -233,7 +233,8 @@ TEST_P(Walking, IsDecoded) {
 
 INSTANTIATE_TEST_SUITE_P(Walks, Walking,
                          ::testing::Values(Walk{"Complementary", "walk", 0.97, 0.0015, 425},
-                                           Walk{"OneSlide", "walk,scheme=one-slide", 0.97, 0.0025, 720}),
+                                           Walk{"OneSlide", "walk,scheme=one-slide", 0.97, 0.0025, 720},
+                                           Walk{"StrongAmbientLight", "walk,ambient=0.8", 0.96, 0.0017, 560}),
                          [](const auto& walk) { return std::string(walk.param.name); });
 
 TEST(Accuracy, OneSlideHasOneBoundaryAtAPlace) {
