@@ -162,14 +162,16 @@ std::optional<StepFinder::Rise> StepFinder::steepest(const Light& light,
     flips += std::fabs(direction[c]);
   }
   std::array<float, 2 * kSteps + 1> steps;
-  std::size_t best = kSteps - kFurthest;
+  constexpr std::size_t kFirst = kSteps - kFurthest;
+  constexpr std::size_t kLast = kSteps + kFurthest;
+  std::size_t best = kFirst;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const float at = predicted_px + kStep_px * (static_cast<float>(i) - kSteps);
     float rise = 0;
     for (std::size_t c = 0; c < 3; ++c)
       rise += direction[c] * (light.at(c, at + kArm_px) - light.at(c, at - kArm_px));
     steps[i] = rise / flips;
-    if (steps[i] > steps[best] && i <= kSteps + kFurthest) best = i;
+    if (i > kFirst && i <= kLast && steps[i] > steps[best]) best = i;
   }
   if (steps[best] <= 0) return std::nullopt;  // of a clipped picture, or one under another camera's colours
   // The middle of what rises nearly as much: a sharp step does so as far as the arms reach.

@@ -57,6 +57,21 @@ TEST(Balance, NothingWhereTheStripesAreOtherwise) {
       finder.balance({.field = field.view(), .colours = colours, .noise = 1}, 0, 0, 5, kRoom_px, kRoom_px));
 }
 
+// The step there is another boundary's, whatever was looked at before.
+TEST(StepFinder, LooksNoFartherThanItShould) {
+  const StepFinder finder(kSameColours);
+  const std::vector<std::array<Primary, 2>> colours{{1, 6}};
+  const Image8 dark = line_with(1, 6, 0, 0);
+  const Image8 field = line_with(1, 6, 160, 160);
+  const auto find = [&](const Image8& picture, float from_px) {
+    const SlideFieldView view{.field = picture.view(), .colours = colours, .noise = 1};
+    return finder.find(view, 0, 0, {kBoundary_px + from_px, 0.5F, kRoom_px, kRoom_px});
+  };
+  EXPECT_FALSE(find(dark, 3.4F));
+  EXPECT_FALSE(find(field, 3.4F));
+  EXPECT_TRUE(find(field, 2));
+}
+
 // Without it taken off, no channel is dark enough to be off.
 TEST(StepFinder, KnowsColoursUnderAmbientLight) {
   const StepFinder finder(kSameColours);
