@@ -17,9 +17,10 @@ const memoryAlone = options.includes('--memory');
 
 const kSource = 'sim:object,stripes=120'; // over 20,000 vertices
 const kStarts = 5;
-const kTasksS = 20;
+const kTasksS = check ? 10 : 20;
 const kTaskMs = 50;
 const kSlowMs = 100; // a frame
+const kSlowLooks = check ? 10 : 20; // half a second apart
 const kBehindMs = 300;
 const kSayS = 30; // between figures of memory
 const kKeptS = 65; // what is kept to go back to has its full length then
@@ -125,7 +126,7 @@ async function slowPage() {
   const seen = [];
   const before = await report(page);
   const begin = Date.now();
-  for (let i = 0; i < 20; ++i) {
+  for (let i = 0; i < kSlowLooks; ++i) {
     await page.waitForTimeout(500);
     seen.push(await behind());
   }

@@ -16,24 +16,30 @@ const [serverPath, relievoPath] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-record-'));
 const saved = join(scratch, 'saved.mcap');
 const folder = join(scratch, 'folder');
+const briefFolder = join(scratch, 'brief');
 mkdirSync(folder);
+mkdirSync(briefFolder);
 const serve = ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5'];
 const server = await Server.start(serverPath, serve);
 const recordingServer = await Server.start(serverPath, [...serve, '--stream', 'kept', '--record-dir', folder, '--pre-roll', '30s']);
+// Its recordings are played to their ends, so little comes before.
+const briefServer = await Server.start(serverPath, [...serve, '--stream', 'brief', '--record-dir', briefFolder, '--pre-roll', '1s']);
 const browser = await launchChromium();
 const complaints = [];
 const { open } = pagesOf(browser, server.address, complaints);
 const { open: openRecording } = pagesOf(browser, recordingServer.address, complaints);
+const { open: openBrief } = pagesOf(browser, briefServer.address, complaints);
 const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
 const kKept = 12;
-async function order(action) {
-  const answer = await fetch(`${recordingServer.address}/api/recording/kept`, {
+async function order(action, server = recordingServer, stream = 'kept') {
+  const answer = await fetch(`${server.address}/api/recording/${stream}`, {
     method: 'POST',
     body: JSON.stringify({ action }),
     headers: { 'content-type': 'application/json' },
   });
   assert.equal(answer.status, 200, await answer.text());
 }
+const orderBrief = (action) => order(action, briefServer, 'brief');
 let last; // the surface shown last while it was recorded
 
 const checks = {
@@ -157,13 +163,13 @@ const checks = {
   },
 
   async 'what is being written plays, grows, and goes on at its end until it is whole'() {
-    const page = await openRecording();
+    const page = await openBrief();
     await shownPast(page, 2);
-    const before = readdirSync(folder);
-    await order('start');
+    const before = readdirSync(briefFolder);
+    await orderBrief('start');
     let file;
     await eventually('it is not listed', async () => {
-      const { recordings } = await (await fetch(`${recordingServer.address}/api/recordings`)).json();
+      const { recordings } = await (await fetch(`${briefServer.address}/api/recordings`)).json();
       file = recordings.find((r) => r.recording && !before.includes(r.file))?.file;
       return file !== undefined;
     });
@@ -201,12 +207,12 @@ const checks = {
     await page.waitForFunction((n) => window.relievo.diagnostics().frame > n, number);
 
     // Whole, it ends.
-    await order('stop');
+    await orderBrief('stop');
     await page.waitForFunction(() => {
       const { playing, index, times } = window.relievo.diagnostics().playback;
       return !playing && index === times.length - 1;
     });
-    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, file)], { encoding: 'utf8' }));
+    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(briefFolder, file)], { encoding: 'utf8' }));
     const whole = await playback(page);
     assert.equal(whole.times.length, told.frames);
     assert.equal((await look(page)).errors, 0, (await look(page)).lastError);
@@ -216,17 +222,17 @@ const checks = {
   },
 
   async 'what is being written goes on beside another recording, and is repeated once it is whole'() {
-    const before = readdirSync(folder);
-    await order('start');
+    const before = readdirSync(briefFolder);
+    await orderBrief('start');
     let file;
     await eventually('nothing of it can be read', async () => {
-      const { recordings } = await (await fetch(`${recordingServer.address}/api/recordings`)).json();
+      const { recordings } = await (await fetch(`${briefServer.address}/api/recordings`)).json();
       file = recordings.find((r) => r.recording && !before.includes(r.file))?.file;
       return file !== undefined;
     });
-    const web = await Server.startWeb(relievoPath, [saved, join(folder, file)]);
+    const web = await Server.startWeb(relievoPath, [saved, join(briefFolder, file)]);
     const { open: openBeside } = pagesOf(browser, web.address, complaints);
-    const page = await openBeside('/?stream=object,kept');
+    const page = await openBeside('/?stream=object,brief');
     const beside = (what, n) =>
       page.waitForFunction(([key, least]) => window.relievo.diagnostics().besides[0]?.[key] >= least, [what, n]);
     await beside('shown', 1);
@@ -235,9 +241,9 @@ const checks = {
     await beside('index', frames + 6);
     const { index, frames: now } = (await look(page)).besides[0];
     assert.ok(index < now, 'it does not begin again while more comes');
-    await order('stop');
+    await orderBrief('stop');
     await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].index < n, frames);
-    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, file)], { encoding: 'utf8' }));
+    const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(briefFolder, file)], { encoding: 'utf8' }));
     const [{ frames: all, errors }] = (await look(page)).besides;
     assert.deepEqual([all, errors], [told.frames, 0]);
     await page.close();
@@ -258,6 +264,7 @@ try {
   await browser.close();
   await server.kill();
   await recordingServer.kill();
+  await briefServer.kill();
   rmSync(scratch, { recursive: true, force: true });
 }
 process.exit(failed === 0 ? 0 : 1);

@@ -11,12 +11,17 @@ import { Feeder, inState, pagesOf, runChecks, shownPast } from './feeder.mjs';
 import { withoutWebGl } from './web.mjs';
 
 const [feederPath, screenshots] = process.argv.slice(2);
-const kLooks = {
-  'desktop-dark': { viewport: { width: 1000, height: 640 }, colorScheme: 'dark' },
-  'desktop-light': { viewport: { width: 1000, height: 640 }, colorScheme: 'light' },
-  'phone-dark': { viewport: { width: 390, height: 780 }, colorScheme: 'dark', hasTouch: true },
-  'phone-light': { viewport: { width: 390, height: 780 }, colorScheme: 'light', hasTouch: true },
+const kDesktop = { viewport: { width: 1000, height: 640 } };
+const kPhone = { viewport: { width: 390, height: 780 }, hasTouch: true };
+const kAllLooks = {
+  'desktop-dark': { ...kDesktop, colorScheme: 'dark' },
+  'desktop-light': { ...kDesktop, colorScheme: 'light' },
+  'phone-dark': { ...kPhone, colorScheme: 'dark' },
+  'phone-light': { ...kPhone, colorScheme: 'light' },
 };
+// What is checked is where things are: each size and each theme once suffices.
+const kChecked = ['desktop-light', 'phone-dark'];
+const kLooks = screenshots ? kAllLooks : Object.fromEntries(kChecked.map((look) => [look, kAllLooks[look]]));
 const kJpegQuality = 80;
 let feeder = await Feeder.start(feederPath);
 const origin = `http://127.0.0.1:${feeder.port}`;
