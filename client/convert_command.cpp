@@ -228,6 +228,7 @@ void report(const Options& options, const Converted& converted, const RecordedSt
 Status run(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.file, options.stream);
   if (!recorded) return recorded.error();
+  recorded->warn_if_cut();
   if (std::filesystem::exists(options.out))
     return Error{options.out.string() + " exists already: name another file, or remove it"};
   Conversion conversion(options, *recorded);

@@ -115,6 +115,7 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
 Status run(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.file, options.stream);
   if (!recorded) return recorded.error();
+  recorded->warn_if_cut();
   auto exported = export_frames(options, *recorded, stop);
   if (!exported) return exported.error();
   const std::string written = std::to_string(exported->written) + " frames are in " + options.out.string();

@@ -50,6 +50,7 @@ void wait_for_readers(const Options& options, const RawPublisher& publisher, Sto
 Status run(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.file, options.stream);
   if (!recorded) return recorded.error();
+  if (!options.play.follow) recorded->warn_if_cut();
   auto info = recorded->find_info();
   if (!info) return info.error();
   const auto range = find_range(*options.range, *recorded);

@@ -51,6 +51,7 @@ Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, c
   auto reader = RecordingReader::open(file);
   if (!reader) return reader.error();
   RecordedStream recorded;
+  recorded.file_ = file;
   recorded.reader_ = std::move(reader).value();
   const RecordingSummary& summary = recorded.reader_->summary();
 
@@ -91,6 +92,12 @@ Result<bool> RecordedStream::read_on() {
   auto more = reader_->read_on();
   if (more) read_channels();
   return more;
+}
+
+void RecordedStream::warn_if_cut() const {
+  if (summary().recovered)
+    log_warning(file_.string() +
+                " is being written, or was cut short or damaged: this is of what is whole in it");
 }
 
 std::uint64_t RecordedStream::frames() const {

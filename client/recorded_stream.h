@@ -27,6 +27,9 @@ class RecordedStream {
   static Result<RecordedStream> open(const std::filesystem::path& file, const std::string& stream);
 
   const std::string& stream() const { return stream_; }
+  /// Logs that only a part of what was recorded may be there, where that is so: a file that is cut short
+  /// reads like a shorter one.
+  void warn_if_cut() const;
   const RecordingSummary& summary() const { return reader_->summary(); }
   /// Number of frames, as the file's index has it.
   std::uint64_t frames() const;
@@ -56,6 +59,7 @@ class RecordedStream {
   RecordedStream() = default;
   void read_channels();
 
+  std::filesystem::path file_;
   std::string stream_;
   std::unique_ptr<RecordingReader> reader_;
   std::vector<std::optional<Topic>> topics_;  // of each channel; nothing where it is not of this stream

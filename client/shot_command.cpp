@@ -85,6 +85,7 @@ class Camera {
 Status of_recording(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.input, options.stream);
   if (!recorded) return recorded.error();
+  recorded->warn_if_cut();
   const auto range = find_range(*options.range, *recorded);
   if (!range) return range.error().in(options.input);
   std::optional<PinholeModel> rig;

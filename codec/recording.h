@@ -68,7 +68,8 @@ class RecordingWriter {
                                             const RecordingChannel& channel) = 0;
   virtual Status add_attachment(const RecordingAttachment& attachment) = 0;
   /// After a failed write (a full disk) the file is closed with what was written before, and its index, for
-  /// which there is always room where the file system can reserve it; every later call fails.
+  /// which there is always room where the file system can reserve it; every later call fails. The same where
+  /// the file was removed meanwhile.
   virtual Status write(const RecordedMessage& message) = 0;
   /// Closes the open chunk where it is older than chunk_ns: call while no messages come.
   virtual Status flush_if_due(std::int64_t now_ns) = 0;

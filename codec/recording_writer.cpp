@@ -197,6 +197,13 @@ class Writer final : public RecordingWriter {
     return {};
   }
 
+  /// A file without a name takes all that is written, and gives none of it back.
+  Status check_linked() const {
+    struct stat of_file {};
+    if (::fstat(file_, &of_file) != 0 || of_file.st_nlink > 0) return {};
+    return Error{"cannot write " + path_.string() + ": it was removed while it was being recorded to"};
+  }
+
   /// The first failure ends the recording: with its index where that still fits, else as it is, which readers
   /// recover.
   Status fail(const Error& error) {
@@ -207,6 +214,7 @@ class Writer final : public RecordingWriter {
     return error;
   }
   Status write_or_close(Parts parts) {
+    if (auto status = check_linked(); !status) return fail(status.error());
     std::uint64_t bytes = 0;
     for (const auto part : parts) bytes += part.size();
     if (auto status = reserve(bytes); !status) return fail(status.error());

@@ -124,6 +124,7 @@ TEST(Play, KilledRecorderLeavesAFileThatPlaysByteForByte) {
     ++runs;
     ASSERT_EQ(player.wait(), 0) << player.err();
     EXPECT_EQ(nlohmann::json::parse(player.out())["frames"], frames.size());
+    EXPECT_THAT(player.err(), HasSubstr("was cut short or damaged: this is of what is whole in it"));
     std::unique_lock lock(mutex);
     complete = changed.wait_for(lock, 1s, all_came);
   }

@@ -263,6 +263,29 @@ TEST(RecordingFault, AFullDiskEndsTheRecordingReadable) {
   }
 }
 
+/// Else it would go on for hours, and leave nothing.
+TEST(RecordingFault, AFileThatIsRemovedMeanwhileEndsTheRecordingWithAWord) {
+  const test::TempFolder folder;
+  const auto file = folder / "removed.mcap", moved = folder / "moved.mcap";
+  auto writer = RecordingWriter::create(file, {.chunk_ns = 2 * kStep_ns, .chunk_bytes = 1 << 20});
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE((*writer)->add_channel(schema(), channel("t")));
+  int n = 0;
+  const auto write = [&](int count) {
+    Status status;
+    for (int i = 0; i < count && status; ++i) status = (*writer)->write(message(0, n++, 100));
+    return status;
+  };
+  EXPECT_TRUE(write(10));
+  std::filesystem::rename(file, moved);
+  EXPECT_TRUE(write(10)) << "it has another name";
+  std::filesystem::remove(moved);
+  const Status removed = write(10);
+  ASSERT_FALSE(removed);
+  EXPECT_NE(removed.error().message.find("removed while it was being recorded to"), std::string::npos);
+  EXPECT_FALSE((*writer)->finish());
+}
+
 /// A file system of its own, that only this process sees, and nothing left behind.
 bool mount_small_disk(const std::filesystem::path& folder, const char* size) {
   return ::unshare(CLONE_NEWNS) == 0 && ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
