@@ -38,20 +38,32 @@ const checks = {
 
   async 'a picture has a transparent ground and the surface on it'(page) {
     feeder.say('stop');
+    await page.keyboard.press('Escape');
+    await page.keyboard.press('ArrowLeft'); // the eye is set by hand: a panel moves it no more
     await still(page);
+    const { pixels } = await look(page);
+    const middle = await page.evaluate(() => window.relievo.toPage([0, 0, 1.2]).x);
     await page.keyboard.press('t');
+    await still(page);
+    assert.ok((await page.evaluate(() => window.relievo.toPage([0, 0, 1.2]).x)) < middle - 100, 'the panel has moved nothing aside');
     const { name, bytes } = await saved(page, 'Picture');
     assert.match(name, /^relievo-ball-\d{6}\.png$/);
-    const { corner, covered } = await page.evaluate(async (data) => {
+    const { corner, covered, column, width } = await page.evaluate(async (data) => {
       const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]));
       const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
       context.drawImage(bitmap, 0, 0);
       const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-      const opaque = rgba.filter((v, i) => i % 4 === 3 && v > 128).length;
-      return { corner: rgba[3], covered: opaque / (bitmap.width * bitmap.height) };
+      let [opaque, columns] = [0, 0];
+      for (let i = 0; i < bitmap.width * bitmap.height; ++i) {
+        if (rgba[4 * i + 3] <= 128) continue;
+        ++opaque;
+        columns += i % bitmap.width;
+      }
+      return { corner: rgba[3], covered: opaque / (bitmap.width * bitmap.height), column: columns / opaque, width: bitmap.width };
     }, bytes.toString('base64'));
     assert.equal(corner, 0);
-    const { pixels } = await look(page);
+    // The panel that was open has no part in it.
+    assert.ok(Math.abs(column / width - middle / 800) < 0.06, `its middle is at ${column} of ${width}, not at ${middle} of 800`);
     assert.ok(Math.abs(covered - pixels.covered) < 0.01, `${covered}, not ${pixels.covered}`);
   },
 

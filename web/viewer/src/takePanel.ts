@@ -63,12 +63,14 @@ export class TakePanel {
     if (type === undefined) return setText(this.status, say.noVideo);
     // A video has no transparency: it gets the page's ground.
     view.background = getComputedStyle(document.documentElement).getPropertyValue('--ground').trim();
+    view.navigator.ignoresPanels = true; // nor would it show why its middle moves
     const recorder = new MediaRecorder(view.canvas.captureStream(kVideoRate), { mimeType: type });
     const parts: Blob[] = [];
     recorder.ondataavailable = (event) => parts.push(event.data);
     recorder.onstop = () => {
       this.recorder = null;
       view.background = null;
+      view.navigator.ignoresPanels = false;
       setText(this.video, say.video);
       this.video.setAttribute('aria-pressed', 'false');
       this.save(new Blob(parts, { type }), type.includes('mp4') ? 'mp4' : 'webm');

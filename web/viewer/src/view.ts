@@ -352,9 +352,9 @@ export class View {
     return this.painter.read(this.drawing(1)); // what is seen does not depend on how quickly it was drawn
   }
 
-  /** The same as a PNG file, transparent where nothing is; null: the browser cannot. */
+  /** The same as a PNG file, transparent where nothing is, and as if no panel were open; null: the browser cannot. */
   png(): Promise<Blob | null> {
-    return this.painter.png(this.drawing(1));
+    return this.painter.png({ ...this.drawing(1), projection: this.navigator.bareProjection });
   }
 
   /** Behind the surface, where the page cannot show through; null: nothing. */
