@@ -119,12 +119,13 @@ export async function press(page, key) {
 /** The page's parts may grow by a line before the view follows: its middle is off by no more than this. */
 export const kJitter_px = 13;
 
-/** The middle of what header, tools and time line leave free of the page: around it a view turns. */
+/** The middle of what header, tools, an open panel and time line leave free of the page: around it a view turns. */
 export const freeMiddle = (page) =>
   page.evaluate(() => {
     const box = (of) => document.querySelector(of).getBoundingClientRect();
     const cursor = box('#cursor').height; // comes and goes with the mouse
-    return { x: box('#rail').left / 2, y: (box('header').bottom + box('footer').top + (cursor > 0 ? cursor + 7 : 0)) / 2 };
+    const panel = document.querySelector('#panels aside:not([hidden])');
+    return { x: (panel ?? document.querySelector('#rail')).getBoundingClientRect().left / 2, y: (box('header').bottom + box('footer').top + (cursor > 0 ? cursor + 7 : 0)) / 2 };
   });
 
 /** Runs named checks one after the other; the number of those that failed. */

@@ -103,6 +103,8 @@ const onFeeder = {
     await page.mouse.move(740, 410, { steps: 3 });
     await page.mouse.up();
     assert.equal((await look(page)).measurements.length, 0);
+    await page.keyboard.press('c'); // beside the camera's picture there is none
+    await still(page);
     await page.mouse.click(5, 400);
     await page.waitForFunction(() => /no surface/.test(document.querySelector('#panel-measure')?.textContent));
   },

@@ -80,6 +80,44 @@ const checks = {
     await press(page, 'r');
   },
 
+  async 'an open panel moves the middle aside, and nothing else'(page) {
+    const { frame } = await look(page);
+    const pivot = pointOf(0.4, 0.4, frame);
+    const at = await toPage(page, pivot);
+    await page.mouse.dblclick(at.x, at.y);
+    await still(page);
+    const before = { pose: await page.evaluate(() => window.relievo.pose()), at: await toPage(page, pivot) };
+    for (const key of ['i', 'm', 't']) {
+      await press(page, key);
+      const [now, middle] = [await toPage(page, pivot), await freeMiddle(page)];
+      near(now.x, middle.x, kJitter_px, `pivot x with the panel of ${key}`);
+      assert.ok(now.x < before.at.x - 100, `${now.x} is where it was`);
+      assert.deepEqual(await page.evaluate(() => window.relievo.pose()), before.pose);
+      for (const [u, v] of kPlaces) {
+        const point = pointOf(u, v, frame);
+        const picked = await pick(page, await toPage(page, point));
+        for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} at ${u}, ${v}`);
+      }
+    }
+    await press(page, 'Escape');
+    near((await toPage(page, pivot)).x, before.at.x, 1e-6, 'pivot x when it is closed again');
+    await press(page, 'c');
+    const seen = await Promise.all(kPlaces.map(([u, v]) => toPage(page, pointOf(u, v, frame))));
+    await press(page, 'm');
+    assert.deepEqual(await Promise.all(kPlaces.map(([u, v]) => toPage(page, pointOf(u, v, frame)))), seen, "what the rig's camera sees moves");
+    await press(page, 'Escape');
+    await press(page, 'o');
+    await press(page, 'r');
+    await page.setViewportSize({ width: 390, height: 780 });
+    await still(page);
+    const onPhone = await toPage(page, pivot);
+    await press(page, 'm');
+    near((await toPage(page, pivot)).x, onPhone.x, 1e-6, 'pivot x under a sheet over all of the width');
+    await press(page, 'Escape');
+    await page.setViewportSize(kPage);
+    await press(page, 'r');
+  },
+
   async 'the field of view is the one that was chosen'(page) {
     const half = kPage.height / 2;
     const shown = async () => {

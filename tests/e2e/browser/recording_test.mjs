@@ -223,14 +223,23 @@ const checks = {
     assert.match(await page.textContent('#source'), /cut short/);
   },
 
-  async 'what is none is refused with a reason, and the rest goes on'(page) {
-    const bad = join(scratch, 'bad.mcap');
-    writeFileSync(bad, 'not a recording at all, only some words in a file');
-    await page.setInputFiles('#file', bad);
-    await page.waitForFunction(() => /no MCAP file/.test(document.querySelector('#card')?.textContent));
-    await page.click('#dismiss');
-    assert.equal(await page.isVisible('#card'), false);
-    assert.equal((await look(page)).state, 'file');
+  async 'what is none, or damaged, is refused with a reason, and the rest goes on'(page) {
+    const png = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 13]);
+    const promising = 'ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n';
+    for (const [name, content, words] of [
+      ['words.mcap', 'not a recording at all, only some words in a file', /no MCAP file/],
+      ['picture.mcap', png, /no MCAP file.*choose a recording/],
+      ['empty.ply', '', /is empty: copy it/],
+      ['promising.ply', promising, /ends before all that it announces/],
+      ['cut.glb', readFileSync(exported('glb', 5)).subarray(0, 5000), /ends before all that it announces/],
+    ]) {
+      await page.setInputFiles('#file', { name, mimeType: 'application/octet-stream', buffer: Buffer.from(content) });
+      await page.waitForFunction((title) => document.querySelector('#card-title')?.textContent.includes(title), name);
+      assert.match(await page.textContent('#card-text'), words, name);
+      await page.click('#dismiss');
+      assert.equal(await page.isVisible('#card'), false);
+      assert.equal((await look(page)).state, 'file');
+    }
   },
 
   async 'nothing of them has left the device'() {

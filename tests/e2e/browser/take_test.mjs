@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: what is taken away is what was seen (picture, video, PLY, GLB, link), and the
-// statistics panel says what the page itself measures. Run as: node take_test.mjs GATEWAY_FEEDER, in web/viewer.
-// Exit 77: no Chromium here.
+// statistics panel says what the page itself measures. The video's pictures are those that ffmpeg decodes, where it is there.
+// Run as: node take_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { kPatienceMs, launchChromium } from './chromium.mjs';
 import { depthOf, Feeder, inState, isRim, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
 
@@ -18,6 +21,42 @@ async function saved(page, name) {
   const [file] = await Promise.all([page.waitForEvent('download'), page.click(`#panel-take button:text-is("${name}")`)]);
   return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
 }
+
+/** The pictures of a video, as another program decodes them; null: there is none here. */
+function decoded(bytes) {
+  if (spawnSync('ffmpeg', ['-version']).error !== undefined) return null;
+  const scratch = mkdtempSync(join(tmpdir(), 'relievo-take-'));
+  const file = join(scratch, 'video');
+  try {
+    writeFileSync(file, bytes);
+    const told = execFileSync('ffprobe', ['-v', 'error', '-show_entries', 'frame=width,height', '-of', 'csv=p=0', file], { encoding: 'utf8' });
+    const sizes = told.trim().split('\n').map((line) => line.split(',').slice(0, 2).map(Number));
+    const [width, height] = sizes[0];
+    const rgb = execFileSync('ffmpeg', ['-v', 'error', '-i', file, '-fps_mode', 'passthrough', '-f', 'rawvideo', '-pix_fmt', 'rgb24', '-'], { maxBuffer: 2 ** 30 });
+    const pictures = sizes.map((_, i) => rgb.subarray(i * width * height * 3, (i + 1) * width * height * 3));
+    return { sizes, width, height, pictures };
+  } finally {
+    rmSync(scratch, { recursive: true });
+  }
+}
+
+/** Mean and standard deviation of each colour in a square of a picture. */
+function colourOf(picture, width, { x, y }, half) {
+  const sums = [0, 1, 2].map(() => [0, 0]);
+  let count = 0;
+  for (let row = y - half; row < y + half; ++row) {
+    for (let column = x - half; column < x + half; ++column, ++count) {
+      for (const c of [0, 1, 2]) {
+        const value = picture[(row * width + column) * 3 + c];
+        sums[c][0] += value;
+        sums[c][1] += value * value;
+      }
+    }
+  }
+  const means = sums.map(([sum]) => sum / count);
+  return { means, deviations: sums.map(([, squares], c) => Math.sqrt(Math.max(0, squares / count - means[c] ** 2))) };
+}
+const apart = (a, b) => Math.max(...a.map((v, i) => Math.abs(v - b[i])));
 
 const checks = {
   async 'the statistics panel adds up'(page) {
@@ -38,28 +77,46 @@ const checks = {
 
   async 'a picture has a transparent ground and the surface on it'(page) {
     feeder.say('stop');
+    await page.keyboard.press('Escape');
+    await page.keyboard.press('ArrowLeft'); // the eye is set by hand: a panel moves it no more
     await still(page);
+    const { pixels } = await look(page);
+    const middle = await page.evaluate(() => window.relievo.toPage([0, 0, 1.2]).x);
     await page.keyboard.press('t');
+    await still(page);
+    assert.ok((await page.evaluate(() => window.relievo.toPage([0, 0, 1.2]).x)) < middle - 100, 'the panel has moved nothing aside');
     const { name, bytes } = await saved(page, 'Picture');
     assert.match(name, /^relievo-ball-\d{6}\.png$/);
-    const { corner, covered } = await page.evaluate(async (data) => {
+    const { corner, covered, column, width } = await page.evaluate(async (data) => {
       const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]));
       const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
       context.drawImage(bitmap, 0, 0);
       const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-      const opaque = rgba.filter((v, i) => i % 4 === 3 && v > 128).length;
-      return { corner: rgba[3], covered: opaque / (bitmap.width * bitmap.height) };
+      let [opaque, columns] = [0, 0];
+      for (let i = 0; i < bitmap.width * bitmap.height; ++i) {
+        if (rgba[4 * i + 3] <= 128) continue;
+        ++opaque;
+        columns += i % bitmap.width;
+      }
+      return { corner: rgba[3], covered: opaque / (bitmap.width * bitmap.height), column: columns / opaque, width: bitmap.width };
     }, bytes.toString('base64'));
     assert.equal(corner, 0);
-    const { pixels } = await look(page);
+    // The panel that was open has no part in it.
+    assert.ok(Math.abs(column / width - middle / 800) < 0.06, `its middle is at ${column} of ${width}, not at ${middle} of 800`);
     assert.ok(Math.abs(covered - pixels.covered) < 0.01, `${covered}, not ${pixels.covered}`);
   },
 
   async 'a video of the view can be played'(page) {
     feeder.say('start ball');
     await page.click('#panel-take button:text-is("Video")');
+    await page.waitForSelector('#panel-take button:text-is("Stop video")');
     const { shown } = await look(page);
-    await shownPast(page, shown + 6);
+    await shownPast(page, shown + 8);
+    const at = await page.evaluate(() => {
+      const { x, y } = window.relievo.toPage([0, 0, 1]);
+      const ground = getComputedStyle(document.documentElement).getPropertyValue('--ground').trim();
+      return { x: Math.round(x), y: Math.round(y), ground: [1, 3, 5].map((i) => parseInt(ground.slice(i, i + 2), 16)) };
+    });
     const { name, bytes } = await saved(page, 'Stop video');
     assert.match(name, /\.(webm|mp4)$/);
     assert.ok(bytes.length > 2000, `${bytes.length} bytes`);
@@ -67,6 +124,25 @@ const checks = {
     const isMp4 = bytes.subarray(4, 8).toString() === 'ftyp';
     assert.ok(isWebm || isMp4, 'neither WebM nor MP4');
     assert.ok(await page.isVisible('#panel-take button:text-is("Video")'));
+    const video = decoded(bytes);
+    if (video === null) return console.log('      its pictures are not looked at: no ffmpeg here; apt-get install ffmpeg');
+    const { sizes, width, pictures } = video;
+    assert.ok(pictures.length >= 5, `${pictures.length} pictures`);
+    assert.deepEqual(sizes.filter(([w, h]) => w !== 800 || h !== 500), [], 'pictures of another size');
+    for (const [i, picture] of pictures.entries()) {
+      assert.equal(picture.length, 800 * 500 * 3, `picture ${i} is not whole`);
+      const middle = colourOf(picture, width, at, 50); // of the ball, with its squares
+      assert.ok(Math.max(...middle.deviations) > 10, `picture ${i} is uniform: ${middle.deviations}`);
+      assert.ok(apart(middle.means, at.ground) > 40, `picture ${i} shows no surface: ${middle.means}`);
+      for (const x of [20, 780]) {
+        const { means } = colourOf(picture, width, { x, y: 20 }, 10);
+        assert.ok(apart(means, at.ground) < 12, `picture ${i} has ${means} at ${x}, and the ground is ${at.ground}`);
+      }
+    }
+    const [first, last] = [pictures[0], pictures.at(-1)];
+    const moved = first.reduce((sum, v, i) => sum + Math.abs(v - last[i]), 0) / first.length;
+    assert.ok(moved > 0.5, `nothing moves: ${moved}`);
+    console.log(`      ${pictures.length} pictures; the last one is ${moved.toFixed(1)} of 255 off the first`);
   },
 
   async 'the surface is taken away as PLY and GLB'(page) {

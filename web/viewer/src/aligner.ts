@@ -85,7 +85,9 @@ export class Aligner {
     if (this.name === null) return [];
     const at = (stream: string, point: Vec3, i: number): Mark[] => {
       const pose = this.view.poseOf(stream);
-      return pose === null ? [] : [{ points: [moved(pose, point)], text: String(i + 1) }];
+      if (pose === null) return [];
+      const place = moved(pose, point);
+      return [{ points: [place], dots: [place], text: String(i + 1) }];
     };
     const { name, view, on, pairs } = this;
     const both = pairs.flatMap(([from, to], i) => [...at(view.name, to, i), ...at(name, from, i)]);

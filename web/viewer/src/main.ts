@@ -34,7 +34,7 @@ const kRefreshMs = 250;
 
 class Viewer {
   private readonly ui: Ui;
-  readonly panels = new Panels();
+  readonly panels = new Panels((box) => this.ui.watch(box));
   private readonly legend = new Legend();
   private readonly pictures = new Pictures();
   private readonly displayPanel: DisplayPanel;
@@ -79,7 +79,7 @@ class Viewer {
         this.fileProblem = null;
         this.refresh();
       },
-      insets: (insets) => this.view?.navigator.setInsets(insets),
+      insets: (parts, withPanel) => this.view?.navigator.setInsets(parts, withPanel),
       retry: () => {
         this.session.source?.retryNow();
         this.server.retryNow();

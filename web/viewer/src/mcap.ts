@@ -2,7 +2,9 @@
 // Where the messages of an MCAP file (https://mcap.dev/spec) are: by its index, or by going through it where there is
 // none, as after a crash. Only uncompressed chunks, which is what recordings have (codec/FORMAT.md). Any input.
 import { crc32 } from './crc32';
+import { FileError } from './fileError';
 import type { Sample } from './frameStore';
+import { text } from './strings';
 
 /** A file, or anything like it. `read` gives fewer bytes only at the end. */
 export interface Bytes {
@@ -46,10 +48,10 @@ const kTogether = 16; // reads at a time
 const kWindow = 2 ** 20; // read at once while looking for a recording
 const kOp = { header: 1, footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, dataEnd: 15 };
 
-/** Throws with what a person should know where the file is none of ours. */
+/** Throws a FileError where the file is none of ours. */
 export async function openMcap(file: Bytes): Promise<McapFile> {
   const start = await file.read(0, kMagic.length);
-  if (!isMagic(start)) throw new Error('it is no MCAP file');
+  if (!isMagic(start)) throw new FileError(text.file.noMcap);
   const indexed = await readIndexed(file);
   return inOrder(indexed ?? (await walk(file)));
 }
@@ -115,11 +117,17 @@ function* records(bytes: Uint8Array): Generator<Record> {
   }
 }
 
-function readChannel(content: Uint8Array, topics: Map<number, string>, id?: number): void {
+interface Channel {
+  id: number;
+  topic: string;
+}
+
+/** Null where it makes no sense. */
+function readChannel(content: Uint8Array): Channel | null {
+  if (content.length < 8) return null;
   const view = viewOf(content);
-  const length = content.length >= 8 ? view.getUint32(4, true) : Infinity;
-  if (8 + length > content.length) throw new Error('its index is damaged');
-  topics.set(id ?? view.getUint16(0, true), new TextDecoder().decode(content.subarray(8, 8 + length)));
+  const end = 8 + view.getUint32(4, true);
+  return end > content.length ? null : { id: view.getUint16(0, true), topic: new TextDecoder().decode(content.subarray(8, end)) };
 }
 
 /** The messages of chunks from `from` on. Null where there is no index, or its CRC is wrong. */
@@ -138,7 +146,11 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
   const chunks: { at: number; recordsAt: number; indexAt: number; indexBytes: number }[] = [];
   try {
     for (const { op, content } of records(summary)) {
-      if (op === kOp.channel) readChannel(content, topics);
+      if (op === kOp.channel) {
+        const channel = readChannel(content);
+        if (channel === null) return null;
+        topics.set(channel.id, channel.topic);
+      }
       if (op !== kOp.chunkIndex) continue;
       const chunk = readChunkIndex(content);
       if (chunk.at >= from) chunks.push(chunk);
@@ -151,12 +163,10 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
     }
     return { topics, messages, end: summaryAt - kDataEndBytes, damage: null };
   } catch (error) {
-    if (error instanceof Compressed) throw error;
+    if (error instanceof FileError) throw error;
     return null;
   }
 }
-
-class Compressed extends Error {}
 
 function readChunkIndex(content: Uint8Array): { at: number; recordsAt: number; indexAt: number; indexBytes: number } {
   const view = viewOf(content);
@@ -173,7 +183,7 @@ function checkCompression(content: Uint8Array, at: number): void {
   const length = viewOf(content).getUint32(at, true);
   if (length === 0) return;
   const name = new TextDecoder().decode(content.subarray(at + 4, at + 4 + Math.min(length, 16)));
-  throw new Compressed(`its chunks are compressed (${name}), which is not read here`);
+  throw new FileError(text.file.compressed(name));
 }
 
 function addIndexed(index: Uint8Array, recordsAt: number, size: number, messages: McapMessage[]): void {
@@ -205,13 +215,15 @@ class Walked {
     return this.parts > 1;
   }
 
+  /** One that makes no sense is left out, and its messages have no topic. */
   addChannel(content: Uint8Array): void {
+    const channel = readChannel(content);
+    if (channel === null) return;
     const told = new TextDecoder('latin1').decode(content.subarray(4)); // all but its numbers
-    const own = viewOf(content).getUint16(0, true);
-    const id = this.channels.get(told) ?? kIds * (this.parts - 1) + own;
+    const id = this.channels.get(told) ?? kIds * (this.parts - 1) + channel.id;
     this.channels.set(told, id);
-    this.ids.set(own, id);
-    readChannel(content, this.found.topics, id);
+    this.ids.set(channel.id, id);
+    this.found.topics.set(id, channel.topic);
   }
 
   /** False where its CRC is wrong. */

@@ -2,6 +2,7 @@
 // Lengths, angles and cross-sections on surfaces, with their standard deviations. Pure; metres, places in the frames of
 // their own rigs' cameras. An error of depth moves a vertex along its ray from its rig's camera; the errors of two places
 // are independent, but for that of the rig's scale, which all places of a stream share.
+import type { Mark } from './overlay';
 import type { Surface, Vec3 } from './pick';
 import { rigDepthError, type RigError } from './rigError';
 import { moved, type Rigid } from './rigid';
@@ -76,6 +77,16 @@ export function measure(tool: Tool, spots: Spot[], surface: Surface | null, eye:
     rig,
     profile: tool === 'section' && surface !== null ? section(surface, points[0]!, points[1]!, eye, spots[0]!.rig) : [],
   };
+}
+
+/**
+ * What is drawn of a measurement: its spots, which a section's line may miss, and the line. `poses` of the spots' cameras
+ * in the scene.
+ */
+export function markOf({ spots, profile }: Pick<Measurement, 'spots' | 'profile'>, poses: readonly Rigid[], text: string): Mark {
+  const dots = spots.map(({ point }, i) => moved(poses[i]!, point));
+  const path = profile.flatMap(([a, b]) => [moved(poses[0]!, a.point), moved(poses[0]!, b.point)]);
+  return { points: path.length > 0 ? path : dots, dots, text };
 }
 
 const together = (surface: number | null, rig: number | null): number | null =>

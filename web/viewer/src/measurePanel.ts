@@ -5,6 +5,7 @@ import { copy, download, fileName } from './download';
 import {
   kSpots,
   kTools,
+  markOf,
   measure,
   measurementsCsv,
   sectionCsv,
@@ -177,13 +178,12 @@ export class MeasurePanel {
   }
 
   private marks(): Mark[] {
-    const mark = (spots: readonly Spot[], profile: Measurement['profile'], text: string): Mark[] => {
-      const poses = spots.map(({ stream }) => this.view.poseOf(stream));
-      if (poses.length === 0 || poses.includes(null)) return []; // of a stream that is not to be seen
-      const path = profile.flatMap(([a, b]) => [moved(poses[0]!, a.point), moved(poses[0]!, b.point)]);
-      return [{ points: path.length > 0 ? path : spots.map(({ point }, i) => moved(poses[i]!, point)), text }];
+    const mark = (of: Pick<Measurement, 'spots' | 'profile'>, text: string): Mark[] => {
+      const poses = of.spots.map(({ stream }) => this.view.poseOf(stream)).filter((pose) => pose !== null);
+      if (of.spots.length === 0 || poses.length < of.spots.length) return []; // of a stream that is not to be seen
+      return [markOf(of, poses, text)];
     };
-    return [...this.measurements.flatMap((m) => mark(m.spots, m.profile, valueText(m))), ...mark(this.spots, [], '')];
+    return [...this.measurements.flatMap((m) => mark(m, valueText(m))), ...mark({ spots: this.spots, profile: [] }, '')];
   }
 
   private drawPlot(): void {

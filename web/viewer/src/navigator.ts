@@ -4,6 +4,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { kFov, type Way } from './display';
 import { Fly } from './fly';
+import { freeOf, kNoInsets, viewOffset, type Insets } from './insets';
 import type { Vec3 } from './pick';
 import type { Pinhole } from './protocol';
 import { lensOf, rigFrustum, rigRay, type Size } from './rigCamera';
@@ -17,14 +18,6 @@ const kDefaultFov = 40;
 export interface Pose {
   position: Vec3;
   target: Vec3;
-}
-
-/** What lies over the sides of what is seen, pixels of the page. */
-export interface Insets {
-  top: number;
-  right: number;
-  bottom: number;
-  left: number;
 }
 
 const kRest = 1e-4; // of the distance, or radians a drawing: less is not seen
@@ -44,7 +37,9 @@ export class Navigator {
   private extent: Extent | null = null;
   private readonly framing = new Framing();
   size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
-  private insets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
+  private insets = kNoInsets; // that the view heeds
+  private told = { parts: kNoInsets, withPanel: kNoInsets };
+  private ignoresPanels_ = false;
   private way_: Way = 'orbit';
   private fov_ = 0;
   private placed = false; // the first view is set
@@ -135,13 +130,37 @@ export class Navigator {
     this.events.changed();
   }
 
-  /** The middle of what they leave free is what is turned around, and the first view lies within. */
-  setInsets(insets: Insets): void {
+  /**
+   * Of the page's own parts, and with the panel that is open, where there is one; else both the same. The middle of what
+   * they leave free is what is turned around, and the first view lies within.
+   */
+  setInsets(parts: Insets, withPanel: Insets): void {
+    this.told = { parts, withPanel };
+    this.heed();
+  }
+
+  /** While what is seen is recorded: panels that open and close do not move it. */
+  set ignoresPanels(ignores: boolean) {
+    this.ignoresPanels_ = ignores;
+    this.heed();
+  }
+
+  private heed(): void {
+    const wanted = this.ignoresPanels_ ? this.told.parts : this.told.withPanel;
     const { top, right, bottom, left } = this.insets;
-    const moved = [insets.top - top, insets.right - right, insets.bottom - bottom, insets.left - left];
+    const moved = [wanted.top - top, wanted.right - right, wanted.bottom - bottom, wanted.left - left];
     if (moved.every((by) => Math.abs(by) < kJitter)) return;
-    this.insets = insets;
+    this.insets = wanted;
     this.resize(this.size);
+  }
+
+  /** The projection as it is while no panel is open. */
+  get bareProjection(): number[] {
+    const { parts, withPanel } = this.told;
+    if (this.isRigView || parts === withPanel || this.ignoresPanels_) return this.camera.projectionMatrix.toArray();
+    const camera = this.camera.clone();
+    camera.setViewOffset(...viewOffset(this.size, parts));
+    return camera.projectionMatrix.toArray();
   }
 
   /** Back to the first view, of the surface as it is now. */
@@ -159,7 +178,7 @@ export class Navigator {
     this.stopMotion();
     this.camera.fov = this.wantedFov();
     const tangent = Math.tan(THREE.MathUtils.degToRad(this.camera.fov) / 2); // of half the page's height
-    const { width, height } = this.free;
+    const { width, height } = freeOf(this.size, this.insets);
     const framed = this.framing.frame(this.extent);
     const view = firstView(framed, (tangent * width) / this.size.height, (tangent * height) / this.size.height);
     this.limits(view.distance);
@@ -289,19 +308,7 @@ export class Navigator {
 
   private project(): void {
     if (this.isRigView) return this.projectRig();
-    const { width, height } = this.size;
-    const { x, y } = this.free;
-    this.camera.setViewOffset(width, height, width / 2 - x, height / 2 - y, width, height); // and the matrix
-  }
-
-  /** What nothing lies over, and its middle; at least a third of the page. */
-  private get free(): { x: number; y: number; width: number; height: number } {
-    const { size } = this;
-    const along = (before: number, behind: number, all: number): [number, number] =>
-      all - before - behind < all / 3 ? [all / 2, all] : [(before + all - behind) / 2, all - before - behind];
-    const [x, width] = along(this.insets.left, this.insets.right, size.width);
-    const [y, height] = along(this.insets.top, this.insets.bottom, size.height);
-    return { x, y, width, height };
+    this.camera.setViewOffset(...viewOffset(this.size, this.insets)); // and the matrix
   }
 
   private limits(distance: number): void {

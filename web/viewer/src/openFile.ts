@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What kind of file it is, and what to read it with. The readers are loaded when they are needed.
+import { FileError, fileError } from './fileError';
 import type { Bytes } from './mcap';
 import type { DecodedFrame } from './messages';
 import type { FrameSource, Moment, SourceEvents } from './source';
+import { text } from './strings';
+
+/** Of a PLY or GLB, which are read whole: what is made of them takes some ten times as much. */
+export const kMaxSurfaceBytes = 256e6;
 
 export interface OpenedRecording {
   kind: 'recording';
@@ -22,22 +27,37 @@ async function openRecording(bytes: Bytes, isGrowing = (): boolean => false): Pr
   return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage, isGrowing };
 }
 
-/** A recording of the server. Throws as openFile. */
+/** A recording of the server. Throws with what a person should know. */
 export async function openRemote(url: URL): Promise<OpenedRecording> {
   const { RemoteFile } = await import('./remoteFile');
   const file = await RemoteFile.open(url);
   return openRecording(file, () => file.isGrowing);
 }
 
-/** Throws with what a person should know. */
+/** Throws a FileError. */
 export async function openFile(file: File): Promise<Opened> {
-  if (/\.mcap$/i.test(file.name)) {
-    const { bytesOf } = await import('./mcap');
-    return openRecording(bytesOf(file));
-  }
-  if (/\.(ply|glb)$/i.test(file.name)) {
-    const { readSurface } = await import('./surfaceFile');
+  const kind = /\.(mcap|ply|glb)$/i.exec(file.name)?.[1]!.toLowerCase();
+  if (kind === undefined) throw new FileError(text.file.otherKind);
+  if (file.size === 0) throw new FileError(text.file.empty);
+  const read = await (kind === 'mcap' ? recordingReader() : surfaceReader()).catch(() => {
+    throw new FileError(text.file.noReader);
+  });
+  return read(file).catch((error: unknown) => {
+    throw fileError(error);
+  });
+}
+
+type Reader = (file: File) => Promise<Opened>;
+
+async function recordingReader(): Promise<Reader> {
+  const [{ bytesOf }] = await Promise.all([import('./mcap'), import('./recording'), import('./recordingSource')]);
+  return (file) => openRecording(bytesOf(file));
+}
+
+async function surfaceReader(): Promise<Reader> {
+  const { readSurface } = await import('./surfaceFile');
+  return async (file) => {
+    if (file.size > kMaxSurfaceBytes) throw new FileError(text.file.tooLarge(file.size, kMaxSurfaceBytes));
     return { kind: 'surface', frame: await readSurface(file.name, await file.arrayBuffer()) };
-  }
-  throw new Error('only .mcap, .ply and .glb files can be shown');
+  };
 }

@@ -5,8 +5,8 @@ import type { Vec3 } from './pick';
 
 export interface Mark {
   points: Vec3[]; // of the scene; joined by lines
+  dots: Vec3[]; // where a person has clicked
   text: string; // at the middle of the points
-  closed?: boolean;
 }
 
 type Project = (point: Vec3) => { x: number; y: number } | null;
@@ -64,7 +64,7 @@ export class Overlay {
     for (const mark of this.marks()) this.mark(mark, project, accent, halo);
   }
 
-  private mark({ points, text }: Mark, project: Project, accent: string, halo: string): void {
+  private mark({ points, dots, text }: Mark, project: Project, accent: string, halo: string): void {
     const places = points.map(project);
     const seen = places.filter((p) => p !== null);
     if (seen.length === 0) return;
@@ -79,10 +79,10 @@ export class Overlay {
         c.stroke();
       }
     }
-    const ends = points.length > 3 ? [seen[0]!, seen[seen.length - 1]!] : seen;
-    for (const { x, y } of ends) {
+    for (const dot of dots.map(project)) {
+      if (dot === null) continue;
       c.beginPath();
-      c.arc(x, y, 4, 0, 2 * Math.PI);
+      c.arc(dot.x, dot.y, 4, 0, 2 * Math.PI);
       c.fillStyle = accent;
       c.strokeStyle = halo;
       c.lineWidth = 1.5;

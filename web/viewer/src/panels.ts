@@ -32,6 +32,9 @@ export class Panels {
   private readonly panels = new Map<RailName, Panel>();
   private opened: RailName | null = null;
 
+  /** `made`: told of each panel's box, closed. */
+  constructor(private readonly made: (box: HTMLElement) => void) {}
+
   /** A button that does something at once. */
   action(name: RailName, act: () => void): HTMLButtonElement {
     const button = railButton(name);
@@ -49,6 +52,7 @@ export class Panels {
     const box = make('aside', { id: `panel-${name}`, hidden: true }, make('header', {}, make('h2', {}, title), close), body);
     box.setAttribute('aria-label', title);
     element('panels').append(box);
+    this.made(box);
     button.setAttribute('aria-expanded', 'false');
     button.setAttribute('aria-controls', box.id);
     this.panels.set(name, { box, body, button, changed });

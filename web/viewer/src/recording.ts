@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording, of this device or of the server: which frames it has, and each one's bytes.
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
+import { FileError } from './fileError';
 import { kTextureH264, parseFrame } from './frame';
 import type { FrameStore, Sample, StoredFrame } from './frameStore';
 import { openAdded, openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
 import type { StreamInfo } from './protocol';
+import { text } from './strings';
 import { videoTextureIsKey } from './videoTexture';
 
 const kFrameTopic = 'relievo/frame';
@@ -41,7 +43,7 @@ export class Recording implements FrameStore {
   static async open(file: Bytes): Promise<Recording> {
     const found = await openMcap(file);
     const frames = ofTopic(found, kFrameTopic);
-    if (frames.length === 0) throw new Error('there is no frame of 3D video in it');
+    if (frames.length === 0) throw new FileError(found.damage === null ? text.file.noFrames : text.file.noWholeFrame);
     const described = ofTopic(found, kInfoTopic)[0];
     const description = described === undefined ? null : await readMessage(file, described);
     const info = description === null ? null : readStreamInfo(description);

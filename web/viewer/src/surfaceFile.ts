@@ -3,20 +3,25 @@
 import * as THREE from 'three';
 import { GLTFLoader, type GLTFParser } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
+import { FileError } from './fileError';
+import { checkGlb } from './glbCheck';
 import { glbDraco } from './glbDraco';
 import type { DecodedFrame } from './messages';
+import { checkPly } from './plyCheck';
+import { text } from './strings';
 import { robustExtent, type Extent } from './surface';
 
 const kHeaderBytes = 2000; // more than the comments of a PLY take
+const kMaxVertices = 2 ** 25;
 
-/** Throws where the file is none, or has nothing to show. */
+/** Throws where the file is none, damaged, or has nothing to show: a FileError, or whatever three's loaders throw. */
 export async function readSurface(name: string, bytes: ArrayBuffer): Promise<DecodedFrame> {
   return /\.ply$/i.test(name) ? readPly(bytes) : readGlb(bytes);
 }
 
 function readPly(bytes: ArrayBuffer): DecodedFrame {
+  checkPly(new Uint8Array(bytes));
   const header = new TextDecoder('latin1').decode(bytes.slice(0, kHeaderBytes));
-  if (!header.startsWith('ply')) throw new Error('it is no PLY file');
   const loader = new PLYLoader();
   loader.setCustomPropertyNameMapping({ sigma: ['sigma'], interpolated: ['interpolated'] });
   const geometry = loader.parse(bytes);
@@ -34,6 +39,7 @@ function readPly(bytes: ArrayBuffer): DecodedFrame {
 }
 
 async function readGlb(bytes: ArrayBuffer): Promise<DecodedFrame> {
+  checkGlb(bytes);
   let picture: ImageBitmap | null = null;
   const loader = new GLTFLoader().setDRACOLoader(glbDraco());
   // The loader's own way goes through blob: addresses, which the page's content policy forbids.
@@ -65,7 +71,7 @@ interface GltfJson {
 async function readPicture(parser: GLTFParser, texture: number): Promise<ImageBitmap> {
   const json = parser.json as GltfJson;
   const image = json.images[json.textures[texture]!.source]!;
-  if (image.bufferView === undefined) throw new Error('its picture lies in another file, which is not read');
+  if (image.bufferView === undefined) throw new FileError(text.file.elsewhere);
   const bytes = (await parser.getDependency('bufferView', image.bufferView)) as ArrayBuffer;
   const blob = new Blob([bytes], { type: image.mimeType ?? 'image/png' });
   return createImageBitmap(blob, { colorSpaceConversion: 'none', premultiplyAlpha: 'none' });
@@ -78,12 +84,14 @@ interface Part {
 
 function toFrame(parts: Part[]): DecodedFrame {
   const vertices = parts.reduce((sum, { geometry }) => sum + geometry.getAttribute('position').count, 0);
-  if (vertices === 0) throw new Error('there is no surface in it');
+  if (vertices === 0) throw new FileError(text.file.noSurface);
+  if (vertices > kMaxVertices) throw new FileError(text.file.tooManyVertices);
   const positions = new Float32Array(vertices * 3);
   const coordinates = all(parts, 'uv') ? new Float32Array(vertices * 2) : null;
   const colours = all(parts, 'color') ? new Float32Array(vertices * 3) : null;
-  const triangles: number[] = [];
-  let base = 0;
+  const corners = parts.reduce((sum, { geometry }) => sum + (geometry.getIndex()?.count ?? 0), 0);
+  const triangles = new Uint32Array(corners);
+  let [base, corner] = [0, 0];
   for (const { geometry, matrix } of parts) {
     const place = geometry.getAttribute('position');
     const [uv, colour] = [geometry.getAttribute('uv'), geometry.getAttribute('color')];
@@ -99,9 +107,15 @@ function toFrame(parts: Part[]): DecodedFrame {
       if (colours !== null) colours.set([colour!.getX(v), colour!.getY(v), colour!.getZ(v)], (base + v) * 3);
     }
     const index = geometry.getIndex();
-    if (index !== null) for (let i = 0; i < index.count; ++i) triangles.push(base + index.getX(i));
+    for (let i = 0; i < (index?.count ?? 0); ++i) {
+      const of = index!.getX(i);
+      if (!(of >= 0 && of < place.count)) throw new FileError(text.file.damaged);
+      triangles[corner++] = base + of;
+    }
     base += place.count;
   }
+  const extent = robustExtent(positions) ?? box(positions);
+  if (![...extent.min, ...extent.max].every(Number.isFinite)) throw new FileError(text.file.damaged);
   return {
     type: 'frame',
     id: 0,
@@ -110,11 +124,11 @@ function toFrame(parts: Part[]): DecodedFrame {
     coordinates,
     colours,
     normals: null,
-    triangles: Uint32Array.from(triangles),
+    triangles,
     edges: null,
     quality: null,
     texture: null,
-    extent: robustExtent(positions) ?? box(positions),
+    extent,
     notice: null,
     decodeMs: 0,
   };

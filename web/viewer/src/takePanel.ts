@@ -26,7 +26,7 @@ export interface Takeable {
 
 export class TakePanel {
   private readonly status = make('p', { className: 'quiet' });
-  private readonly video = button(say.video, say.videoTitle, () => this.toggleVideo());
+  private readonly video: HTMLButtonElement;
   private recorder: MediaRecorder | null = null;
 
   constructor(
@@ -34,10 +34,11 @@ export class TakePanel {
     private readonly of: Takeable,
   ) {
     this.status.setAttribute('role', 'status');
-    this.video.hidden = typeof MediaRecorder === 'undefined';
-    const row = (...buttons: HTMLElement[]): HTMLElement => make('div', { className: 'buttons' }, ...buttons);
     const guarded = (act: () => Promise<void>) => () =>
       void act().catch((error: unknown) => setText(this.status, error instanceof Error ? error.message : String(error)));
+    this.video = button(say.video, say.videoTitle, guarded(() => this.toggleVideo()));
+    this.video.hidden = typeof MediaRecorder === 'undefined';
+    const row = (...buttons: HTMLElement[]): HTMLElement => make('div', { className: 'buttons' }, ...buttons);
     const range = new RangeCard(of, (words) => setText(this.status, words));
     body.append(
       make('h3', {}, say.picture),
@@ -56,19 +57,32 @@ export class TakePanel {
     if (blob !== null) this.save(blob, 'png');
   }
 
-  private toggleVideo(): void {
+  private async toggleVideo(): Promise<void> {
     if (this.recorder !== null) return this.recorder.stop();
     const { view } = this.of;
     const type = kVideoTypes.find((t) => MediaRecorder.isTypeSupported(t));
     if (type === undefined) return setText(this.status, say.noVideo);
-    // A video has no transparency: it gets the page's ground.
-    view.background = getComputedStyle(document.documentElement).getPropertyValue('--ground').trim();
+    this.video.disabled = true; // until it has begun
+    try {
+      // A video has no transparency: it gets the page's ground.
+      await view.film(getComputedStyle(document.documentElement).getPropertyValue('--ground').trim());
+      this.record(type);
+    } catch (error) {
+      view.endFilm();
+      throw error;
+    } finally {
+      this.video.disabled = false;
+    }
+  }
+
+  private record(type: string): void {
+    const { view } = this.of;
     const recorder = new MediaRecorder(view.canvas.captureStream(kVideoRate), { mimeType: type });
     const parts: Blob[] = [];
     recorder.ondataavailable = (event) => parts.push(event.data);
     recorder.onstop = () => {
       this.recorder = null;
-      view.background = null;
+      view.endFilm();
       setText(this.video, say.video);
       this.video.setAttribute('aria-pressed', 'false');
       this.save(new Blob(parts, { type }), type.includes('mp4') ? 'mp4' : 'webm');

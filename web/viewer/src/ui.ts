@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page around the picture: badge, card, list of streams, statistics line.
 import { element, setText } from './dom';
-import type { Insets } from './navigator';
+import { withPanel, type Insets } from './insets';
 import type { Notice } from './messages';
 import type { ListedStream } from './protocol';
 import type { Presentation } from './state';
@@ -22,12 +22,14 @@ export interface UiEvents {
   stream(name: string): void;
   retry(): void;
   dismiss(): void;
-  insets(insets: Insets): void;
+  /** Of what is there for good, and with the panel that is open; the same where none is. */
+  insets(parts: Insets, withPanel: Insets): void;
 }
 
 export class Ui {
   readonly canvas = element<HTMLCanvasElement>('view');
   private shownStreams = '';
+  private readonly around: ResizeObserver; // of what lies over the picture
   private readonly cells = new Map<string, { box: HTMLElement; value: HTMLElement }>();
 
   constructor(events: UiEvents) {
@@ -43,8 +45,18 @@ export class Ui {
     const say = (name: string, size: number): void => document.body.style.setProperty(name, `${size}px`);
     new ResizeObserver(() => say('--footer', footer.offsetHeight)).observe(footer);
     new ResizeObserver(() => say('--rail', rail.offsetWidth)).observe(rail);
-    const around = new ResizeObserver(() => events.insets(this.insets));
-    for (const part of [...this.parts, this.canvas]) around.observe(part);
+    this.around = new ResizeObserver(() => {
+      const { insets } = this;
+      const panel = document.querySelector('#panels aside:not([hidden])')?.getBoundingClientRect();
+      const isSeen = panel !== undefined && panel.width > 0;
+      events.insets(insets, isSeen ? withPanel(insets, this.canvas.getBoundingClientRect(), panel) : insets);
+    });
+    for (const part of [...this.parts, this.canvas]) this.around.observe(part);
+  }
+
+  /** A panel, which lies over the picture while it is open. */
+  watch(panel: HTMLElement): void {
+    this.around.observe(panel);
   }
 
   private get parts(): [header: HTMLElement, rail: HTMLElement, footer: HTMLElement] {

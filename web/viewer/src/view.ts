@@ -333,7 +333,7 @@ export class View {
       this.scheduled = false; // what changed until here is drawn now, not once more
       if (this.ended || this.headset !== null) return;
       this.navigator.update(now);
-      this.render(this.resolution.scale);
+      this.render(this.isFilmed ? 1 : this.resolution.scale);
     });
   }
 
@@ -352,15 +352,30 @@ export class View {
     return this.painter.read(this.drawing(1)); // what is seen does not depend on how quickly it was drawn
   }
 
-  /** The same as a PNG file, transparent where nothing is; null: the browser cannot. */
+  /** The same as a PNG file, transparent where nothing is, and as if no panel were open; null: the browser cannot. */
   png(): Promise<Blob | null> {
-    return this.painter.png(this.drawing(1));
+    return this.painter.png({ ...this.drawing(1), projection: this.navigator.bareProjection });
   }
 
-  /** Behind the surface, where the page cannot show through; null: nothing. */
-  set background(colour: string | null) {
-    this.background_ = colour;
+  /**
+   * While a video is made of the canvas: `ground` is behind the surface, where the page shows through, all pictures are of
+   * one size, as fine as the screen, and panels do not move them. Resolves when the canvas is so.
+   */
+  async film(ground: string): Promise<void> {
+    this.background_ = ground;
+    this.navigator.ignoresPanels = true;
     this.invalidate();
+    await this.pixels();
+  }
+
+  endFilm(): void {
+    this.background_ = null;
+    this.navigator.ignoresPanels = false;
+    this.invalidate();
+  }
+
+  private get isFilmed(): boolean {
+    return this.background_ !== null;
   }
 
   // The rig's camera sees none.
@@ -435,7 +450,7 @@ export class View {
   }
 
   private render(scale: number): void {
-    const drawing = this.drawing(scale, !document.hidden);
+    const drawing = this.drawing(scale, !document.hidden && !this.isFilmed);
     this.painting = true;
     this.timing ||= drawing.timed;
     this.painter.draw(drawing);

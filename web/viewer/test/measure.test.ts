@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: lengths, angles and sections of known shapes are true, and errors of depth go into them as they should.
 import { describe, expect, it } from 'vitest';
-import { lengthText, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
+import { lengthText, markOf, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
 import type { Surface, Vec3 } from '../src/pick';
 import type { StreamInfo } from '../src/protocol';
 import { rigDepthError, rigErrorOf } from '../src/rigError';
@@ -185,4 +185,15 @@ describe('text', () => {
     expect(line!.slice(0, 3)).toEqual(['distance', '1.00000000', 'm']);
     expect(line![head!.indexOf('sigma2_m')]).toBe('');
   });
+});
+
+it('a section is marked where it was clicked, which may be off what was cut', () => {
+  const spots = [spot([-0.5, 0, 2.25]), spot([1.5, 0, 3])]; // the second where the surface has ended since
+  const m = measure('section', spots, roof, eye);
+  const pose = rigidOf([0, 0, 0], [1, 2, 3]);
+  const { points, dots } = markOf(m, [pose, pose], '');
+  expect(dots).toEqual([[0.5, 2, 5.25], [2.5, 2, 6]]);
+  expect(points.length).toBe(2 * m.profile.length);
+  expect(dots).not.toContainEqual(points.at(-1));
+  expect(markOf({ spots, profile: [] }, [kNowhere, kNowhere], '').points).toEqual(spots.map(({ point }) => point));
 });

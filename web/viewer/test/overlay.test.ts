@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-import { describe, expect, it } from 'vitest';
-import { overlap } from '../src/overlay';
+import { afterEach, describe, expect, it, vi } from 'vitest';
+import { overlap, Overlay } from '../src/overlay';
+import type { Vec3 } from '../src/pick';
 
 const box = (x: number, y: number): Parameters<typeof overlap>[0] => ({ x, y, width: 20, height: 10 });
 
@@ -13,4 +14,24 @@ describe('overlap', () => {
     expect(overlap(box(0, 0), box(20, 0))).toBe(false);
     expect(overlap(box(0, 0), box(0, 10))).toBe(false);
   });
+});
+
+afterEach(() => vi.unstubAllGlobals());
+
+it('dots are where they are said to be, not at the ends of a line', () => {
+  const [arcs, corners]: [number[][], number[][]] = [[], []];
+  const drawn: Record<string, unknown> = {
+    arc: (x: number, y: number) => arcs.push([x, y]),
+    moveTo: (x: number, y: number) => corners.push([x, y]),
+    lineTo: (x: number, y: number) => corners.push([x, y]),
+  };
+  const context = new Proxy(drawn, { get: (of, name: string) => of[name] ?? (() => undefined), set: () => true });
+  vi.stubGlobal('window', { devicePixelRatio: 1 });
+  vi.stubGlobal('getComputedStyle', () => ({ getPropertyValue: () => 'red' }));
+  const overlay = new Overlay({ getContext: () => context, clientWidth: 100, clientHeight: 100 } as unknown as HTMLCanvasElement);
+  const line: Vec3[] = [[10, 10, 1], [20, 12, 1], [30, 12, 1], [40, 10, 1], [50, 10, 1]];
+  overlay.marks = () => [{ points: line, dots: [[8, 10, 1], [55, 10, 1], [70, 10, -1]], text: '' }];
+  overlay.draw(([x, y, z]) => (z > 0 ? { x, y } : null), []);
+  expect(arcs).toEqual([[8, 10], [55, 10]]);
+  expect(corners).toEqual([...line, ...line].map(([x, y]) => [x, y])); // and its halo
 });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: the words that a page shows are all in its strings.ts. Reads the sources: what is given to an element as its text or name holds
-// no words of its own. Why a file cannot be read, which decoders say by throwing, is not of it.
+// no words of its own. Why a frame cannot be decoded, which decoders say by throwing, is not of it.
 import { readFileSync, readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import ts from 'typescript';
