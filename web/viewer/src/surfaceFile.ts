@@ -27,13 +27,10 @@ function readPly(bytes: ArrayBuffer): DecodedFrame {
   const geometry = loader.parse(bytes);
   // Ours say so; others count upwards.
   const frame = toFrame([{ geometry, matrix: /camera frame/.test(header) ? null : new THREE.Matrix4() }]);
-  const sigma = geometry.getAttribute('sigma');
-  if (sigma !== undefined) {
-    const interpolated = geometry.getAttribute('interpolated')?.array;
-    frame.quality = {
-      sigmas: Float32Array.from(sigma.array),
-      interpolated: interpolated ? Uint8Array.from(interpolated) : new Uint8Array(sigma.count),
-    };
+  // NaN where the file has none.
+  const sigmas = Float32Array.from(geometry.getAttribute('sigma').array, (sigma) => (sigma > 0 && sigma < Infinity ? sigma : 0));
+  if (sigmas.some((sigma) => sigma > 0)) {
+    frame.quality = { sigmas, interpolated: Uint8Array.from(geometry.getAttribute('interpolated').array) };
   }
   return frame;
 }

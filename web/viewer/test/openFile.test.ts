@@ -48,6 +48,18 @@ describe('any file', () => {
   });
 });
 
+describe('a PLY of another program', () => {
+  const of = (property: string, value: string): string =>
+    `ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n${property}end_header\n0 0 1${value}\n`;
+  const qualityOf = async (content: string): Promise<unknown> => {
+    const opened = await open('a.ply', content);
+    return opened.kind === 'surface' ? opened.frame.quality : opened.kind;
+  };
+  it('says nothing of how exact it is, and nothing is said', async () => expect(await qualityOf(of('', ''))).toBeNull());
+  it('that says it is heeded', async () =>
+    expect(await qualityOf(of('property float sigma\n', ' 0.5'))).toEqual({ sigmas: Float32Array.of(0.5), interpolated: Uint8Array.of(0) }));
+});
+
 describe('a picture with another name', () => {
   it('is no recording', () => refused('a.mcap', say.noMcap, png));
   it('is no PLY', () => refused('a.ply', say.noPly, png));
