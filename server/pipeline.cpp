@@ -117,6 +117,7 @@ class ThreadedPipeline final : public Pipeline {
 
   StageTimes stages() const override {
     StageTimes times = stats_.stages();
+    times.decoder = decoder_name(options_.reconstruct.decoder);
     times.waiting_reconstruct = to_reconstruct_.size();
     times.waiting_encode = to_encode_.size();
     times.waiting_publish = to_publish_.size();

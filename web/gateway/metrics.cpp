@@ -101,6 +101,13 @@ void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
     for (const auto& s : streams)
       if (s.stages) write("stream=" + label(s.info.stream), *s.stages);
   };
+  out.family("relievo_stream_info", "gauge", "1, for how the stream is projected and decoded.");
+  for (const auto& s : streams)
+    if (s.stages)
+      out.sample("{stream=" + label(s.info.stream) + ",scheme=\"" +
+                     std::string(to_string(s.info.pattern.scheme)) + "\",decoder=\"" +
+                     std::string(s.stages->decoder) + "\"}",
+                 1);
   each("relievo_stage_seconds", "histogram",
        "What each stage takes for a frame, without waiting for it; decode: at the clients over DDS.",
        [&](const std::string& stream, const StageTimes& times) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "base/client_report.h"
 #include "base/histogram.h"
@@ -14,6 +15,7 @@ namespace relievo {
 
 /// Since the start. Times of a frame in each stage, without what it waited before it.
 struct StageTimes {
+  std::string_view decoder;  // as `--decoder` has it
   Histogram reconstruct, encode_geometry, encode_texture, publish;
   // Frames that wait now, before each stage.
   std::size_t waiting_reconstruct = 0, waiting_encode = 0, waiting_publish = 0;

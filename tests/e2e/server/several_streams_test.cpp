@@ -200,6 +200,9 @@ TEST_F(SeveralStreams, MetricsSayWhatEachStageTakes) {
       EXPECT_GE(value("relievo_stage_seconds_count" + labels), 3) << labels;
       EXPECT_GT(value("relievo_stage_seconds_sum" + labels), 0) << labels;
     }
+    EXPECT_EQ(
+        value("relievo_stream_info{stream=\"" + stream + "\",scheme=\"complementary\",decoder=\"ordered\"}"),
+        1);
     EXPECT_GE(value("relievo_stage_waiting{stream=\"" + stream + "\",stage=\"encode\"}"), 0);
     EXPECT_EQ(value("relievo_stream_sent_again_bytes_total{stream=\"" + stream + "\"}"), 0);
   }
