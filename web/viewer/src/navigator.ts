@@ -29,6 +29,12 @@ export interface NavigatorEvents {
   way(way: Way): void;
 }
 
+/** `wanted`, or `before` where that is nearly the same. */
+function follow(before: Insets, wanted: Insets): Insets {
+  const moved = [wanted.top - before.top, wanted.right - before.right, wanted.bottom - before.bottom, wanted.left - before.left];
+  return moved.every((by) => Math.abs(by) < kJitter) ? before : wanted;
+}
+
 export class Navigator {
   readonly camera = new THREE.PerspectiveCamera(kDefaultFov, 1, 0.01, 100);
   private readonly controls: OrbitControls;
@@ -37,8 +43,9 @@ export class Navigator {
   private extent: Extent | null = null;
   private readonly framing = new Framing();
   size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
-  private insets = kNoInsets; // that the view heeds
-  private told = { parts: kNoInsets, withPanel: kNoInsets };
+  // What the view heeds of what lies over it: the page's parts, and they with the panel that is open; else both the same.
+  private heeded = { parts: kNoInsets, withPanel: kNoInsets };
+  private insets = kNoInsets; // one of them
   private ignoresPanels_ = false;
   private way_: Way = 'orbit';
   private fov_ = 0;
@@ -135,7 +142,8 @@ export class Navigator {
    * they leave free is what is turned around, and the first view lies within.
    */
   setInsets(parts: Insets, withPanel: Insets): void {
-    this.told = { parts, withPanel };
+    const heeded = follow(this.heeded.parts, parts);
+    this.heeded = { parts: heeded, withPanel: parts === withPanel ? heeded : follow(this.heeded.withPanel, withPanel) };
     this.heed();
   }
 
@@ -146,20 +154,17 @@ export class Navigator {
   }
 
   private heed(): void {
-    const wanted = this.ignoresPanels_ ? this.told.parts : this.told.withPanel;
-    const { top, right, bottom, left } = this.insets;
-    const moved = [wanted.top - top, wanted.right - right, wanted.bottom - bottom, wanted.left - left];
-    if (moved.every((by) => Math.abs(by) < kJitter)) return;
+    const wanted = this.ignoresPanels_ ? this.heeded.parts : this.heeded.withPanel;
+    if (wanted === this.insets) return;
     this.insets = wanted;
     this.resize(this.size);
   }
 
   /** The projection as it is while no panel is open. */
   get bareProjection(): number[] {
-    const { parts, withPanel } = this.told;
-    if (this.isRigView || parts === withPanel || this.ignoresPanels_) return this.camera.projectionMatrix.toArray();
+    if (this.isRigView || this.insets === this.heeded.parts) return this.camera.projectionMatrix.toArray();
     const camera = this.camera.clone();
-    camera.setViewOffset(...viewOffset(this.size, parts));
+    camera.setViewOffset(...viewOffset(this.size, this.heeded.parts));
     return camera.projectionMatrix.toArray();
   }
 

@@ -94,6 +94,17 @@ describe('a panel', () => {
     for (const i of [0, 1]) expect(origin[i]! + along * direction[i]!).toBeCloseTo(point[i]!, 9);
   });
 
+  it('leaves a picture what was seen without it, also where the parts have grown by a line since', () => {
+    const of = navigator();
+    of.orbit(0.2, 0.1);
+    const before = of.camera.projectionMatrix.toArray();
+    const grown = { ...parts, bottom: parts.bottom + 20 };
+    of.setInsets(grown, grown);
+    expect(of.camera.projectionMatrix.toArray()).toEqual(before); // the view does not follow so little
+    of.setInsets(grown, { ...grown, right: beside.right });
+    expect(of.bareProjection).toEqual(before);
+  });
+
   it("does not move what the rig's camera sees", () => {
     const of = navigator();
     of.way = 'camera';
