@@ -29,7 +29,7 @@ async function picture(name, path, { viewport = kDesktop, colorScheme = 'dark', 
   await page.goto(server.address + path);
   await shownPast(page, 3);
   await act(page);
-  await page.screenshot({ path: join(folder, `viewer-${name}.png`) });
+  await page.screenshot({ path: join(folder, name === '' ? 'viewer.png' : `viewer-${name}.png`) });
   await context.close();
   console.log(name);
 }
@@ -38,7 +38,44 @@ const presses = (...keys) => async (page) => {
   await page.waitForTimeout(1500); // for the look of it
 };
 
+/** Of the simulator's cube (capture/source/sim/scenes_simple.cpp): metres from its middle, in its own frame. */
+function onCube([x, y, z]) {
+  const [s, c] = [Math.sin(0.5), Math.cos(0.5)];
+  return [0.12 + c * x + s * z, 0.078 + y, 0.95 - s * x + c * z];
+}
+async function measure(page, tool, places) {
+  await page.click(`#panel-measure .segments button:text-is("${tool}")`);
+  for (const place of places) {
+    const at = await page.evaluate((point) => window.relievo.toPage(point), onCube(place));
+    await page.mouse.click(at.x, at.y);
+  }
+}
+
+const kModes = ['shaded', 'wire', 'points', 'normals', 'depth', 'confidence']; // keys 2 to 7
+
 try {
+  await picture('', '/?stream=object', {}, async (page) => {
+    await shownPast(page, kFrames / 2);
+    await page.keyboard.press(' ');
+    await still(page);
+  });
+  for (const [i, mode] of kModes.entries()) {
+    await picture(mode, '/?stream=object', { colorScheme: mode === 'depth' ? 'light' : 'dark' }, async (page) => {
+      await page.keyboard.press(String(i + 2));
+      await page.keyboard.press(' ');
+      await still(page);
+    });
+  }
+  await picture('measure', '/?stream=object', {}, async (page) => {
+    await page.keyboard.press('m');
+    await page.keyboard.press(' ');
+    await still(page);
+    const [left, right] = [[-0.03, 0.02, -0.05], [0.05, 0.02, 0.03]]; // on either face
+    await measure(page, 'Distance', [[-0.02, -0.04, -0.05], [-0.02, 0.04, -0.05]]);
+    await measure(page, 'Section', [left, right]);
+    await page.mouse.move(0, 0);
+    await page.waitForTimeout(1000);
+  });
   await picture('camera', '/?stream=object', {}, presses('c', 'v'));
   await picture('split', '/?stream=face', { viewport: kWide }, presses('v', 'v', 'v'));
   await picture('streams', '/?stream=face,object', { viewport: kWide }, async (page) => {

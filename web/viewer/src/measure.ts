@@ -115,7 +115,7 @@ export interface ProfilePoint {
 }
 export type Segment = readonly [ProfilePoint, ProfilePoint];
 
-/** Where the plane through `eye` and both places cuts the surface, between the places. */
+/** Where the plane through `eye` and both places cuts the surface, between the places, as far as the eye sees it. */
 export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3, rig: RigError | null): Segment[] {
   const { positions: p, triangles } = surface;
   const along = unit(minus(b, a));
@@ -146,10 +146,42 @@ export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3, rig: RigE
       if (side[v]! < 0 !== side[w]! < 0) ends.push(cut(v, w));
     }
     if (ends.length !== 2) continue;
-    const [from, to] = ends[0]!.along <= ends[1]!.along ? [ends[0]!, ends[1]!] : [ends[1]!, ends[0]!];
-    if (to.along >= 0 && from.along <= end) segments.push([from, to]);
+    segments.push(ends[0]!.along <= ends[1]!.along ? [ends[0]!, ends[1]!] : [ends[1]!, ends[0]!]);
   }
-  return segments.sort((x, y) => x[0].along - y[0].along);
+  return seen(segments, [dot(minus(eye, a), along), dot(minus(eye, a), up)], end).sort((x, y) => x[0].along - y[0].along);
+}
+
+const kBehind = 0.01; // of its distance: what lies no farther behind another part may be the same surface's, by noise or a fold
+
+/**
+ * Those that the eye sees, and sees between the places: what a ray through their middle meets first. The eye's place is
+ * along the line, which is so long, and off it.
+ */
+function seen(segments: Segment[], [eyeAlong, eyeHeight]: readonly [number, number], length: number): Segment[] {
+  type Ray = readonly [number, number]; // from the eye
+  const ray = ({ along, height }: ProfilePoint): Ray => [along - eyeAlong, height - eyeHeight];
+  const turn = ([px, py]: Ray, [qx, qy]: Ray): number => px * qy - py * qx; // from one to the other
+  const rays = segments.map(([from, to]) => [ray(from), ray(to)] as const);
+  const [first, last]: [Ray, Ray] = [
+    [-eyeAlong, -eyeHeight],
+    [length - eyeAlong, -eyeHeight],
+  ];
+  const way = Math.sign(turn(first, last));
+  return segments.filter(([from, to], i) => {
+    if (to.along < 0 || from.along > length) return false;
+    const own = rays[i]!;
+    if (own.every((r) => way * turn(first, r) < 0) || own.every((r) => way * turn(r, last) < 0)) return false;
+    const middle: Ray = [(own[0][0] + own[1][0]) / 2, (own[0][1] + own[1][1]) / 2];
+    const size2 = middle[0] ** 2 + middle[1] ** 2;
+    for (const [p, q] of rays) {
+      const [off, offOther] = [turn(p, middle), turn(q, middle)];
+      if (off < 0 === offOther < 0) continue;
+      const t = off / (off - offOther);
+      const met = ((p[0] + t * (q[0] - p[0])) * middle[0] + (p[1] + t * (q[1] - p[1])) * middle[1]) / size2; // of the way
+      if (met > 0 && met < 1 - kBehind) return false;
+    }
+    return true;
+  });
 }
 
 function sigmaBetween({ quality }: Surface, v: number, w: number, t: number): number | null {

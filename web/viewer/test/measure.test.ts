@@ -187,6 +187,31 @@ describe('text', () => {
   });
 });
 
+it('a section is of what the eye sees: not of what lies behind', () => {
+  /** Upright strips of 1 cm side by side, from -half to half, one surface behind the other. */
+  function walls(...of: { z: number; half: number }[]): Surface {
+    const [positions, triangles]: [number[], number[]] = [[], []];
+    for (const { z, half } of of) {
+      for (let x = -half; x < half - 1e-9; x += 0.01) {
+        const first = positions.length / 3;
+        positions.push(x, -1, z, x, 1, z, x + 0.01, -1, z, x + 0.01, 1, z);
+        triangles.push(first, first + 1, first + 3, first, first + 3, first + 2);
+      }
+    }
+    return { positions: new Float32Array(positions), coordinates: null, triangles: new Uint32Array(triangles), quality: null };
+  }
+  const depths = (of: ReturnType<typeof section>): Set<string> => new Set(of.map(([{ point }]) => point[2].toFixed(3)));
+  const box = { z: 1, half: 0.1 };
+  const [wall, step] = [walls(box, { z: 1.5, half: 1 }), walls(box, { z: 1.005, half: 1 })];
+  expect(depths(section(wall, [-0.05, 0, 1], [0.05, 0, 1], eye, null))).toEqual(new Set(['1.000']));
+  // Beside the box the wall is seen.
+  const beside = section(wall, [0, 0, 1], [0.45, 0, 1.5], eye, null);
+  expect(depths(beside)).toEqual(new Set(['1.000', '1.500']));
+  for (const [{ point: [x, , z] }] of beside) expect(z < 1.4 || x > 0.14, `${x} of the wall, behind the box`).toBe(true);
+  // What is as near as steps and noise of one surface hides nothing.
+  expect(depths(section(step, [-0.05, 0, 1], [0.05, 0, 1], eye, null))).toEqual(new Set(['1.000', '1.005']));
+});
+
 it('a section is marked where it was clicked, which may be off what was cut', () => {
   const spots = [spot([-0.5, 0, 2.25]), spot([1.5, 0, 3])]; // the second where the surface has ended since
   const m = measure('section', spots, roof, eye);
