@@ -152,35 +152,46 @@ export function section(surface: Surface, a: Vec3, b: Vec3, eye: Vec3, rig: RigE
 }
 
 const kBehind = 0.01; // of its distance: what lies no farther behind another part may be the same surface's, by noise or a fold
+const kBins = 512; // of the line
+
+type Ray = readonly [number, number]; // from the eye, in the section's plane
+const turn = ([px, py]: Ray, [qx, qy]: Ray): number => px * qy - py * qx; // from one to the other
+
+/** Whether the ray to `end` meets this piece before. */
+function isBefore([p, q]: readonly [Ray, Ray], [x, y]: Ray): boolean {
+  const [off, offOther] = [turn(p, [x, y]), turn(q, [x, y])];
+  if (off < 0 === offOther < 0) return false;
+  const t = off / (off - offOther);
+  const met = ((p[0] + t * (q[0] - p[0])) * x + (p[1] + t * (q[1] - p[1])) * y) / (x * x + y * y); // of the way
+  return met > 0 && met < 1 - kBehind;
+}
 
 /**
  * Those that the eye sees, and sees between the places: what a ray through their middle meets first. The eye's place is
  * along the line, which is so long, and off it.
  */
 function seen(segments: Segment[], [eyeAlong, eyeHeight]: readonly [number, number], length: number): Segment[] {
-  type Ray = readonly [number, number]; // from the eye
-  const ray = ({ along, height }: ProfilePoint): Ray => [along - eyeAlong, height - eyeHeight];
-  const turn = ([px, py]: Ray, [qx, qy]: Ray): number => px * qy - py * qx; // from one to the other
-  const rays = segments.map(([from, to]) => [ray(from), ray(to)] as const);
-  const [first, last]: [Ray, Ray] = [
-    [-eyeAlong, -eyeHeight],
-    [length - eyeAlong, -eyeHeight],
-  ];
+  const [first, last]: [Ray, Ray] = [[-eyeAlong, -eyeHeight], [length - eyeAlong, -eyeHeight]];
   const way = Math.sign(turn(first, last));
+  /** By where its ray meets the line; -1 and kBins: before the first place, behind the second. */
+  const binOf = (ray: Ray): number => {
+    if (way * turn(first, ray) < 0) return -1;
+    if (way * turn(ray, last) < 0) return kBins;
+    return Math.min(kBins - 1, Math.floor(((eyeAlong - (ray[0] * eyeHeight) / ray[1]) / length) * kBins));
+  };
+  const rays = segments.map((ends) => ends.map(({ along, height }): Ray => [along - eyeAlong, height - eyeHeight]) as [Ray, Ray]);
+  const reach = rays.map((ends): Ray => {
+    const [a, b] = ends.map(binOf) as [number, number];
+    return [Math.max(0, Math.min(a, b)), Math.min(kBins - 1, Math.max(a, b))]; // none where both are off on one side
+  });
+  const bins: [Ray, Ray][][] = Array.from({ length: kBins }, () => []);
+  for (const [i, [least, most]] of reach.entries()) for (let bin = least; bin <= most; ++bin) bins[bin]!.push(rays[i]!);
   return segments.filter(([from, to], i) => {
-    if (to.along < 0 || from.along > length) return false;
-    const own = rays[i]!;
-    if (own.every((r) => way * turn(first, r) < 0) || own.every((r) => way * turn(r, last) < 0)) return false;
-    const middle: Ray = [(own[0][0] + own[1][0]) / 2, (own[0][1] + own[1][1]) / 2];
-    const size2 = middle[0] ** 2 + middle[1] ** 2;
-    for (const [p, q] of rays) {
-      const [off, offOther] = [turn(p, middle), turn(q, middle)];
-      if (off < 0 === offOther < 0) continue;
-      const t = off / (off - offOther);
-      const met = ((p[0] + t * (q[0] - p[0])) * middle[0] + (p[1] + t * (q[1] - p[1])) * middle[1]) / size2; // of the way
-      if (met > 0 && met < 1 - kBehind) return false;
-    }
-    return true;
+    const [least, most] = reach[i]!;
+    if (least > most || to.along < 0 || from.along > length) return false;
+    const [[px, py], [qx, qy]] = rays[i]!;
+    const middle: Ray = [(px + qx) / 2, (py + qy) / 2];
+    return !bins[Math.min(most, Math.max(least, binOf(middle)))]!.some((other) => isBefore(other, middle));
   });
 }
 

@@ -208,6 +208,23 @@ it('a section is of what the eye sees: not of what lies behind', () => {
   const beside = section(wall, [0, 0, 1], [0.45, 0, 1.5], eye, null);
   expect(depths(beside)).toEqual(new Set(['1.000', '1.500']));
   for (const [{ point: [x, , z] }] of beside) expect(z < 1.4 || x > 0.14, `${x} of the wall, behind the box`).toBe(true);
+  // From anywhere: the box hides what rays to its other side go through.
+  for (const from of [[-0.6, 0, 0.2], [0.5, 0, -0.4], [0.04, 0, 0.5]] as Vec3[]) {
+    const depthsThere = depths(section(wall, [-0.09, 0, 1], [0.09, 0, 1], from, null));
+    expect(depthsThere, String(from)).toEqual(new Set(['1.000']));
+    const behind = section(wall, [-0.9, 0, 1.5], [0.9, 0, 1.5], from, null).filter(([{ point }]) => point[2] > 1.4);
+    expect(behind.length).toBeGreaterThan(20);
+    for (const ends of behind) {
+      const x = (ends[0].point[0] + ends[1].point[0]) / 2;
+      const atBox = from[0] + ((x - from[0]) * (1 - from[2])) / (1.5 - from[2]);
+      expect(Math.abs(atBox) > 0.1 - 1e-6, `${x} of the wall is behind the box, from ${from}`).toBe(true);
+    }
+    const seen = Array.from({ length: 200 }, (_, i) => -0.995 + i * 0.01).filter((x) => {
+      const atBox = from[0] + ((x - from[0]) * (1 - from[2])) / (1.5 - from[2]);
+      return Math.abs(x) < 0.9 && Math.abs(atBox) > 0.1;
+    });
+    expect(Math.abs(new Set(behind.map(([p]) => p.point[0].toFixed(2))).size - seen.length)).toBeLessThan(8); // half strips at the ends, of well over a hundred
+  }
   // What is as near as steps and noise of one surface hides nothing.
   expect(depths(section(step, [-0.05, 0, 1], [0.05, 0, 1], eye, null))).toEqual(new Set(['1.000', '1.005']));
 });
