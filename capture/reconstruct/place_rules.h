@@ -36,7 +36,7 @@ inline int column_of(float column_px) {
   return static_cast<int>(column_px + 0.5F);
 }
 
-/// Where `row` is steepest within `reach` columns of `centre`; two more are read on either side.
+/// Where `row` is steepest within `reach` columns of `centre`; two more are read before and one behind.
 template <class Sample>
 float steepest_place_px(const Sample* row, int centre, int reach) {
   auto steepest = std::abs(row[centre - reach] - row[centre - reach - 1]);
@@ -52,6 +52,13 @@ float steepest_place_px(const Sample* row, int centre, int reach) {
   const float bend = before - 2 * static_cast<float>(steepest) + after;
   return static_cast<float>(at) - 0.5F +
          (bend < 0 ? std::clamp(0.5F * (before - after) / bend, -0.5F, 0.5F) : 0);
+}
+
+/// Standard deviation that a contrast of 1 adds to a zero crossing, from the median of the squares of how far
+/// luma's and colour's places were apart, over that of the contrast.
+inline float drawn_by_contrast_px(float median) {
+  return std::clamp(kDrawnTogether * std::sqrt(std::max(0.F, median) * kVarianceOfMedian),
+                    kLeastColourBias_px, kMostColourBias_px);
 }
 
 /// Quantiles of many values, as exact as its bins are wide.

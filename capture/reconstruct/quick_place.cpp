@@ -110,10 +110,7 @@ void QuickPlacer::place(const QuadImage& image, View8 slide, const SequenceResul
       look_at_line(image, slide, line, result, colours, worker, edges);
   });
   const float drawn_px =
-      by_contrast_.size() < kLeastSeen
-          ? kUsualColourBias_px
-          : std::clamp(kDrawnTogether * std::sqrt(std::max(0.F, by_contrast_.median(0)) * kVarianceOfMedian),
-                       kLeastColourBias_px, kMostColourBias_px);
+      by_contrast_.size() < kLeastSeen ? kUsualColourBias_px : drawn_by_contrast_px(by_contrast_.median(0));
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     const std::uint32_t last = edges.line_start[static_cast<std::size_t>(end)];
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(begin)]; e < last; ++e) {

@@ -266,8 +266,7 @@ void Refiner::refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge) 
 /// How far blurred chroma draws colour's place from luma's, in the frame at hand.
 Refiner::Drawn Refiner::colour_drawn() {
   return {std::sqrt(std::max(0.F, always_.median(0)) * kVarianceOfMedian),
-          std::clamp(kDrawnTogether * std::sqrt(std::max(0.F, by_contrast_.median(0)) * kVarianceOfMedian),
-                     kLeastColourBias_px, kMostColourBias_px)};
+          drawn_by_contrast_px(by_contrast_.median(0))};
 }
 
 void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,

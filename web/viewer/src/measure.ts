@@ -157,7 +157,7 @@ const kBins = 512; // of the line
 type Ray = readonly [number, number]; // from the eye, in the section's plane
 const turn = ([px, py]: Ray, [qx, qy]: Ray): number => px * qy - py * qx; // from one to the other
 
-/** Whether the ray to `end` meets this piece before. */
+/** Whether the ray to a place meets this piece before it. */
 function isBefore([p, q]: readonly [Ray, Ray], [x, y]: Ray): boolean {
   const [off, offOther] = [turn(p, [x, y]), turn(q, [x, y])];
   if (off < 0 === offOther < 0) return false;
