@@ -21,21 +21,28 @@ constexpr int kSamples = 9;             // columns at which a boundary's depth i
 DepthRange::DepthRange(int boundaries, int width, int lines, int every)
     : width_(width), lines_(lines), every_(every), columns_(static_cast<std::size_t>(boundaries)) {}
 
-void DepthRange::update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator,
+void DepthRange::update(const DecodedGrid& grid, std::size_t points, const Triangulator& triangulator,
                         WorkerPool& pool) {
-  if (vertices.size() < kLeastPoints) return;
-  inverse_depths_.reset(pool.threads());
-  const std::size_t asked = vertices.size() / static_cast<std::size_t>(every_);
-  pool.for_ranges(static_cast<int>(asked), [&](int begin, int end, int worker) {
-    std::vector<float>& own = inverse_depths_.of(worker);
-    own.resize(static_cast<std::size_t>(end - begin));
-    for (int i = begin; i < end; ++i)
-      own[static_cast<std::size_t>(i - begin)] =
-          1 / vertices[static_cast<std::size_t>(i * every_)].position[2];
+  if (points < kLeastPoints) return;
+  depths_.reset(pool.threads());
+  pool.for_ranges((grid.lines() + every_ - 1) / every_, [&](int begin, int end, int worker) {
+    std::vector<float>& own = depths_.of(worker);
+    own.resize(static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(grid.boundaries()));
+    std::size_t count = 0;
+    for (int i = begin; i < end; ++i) {
+      const float* z = grid.z(i * every_);
+      for (int b = 0; b < grid.boundaries(); ++b) {
+        own[count] = z[b];
+        count += z[b] == z[b];
+      }
+    }
+    own.resize(count);
   });
+  const std::size_t asked = depths_.size();
+  if (asked == 0) return;
   const std::size_t rank = asked / kOutliers;
-  float far = inverse_depths_.at(rank);
-  float near = inverse_depths_.at(asked - 1 - rank);
+  float far = 1 / depths_.at(asked - 1 - rank);
+  float near = 1 / depths_.at(rank);
   const float wider = kWider * (near - far);
   far -= wider + kWiderShare * far;
   near += wider + kWiderShare * near;

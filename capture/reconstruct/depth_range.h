@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/ranked_sample.h"
-#include "capture/reconstruct/surface.h"
 #include "capture/reconstruct/triangulate.h"
 
 namespace relievo {
@@ -19,11 +19,12 @@ using ColumnRange = std::array<float, 2>;
 /// Keeps its scratch memory from frame to frame. One thread.
 class DepthRange {
  public:
-  /// `width` of the camera's picture, `lines` of detection. One point in `every` is asked.
+  /// `width` of the camera's picture, `lines` of detection. One line in `every` is asked.
   DepthRange(int boundaries, int width, int lines, int every = 1);
 
-  /// From a frame's points; few of them change nothing.
-  void update(const std::vector<GridVertex>& vertices, const Triangulator& triangulator, WorkerPool& pool);
+  /// From a frame's points, of which there are so many; few of them change nothing.
+  void update(const DecodedGrid& grid, std::size_t points, const Triangulator& triangulator,
+              WorkerPool& pool);
 
   /// One a boundary; null until a frame was seen.
   const std::vector<ColumnRange>* columns() const { return known_ ? &columns_ : nullptr; }
@@ -34,7 +35,7 @@ class DepthRange {
   bool known_ = false;
   int width_, lines_, every_;
   std::vector<ColumnRange> columns_;
-  RankedSample inverse_depths_;
+  RankedSample depths_;
 };
 
 }  // namespace relievo

@@ -25,19 +25,18 @@ constexpr float kMore_px = 0.1F;        // standard deviation more
 }  // namespace
 
 HalfWay::HalfWay(int boundaries, int lines) {
-  before_.reset(boundaries, lines, {});
-  now_.reset(boundaries, lines, {});
+  before_.reset(boundaries, lines);
 }
 
 /// How far a place's neighbours go from frame to frame, where they go alike.
-std::optional<float> HalfWay::went(int line, int boundary) const {
+std::optional<float> HalfWay::went(const DecodedGrid& now, int line, int boundary) const {
   std::array<float, 24> went{};
   std::size_t count = 0;
   for (int lines = -3; lines <= 3; ++lines) {
     for (int boundaries = -2; boundaries <= 2; ++boundaries) {
       if (std::abs(lines) + std::abs(boundaries) > 3) continue;
-      const float px = now_.line(line + lines)[boundary + boundaries].column_px -
-                       before_.line(line + lines)[boundary + boundaries].column_px;
+      const float px = now.column_px(line + lines)[boundary + boundaries] -
+                       before_.column_px(line + lines)[boundary + boundaries];
       if (std::fabs(px) <= kFurthest_px) went[count++] = px;
     }
   }
@@ -47,23 +46,25 @@ std::optional<float> HalfWay::went(int line, int boundary) const {
   return went[count / 2];
 }
 
-void HalfWay::place_line(int line, std::vector<DecodedBoundary>& out) {
-  const Place* before = before_.line(line);
-  const Place* now = now_.line(line);
+void HalfWay::place_line(const DecodedGrid& grid, int line, DecodedGrid& out) {
+  const float* before = before_.column_px(line);
+  const float* now = grid.column_px(line);
+  const auto known = [](float column) { return column == column; };
+  out.start_line(line);
   columns_.clear();
-  for (int b = 0; b < now_.boundaries(); ++b) {
-    if (!(std::fabs(before[b].column_px - now[b].column_px) <= kFurthest_px)) continue;
+  for (int b = 0; b < grid.boundaries(); ++b) {
+    if (!(std::fabs(before[b] - now[b]) <= kFurthest_px)) continue;
     // Both columns are as exact, so their mean is more so.
-    out.push_back({b, line, 0.5F * (before[b].column_px + now[b].column_px),
-                   now[b].sigma_px * std::numbers::sqrt2_v<float> / 2, 0});
-    columns_.push_back({out.back().column_px, b});
+    const float column = 0.5F * (before[b] + now[b]);
+    out.put(line, b, column, grid.sigma_px(line)[b] * std::numbers::sqrt2_v<float> / 2, 0);
+    columns_.push_back({column, b});
   }
   std::ranges::sort(columns_, {}, &Column::px);
-  for (int b = 0; b < now_.boundaries(); ++b) {
-    if (before[b].known() == now[b].known()) continue;
-    const std::optional<float> px = went(line, b);
+  for (int b = 0; b < grid.boundaries(); ++b) {
+    if (known(before[b]) == known(now[b])) continue;
+    const std::optional<float> px = went(grid, line, b);
     if (!px) continue;
-    const float column = now[b].known() ? now[b].column_px - 0.5F * *px : before[b].column_px + 0.5F * *px;
+    const float column = known(now[b]) ? now[b] - 0.5F * *px : before[b] + 0.5F * *px;
     const auto right = std::ranges::lower_bound(columns_, column, {}, &Column::px);
     const auto is_free = [&](const Column& other) {
       const float room_px = std::abs(other.boundary - b) <= kOwn ? kRoom_px : kOther_px;
@@ -71,23 +72,16 @@ void HalfWay::place_line(int line, std::vector<DecodedBoundary>& out) {
     };
     if (right != columns_.end() && !is_free(*right)) continue;
     if (right != columns_.begin() && !is_free(*std::prev(right))) continue;
-    const float sigma = now[b].known() ? now[b].sigma_px : before[b].sigma_px;
-    out.push_back({b, line, column, std::hypot(sigma, kMore_px), 0});
+    const float sigma = known(now[b]) ? grid.sigma_px(line)[b] : before_.sigma_px(line)[b];
+    out.put(line, b, column, std::hypot(sigma, kMore_px), 0);
   }
 }
 
-bool HalfWay::place(const std::vector<DecodedBoundary>& now, std::int64_t time_ns, std::int64_t longest_ns,
-                    std::vector<DecodedBoundary>& out) {
-  out.clear();
+bool HalfWay::place(const DecodedGrid& now, std::int64_t time_ns, std::int64_t longest_ns, DecodedGrid& out) {
   const bool follows = time_ns_ != 0 && time_ns > time_ns_ && time_ns - time_ns_ <= longest_ns;
-  now_.reset(now_.boundaries(), now_.lines(), {});
-  for (const DecodedBoundary& b : now) {
-    Place& place = now_.line(b.line)[b.boundary];
-    if (!place.known()) place = {b.column_px, b.sigma_px};  // the surest comes first
-  }
   if (follows)
-    for (int line = 0; line < now_.lines(); ++line) place_line(line, out);
-  std::swap(before_, now_);
+    for (int line = 0; line < now.lines(); ++line) place_line(now, line, out);
+  before_ = now;
   time_ns_ = time_ns;
   return follows;
 }

@@ -7,8 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "capture/reconstruct/place_grid.h"
-#include "capture/reconstruct/slide_decoder.h"
+#include "capture/reconstruct/decoded_grid.h"
 
 namespace relievo {
 
@@ -22,21 +21,20 @@ class HalfWay {
 
   /// `out` becomes the boundaries half way between a frame's and those of the frame before: half way between
   /// their columns where both frames have them, and as their neighbours go where one has, unless
-  /// another surface is there. False, and `out` empty, where the frame before is none or longer ago than
+  /// another surface is there. False, and `out` as it was, where the frame before is none or longer ago than
   /// `longest_ns`. Once a frame.
-  bool place(const std::vector<DecodedBoundary>& now, std::int64_t time_ns, std::int64_t longest_ns,
-             std::vector<DecodedBoundary>& out);
+  bool place(const DecodedGrid& now, std::int64_t time_ns, std::int64_t longest_ns, DecodedGrid& out);
 
  private:
   struct Column {
     float px;
     int boundary;
   };
-  void place_line(int line, std::vector<DecodedBoundary>& out);
-  std::optional<float> went(int line, int boundary) const;
+  void place_line(const DecodedGrid& now, int line, DecodedGrid& out);
+  std::optional<float> went(const DecodedGrid& now, int line, int boundary) const;
 
   std::int64_t time_ns_ = 0;
-  PlaceGrid before_, now_;
+  DecodedGrid before_;
   std::vector<Column> columns_;  // a line's that both frames have, left to right
 };
 

@@ -20,8 +20,7 @@
 namespace relievo {
 namespace {
 
-constexpr Vec3f kNoPoint{0, 0, 0};       // no point has it: all lie in front of the camera
-constexpr int kDepthsQuickly = 8;        // one point in so many tells the range of depths
+constexpr int kDepthsQuickly = 8;        // one line in so many tells the range of depths
 constexpr std::size_t kSpareFrames = 4;  // a stage's queue and what its neighbours hold
 
 int line_step(const Rig& rig) {
@@ -104,6 +103,8 @@ struct Reconstructor::State {
         white_texture(r.colour_matrix, o.decoder == Decoder::kQuick),
         half_way(p.boundaries(), line_count(r)),
         surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
+    decoded.reset(p.boundaries(), line_count(r));
+    if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), line_count(r));
     spare.reserve(kSpareFrames);
   }
 
@@ -120,9 +121,8 @@ struct Reconstructor::State {
   HalfWay half_way;  // white-field
   SurfaceBuilder surface_builder;
 
-  std::vector<DecodedBoundary> decoded;
-  std::vector<DecodedBoundary> decoded_between;
-  std::vector<GridVertex> vertices;
+  DecodedGrid decoded;
+  DecodedGrid decoded_between;  // white-field
   std::optional<Frame3D> waiting;
   Image8 last_texture;  // white-field: of the frame before
   std::int64_t last_texture_time_ns = 0;
@@ -134,7 +134,7 @@ struct Reconstructor::State {
 
   void forget();
   Frame3D blank_frame();
-  void make_surface(const std::vector<DecodedBoundary>& boundaries, Surface& out);
+  void make_surface(DecodedGrid& grid, Surface& out);
   void make_texture(const CapturedFrame& frame, Image8& out);
   std::optional<Frame3D> surface_between(const CapturedFrame& frame);
 };
@@ -155,32 +155,20 @@ Frame3D Reconstructor::State::blank_frame() {
   return out;
 }
 
-void Reconstructor::State::make_surface(const std::vector<DecodedBoundary>& boundaries, Surface& out) {
+void Reconstructor::State::make_surface(DecodedGrid& grid, Surface& out) {
   StageClock clock;
-  vertices.resize(boundaries.size());
+  std::atomic<std::size_t> points{0};
   std::atomic<std::size_t> no_point{0};
-  pool.for_ranges(static_cast<int>(boundaries.size()), [&](int begin, int end, int) {
-    std::size_t own_no_point = 0;
-    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
-      const DecodedBoundary& b = boundaries[i];
-      GridVertex& v = vertices[i];
-      v.at.boundary = static_cast<std::uint16_t>(b.boundary);
-      v.at.line = static_cast<std::uint16_t>(b.line);
-      v.at.column_px = b.column_px;
-      v.at.sigma_px = b.sigma_px;
-      v.at.interpolated = false;
-      v.slope = b.slope;
-      if (triangulator.find(b.boundary, 0, b.line, b.column_px, v.position)) continue;
-      v.position = kNoPoint;
-      ++own_no_point;
-    }
-    no_point += own_no_point;
+  pool.for_ranges(grid.lines(), [&](int begin, int end, int) {
+    PointCounts own;
+    for (int line = begin; line < end; ++line) own += triangulator.place_line(line, grid);
+    points += own.points;
+    no_point += own.no_point;
   });
-  if (no_point > 0) std::erase_if(vertices, [](const GridVertex& v) { return v.position == kNoPoint; });
   report.filters.no_point += no_point;
-  if (options.decoder != Decoder::kPaper) depths.update(vertices, triangulator, pool);
+  if (options.decoder != Decoder::kPaper) depths.update(grid, points, triangulator, pool);
   report.triangulate_ms += clock.lap_ms();
-  surface_builder.build(vertices, triangulator, pool, out, report.filters);
+  surface_builder.build(grid, triangulator, pool, out, report.filters);
   report.surface_ms += clock.lap_ms();
 }
 
@@ -193,7 +181,7 @@ void Reconstructor::State::make_texture(const CapturedFrame& frame, Image8& out)
   } else if (options.decoder == Decoder::kPaper) {
     add_fields(frame, pool, out);
   } else {
-    white_texture.make(frame, vertices, pool, out);
+    white_texture.make(frame, decoded, pool, out);
   }
 }
 

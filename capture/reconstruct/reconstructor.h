@@ -13,7 +13,7 @@
 #include "base/result.h"
 #include "base/rig.h"
 #include "capture/reconstruct/step_keeping.h"
-#include "capture/reconstruct/surface_builder.h"
+#include "capture/reconstruct/surface_builder_options.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {

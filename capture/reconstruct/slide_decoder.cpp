@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/slide_decoder.h"
 
+#include <atomic>
 #include <optional>
 #include <utility>
 
@@ -118,7 +119,6 @@ struct SlideDecoder::State {
   EdgeImage edges;
   SequenceResult result, other_result;
   std::vector<RecoveredBoundary> recovered;
-  std::vector<std::uint32_t> decoded_before;  // each line, in the list
 
   bool shows_same_slide() const;
   bool match_paper(SlideOrder tried, Match& out);
@@ -127,7 +127,7 @@ struct SlideDecoder::State {
   QuickContext quick_context(SlideOrder tried) const;
   void decode_quickly(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
   void match_in_order(SlideOrder predicted, WorkerPool& pool);
-  void list(WorkerPool& pool, std::vector<DecodedBoundary>& out);
+  std::size_t fill(WorkerPool& pool, DecodedGrid& out) const;
 };
 
 bool SlideDecoder::State::shows_same_slide() const {
@@ -227,41 +227,34 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
       result.counts.in_order - result.counts.unsupported + result.counts.completed + report.filters.recovered;
 }
 
-/// Decoded boundaries by line, and behind them what was recovered.
-void SlideDecoder::State::list(WorkerPool& pool, std::vector<DecodedBoundary>& out) {
+/// Puts each boundary in its place. Returns how many were in one that another one has.
+std::size_t SlideDecoder::State::fill(WorkerPool& pool, DecodedGrid& out) const {
   const auto& starts = paper ? newer.detection.line_start : edges.line_start;
   const std::vector<std::int16_t>& found = paper ? match.boundary : result.boundary;
-  decoded_before.resize(starts.size());
-  decoded_before[0] = 0;
+  std::atomic<std::size_t> duplicates{0};
   pool.for_shares(starts, [&](int begin, int end, int) {
-    for (auto line = static_cast<std::size_t>(begin); line < static_cast<std::size_t>(end); ++line) {
-      std::uint32_t decoded = 0;
-      for (std::uint32_t i = starts[line]; i < starts[line + 1]; ++i) decoded += found[i] >= 0;
-      decoded_before[line + 1] = decoded;
-    }
-  });
-  for (std::size_t line = 1; line < starts.size(); ++line) decoded_before[line] += decoded_before[line - 1];
-  out.resize(decoded_before.back() + (paper ? 0 : recovered.size()));
-  pool.for_shares(starts, [&](int begin, int end, int) {
-    DecodedBoundary* next = out.data() + decoded_before[static_cast<std::size_t>(begin)];
+    std::size_t own_duplicates = 0;
     for (int line = begin; line < end; ++line) {
+      out.start_line(line);
       for (std::uint32_t i = starts[static_cast<std::size_t>(line)];
            i < starts[static_cast<std::size_t>(line) + 1]; ++i) {
         if (found[i] < 0) continue;
         if (paper) {
           const Boundary& b = newer.detection.boundaries[i];
-          *next++ = {found[i], line, b.column_px, 0, b.slope};
+          own_duplicates += !out.put(line, found[i], b.column_px, 0, b.slope);
         } else {
           const Edge& e = edges.edges[i];
-          *next++ = {found[i], line, e.column_px, e.sigma_px, e.slope};
+          own_duplicates += !out.put(line, found[i], e.column_px, e.sigma_px, e.slope);
         }
       }
     }
+    duplicates += own_duplicates;
   });
-  if (paper) return;
-  DecodedBoundary* next = out.data() + decoded_before.back();
+  std::size_t twice = duplicates;
+  if (paper) return twice;
   for (const RecoveredBoundary& r : recovered)
-    *next++ = {r.boundary, r.line, r.column_px, r.sigma_px, r.slope};
+    twice += !out.put(r.line, r.boundary, r.column_px, r.sigma_px, r.slope);
+  return twice;
 }
 
 SlideDecoder::SlideDecoder(const Rig& rig, const Pattern& pattern, const ReconstructOptions& options)
@@ -302,7 +295,7 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
 }
 
 bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report,
-                          std::vector<DecodedBoundary>& out) {
+                          DecodedGrid& out) {
   State& s = *state_;
   if (!s.have_older && s.pattern.slides == 2) return false;
   const CapturedFrame& pair = view.pair;
@@ -367,7 +360,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.filters.rejected += weighed.rejected;
     report.filters.moved += weighed.moved;
   }
-  s.list(pool, out);
+  report.filters.duplicate = s.fill(pool, out);
   return true;
 }
 

@@ -10,20 +10,12 @@
 #include "base/parallel.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
-
-/// A projected boundary found in the picture.
-struct DecodedBoundary {
-  int boundary;
-  int line;
-  float column_px;
-  float sigma_px;  // standard deviation of column_px; 0: not known
-  float slope;     // the greater, the surer
-};
 
 /// What decode() is to decode.
 struct SlideView {
@@ -43,10 +35,10 @@ class SlideDecoder {
   /// Looks at a frame whose exposures are a slide and its complement. Sets report.boundaries and .same_slide.
   void observe(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
 
-  /// Decodes the frame observed last, which is `view.pair`, into `out`; false while
-  /// the other slide was not seen. Sets report.matched and .filters. `out`'s memory is reused.
-  bool decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report,
-              std::vector<DecodedBoundary>& out);
+  /// Decodes the frame observed last, which is `view.pair`, into `out`, a grid of the pattern's boundaries
+  /// and the rig's lines whose points are left as they are; false while the other slide was not seen. Sets
+  /// report.matched and .filters.
+  bool decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report, DecodedGrid& out);
 
  private:
   struct State;

@@ -8,6 +8,7 @@ namespace {
 
 // A dense piece of surface has about as many pixels for each boundary as stripes are wide.
 constexpr int kLeastDenseComponent = 60;
+constexpr int kLinesApart = 8;  // that tell the usual standard deviation
 
 }  // namespace
 
@@ -36,10 +37,11 @@ std::size_t SurfaceBuilder::fill_columns(const std::vector<GridVertex>& vertices
   return duplicates;
 }
 
-/// The median of every fourth, which is as good; 0 where it is not known.
+/// The median on some of the lines, which is as good; 0 where it is not known.
 float SurfaceBuilder::usual_sigma_px(const std::vector<GridVertex>& vertices) {
   sigmas_px_.reset(1);
-  for (std::size_t i = 0; i < vertices.size(); i += 4) sigmas_px_.of(0).push_back(vertices[i].at.sigma_px);
+  for (const GridVertex& v : vertices)
+    if (v.at.line % kLinesApart == 0) sigmas_px_.of(0).push_back(v.at.sigma_px);
   return sigmas_px_.median(0);
 }
 
@@ -61,8 +63,20 @@ void SurfaceBuilder::finish(WorkerPool& pool, Surface& out) const {
   });
 }
 
-void SurfaceBuilder::build(std::vector<GridVertex>& vertices, const Triangulator& triangulator,
-                           WorkerPool& pool, Surface& out, FilterCounts& counts) {
+void SurfaceBuilder::build(DecodedGrid& grid, const Triangulator& triangulator, WorkerPool& pool,
+                           Surface& out, FilterCounts& counts) {
+  std::vector<GridVertex>& vertices = vertices_;
+  vertices.clear();
+  for (int line = 0; line < grid.lines(); ++line) {
+    const PointRow points = grid.points(line);
+    for (int b = 0; b < grid.boundaries(); ++b) {
+      if (!(points.z[b] > 0)) continue;
+      vertices.push_back({{static_cast<std::uint16_t>(b), static_cast<std::uint16_t>(line),
+                           grid.column_px(line)[b], grid.sigma_px(line)[b]},
+                          {points.x[b], points.y[b], points.z[b]},
+                          grid.slope(line)[b]});
+    }
+  }
   const std::size_t duplicates = fill_columns(vertices);
   const ColumnScale scale{line_step_px_, usual_sigma_px(vertices)};
   fill_holes(options_.fill_holes, scale, columns_, holes_);

@@ -14,18 +14,10 @@
 #include "capture/reconstruct/depth_sigma.h"
 #include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/surface.h"
+#include "capture/reconstruct/surface_builder_options.h"
 #include "capture/reconstruct/triangulate.h"
 
 namespace relievo {
-
-inline constexpr int kMostFilled = 16;
-
-struct SurfaceBuilderOptions {
-  bool dense = false;  // a vertex at each pixel of a line, instead of one at each boundary
-  int fill_holes = 0;  // missing boundaries or lines that are bridged on one surface, 0..kMostFilled
-
-  bool operator==(const SurfaceBuilderOptions&) const = default;
-};
 
 /// Keeps its scratch memory from frame to frame. One thread.
 class SurfaceBuilder {
@@ -33,10 +25,11 @@ class SurfaceBuilder {
   SurfaceBuilder(const Rig& rig, int boundaries, int lines, int line_step_px,
                  const SurfaceBuilderOptions& options);
 
-  /// `vertices` in any order; overwritten. Fills `out` but for what it holds of old, and adds what the
-  /// filters did to `counts`. `triangulator` must be of the same rig, pattern and lines.
-  void build(std::vector<GridVertex>& vertices, const Triangulator& triangulator, WorkerPool& pool,
-             Surface& out, FilterCounts& counts);
+  /// Of boundaries with their points: `grid` gains what fills holes. Fills `out` but for what it holds of
+  /// old, and adds what the filters did to `counts`. `triangulator` must be of the same rig, pattern and
+  /// lines.
+  void build(DecodedGrid& grid, const Triangulator& triangulator, WorkerPool& pool, Surface& out,
+             FilterCounts& counts);
 
  private:
   std::size_t fill_columns(const std::vector<GridVertex>& vertices);
@@ -53,7 +46,7 @@ class SurfaceBuilder {
   std::vector<Hole> holes_;
   GridLinks links_;
   DenseSampler dense_;
-  std::vector<GridVertex> pixels_;
+  std::vector<GridVertex> vertices_, pixels_;
   SurfaceScratch scratch_;
 };
 

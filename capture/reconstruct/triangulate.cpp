@@ -8,7 +8,6 @@
 namespace relievo {
 namespace {
 
-constexpr int kRayStep = 8;        // columns between ray samples: linear between them is good to 1e-3 px
 constexpr int kSheetSamples = 65;  // over the projector's height and a quarter beyond
 constexpr int kSheetRounds = 4;    // of point -> row -> sheet; each gains about two digits
 
@@ -44,6 +43,7 @@ Triangulator::Triangulator(const Rig& rig, const Pattern& pattern, int lines, in
           static_cast<float>(straight_sheets_ ? target : sheet_at(projector.distortion, target, y)));
     }
   }
+  sheets_.insert(sheets_.end(), 8, kNone);
 }
 
 std::array<float, 2> Triangulator::ray(int line, float column_px) const {
@@ -77,7 +77,7 @@ bool Triangulator::find(int boundary, float beyond, int line, float column_px, V
     if (beyond != 0) x += beyond * (sheet(boundary + 1, y) - x);
     // On the sheet: X = x Z in the projector's frame.
     const double denominator = dx - x * dz;
-    if (std::fabs(denominator) < 1e-9) return false;
+    if (std::fabs(denominator) < kLeastCrossing) return false;
     z = (x * translation_[2] - translation_[0]) / denominator;
     const double depth = z * dz + translation_[2];
     if (!(z > 0) || !(depth > 0)) return false;  // also where ray or sheet is none (NaN)
@@ -85,6 +85,38 @@ bool Triangulator::find(int boundary, float beyond, int line, float column_px, V
   }
   out = {static_cast<float>(z * rx), static_cast<float>(z * ry), static_cast<float>(z)};
   return true;
+}
+
+PointCounts Triangulator::place_line(int line, DecodedGrid& grid) const {
+  float* column_px = grid.column_px(line);
+  const PointRow to = grid.points(line);
+  if (straight_sheets_) {
+    const auto* rays = rays_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(ray_samples_);
+    const auto& r = rotation_;
+    return triangulate_kernels().straight({.rays = rays->data(),
+                                           .ray_samples = ray_samples_,
+                                           .sheets = sheets_.data(),
+                                           .across = {r[0], r[1], r[2]},
+                                           .forward = {r[6], r[7], r[8]},
+                                           .translation_x = translation_[0],
+                                           .translation_z = translation_[2]},
+                                          grid.boundaries(), column_px, to);
+  }
+  PointCounts counts;
+  for (int b = 0; b < grid.boundaries(); ++b) {
+    const bool known = column_px[b] == column_px[b];
+    Vec3f point{kNoColumn, kNoColumn, kNoColumn};
+    if (known && find(b, 0, line, column_px[b], point)) {
+      ++counts.points;
+    } else {
+      counts.no_point += known;
+      column_px[b] = kNoColumn;
+    }
+    to.x[b] = point[0];
+    to.y[b] = point[1];
+    to.z[b] = point[2];
+  }
+  return counts;
 }
 
 }  // namespace relievo

@@ -10,6 +10,7 @@
 #include "base/lens.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/reconstruct/triangulate_rows.h"
 
 namespace relievo {
 
@@ -35,6 +36,9 @@ class Triangulator {
   /// As point(), into `out`, which stays as it is where it returns false.
   bool find(int boundary, float beyond, int line, float column_px, Vec3f& out) const;
 
+  /// The points of all boundaries of a line of `grid`; what has none is taken off it.
+  PointCounts place_line(int line, DecodedGrid& grid) const;
+
  private:
   std::array<float, 2> ray(int line, float column_px) const;
   double sheet(int boundary, double y) const;
@@ -43,7 +47,7 @@ class Triangulator {
   std::vector<std::array<float, 2>> rays_;  // [line][every kRayStep columns]: x/z, y/z of the camera's ray
   int sheet_samples_;
   double sheet_first_, sheet_step_;  // y/z of the first sample, and between samples
-  std::vector<float> sheets_;        // [boundary][sample]: x/z in the projector's frame
+  std::vector<float> sheets_;        // [boundary][sample], padded: x/z in the projector's frame
   bool straight_sheets_;             // no projector distortion: the first sample holds for all
   std::array<double, 9> rotation_;
   std::array<double, 3> translation_;

@@ -16,8 +16,9 @@ namespace {
 constexpr int kBeside_px = 3;           // from a boundary to where its sides' colours are pure
 constexpr float kLeastStep = 12;        // grey levels of a primary that a boundary must switch
 constexpr std::size_t kLeastSeen = 50;  // boundaries that must tell of a primary
-constexpr std::size_t kEvery = 4;       // boundaries looked at,
-constexpr std::size_t kEveryQuickly = 64;
+constexpr int kEvery = 4;               // boundaries looked at: one in so many of a line,
+constexpr int kEveryQuickly = 64;
+constexpr int kEachLine = 29;   // others than on the one above, so many to the left
 constexpr float kSame = 0.01F;  // gains nearer 1 are noise
 constexpr float kMostGain = 2;
 
@@ -120,12 +121,10 @@ WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quic
 /// Median over boundaries of how much less a primary becomes in the slide for what more it becomes in the
 /// complement, where it is switched. An edge of the scene there changes both alike and is as often on one
 /// side.
-void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices,
-                                 WorkerPool& pool) {
+void WhiteTexture::measure_gains(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool) {
   for (RankedSample& r : ratios_) r.reset(pool.threads());
-  const std::size_t looked_at = (vertices.size() + every_ - 1) / every_;
-  pool.for_ranges(static_cast<int>(looked_at), [&](int begin, int end, int worker) {
-    measure_ratios(frame, vertices, begin, end, worker);
+  pool.for_ranges(grid.lines(), [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) measure_ratios(frame, grid, line, worker);
   });
   level_ = false;
   for (std::size_t c = 0; c < 3; ++c) {
@@ -146,17 +145,17 @@ void WhiteTexture::measure_gains(const CapturedFrame& frame, const std::vector<G
   }
 }
 
-/// Of every every_-th vertex, [begin, end) of them.
-void WhiteTexture::measure_ratios(const CapturedFrame& frame, const std::vector<GridVertex>& vertices,
-                                  int begin, int end, int worker) {
+/// Of every every_-th boundary on a line.
+void WhiteTexture::measure_ratios(const CapturedFrame& frame, const DecodedGrid& grid, int line, int worker) {
   const bool interlaced = frame.scan == Scan::kInterlaced;
-  const int height = frame.picture.height();
-  for (int i = begin; i < end; ++i) {
-    const GridPoint& at = vertices[static_cast<std::size_t>(i) * every_].at;
-    const int x = static_cast<int>(at.column_px + 0.5F);
-    const int y = interlaced ? 2 * at.line : at.line;
-    if (at.interpolated || x < kBeside_px || x + kBeside_px >= frame.picture.width() || y + 1 >= height)
-      continue;
+  const int y = interlaced ? 2 * line : line;
+  if (y + 1 >= frame.picture.height()) return;
+  const float* column_px = grid.column_px(line);
+  const std::uint8_t* interpolated = grid.interpolated(line);
+  for (int b = every_ - 1 - (kEachLine * line + every_ - 1) % every_; b < grid.boundaries(); b += every_) {
+    if (!(column_px[b] >= 0) || (interpolated != nullptr && interpolated[b] != 0)) continue;
+    const int x = static_cast<int>(column_px[b] + 0.5F);
+    if (x < kBeside_px || x + kBeside_px >= frame.picture.width()) continue;
     const std::uint8_t* slide = frame.picture.row(y);
     const std::uint8_t* complement = interlaced ? frame.picture.row(y + 1) : frame.complement.row(y);
     if (interlaced && first_row(frame.field_order, 0) == 1) std::swap(slide, complement);
@@ -216,9 +215,8 @@ void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& sc
   loops().store_sum(scratch.own.data(), other, 3 * width, out.row(y));
 }
 
-void WhiteTexture::make(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool,
-                        Image8& out) {
-  measure_gains(frame, vertices, pool);
+void WhiteTexture::make(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool, Image8& out) {
+  measure_gains(frame, grid, pool);
   const int width = frame.picture.width();
   const int height = frame.picture.height();
   if (height < 2 || (!level_ && (quickly_ || frame.scan == Scan::kProgressive))) {

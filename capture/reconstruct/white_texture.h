@@ -11,8 +11,8 @@
 
 #include "base/image.h"
 #include "base/parallel.h"
+#include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/ranked_sample.h"
-#include "capture/reconstruct/surface.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -24,11 +24,10 @@ class WhiteTexture {
   /// by adding the fields.
   explicit WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly = false);
 
-  /// RGB, the size of the camera's picture; values saturate at 255. `vertices` are decoded boundaries, in any
-  /// order: across each, what the slide loses of a primary its complement gains, so they tell how bright one
-  /// is by the other. `out` is reused where its size fits.
-  void make(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool,
-            Image8& out);
+  /// RGB, the size of the camera's picture; values saturate at 255. Across each boundary of `grid`, what the
+  /// slide loses of a primary its complement gains, so they tell how bright one is by the other. `out` is
+  /// reused where its size fits.
+  void make(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool, Image8& out);
 
   /// What the complement's calibrated red, green and blue were multiplied by in the last frame.
   const std::array<float, 3>& gains() const { return gains_; }
@@ -39,9 +38,8 @@ class WhiteTexture {
     std::vector<float> own, other;           // [3 width]
     std::vector<std::uint8_t> differences;   // as weave_rows() asks for
   };
-  void measure_gains(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, WorkerPool& pool);
-  void measure_ratios(const CapturedFrame& frame, const std::vector<GridVertex>& vertices, int begin, int end,
-                      int worker);
+  void measure_gains(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool);
+  void measure_ratios(const CapturedFrame& frame, const DecodedGrid& grid, int line, int worker);
   void level(float* row, int width) const;
   void progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
   void interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
@@ -53,7 +51,7 @@ class WhiteTexture {
   std::array<float, 3> gains_{1, 1, 1};
   bool level_ = false;
   bool quickly_;
-  std::size_t every_;  // boundaries looked at
+  int every_;  // boundaries looked at
   std::vector<Scratch> scratch_;
   std::array<RankedSample, 3> ratios_;  // of each primary, at boundaries
 };

@@ -28,25 +28,22 @@ struct Stretch {
   double from = 0;
   double to = 1e9;
 };
-std::vector<GridVertex> vertices_of(const std::vector<Stretch>& stretches, const Triangulator& triangulator,
-                                    const std::function<bool(int boundary, int line)>& there) {
-  std::vector<GridVertex> out;
+void place(const std::vector<Stretch>& stretches, const Triangulator& triangulator,
+           const std::function<bool(int boundary, int line)>& there, DecodedGrid& grid) {
   for (int line = 0; line < kLines; ++line) {
     for (const Stretch& s : stretches) {
       for (int b = 0; b < s.scene.pattern.boundaries(); ++b) {
         const double column = s.scene.camera_column(b);
         if (column < std::max(1.0, s.from) || column >= std::min(158.0, s.to) || !there(b, line)) continue;
-        const auto position = triangulator.point(b, line, static_cast<float>(column));
-        if (!position) continue;
-        out.push_back({{.boundary = static_cast<std::uint16_t>(b),
-                        .line = static_cast<std::uint16_t>(line),
-                        .column_px = static_cast<float>(column),
-                        .sigma_px = 0.05F},
-                       *position,
-                       10});
+        grid.put(line, b, static_cast<float>(column), 0.05F, 10);
       }
     }
+    triangulator.place_line(line, grid);
   }
+}
+DecodedGrid blank(const StripedScene& scene) {
+  DecodedGrid out;
+  out.reset(scene.pattern.boundaries(), kLines);
   return out;
 }
 bool everywhere(int, int) {
@@ -64,8 +61,9 @@ Built build(const std::vector<Stretch>& stretches, const SurfaceBuilderOptions& 
   SurfaceBuilder builder(scene.rig, scene.pattern.boundaries(), kLines, 2, options);
   WorkerPool pool(threads);
   Built out;
-  std::vector<GridVertex> vertices = vertices_of(stretches, triangulator, there);
-  builder.build(vertices, triangulator, pool, out.surface, out.counts);
+  DecodedGrid grid = blank(scene);
+  place(stretches, triangulator, there, grid);
+  builder.build(grid, triangulator, pool, out.surface, out.counts);
   return out;
 }
 
@@ -150,16 +148,16 @@ TEST(Steps, NoTriangleBridgesOneBetweenTwoLines) {
   StripedScene far = near;
   far.depth_m = 1.3;
   const Triangulator triangulator(near.rig, near.pattern, kLines, 2);
-  std::vector<GridVertex> vertices =
-      vertices_of({{near}}, triangulator, [](int, int line) { return line < 30; });
-  const std::vector<GridVertex> below =
-      vertices_of({{far}}, triangulator, [](int, int line) { return line >= 30; });
-  vertices.insert(vertices.end(), below.begin(), below.end());
+  DecodedGrid grid = blank(near);
+  place(
+      {{near}}, triangulator, [](int, int line) { return line < 30; }, grid);
+  place(
+      {{far}}, triangulator, [](int, int line) { return line >= 30; }, grid);
   SurfaceBuilder builder(near.rig, near.pattern.boundaries(), kLines, 2, {});
   WorkerPool pool(1);
   Surface s;
   FilterCounts counts;
-  builder.build(vertices, triangulator, pool, s, counts);
+  builder.build(grid, triangulator, pool, s, counts);
   EXPECT_GT(s.triangles.size(), 100U);
   EXPECT_EQ(spanning(s, 0.1), 0U);
   EXPECT_GT(counts.step, 0U);

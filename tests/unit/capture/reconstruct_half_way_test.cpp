@@ -3,9 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <cmath>
 #include <optional>
-#include <vector>
 
 namespace relievo {
 namespace {
@@ -14,27 +13,43 @@ constexpr int kLines = 12;
 constexpr int kBoundaries = 30;
 constexpr std::int64_t kFrame_ns = 33'366'700;
 
+struct Place {
+  float column_px, sigma_px;
+};
+
+/// Nothing on it.
+DecodedGrid blank() {
+  DecodedGrid out;
+  out.reset(kBoundaries, kLines);
+  return out;
+}
 /// Boundaries [first, last], 10 px apart, on every line.
-void add(std::vector<DecodedBoundary>& frame, int first, int last, float moved_px) {
+void add(DecodedGrid& frame, int first, int last, float moved_px) {
   for (int line = 0; line < kLines; ++line)
     for (int b = first; b <= last; ++b)
-      frame.push_back({b, line, 20 + 10 * static_cast<float>(b) + moved_px, 0.04F, 1});
+      frame.put(line, b, 20 + 10 * static_cast<float>(b) + moved_px, 0.04F, 1);
 }
-void lose(std::vector<DecodedBoundary>& frame, int line, int boundary) {
-  std::erase_if(frame, [&](const DecodedBoundary& b) { return b.line == line && b.boundary == boundary; });
+void lose(DecodedGrid& frame, int line, int boundary) {
+  frame.column_px(line)[boundary] = kNoColumn;
 }
-std::optional<DecodedBoundary> at(const std::vector<DecodedBoundary>& frame, int line, int boundary) {
-  const auto found = std::ranges::find_if(
-      frame, [&](const DecodedBoundary& b) { return b.line == line && b.boundary == boundary; });
-  return found == frame.end() ? std::nullopt : std::optional(*found);
+std::optional<Place> at(const DecodedGrid& frame, int line, int boundary) {
+  const float column_px = frame.column_px(line)[boundary];
+  if (std::isnan(column_px)) return std::nullopt;
+  return Place{column_px, frame.sigma_px(line)[boundary]};
+}
+int known(const DecodedGrid& frame) {
+  int out = 0;
+  for (int line = 0; line < kLines; ++line)
+    for (int b = 0; b < kBoundaries; ++b) out += at(frame, line, b).has_value();
+  return out;
 }
 
 class HalfWayTest : public ::testing::Test {
  protected:
   /// Of two frames that follow each other.
-  std::vector<DecodedBoundary> between(const std::vector<DecodedBoundary>& first,
-                                       const std::vector<DecodedBoundary>& second) {
-    std::vector<DecodedBoundary> out;
+  DecodedGrid between(const DecodedGrid& first, const DecodedGrid& second) {
+    DecodedGrid out = blank();
+    out.put(3, 3, 77, 0, 1);  // of an older frame
     EXPECT_FALSE(half_way_.place(first, kFrame_ns, kFrame_ns * 3 / 2, out));
     EXPECT_TRUE(half_way_.place(second, 2 * kFrame_ns, kFrame_ns * 3 / 2, out));
     return out;
@@ -44,17 +59,17 @@ class HalfWayTest : public ::testing::Test {
 };
 
 TEST_F(HalfWayTest, WhatBothFramesHaveIsBetweenItsColumns) {
-  std::vector<DecodedBoundary> first, second;
+  DecodedGrid first = blank(), second = blank();
   add(first, 0, 9, 0);
   add(second, 0, 9, 3);
   const auto out = between(first, second);
-  ASSERT_EQ(out.size(), first.size());
+  ASSERT_EQ(known(out), known(first));
   EXPECT_NEAR(at(out, 5, 4)->column_px, 61.5, 1e-4);
   EXPECT_NEAR(at(out, 5, 4)->sigma_px, 0.04 / 1.41421, 1e-4);
 }
 
 TEST_F(HalfWayTest, WhatOneHasGoesAsItsNeighboursDo) {
-  std::vector<DecodedBoundary> first, second;
+  DecodedGrid first = blank(), second = blank();
   add(first, 0, 9, 0);
   add(second, 0, 9, 3);
   lose(first, 5, 4);
@@ -68,7 +83,7 @@ TEST_F(HalfWayTest, WhatOneHasGoesAsItsNeighboursDo) {
 }
 
 TEST_F(HalfWayTest, WhatAnotherSurfacePassesIsNotTakenToBeSeen) {
-  std::vector<DecodedBoundary> first, second;
+  DecodedGrid first = blank(), second = blank();
   add(first, 0, 12, 0);
   add(second, 0, 11, 0);  // the last one is covered
   add(first, 20, 25, -65);
@@ -77,7 +92,7 @@ TEST_F(HalfWayTest, WhatAnotherSurfacePassesIsNotTakenToBeSeen) {
 }
 
 TEST_F(HalfWayTest, NorWhatNothingTellsTheWayOf) {
-  std::vector<DecodedBoundary> first, second;
+  DecodedGrid first = blank(), second = blank();
   add(first, 0, 9, 0);
   add(second, 0, 3, 3);
   const auto out = between(first, second);
@@ -86,11 +101,11 @@ TEST_F(HalfWayTest, NorWhatNothingTellsTheWayOf) {
 }
 
 TEST_F(HalfWayTest, OverALostFrameNothingIsPlaced) {
-  std::vector<DecodedBoundary> frame, out;
+  DecodedGrid frame = blank(), out = blank();
   add(frame, 0, 9, 0);
   half_way_.place(frame, kFrame_ns, kFrame_ns * 3 / 2, out);
   EXPECT_FALSE(half_way_.place(frame, 3 * kFrame_ns, kFrame_ns * 3 / 2, out));
-  EXPECT_TRUE(out.empty());
+  EXPECT_EQ(known(out), 0);
 }
 
 }  // namespace

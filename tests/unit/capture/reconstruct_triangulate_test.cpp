@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <random>
 #include <vector>
 
 #include "capture/pattern/bcsl.h"
@@ -229,6 +231,106 @@ TEST(Triangulator, NothingWhereTheProjectorModelFoldsOver) {
     for (float column = 0; column < 160; column += 8)
       EXPECT_FALSE(triangulator.point(boundary, 60, column)) << boundary << " at " << column;
   EXPECT_TRUE(triangulator.point(7, 60, 99.5F));
+}
+
+/// Whole lines of boundaries, some nowhere, some where nothing is seen.
+DecodedGrid scattered(const Rig& rig, const Pattern& pattern, int lines) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> column(-40.F, static_cast<float>(rig.camera.width) + 40.F);
+  DecodedGrid out;
+  out.reset(pattern.boundaries(), lines);
+  for (int line = 0; line < lines; ++line) {
+    for (int b = 0; b < pattern.boundaries(); ++b) {
+      if (random() % 5 == 0) continue;
+      const float extreme[] = {0.F,    -0.F,       1e30F,
+                               -1e30F, 7.9999995F, static_cast<float>(rig.camera.width - 1)};
+      out.put(line, b, random() % 20 == 0 ? extreme[random() % 6] : column(random), 0, 1);
+    }
+  }
+  return out;
+}
+
+/// Also of counts that are no multiple of what a kernel takes at once.
+TEST(Triangulator, ALineAtOnceIsAsOneByOne) {
+  for (const bool straight : {true, false}) {
+    for (const int stripes : {2, 3, 9, 16, 60, 111}) {
+      const Rig rig = straight ? without_distortion(shell_rig()) : shell_rig();
+      Pattern pattern;
+      pattern.sequence.assign(static_cast<std::size_t>(stripes), 0);
+      constexpr int kLines = 40;
+      const Triangulator triangulator(rig, pattern, kLines, 23);
+      const DecodedGrid columns = scattered(rig, pattern, kLines);
+      DecodedGrid grid = columns;
+      std::size_t points = 0;
+      for (int line = 0; line < kLines; ++line) {
+        const PointCounts counts = triangulator.place_line(line, grid);
+        PointCounts expected;
+        for (int b = 0; b < pattern.boundaries(); ++b) {
+          const float column_px = columns.column_px(line)[b];
+          if (std::fabs(column_px) > 1e6F) continue;  // beyond what one by one is for
+          const auto point = std::isnan(column_px) ? std::nullopt : triangulator.point(b, line, column_px);
+          expected.points += point.has_value();
+          expected.no_point += !std::isnan(column_px) && !point;
+          ASSERT_EQ(std::isnan(grid.column_px(line)[b]), !point) << line << ", " << b << ", " << column_px;
+          const PointRow at = grid.points(line);
+          if (point) {
+            ASSERT_EQ(*point, (Vec3f{at.x[b], at.y[b], at.z[b]})) << line << ", " << b;
+            ASSERT_EQ(grid.column_px(line)[b], column_px);
+          } else {
+            ASSERT_TRUE(std::isnan(at.x[b]) && std::isnan(at.y[b]) && std::isnan(at.z[b]));
+          }
+        }
+        EXPECT_GE(counts.points, expected.points);
+        EXPECT_GE(counts.no_point, expected.no_point);
+        points += counts.points;
+      }
+      EXPECT_GT(points, 20U) << stripes;
+    }
+  }
+}
+
+TEST(Triangulator, AllKernelsMakeTheSamePoints) {
+  const Rig rig = without_distortion(shell_rig());
+  const Pattern pattern = *make_pattern(6, 2, 0, 111);
+  DecodedGrid columns = scattered(rig, pattern, 64);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> ray(-0.6F, 0.6F);
+  std::vector<float> rays(2 * 162), sheets(static_cast<std::size_t>(pattern.boundaries()) + 8, kNoColumn);
+  for (int round = 0; round < 64; ++round) {
+    for (float& r : rays) r = ray(random);
+    for (int b = 0; b < pattern.boundaries(); ++b) sheets[static_cast<std::size_t>(b)] = ray(random);
+    if (round % 8 == 1) rays[static_cast<std::size_t>(round)] = kNoColumn;
+    if (round % 8 == 2) rays[static_cast<std::size_t>(round)] = 1e30F;
+    if (round % 8 == 3) sheets[static_cast<std::size_t>(round)] = -1e30F;
+    const StraightSheets seen{
+        .rays = rays.data(),
+        .ray_samples = 162,
+        .sheets = sheets.data(),
+        .across = {rig.projector_from_camera_rotation[0], rig.projector_from_camera_rotation[1],
+                   rig.projector_from_camera_rotation[2]},
+        .forward = {rig.projector_from_camera_rotation[6], rig.projector_from_camera_rotation[7],
+                    rig.projector_from_camera_rotation[8]},
+        .translation_x = rig.projector_from_camera_translation[0],
+        .translation_z = round % 8 == 4 ? 0 : rig.projector_from_camera_translation[2]};
+    const auto made = [&](const TriangulateKernels& kernels) {
+      DecodedGrid grid = columns;
+      const PointCounts counts =
+          kernels.straight(seen, pattern.boundaries(), grid.column_px(round), grid.points(round));
+      std::vector<std::uint32_t> bits{static_cast<std::uint32_t>(counts.points),
+                                      static_cast<std::uint32_t>(counts.no_point)};
+      const PointRow at = grid.points(round);
+      for (const float* plane :
+           {static_cast<const float*>(grid.column_px(round)), static_cast<const float*>(at.x),
+            static_cast<const float*>(at.y), static_cast<const float*>(at.z)})
+        for (int b = 0; b < pattern.boundaries(); ++b)
+          bits.push_back(std::isnan(plane[b]) ? 0x7fc00000U : std::bit_cast<std::uint32_t>(plane[b]));
+      return bits;
+    };
+    const auto reference = made(all_triangulate_kernels().front());
+    EXPECT_GT(reference[0], 0U);
+    for (const TriangulateKernels& kernels : all_triangulate_kernels())
+      ASSERT_EQ(made(kernels), reference) << kernels.name << ", " << round;
+  }
 }
 
 }  // namespace

@@ -197,16 +197,19 @@ TEST(WhiteTexture, GainsAreThoseOfTheComplement) {
   ASSERT_TRUE(reconstructor->add(first).ok());
   auto frame = reconstructor->add(second);
   ASSERT_TRUE(frame.ok() && *frame);
-  std::vector<GridVertex> vertices;
-  for (const GridPoint& at : (*frame)->surface.grid) vertices.push_back({at, {}, 0});
+  DecodedGrid grid;
+  grid.reset(filmed.pattern.boundaries(), filmed.rig.camera.height);
+  for (const GridPoint& at : (*frame)->surface.grid)
+    grid.put(at.line, at.boundary, at.column_px, at.sigma_px, 0);
   WhiteTexture texture(filmed.rig.colour_matrix);
   WorkerPool pool(1);
   Image8 out;
-  texture.make(second, vertices, pool, out);
+  texture.make(second, grid, pool, out);
   EXPECT_NEAR(texture.gains()[0], 1 / 0.8, 0.03);
   EXPECT_NEAR(texture.gains()[1], 1, 0.03);
   EXPECT_NEAR(texture.gains()[2], 1 / 0.9, 0.03);
-  texture.make(second, {}, pool, out);  // nothing tells: as they are
+  grid.reset(filmed.pattern.boundaries(), filmed.rig.camera.height);
+  texture.make(second, grid, pool, out);  // nothing tells: as they are
   EXPECT_EQ(texture.gains(), (std::array<float, 3>{1, 1, 1}));
 }
 
@@ -228,7 +231,7 @@ TEST(WhiteTexture, SmallPicturesAreAdded) {
     WhiteTexture texture({1, 0, 0, 0, 1, 0, 0, 0, 1});
     WorkerPool pool(1);
     Image8 out;
-    texture.make(frame, {}, pool, out);
+    texture.make(frame, DecodedGrid(), pool, out);
     ASSERT_EQ(out.height(), height);
     for (std::size_t i = 0; i < out.size(); ++i) EXPECT_EQ(out.data()[i], height == 1 ? 60 : 120);
   }
