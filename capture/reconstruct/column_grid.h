@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/parallel.h"
+#include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/margin_grid.h"
 
 namespace relievo {
@@ -24,6 +24,18 @@ struct ColumnScale {
   float noise_px = 0;    // usual standard deviation of a column
 };
 
+/// How far a difference of columns may lie outside those of its neighbours, in pixels. At a crease it lies
+/// between them.
+struct ColumnLimits {
+  static constexpr float kAcrossShare = 0.15F;  // of the difference more, where both neighbours are known
+  static constexpr float kAcrossOpen = 0.35F;   // the same where only one is
+  static constexpr float kWidest_px = 64.F;     // across, where none is
+
+  explicit ColumnLimits(const ColumnScale& scale);
+  float across, along;
+  float lean;  // along, where no neighbour is known
+};
+
 /// Whether one surface goes on from x[1] to x[2], both of them `gap` grid places apart, by their difference
 /// and those before (x[0] to x[1]) and behind (x[2] to x[3]), each of one place. NaN: not there, and nothing
 /// speaks against. Columns rise from boundary to boundary.
@@ -31,21 +43,13 @@ bool surface_goes_on_across(const std::array<float, 4>& x, float gap, const Colu
 /// The same from line to line.
 bool surface_goes_on_along(const std::array<float, 4>& x, float gap, const ColumnScale& scale);
 
-/// [line][boundary], without margin.
-struct GridLinks {
-  std::vector<std::uint8_t> across;  // 1: the surface goes on to the next boundary on the line
-  std::vector<std::uint8_t> along;   // 1: to the same boundary on the next line
-  std::size_t steps = 0;             // places where both are there and the surface does not go on
-};
-void find_links(const ColumnGrid& grid, const ColumnScale& scale, WorkerPool& pool, GridLinks& out);
-
 struct Hole {
   std::uint16_t boundary;
   std::uint16_t line;
   float column_px;
 };
 /// Places with nothing between two of one surface that are at most `size` missing places apart, on the line
-/// or along the boundary, whichever is nearer. Sets them in `grid`; `out` is overwritten.
-void fill_holes(int size, const ColumnScale& scale, ColumnGrid& grid, std::vector<Hole>& out);
+/// or along the boundary, whichever is nearer. `out` is overwritten.
+void find_holes(int size, const ColumnScale& scale, const DecodedGrid& grid, std::vector<Hole>& out);
 
 }  // namespace relievo

@@ -16,8 +16,8 @@ constexpr float kBendShare = 0.25F;
 
 /// A cubic through the knots (Hermite), with slopes from the parabola through three, limited so that the
 /// column of the projector never falls (Fritsch and Carlson).
-void DenseSampler::sample_piece(int first_boundary, int line, const Triangulator& triangulator, int width_px,
-                                Scratch& scratch) {
+void DenseSampler::sample_piece(int first_boundary, int line, const Triangulator& triangulator,
+                                Scratch& scratch, DenseGrid& out) {
   auto& knots = scratch.knots;
   const std::size_t n = knots.size();
   if (n < 2) {
@@ -36,8 +36,13 @@ void DenseSampler::sample_piece(int first_boundary, int line, const Triangulator
   end(0, 1, width(0));
   end(n - 1, n - 2, width(n - 2));
 
+  DecodedGrid& pixels = out.pixels;
+  const PointRow points = pixels.points(line);
+  std::uint8_t* interpolated_row = pixels.interpolated_of(line);
+  std::uint16_t* boundaries = out.boundaries.data() + static_cast<std::size_t>(line) * pixels.stride();
   const int begin = std::max(0, static_cast<int>(std::ceil(knots[0].column_px - kHalfPixel)));
-  const int last = std::min(width_px - 1, static_cast<int>(std::floor(knots[n - 1].column_px + kHalfPixel)));
+  const int last =
+      std::min(pixels.boundaries() - 1, static_cast<int>(std::floor(knots[n - 1].column_px + kHalfPixel)));
   std::size_t i = 0;
   for (int x = begin; x <= last; ++x) {
     const auto column = static_cast<float>(x);
@@ -66,61 +71,57 @@ void DenseSampler::sample_piece(int first_boundary, int line, const Triangulator
     const float bend = inner * (1 - inner) * kBendShare * std::fabs(a - b);
     const float sl = (1 - inner) * left.sigma_px;
     const float sr = inner * right.sigma_px;
-    GridVertex v;
-    v.at = {.boundary = static_cast<std::uint16_t>(boundary),
-            .line = static_cast<std::uint16_t>(line),
-            .column_px = column,
-            .sigma_px = left.sigma_px > 0 ? std::sqrt(sl * sl + sr * sr + bend * bend) : 0,
-            .interpolated = interpolated};
-    v.position = *position;
-    v.slope = (nearer_left ? left : right).slope_px;
-    scratch.vertices.push_back(v);
+    const float sigma_px = left.sigma_px > 0 ? std::sqrt(sl * sl + sr * sr + bend * bend) : 0;
+    const float slope = (nearer_left ? left : right).slope_px;
     ++(interpolated ? scratch.counts.interpolated : scratch.counts.measured);
+    const bool steeper = !(pixels.slope(line)[x] >= slope);
+    const bool alone = pixels.put(line, x, column, sigma_px, slope);
+    scratch.counts.duplicate += !alone;
+    if (!alone && !steeper) continue;
+    points.x[x] = (*position)[0];
+    points.y[x] = (*position)[1];
+    points.z[x] = (*position)[2];
+    interpolated_row[x] = interpolated;
+    boundaries[x] = static_cast<std::uint16_t>(boundary);
   }
 }
 
-DenseCounts DenseSampler::sample(const std::vector<GridVertex>& measured, const ColumnGrid& columns,
-                                 const GridLinks& links, const Triangulator& triangulator, int width_px,
-                                 WorkerPool& pool, std::vector<GridVertex>& out) {
-  const int boundaries = columns.boundaries();
-  const auto cell = [&](int line, int boundary) {
-    return static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries) +
-           static_cast<std::size_t>(boundary);
-  };
-  vertex_.assign(cell(columns.lines(), 0), -1);
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    const GridPoint& at = measured[i].at;
-    if (columns.line(at.line)[at.boundary] == at.column_px)
-      vertex_[cell(at.line, at.boundary)] = static_cast<std::int32_t>(i);
+DenseCounts DenseSampler::sample(const DecodedGrid& measured, const GridLinks& links,
+                                 const Triangulator& triangulator, int width_px, WorkerPool& pool,
+                                 DenseGrid& out) {
+  DecodedGrid& pixels = out.pixels;
+  if (pixels.boundaries() != width_px || pixels.lines() != measured.lines()) {
+    pixels.reset(width_px, measured.lines());
+    pixels.start_interpolated();
+    out.boundaries.resize(static_cast<std::size_t>(measured.lines()) * pixels.stride());
   }
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
-  for (Scratch& s : scratch_) {
-    s.vertices.clear();
-    s.counts = {};
-  }
-  pool.for_ranges(columns.lines(), [&](int begin, int end, int worker) {
+  for (Scratch& s : scratch_) s.counts = {};
+  pool.for_ranges(measured.lines(), [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
+      pixels.start_line(line);
+      std::fill_n(pixels.points(line).z, width_px, kNoColumn);
+      const float* z = measured.z(line);
+      const std::uint8_t* across = links.across(line);
+      const std::uint8_t* filled = measured.interpolated(line);
       scratch.knots.clear();
-      for (int b = 0; b < boundaries; ++b) {
-        const std::int32_t i = vertex_[cell(line, b)];
-        if (i < 0) continue;
-        const GridVertex& v = measured[static_cast<std::size_t>(i)];
-        scratch.knots.push_back({v.at.column_px, v.at.sigma_px, 0, v.slope, v.at.interpolated});
-        if (links.across[cell(line, b)] != 0 && b + 1 < boundaries && vertex_[cell(line, b + 1)] >= 0)
-          continue;
-        sample_piece(b + 1 - static_cast<int>(scratch.knots.size()), line, triangulator, width_px, scratch);
+      for (int b = 0; b < measured.boundaries(); ++b) {
+        if (!(z[b] > 0)) continue;
+        scratch.knots.push_back({measured.column_px(line)[b], measured.sigma_px(line)[b], 0,
+                                 measured.slope(line)[b], filled != nullptr && filled[b] != 0});
+        if (across[b] != 0 && z[b + 1] > 0) continue;
+        sample_piece(b + 1 - static_cast<int>(scratch.knots.size()), line, triangulator, scratch, out);
         scratch.knots.clear();
       }
     }
   });
-  out.clear();
   DenseCounts total;
   for (const Scratch& s : scratch_) {
-    out.insert(out.end(), s.vertices.begin(), s.vertices.end());
     total.measured += s.counts.measured;
     total.interpolated += s.counts.interpolated;
     total.alone += s.counts.alone;
+    total.duplicate += s.counts.duplicate;
   }
   return total;
 }

@@ -102,7 +102,7 @@ struct Reconstructor::State {
                o.decoder == Decoder::kQuick ? kDepthsQuickly : 1),
         white_texture(r.colour_matrix, o.decoder == Decoder::kQuick),
         half_way(p.boundaries(), line_count(r)),
-        surface_builder(r, p.boundaries(), line_count(r), line_step(r), o.surface) {
+        surface_builder(r, line_step(r), o.surface) {
     decoded.reset(p.boundaries(), line_count(r));
     if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), line_count(r));
     spare.reserve(kSpareFrames);

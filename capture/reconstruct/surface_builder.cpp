@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/surface_builder.h"
 
-#include <algorithm>
-
 namespace relievo {
 namespace {
 
@@ -12,102 +10,77 @@ constexpr int kLinesApart = 8;  // that tell the usual standard deviation
 
 }  // namespace
 
-SurfaceBuilder::SurfaceBuilder(const Rig& rig, int boundaries, int lines, int line_step_px,
-                               const SurfaceBuilderOptions& options)
-    : rig_(rig),
-      boundaries_(boundaries),
-      lines_(lines),
+SurfaceBuilder::SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options)
+    : width_px_(rig.camera.width),
+      height_px_(rig.camera.height),
       line_step_px_(line_step_px),
       options_(options),
       depth_slope_(rig) {}
 
-std::size_t SurfaceBuilder::fill_columns(const std::vector<GridVertex>& vertices) {
-  std::size_t duplicates = 0;
-  columns_.reset(boundaries_, lines_, kNoColumn);
-  vertex_.assign(static_cast<std::size_t>(boundaries_) * static_cast<std::size_t>(lines_), -1);
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const GridPoint& at = vertices[i].at;
-    std::int32_t& slot =
-        vertex_[static_cast<std::size_t>(at.line) * static_cast<std::size_t>(boundaries_) + at.boundary];
-    duplicates += slot >= 0;
-    if (slot >= 0 && !better(vertices[i], vertices[static_cast<std::size_t>(slot)])) continue;
-    slot = static_cast<std::int32_t>(i);
-    columns_.line(at.line)[at.boundary] = at.column_px;
-  }
-  return duplicates;
-}
-
 /// The median on some of the lines, which is as good; 0 where it is not known.
-float SurfaceBuilder::usual_sigma_px(const std::vector<GridVertex>& vertices) {
+float SurfaceBuilder::usual_sigma_px(const DecodedGrid& grid) {
   sigmas_px_.reset(1);
-  for (const GridVertex& v : vertices)
-    if (v.at.line % kLinesApart == 0) sigmas_px_.of(0).push_back(v.at.sigma_px);
+  std::vector<float>& sample = sigmas_px_.of(0);
+  const auto boundaries = static_cast<std::size_t>(grid.boundaries());
+  std::size_t count = 0;
+  for (int line = 0; line < grid.lines(); line += kLinesApart) {
+    sample.resize(count + boundaries);
+    const float* column_px = grid.column_px(line);
+    const float* sigma_px = grid.sigma_px(line);
+    for (std::size_t b = 0; b < boundaries; ++b) {
+      sample[count] = sigma_px[b];
+      count += column_px[b] == column_px[b];
+    }
+  }
+  sample.resize(count);
   return sigmas_px_.median(0);
 }
 
-void SurfaceBuilder::finish(WorkerPool& pool, Surface& out) const {
-  const auto width = static_cast<float>(rig_.camera.width);
-  const auto height = static_cast<float>(rig_.camera.height);
-  const std::size_t count = out.grid.size();
-  out.texture_coordinates.resize(count);
-  out.sigmas_m.resize(count);
-  out.interpolated.resize(count);
-  pool.for_ranges(static_cast<int>(count), [&](int begin, int end, int) {
-    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
-      const GridPoint& at = out.grid[i];
-      out.texture_coordinates[i] = {(at.column_px + 0.5F) / width,
-                                    (static_cast<float>(at.line * line_step_px_) + 0.5F) / height};
-      out.sigmas_m[i] = at.sigma_px > 0 ? at.sigma_px * depth_slope_.metres_per_px(out.positions[i]) : 0;
-      out.interpolated[i] = at.interpolated;
-    }
-  });
+/// Returns how many places were filled.
+std::size_t SurfaceBuilder::fill(const ColumnScale& scale, const Triangulator& triangulator,
+                                 DecodedGrid& grid) {
+  find_holes(options_.fill_holes, scale, grid, holes_);
+  grid.start_interpolated();
+  std::size_t filled = 0;
+  for (const Hole& hole : holes_) {
+    const int b = hole.boundary;
+    grid.put(hole.line, b, hole.column_px, 0, 0);
+    const auto position = triangulator.point(b, hole.line, hole.column_px);
+    if (!position) continue;
+    const PointRow points = grid.points(hole.line);
+    points.x[b] = (*position)[0];
+    points.y[b] = (*position)[1];
+    points.z[b] = (*position)[2];
+    grid.interpolated_of(hole.line)[b] = 1;
+    ++filled;
+  }
+  return filled;
 }
 
 void SurfaceBuilder::build(DecodedGrid& grid, const Triangulator& triangulator, WorkerPool& pool,
                            Surface& out, FilterCounts& counts) {
-  std::vector<GridVertex>& vertices = vertices_;
-  vertices.clear();
-  for (int line = 0; line < grid.lines(); ++line) {
-    const PointRow points = grid.points(line);
-    for (int b = 0; b < grid.boundaries(); ++b) {
-      if (!(points.z[b] > 0)) continue;
-      vertices.push_back({{static_cast<std::uint16_t>(b), static_cast<std::uint16_t>(line),
-                           grid.column_px(line)[b], grid.sigma_px(line)[b]},
-                          {points.x[b], points.y[b], points.z[b]},
-                          grid.slope(line)[b]});
-    }
-  }
-  const std::size_t duplicates = fill_columns(vertices);
-  const ColumnScale scale{line_step_px_, usual_sigma_px(vertices)};
-  fill_holes(options_.fill_holes, scale, columns_, holes_);
-  for (const Hole& hole : holes_) {
-    const auto position = triangulator.point(hole.boundary, hole.line, hole.column_px);
-    if (!position) continue;
-    vertex_[static_cast<std::size_t>(hole.line) * static_cast<std::size_t>(boundaries_) + hole.boundary] =
-        static_cast<std::int32_t>(vertices.size());
-    vertices.push_back({{hole.boundary, hole.line, hole.column_px, 0, true}, *position, 0});
-    ++counts.filled;
-  }
-  find_links(columns_, scale, pool, links_);
+  const ColumnScale scale{line_step_px_, usual_sigma_px(grid)};
+  if (options_.fill_holes > 0) counts.filled += fill(scale, triangulator, grid);
+  find_links(grid, scale, pool, links_);
+  const SurfacePicture picture{width_px_, height_px_, line_step_px_, depth_slope_};
   SurfaceCounts made;
   if (options_.dense) {
-    const DenseCounts sampled =
-        dense_.sample(vertices, columns_, links_, triangulator, rig_.camera.width, pool, pixels_);
+    const DenseCounts sampled = dense_.sample(grid, links_, triangulator, width_px_, pool, pixels_);
     counts.interpolated += sampled.interpolated;
     counts.alone += sampled.alone;
-    made = build_surface(pixels_, rig_.camera.width, lines_,
-                         {.least_component = kLeastDenseComponent, .pool = &pool, .by_pixel = true}, scratch_,
-                         out);
-  } else {
-    made = build_surface(vertices, boundaries_, lines_, {.links = &links_, .pool = &pool, .places = &vertex_},
+    counts.duplicate += sampled.duplicate;
+    made = build_surface(pixels_.pixels,
+                         {.least_component = kLeastDenseComponent,
+                          .pool = &pool,
+                          .picture = &picture,
+                          .boundaries = pixels_.boundaries.data()},
                          scratch_, out);
-    made.duplicate = duplicates;
+  } else {
+    made = build_surface(grid, {.links = &links_, .pool = &pool, .picture = &picture}, scratch_, out);
   }
-  counts.duplicate += made.duplicate;
   counts.step += made.step;
   counts.edge_on += made.edge_on;
   counts.small_component += made.small_component;
-  finish(pool, out);
 }
 
 }  // namespace relievo

@@ -22,8 +22,7 @@ namespace relievo {
 /// Keeps its scratch memory from frame to frame. One thread.
 class SurfaceBuilder {
  public:
-  SurfaceBuilder(const Rig& rig, int boundaries, int lines, int line_step_px,
-                 const SurfaceBuilderOptions& options);
+  SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options);
 
   /// Of boundaries with their points: `grid` gains what fills holes. Fills `out` but for what it holds of
   /// old, and adds what the filters did to `counts`. `triangulator` must be of the same rig, pattern and
@@ -32,21 +31,17 @@ class SurfaceBuilder {
              FilterCounts& counts);
 
  private:
-  std::size_t fill_columns(const std::vector<GridVertex>& vertices);
-  float usual_sigma_px(const std::vector<GridVertex>& vertices);
-  void finish(WorkerPool& pool, Surface& out) const;
+  float usual_sigma_px(const DecodedGrid& grid);
+  std::size_t fill(const ColumnScale& scale, const Triangulator& triangulator, DecodedGrid& grid);
 
-  Rig rig_;
-  int boundaries_, lines_, line_step_px_;
+  int width_px_, height_px_, line_step_px_;
   SurfaceBuilderOptions options_;
   DepthSlope depth_slope_;
-  ColumnGrid columns_;
-  std::vector<std::int32_t> vertex_;  // [line][boundary]: the better vertex there, or -1
   RankedSample sigmas_px_;
   std::vector<Hole> holes_;
   GridLinks links_;
   DenseSampler dense_;
-  std::vector<GridVertex> vertices_, pixels_;
+  DenseGrid pixels_;
   SurfaceScratch scratch_;
 };
 

@@ -2,31 +2,12 @@
 #include "capture/reconstruct/surface_cells.h"
 
 #include <cmath>
-#include <cstring>
 
 #include "base/variants.h"
+#include "capture/reconstruct/eight.h"
 
 namespace relievo {
 namespace {
-
-// Eight cells at once; a processor with narrower registers takes several for them.
-using Eight = float __attribute__((vector_size(32)));
-using EightInts = std::int32_t __attribute__((vector_size(32)));  // as a mask: 0 or -1
-using EightBytes = std::uint8_t __attribute__((vector_size(8)));
-
-#define RELIEVO_INLINE [[gnu::always_inline]] inline
-
-RELIEVO_INLINE void load(const float* from, Eight& to) {
-  std::memcpy(&to, from, sizeof to);
-}
-RELIEVO_INLINE void store(const Eight& from, float* to) {
-  std::memcpy(to, &from, sizeof from);
-}
-RELIEVO_INLINE void load_links(const std::uint8_t* from, EightInts& to) {
-  EightBytes bytes;
-  std::memcpy(&bytes, from, sizeof bytes);
-  to = __builtin_convertvector(bytes, EightInts) != 0;
-}
 
 struct Corner {
   Eight x, y, z, x_z, y_z;
@@ -37,14 +18,14 @@ struct Corner {
     load(row.x_z + b, x_z);
     load(row.y_z + b, y_z);
   }
-  RELIEVO_INLINE void choose(const EightInts& mask, const Corner& a, const Corner& b) {
-    x = mask ? a.x : b.x;
-    y = mask ? a.y : b.y;
-    z = mask ? a.z : b.z;
-    x_z = mask ? a.x_z : b.x_z;
-    y_z = mask ? a.y_z : b.y_z;
-  }
 };
+
+/// a where `mask` is set, elsewhere b.
+RELIEVO_INLINE void choose(const EightInts& mask, const Corner& a, const Corner& b, Corner& out) {
+  out.x = mask ? a.x : b.x;
+  out.y = mask ? a.y : b.y;
+  out.z = mask ? a.z : b.z;
+}
 
 /// No depth step between two neighbours on the grid. False also where one is not there.
 RELIEVO_INLINE void connected(const Corner& a, const Corner& b, float ratio, EightInts& out) {
@@ -82,22 +63,35 @@ RELIEVO_INLINE void keep(const EightInts& mask, Normal& n) {
   n.z = mask ? n.z : none;
 }
 
-RELIEVO_INLINE void make_body(const VertexRow& above, const VertexRow& below, const CellLinks& links,
-                              int count, const CellLimits& limits, std::uint8_t* cells,
-                              const CellNormals& normals, CellCounts& counts) {
+/// Sums over the cells to the right of eight vertices, `here`, and to their left; the ones before these eight
+/// are `before`, which becomes `left`.
+RELIEVO_INLINE void add_left(const Eight& here, const Eight& left, Eight& before, Eight& out) {
+  out = here + __builtin_shufflevector(before, left, 7, 8, 9, 10, 11, 12, 13, 14);
+  before = left;
+}
+
+/// What the cells add to the normals of their corners, and of the upper line.
+struct NormalSums {
+  // There is no cell to the left of the first: what changes no sum, not even a zero's sign.
+  Eight upper_before[3], lower_before[3];
+  RELIEVO_INLINE void start() {
+    const Eight zero{};
+    for (int axis = 0; axis < 3; ++axis) upper_before[axis] = lower_before[axis] = -zero;
+  }
+};
+
+RELIEVO_INLINE void make_body(const CellRow& row, const CellLimits& limits, std::uint8_t* cells,
+                              const NormalRow& unit, const NormalRow& next, CellCounts& counts) {
   EightInts steps{};  // negative
   EightInts edge_on{};
-  for (int b = 0; b < count; b += 8) {
+  NormalSums sums;
+  sums.start();
+  for (int b = 0; b < row.count; b += 8) {
     Corner q0, q1, q2, q3;
-    q0.load_from(above, b);
-    q1.load_from(below, b);
-    q2.load_from(below, b + 1);
-    q3.load_from(above, b + 1);
-    EightInts left, lower, right, upper;  // sides from each corner to the next
-    load_links(links.down + b, left);
-    load_links(links.across_below + b, lower);
-    load_links(links.down + b + 1, right);
-    load_links(links.across_above + b, upper);
+    q0.load_from(row.above, b);
+    q1.load_from(row.below, b);
+    q2.load_from(row.below, b + 1);
+    q3.load_from(row.above, b + 1);
 
     // Of a whole cell the diagonal with the smaller depth step follows the surface. Otherwise the one between
     // the corners that are there.
@@ -107,22 +101,27 @@ RELIEVO_INLINE void make_body(const VertexRow& above, const VertexRow& below, co
     const Eight rising_step = rising < 0 ? -rising : rising;
     const EightInts straight = (falling == falling) & ((rising != rising) | (falling_step <= rising_step));
     Corner p0, p1, p2, p3;
-    p0.choose(straight, q0, q1);
-    p1.choose(straight, q1, q2);
-    p2.choose(straight, q2, q3);
-    p3.choose(straight, q3, q0);
+    choose(straight, q0, q1, p0);
+    choose(straight, q1, q2, p1);
+    choose(straight, q2, q3, p2);
+    choose(straight, q3, q0, p3);
+    p0.x_z = straight ? q0.x_z : q1.x_z;
+    p0.y_z = straight ? q0.y_z : q1.y_z;
+    p2.x_z = straight ? q2.x_z : q3.x_z;
+    p2.y_z = straight ? q2.y_z : q3.y_z;
 
-    EightInts c01, c12, c20, c23, c30;
-    connected(p0, p1, limits.depth_step_ratio, c01);
-    connected(p1, p2, limits.depth_step_ratio, c12);
-    connected(p2, p0, limits.depth_step_ratio, c20);
-    connected(p2, p3, limits.depth_step_ratio, c23);
-    connected(p3, p0, limits.depth_step_ratio, c30);
+    const float ratio = limits.depth_step_ratio;
+    EightInts left, lower, right, upper, diagonal;
+    connected(q0, q1, ratio, left);
+    connected(q1, q2, ratio, lower);
+    connected(q2, q3, ratio, right);
+    connected(q3, q0, ratio, upper);
+    connected(p0, p2, ratio, diagonal);
     const EightInts there = (p0.z == p0.z) & (p2.z == p2.z);
     const EightInts first_there = there & (p1.z == p1.z);
     const EightInts second_there = there & (p3.z == p3.z);
-    const EightInts first_one = first_there & c01 & c12 & c20;
-    const EightInts second_one = second_there & c23 & c30 & c20;
+    const EightInts first_one = first_there & lower & diagonal & (straight ? left : right);
+    const EightInts second_one = second_there & upper & diagonal & (straight ? right : left);
     Normal n1, n2;
     EightInts good1, good2;
     face(p0, p1, p2, limits.least_facing, n1, good1);
@@ -130,31 +129,38 @@ RELIEVO_INLINE void make_body(const VertexRow& above, const VertexRow& below, co
     const EightInts first_joins = first_one & good1;
     const EightInts second_joins = second_one & good2;
     // A triangle's sides but the diagonal must be linked.
-    const EightInts first = first_joins & (straight ? left & lower : lower & right);
-    const EightInts second = second_joins & (straight ? right & upper : upper & left);
+    EightInts down, down_right, across_above, across_below;
+    load(row.links.down + b, down);
+    load(row.links.down + b + 1, down_right);
+    load(row.links.across_above + b, across_above);
+    load(row.links.across_below + b, across_below);
+    const EightInts left_on = down != 0;
+    const EightInts right_on = down_right != 0;
+    const EightInts first = first_joins & (across_below != 0) & (straight ? left_on : right_on);
+    const EightInts second = second_joins & (across_above != 0) & (straight ? right_on : left_on);
     steps += (first_there & ~first) & ~(first_one & ~good1);
     steps += (second_there & ~second) & ~(second_one & ~good2);
     edge_on += first_one & ~good1;
     edge_on += second_one & ~good2;
 
-    const EightInts bits = (~straight & cell::kTurned) | (first & cell::kFirst) | (second & cell::kSecond) |
-                           (first_joins & cell::kFirstJoins) | (second_joins & cell::kSecondJoins);
-    const EightBytes bytes = __builtin_convertvector(bits, EightBytes);
-    std::memcpy(cells + b, &bytes, sizeof bytes);
+    store((~straight & cell::kTurned) | (first & cell::kFirst) | (second & cell::kSecond) |
+              (first_joins & cell::kFirstJoins) | (second_joins & cell::kSecondJoins) |
+              ((q0.z == q0.z) & cell::kCorner) | (((down & kSureLink) != 0) & cell::kSureDown),
+          cells + b);
 
     keep(first, n1);
     keep(second, n2);
-    const Normal both{n1.x + n2.x, n1.y + n2.y, n1.z + n2.z};
-    const auto add = [&](int corner, const Normal& when_straight, const Normal& when_turned)
-        __attribute__((always_inline)) {
-      store(straight ? when_straight.x : when_turned.x, normals.plane(corner, 0) + b);
-      store(straight ? when_straight.y : when_turned.y, normals.plane(corner, 1) + b);
-      store(straight ? when_straight.z : when_turned.z, normals.plane(corner, 2) + b);
-    };
-    add(0, both, n2);
-    add(1, n1, both);
-    add(2, both, n1);
-    add(3, n2, both);
+    const Eight one[3] = {n1.x, n1.y, n1.z};
+    const Eight two[3] = {n2.x, n2.y, n2.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eight both = one[axis] + two[axis];
+      Eight of_upper, of_lower, above;
+      add_left(straight ? both : two[axis], straight ? two[axis] : both, sums.upper_before[axis], of_upper);
+      add_left(straight ? one[axis] : both, straight ? both : one[axis], sums.lower_before[axis], of_lower);
+      load(unit.axis(axis) + b, above);
+      store(above + of_upper, unit.axis(axis) + b);
+      store(of_lower, next.axis(axis) + b);
+    }
   }
   for (int i = 0; i < 8; ++i) {
     counts.step += static_cast<std::size_t>(-steps[i]);
@@ -162,43 +168,44 @@ RELIEVO_INLINE void make_body(const VertexRow& above, const VertexRow& below, co
   }
 }
 
-RELIEVO_INLINE void normals_body(const CellNormals& above, const CellNormals& below, int count, float* out,
-                                 std::ptrdiff_t out_stride) {
-  // Of the cell to the right a vertex is the left corner; there is no cell to the left of the first.
-  for (int axis = 0; axis < 3; ++axis) {
-    const float* __restrict right_above = above.plane(1, axis);
-    const float* __restrict left_above = above.plane(2, axis) - 1;
-    const float* __restrict right_below = below.plane(0, axis);
-    const float* __restrict left_below = below.plane(3, axis) - 1;
-    float* __restrict to = out + axis * out_stride;
-    to[0] = right_above[0] + right_below[0];
-    for (int b = 1; b < count; ++b)
-      to[b] = (right_above[b] + left_above[b]) + (right_below[b] + left_below[b]);
-  }
-  float* __restrict x = out;
-  float* __restrict y = out + out_stride;
-  float* __restrict z = out + 2 * out_stride;
+RELIEVO_INLINE void unit_body(int count, const NormalRow& row) {
+  float* __restrict x = row.axis(0);
+  float* __restrict y = row.axis(1);
+  float* __restrict z = row.axis(2);
   for (int b = 0; b < count; ++b) {
     const float square = x[b] * x[b] + y[b] * y[b] + z[b] * z[b];
     const bool none = square <= 0;
     const float per_length = 1 / std::sqrt(none ? 1 : square);
+    const float forward = z[b] * per_length;
     x[b] *= per_length;
     y[b] *= per_length;
-    z[b] = none ? -1 : z[b] * per_length;
+    z[b] = none ? -1 : forward;
+  }
+}
+
+RELIEVO_INLINE void views_body(const float* x, const float* y, const float* z, int count, float* x_z,
+                               float* y_z) {
+  for (int b = 0; b < count; b += 8) {
+    Eight vx, vy, vz;
+    load(x + b, vx);
+    load(y + b, vy);
+    load(z + b, vz);
+    store(vx / vz, x_z + b);
+    store(vy / vz, y_z + b);
   }
 }
 
 /// All kernels for one set of instructions, as static functions of a struct.
 #define RELIEVO_KERNELS(set, attributes)                                                                \
   struct set {                                                                                          \
-    attributes static void make(const VertexRow& above, const VertexRow& below, const CellLinks& links, \
-                                int count, const CellLimits& limits, std::uint8_t* cells,               \
-                                const CellNormals& normals, CellCounts& counts) {                       \
-      make_body(above, below, links, count, limits, cells, normals, counts);                            \
+    attributes static void views(const float* x, const float* y, const float* z, int count, float* x_z, \
+                                 float* y_z) {                                                          \
+      views_body(x, y, z, count, x_z, y_z);                                                             \
     }                                                                                                   \
-    attributes static void normals(const CellNormals& above, const CellNormals& below, int count,       \
-                                   float* out, std::ptrdiff_t out_stride) {                             \
-      normals_body(above, below, count, out, out_stride);                                               \
+    attributes static void make(const CellRow& row, const CellLimits& limits, std::uint8_t* cells,      \
+                                const NormalRow& unit, const NormalRow& next, CellCounts& counts) {     \
+      make_body(row, limits, cells, unit, next, counts);                                                \
+      unit_body((row.count + 7) / 8 * 8, unit);                                                         \
     }                                                                                                   \
   }
 
@@ -210,9 +217,9 @@ RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]]);
 }  // namespace
 
 const std::vector<CellKernels>& all_cell_kernels() {
-  const CellKernels portable{"portable", Portable::make, Portable::normals};
+  const CellKernels portable{"portable", Portable::views, Portable::make};
 #if defined(__x86_64__)
-  static const auto kernels = variants(portable, {"avx2", Avx2::make, Avx2::normals});
+  static const auto kernels = variants(portable, {"avx2", Avx2::views, Avx2::make});
 #else
   static const auto kernels = variants(portable);
 #endif

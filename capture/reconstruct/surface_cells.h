@@ -17,8 +17,12 @@ struct VertexRow {
   const float *x_z, *y_z;  // x / z, y / z
 };
 
-/// 1 where the surface goes on: from a vertex to the one below it, and to the next one on the upper and on
-/// the lower line. As long as a VertexRow.
+/// Where the surface goes on from a place to the next: a bit of those below.
+constexpr std::uint8_t kLink = 1;
+constexpr std::uint8_t kSureLink = 2;  // and both columns are so exact that it does beyond doubt
+
+/// From a vertex to the one below it, and to the next one on the upper and on the lower line. As long as a
+/// VertexRow.
 struct CellLinks {
   const std::uint8_t *down, *across_above, *across_below;
 };
@@ -35,32 +39,40 @@ namespace cell {
 constexpr std::uint8_t kTurned = 1;
 constexpr std::uint8_t kFirst = 2, kSecond = 4;             // the triangle is there
 constexpr std::uint8_t kFirstJoins = 8, kSecondJoins = 16;  // it is one surface in depth, linked or not
+constexpr std::uint8_t kCorner = 32;                        // corner 0 is there
+constexpr std::uint8_t kSureDown = 64;                      // CellLinks::down says kSureLink there
 }  // namespace cell
 
-/// What a row of cells adds to the normals of its corners 0 to 3: planes x, y, z of corner 0, then of corner
-/// 1 and so on, each `stride` long. Each triangle weighs by its area.
-struct CellNormals {
+/// Three planes x, y, z, `stride` apart: of triangles' normals, each as long as twice its area.
+struct NormalRow {
   float* planes;
   std::ptrdiff_t stride;
-  float* plane(int corner, int axis) const { return planes + (3 * corner + axis) * stride; }
+  float* axis(int a) const { return planes + a * stride; }
 };
 
 struct CellCounts {
   std::size_t step = 0, edge_on = 0;  // triangles not made, see SurfaceCounts
 };
 
+/// Two lines' vertices and what lies between them.
+struct CellRow {
+  const VertexRow &above, &below;
+  CellLinks links;
+  int count;  // cells, as many as a line has places: the last one has nothing to its right
+};
+
 struct CellKernels {
   const char* name;
 
-  /// Cells between `above` and `below`: `count` of them to `cells`, and up to 7 more of nothing behind.
-  /// Adds to `counts`.
-  void (*make)(const VertexRow& above, const VertexRow& below, const CellLinks& links, int count,
-               const CellLimits& limits, std::uint8_t* cells, const CellNormals& normals, CellCounts& counts);
+  /// x / z and y / z of `count` vertices, and up to 7 more of whatever is there.
+  void (*views)(const float* x, const float* y, const float* z, int count, float* x_z, float* y_z);
 
-  /// Unit normals of a line of `count` vertices from the cells above and below it; towards the camera's
-  /// centre line where there is no triangle. `out` is planes x, y, z, `out_stride` apart.
-  void (*normals)(const CellNormals& above, const CellNormals& below, int count, float* out,
-                  std::ptrdiff_t out_stride);
+  /// Cells to `cells`, and up to 7 more of nothing behind, as all rows here. `unit` holds what the cells
+  /// above the upper line add to its vertices' normals; they become unit normals of that line, towards the
+  /// camera's centre line where there is no triangle. `next` becomes what these cells add to the lower
+  /// line's. Adds to `counts`.
+  void (*make)(const CellRow& row, const CellLimits& limits, std::uint8_t* cells, const NormalRow& unit,
+               const NormalRow& next, CellCounts& counts);
 };
 
 /// Those that run on this machine, the reference first and the best last.

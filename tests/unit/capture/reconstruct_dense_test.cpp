@@ -7,6 +7,8 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <random>
+#include <vector>
 
 #include "capture/reconstruct/depth_sigma.h"
 #include "capture/reconstruct/reconstructor.h"
@@ -58,7 +60,7 @@ Built build(const std::vector<Stretch>& stretches, const SurfaceBuilderOptions& 
             const std::function<bool(int, int)>& there = everywhere, int threads = 1) {
   const StripedScene& scene = stretches[0].scene;
   const Triangulator triangulator(scene.rig, scene.pattern, kLines, 2);
-  SurfaceBuilder builder(scene.rig, scene.pattern.boundaries(), kLines, 2, options);
+  SurfaceBuilder builder(scene.rig, 2, options);
   WorkerPool pool(threads);
   Built out;
   DecodedGrid grid = blank(scene);
@@ -153,7 +155,7 @@ TEST(Steps, NoTriangleBridgesOneBetweenTwoLines) {
       {{near}}, triangulator, [](int, int line) { return line < 30; }, grid);
   place(
       {{far}}, triangulator, [](int, int line) { return line >= 30; }, grid);
-  SurfaceBuilder builder(near.rig, near.pattern.boundaries(), kLines, 2, {});
+  SurfaceBuilder builder(near.rig, 2, {});
   WorkerPool pool(1);
   Surface s;
   FilterCounts counts;
@@ -272,6 +274,37 @@ TEST(DepthSigma, IsTheSlopeOfDepthTimesTheColumns) {
     ASSERT_TRUE(left && right);
     const float wanted = 0.05F * std::fabs((*right)[2] - (*left)[2]) / 0.2F;
     ASSERT_NEAR(s.sigmas_m[i], wanted, 0.02F * wanted);
+  }
+}
+
+TEST(DepthSigma, OfManyAtOnceIsThatOfEach) {
+  const StripedScene scene = striped_scene();
+  const DepthSlope slope(scene.rig);
+  std::mt19937 random(5);
+  std::normal_distribution<float> off(0, 1);
+  for (const int count : {1, 7, 8, 9, 299}) {
+    std::vector<std::vector<float>> rows(4);
+    for (auto& row : rows) row.assign(static_cast<std::size_t>(count) + 8, 1);
+    for (std::size_t b = 0; b < static_cast<std::size_t>(count); ++b) {
+      for (auto& row : rows) row[b] = random() % 20 == 0 ? 0.F : off(random);
+      if (random() % 10 == 0) rows[random() % 3][b] = 1e20F;
+    }
+    std::vector<float> out(static_cast<std::size_t>(count) + 8);
+    const DepthSlope::Positions at{rows[0].data(), rows[1].data(), rows[2].data()};
+    slope.sigmas_m(at, rows[3].data(), count, out.data());
+    for (std::size_t b = 0; b < static_cast<std::size_t>(count); ++b) {
+      const float wanted = rows[3][b] > 0 ? rows[3][b] * slope.metres_per_px({at.x[b], at.y[b], at.z[b]}) : 0;
+      EXPECT_TRUE(out[b] == wanted || (std::isnan(out[b]) && std::isnan(wanted))) << out[b] << ", " << wanted;
+    }
+    const DepthSlopeRig rig{{0.9F, 0.1F, 0, -0.1F, 1, 0, 0.2F, 0, 0.8F}, {0.1F, 0, -0.05F}, 0.002F};
+    std::vector<float> reference(out.size());
+    all_depth_sigma_kernels().front().sigmas_m(rig, at, rows[3].data(), count, reference.data());
+    for (const DepthSigmaKernels& kernels : all_depth_sigma_kernels()) {
+      kernels.sigmas_m(rig, at, rows[3].data(), count, out.data());
+      for (std::size_t b = 0; b < static_cast<std::size_t>(count); ++b)
+        EXPECT_TRUE(out[b] == reference[b] || (std::isnan(out[b]) && std::isnan(reference[b])))
+            << kernels.name;
+    }
   }
 }
 

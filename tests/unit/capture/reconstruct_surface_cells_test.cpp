@@ -6,14 +6,19 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <bit>
 #include <limits>
 #include <random>
 #include <string>
 
 #include "capture/reconstruct/surface.h"
+#include "tests/support/make_decoded.h"
 
 namespace relievo {
 namespace {
+
+using test::decoded_grid;
+using test::GridVertex;
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
@@ -24,7 +29,8 @@ struct Rows {
     planes.assign(10 * stride, kNone);
     for (auto& row : links) {
       row.assign(stride, 0);
-      for (auto& link : row) link = linked(random);
+      for (auto& link : row)
+        link = static_cast<std::uint8_t>(linked(random) ? kLink | (random() % 2 == 0 ? kSureLink : 0) : 0);
     }
     for (std::size_t line = 0; line < 2; ++line) {
       for (std::size_t b = 0; b < static_cast<std::size_t>(count); ++b) {
@@ -49,20 +55,30 @@ struct Rows {
 
 struct Made {
   std::vector<std::uint8_t> cells;
-  std::vector<float> planes, normals;
+  std::vector<float> unit, next, views;
   CellCounts counts;
 };
 
+/// Bits of numbers, of which NaN may be any.
+std::vector<std::uint32_t> bits(const std::vector<float>& values) {
+  std::vector<std::uint32_t> out;
+  for (const float v : values) out.push_back(v == v ? std::bit_cast<std::uint32_t>(v) : 0x7fc00000U);
+  return out;
+}
+
 Made make(const CellKernels& kernels, const Rows& rows, int count) {
   Made out;
-  const auto size = static_cast<std::size_t>(count);
   out.cells.assign(rows.stride, 0);
-  out.planes.assign(12 * rows.stride, 0);
-  out.normals.assign(3 * size, 0);
-  const CellNormals normals{out.planes.data(), static_cast<std::ptrdiff_t>(rows.stride)};
-  kernels.make(rows.row(0), rows.row(1), {rows.links[0].data(), rows.links[1].data(), rows.links[2].data()},
-               count, {4, 0.2F}, out.cells.data(), normals, out.counts);
-  kernels.normals(normals, normals, count, out.normals.data(), count);
+  out.next.assign(3 * rows.stride, 0);
+  out.views.assign(2 * rows.stride, 0);
+  for (std::size_t i = 0; i < 3 * rows.stride; ++i)
+    out.unit.push_back(i % 7 == 0 ? 0.F : -1e-6F * static_cast<float>(i % 5));
+  const auto stride = static_cast<std::ptrdiff_t>(rows.stride);
+  const VertexRow above = rows.row(0);
+  const VertexRow below = rows.row(1);
+  kernels.views(above.x, above.y, above.z, count, out.views.data(), out.views.data() + stride);
+  kernels.make({above, below, {rows.links[0].data(), rows.links[1].data(), rows.links[2].data()}, count},
+               {4, 0.2F}, out.cells.data(), {out.unit.data(), stride}, {out.next.data(), stride}, out.counts);
   return out;
 }
 
@@ -75,11 +91,28 @@ TEST(SurfaceCells, AllKernelsMakeTheSame) {
       for (const CellKernels& kernels : all_cell_kernels()) {
         const Made made = make(kernels, rows, count);
         ASSERT_EQ(made.cells, reference.cells) << kernels.name << ", " << count;
-        ASSERT_EQ(made.planes, reference.planes) << kernels.name << ", " << count;
-        ASSERT_EQ(made.normals, reference.normals) << kernels.name << ", " << count;
+        ASSERT_EQ(bits(made.unit), bits(reference.unit)) << kernels.name << ", " << count;
+        ASSERT_EQ(bits(made.next), bits(reference.next)) << kernels.name << ", " << count;
+        ASSERT_EQ(bits(made.views), bits(reference.views)) << kernels.name << ", " << count;
         ASSERT_EQ(made.counts.step, reference.counts.step);
         ASSERT_EQ(made.counts.edge_on, reference.counts.edge_on);
       }
+    }
+  }
+}
+
+TEST(SurfaceCells, AllKernelsMakeTheSameOfAnything) {
+  std::mt19937 random(6);
+  for (int round = 0; round < 100; ++round) {
+    Rows rows(97, random);
+    const float extreme[] = {0, -0.F, 1e30F, -1e30F, 1e-30F, std::numeric_limits<float>::infinity(), kNone};
+    for (int i = 0; i < 60; ++i) rows.planes[random() % rows.planes.size()] = extreme[random() % 7];
+    const Made reference = make(all_cell_kernels().front(), rows, 97);
+    for (const CellKernels& kernels : all_cell_kernels()) {
+      const Made made = make(kernels, rows, 97);
+      ASSERT_EQ(made.cells, reference.cells) << kernels.name;
+      ASSERT_EQ(bits(made.unit), bits(reference.unit)) << kernels.name;
+      ASSERT_EQ(bits(made.next), bits(reference.next)) << kernels.name;
     }
   }
 }
@@ -98,15 +131,16 @@ TEST(SurfaceCells, TheSurfaceIsTheSameForAnyNumberOfThreads) {
                           1});
     }
   }
+  const DecodedGrid decoded = decoded_grid(vertices, 60, 50);
   SurfaceScratch scratch;
   Surface serial;
-  const SurfaceCounts counts = build_surface(vertices, 60, 50, {}, scratch, serial);
+  const SurfaceCounts counts = build_surface(decoded, {}, scratch, serial);
   ASSERT_GT(serial.triangles.size(), 1000U);
   ASSERT_GT(counts.step + counts.edge_on, 0U);
   for (const int threads : {1, 2, 3, 7}) {
     WorkerPool pool(threads);
     Surface made;
-    const SurfaceCounts again = build_surface(vertices, 60, 50, {.pool = &pool}, scratch, made);
+    const SurfaceCounts again = build_surface(decoded, {.pool = &pool}, scratch, made);
     EXPECT_EQ(made.positions, serial.positions);
     EXPECT_EQ(made.normals, serial.normals);
     EXPECT_EQ(made.triangles, serial.triangles);
@@ -133,7 +167,9 @@ TEST(SurfaceCells, NoTriangleOfADroppedPieceStays) {
       }
     }
     Surface made;
-    ASSERT_GT(build_surface(vertices, 20, 20, {.least_component = 6}, scratch, made).small_component, 0U);
+    ASSERT_GT(
+        build_surface(decoded_grid(vertices, 20, 20), {.least_component = 6}, scratch, made).small_component,
+        0U);
     std::vector<bool> used(made.positions.size());
     for (const Triangle& t : made.triangles) {
       for (const std::uint32_t v : t) {

@@ -10,10 +10,14 @@
 #include <numeric>
 #include <utility>
 
+#include "tests/support/make_decoded.h"
 #include "tests/support/make_surface.h"
 
 namespace relievo {
 namespace {
+
+using test::decoded_grid;
+using test::GridVertex;
 
 /// A vertex of a wall at z(boundary, line), one centimetre a step across the view.
 GridVertex vertex(int boundary, int line, float z = 1, float slope = 10) {
@@ -37,7 +41,7 @@ Surface build(const std::vector<GridVertex>& vertices, int boundaries, int lines
               const SurfaceOptions& options = {.least_component = 1}) {
   SurfaceScratch scratch;
   Surface out;
-  build_surface(vertices, boundaries, lines, options, scratch, out);
+  build_surface(decoded_grid(vertices, boundaries, lines), options, scratch, out);
   return out;
 }
 
@@ -194,11 +198,15 @@ TEST(Surface, SmallPiecesGoAndAreCounted) {
   vertices.push_back(vertex(8, 7));
   SurfaceScratch scratch;
   Surface without;
-  EXPECT_EQ(build_surface(vertices, 10, 9, {.least_component = 9}, scratch, without).small_component, 1U);
+  EXPECT_EQ(
+      build_surface(decoded_grid(vertices, 10, 9), {.least_component = 9}, scratch, without).small_component,
+      1U);
   expect_sound(without);
   EXPECT_EQ(without.positions.size(), 9U);
   Surface none;
-  EXPECT_EQ(build_surface(vertices, 10, 9, {.least_component = 10}, scratch, none).small_component, 10U);
+  EXPECT_EQ(
+      build_surface(decoded_grid(vertices, 10, 9), {.least_component = 10}, scratch, none).small_component,
+      10U);
   EXPECT_TRUE(none.positions.empty());
   EXPECT_TRUE(none.triangles.empty());
   const Surface with = build(vertices, 10, 9, {.least_component = 1});
@@ -216,13 +224,14 @@ TEST(Surface, ABoundaryThatGoesOnAloneIsKept) {
       vertices.push_back(vertex(2, l));
       vertices.back().at.sigma_px = sigma_px;
     }
+    const DecodedGrid boundaries = decoded_grid(vertices, 5, kLines);
     GridLinks links;
-    links.across.assign(5 * kLines, 0);
-    links.along.assign(5 * kLines, 0);
-    for (int l = 0; linked && l + 1 < lines; ++l) links.along[static_cast<std::size_t>(5 * l + 2)] = 1;
+    links.fit(boundaries);
+    WorkerPool pool(1);
+    if (linked) find_links(boundaries, {}, pool, links);
     SurfaceScratch scratch;
     Surface out;
-    build_surface(vertices, 5, kLines, {.links = &links}, scratch, out);
+    build_surface(boundaries, {.links = &links}, scratch, out);
     expect_sound(out);
     EXPECT_TRUE(out.triangles.empty());
     return out.positions.size();
@@ -270,11 +279,52 @@ TEST(Surface, TheOrderOfVerticesMakesNoDifference) {
 TEST(Surface, ScratchAndOutputAreReused) {
   SurfaceScratch scratch;
   Surface out;
-  build_surface(wall(20, 20), 20, 20, {}, scratch, out);
-  build_surface(wall(3, 2), 3, 2, {.least_component = 1}, scratch, out);
+  build_surface(decoded_grid(wall(20, 20), 20, 20), {}, scratch, out);
+  build_surface(decoded_grid(wall(3, 2), 3, 2), {.least_component = 1}, scratch, out);
   EXPECT_TRUE(same(out, build(wall(3, 2), 3, 2)));
-  build_surface({}, 3, 2, {}, scratch, out);
+  build_surface(decoded_grid({}, 3, 2), {}, scratch, out);
   EXPECT_TRUE(out.positions.empty() && out.triangles.empty() && out.grid.empty() && out.normals.empty());
+}
+
+/// Pieces against a search that goes from triangle to triangle, over the words that lines are made of.
+TEST(Surface, PiecesAreWhatTrianglesJoin) {
+  for (const int boundaries : {5, 63, 64, 65, 130}) {
+    constexpr int kLines = 40;
+    test::Random random(static_cast<std::uint64_t>(boundaries));
+    std::vector<GridVertex> vertices =
+        grid(boundaries, kLines, [&](int, int) { return random.below(2) == 0 ? 1.F : 1.3F; });
+    for (std::size_t i = vertices.size() / 4; i > 0; --i)
+      vertices.erase(vertices.begin() + random.below(static_cast<std::uint32_t>(vertices.size())));
+    const Surface all = build(vertices, boundaries, kLines, {.least_component = 0});
+    ASSERT_EQ(all.positions.size(), vertices.size());
+    std::vector<std::size_t> piece(vertices.size());
+    std::iota(piece.begin(), piece.end(), std::size_t{0});
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (const Triangle& t : all.triangles) {
+        const std::size_t least = std::min({piece[t[0]], piece[t[1]], piece[t[2]]});
+        for (const std::uint32_t v : t) changed |= std::exchange(piece[v], least) != least;
+      }
+    }
+    // Those that no triangle joins to the one beside them on the line count half.
+    std::vector<int> weight(vertices.size(), 1);
+    for (const Triangle& t : all.triangles)
+      for (std::size_t c = 0; c < 3; ++c)
+        if (all.grid[t[c]].line == all.grid[t[(c + 1) % 3]].line) weight[t[c]] = weight[t[(c + 1) % 3]] = 2;
+    std::vector<int> size(vertices.size());
+    for (std::size_t v = 0; v < piece.size(); ++v) size[piece[v]] += weight[v];
+    for (const int least : {2, 3, 6, 20}) {
+      const auto stays = [&](std::size_t v) { return size[piece[v]] + 1 >= 2 * least; };
+      std::vector<Vec3f> expected;
+      for (std::size_t v = 0; v < piece.size(); ++v)
+        if (stays(v)) expected.push_back(all.positions[v]);
+      std::size_t triangles = 0;
+      for (const Triangle& t : all.triangles) triangles += stays(t[0]);
+      const Surface kept = build(vertices, boundaries, kLines, {.least_component = least});
+      EXPECT_EQ(kept.positions, expected) << boundaries << ", " << least;
+      EXPECT_EQ(kept.triangles.size(), triangles) << boundaries << ", " << least;
+    }
+  }
 }
 
 }  // namespace

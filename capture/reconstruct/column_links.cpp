@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/column_links.h"
+
+#include <algorithm>
+
+#include "base/variants.h"
+#include "capture/reconstruct/eight.h"
+
+namespace relievo {
+namespace {
+
+/// One difference of columns and those beside it.
+struct Steps {
+  Eight before, here, behind;
+  EightInts know_before, know_behind;
+  RELIEVO_INLINE void take(const Eight& x0, const Eight& x1, const Eight& x2, const Eight& x3) {
+    before = x1 - x0;
+    here = x2 - x1;
+    behind = x3 - x2;
+    know_before = before == before;
+    know_behind = behind == behind;
+  }
+  /// How far `here` is outside of what lies between the other two, or beside the one that is known: no more
+  /// than that. Where neither is, nothing is said.
+  RELIEVO_INLINE void within(const Eight& between, const Eight& beside, EightInts& out) const {
+    const Eight low = behind < before ? behind : before;
+    const Eight high = before < behind ? behind : before;
+    const EightInts inside = (here >= low - between) & (here <= high + between);
+    const Eight one = know_before ? before : behind;
+    const Eight off = here - one;
+    const Eight distance = off < 0 ? -off : off;
+    out = know_before & know_behind ? inside : distance <= beside;
+  }
+};
+
+/// surface_goes_on_across() and surface_goes_on_along(), of neighbours.
+RELIEVO_INLINE void find_body(const ColumnRows& rows, const ColumnScale& scale, int count,
+                              std::uint8_t* across, std::uint8_t* along) {
+  const ColumnLimits limits(scale);
+  const Eight none{};
+  for (int b = 0; b < count; b += 8) {
+    Eight left, here, right, right_but_one, above, below, further, sigma_here, sigma_below;
+    load(rows.here + b - 1, left);
+    load(rows.here + b, here);
+    load(rows.here + b + 1, right);
+    load(rows.here + b + 2, right_but_one);
+    load(rows.above + b, above);
+    load(rows.below + b, below);
+    load(rows.further + b, further);
+    load(rows.sigma_here + b, sigma_here);
+    load(rows.sigma_below + b, sigma_below);
+
+    // Where either is not there, the difference compares as neither less nor more.
+    Steps steps;
+    EightInts on;
+    steps.take(left, here, right, right_but_one);
+    const Eight one = steps.know_before ? steps.before : steps.behind;
+    const Eight least = one < steps.here ? one : steps.here;
+    steps.within(limits.across + ColumnLimits::kAcrossShare * steps.here,
+                 limits.across + ColumnLimits::kAcrossOpen * least, on);
+    const EightInts narrow = steps.here <= ColumnLimits::kWidest_px;
+    on = (steps.here > none) & (steps.know_before | steps.know_behind ? on : narrow);
+    store(on & kLink, across + b);
+
+    steps.take(above, here, below, further);
+    const Eight slack = none + limits.along;
+    steps.within(slack, slack, on);
+    const Eight lean = steps.here < 0 ? -steps.here : steps.here;
+    on = steps.know_before | steps.know_behind ? on : lean <= limits.lean;
+    const EightInts sure = on & (sigma_here < kSure_px) & (sigma_below < kSure_px);
+    store((on & kLink) | (sure & kSureLink), along + b);
+  }
+}
+
+void find_portable(const ColumnRows& rows, const ColumnScale& scale, int count, std::uint8_t* across,
+                   std::uint8_t* along) {
+  find_body(rows, scale, count, across, along);
+}
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void find_avx2(const ColumnRows& rows, const ColumnScale& scale, int count,
+                                       std::uint8_t* across, std::uint8_t* along) {
+  find_body(rows, scale, count, across, along);
+}
+#endif
+
+}  // namespace
+
+const std::vector<LinkKernels>& all_link_kernels() {
+  const LinkKernels portable{"portable", find_portable};
+#if defined(__x86_64__)
+  static const auto kernels = variants(portable, {"avx2", find_avx2});
+#else
+  static const auto kernels = variants(portable);
+#endif
+  return kernels;
+}
+
+const LinkKernels& link_kernels() {
+  return all_link_kernels().back();
+}
+
+void GridLinks::fit(const DecodedGrid& grid) {
+  if (stride_ == grid.stride() && lines_ == grid.lines()) return;
+  stride_ = grid.stride();
+  lines_ = grid.lines();
+  for (auto* links : {&across_, &along_}) links->assign(static_cast<std::size_t>(lines_ + 2) * stride_, 0);
+}
+
+void find_links(const DecodedGrid& grid, const ColumnScale& scale, WorkerPool& pool, GridLinks& out) {
+  out.fit(grid);
+  pool.for_ranges(grid.lines(), [&](int begin, int end, int) {
+    for (int l = begin; l < end; ++l) {
+      const ColumnRows rows{grid.column_px(l - 1), grid.column_px(l), grid.column_px(l + 1),
+                            grid.column_px(l + 2), grid.sigma_px(l),  grid.sigma_px(l + 1)};
+      link_kernels().find(rows, scale, grid.boundaries(), out.across(l), out.along(l));
+    }
+  });
+}
+
+}  // namespace relievo
