@@ -35,7 +35,7 @@ struct Steps {
 
 /// surface_goes_on_across() and surface_goes_on_along(), of neighbours.
 RELIEVO_INLINE void find_body(const ColumnRows& rows, const ColumnScale& scale, int count,
-                              std::uint8_t* across, std::uint8_t* along) {
+                              const LinkRow& out) {
   const ColumnLimits limits(scale);
   const Eight none{};
   for (int b = 0; b < count; b += 8) {
@@ -60,7 +60,7 @@ RELIEVO_INLINE void find_body(const ColumnRows& rows, const ColumnScale& scale, 
                  limits.across + ColumnLimits::kAcrossOpen * least, on);
     const EightInts narrow = steps.here <= ColumnLimits::kWidest_px;
     on = (steps.here > none) & (steps.know_before | steps.know_behind ? on : narrow);
-    store(on & kLink, across + b);
+    out.across[b / 8] = gather(on);
 
     steps.take(above, here, below, further);
     const Eight slack = none + limits.along;
@@ -68,18 +68,18 @@ RELIEVO_INLINE void find_body(const ColumnRows& rows, const ColumnScale& scale, 
     const Eight lean = steps.here < 0 ? -steps.here : steps.here;
     on = steps.know_before | steps.know_behind ? on : lean <= limits.lean;
     const EightInts sure = on & (sigma_here < kSure_px) & (sigma_below < kSure_px);
-    store((on & kLink) | (sure & kSureLink), along + b);
+    out.along[b / 8] = gather(on);
+    out.sure_along[b / 8] = gather(sure);
   }
 }
 
-void find_portable(const ColumnRows& rows, const ColumnScale& scale, int count, std::uint8_t* across,
-                   std::uint8_t* along) {
-  find_body(rows, scale, count, across, along);
+void find_portable(const ColumnRows& rows, const ColumnScale& scale, int count, const LinkRow& out) {
+  find_body(rows, scale, count, out);
 }
 #if defined(__x86_64__)
 [[gnu::target("avx2")]] void find_avx2(const ColumnRows& rows, const ColumnScale& scale, int count,
-                                       std::uint8_t* across, std::uint8_t* along) {
-  find_body(rows, scale, count, across, along);
+                                       const LinkRow& out) {
+  find_body(rows, scale, count, out);
 }
 #endif
 
@@ -100,10 +100,11 @@ const LinkKernels& link_kernels() {
 }
 
 void GridLinks::fit(const DecodedGrid& grid) {
-  if (stride_ == grid.stride() && lines_ == grid.lines()) return;
-  stride_ = grid.stride();
+  const std::size_t bytes = grid.stride() / 8 + 1;
+  if (bytes_ == bytes && lines_ == grid.lines()) return;
+  bytes_ = bytes;
   lines_ = grid.lines();
-  for (auto* links : {&across_, &along_}) links->assign(static_cast<std::size_t>(lines_ + 2) * stride_, 0);
+  links_.assign(3 * static_cast<std::size_t>(lines_ + 2) * bytes_, 0);
 }
 
 void find_links(const DecodedGrid& grid, const ColumnScale& scale, WorkerPool& pool, GridLinks& out) {
@@ -112,7 +113,7 @@ void find_links(const DecodedGrid& grid, const ColumnScale& scale, WorkerPool& p
     for (int l = begin; l < end; ++l) {
       const ColumnRows rows{grid.column_px(l - 1), grid.column_px(l), grid.column_px(l + 1),
                             grid.column_px(l + 2), grid.sigma_px(l),  grid.sigma_px(l + 1)};
-      link_kernels().find(rows, scale, grid.boundaries(), out.across(l), out.along(l));
+      link_kernels().find(rows, scale, grid.boundaries(), out.row(l));
     }
   });
 }

@@ -10,32 +10,38 @@
 #include "base/parallel.h"
 #include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/decoded_grid.h"
-#include "capture/reconstruct/surface_cells.h"
 
 namespace relievo {
 
-/// [line][boundary], kLink and kSureLink; nothing outside the grid, where lines -1 and `lines` can be asked
-/// for.
+/// Rows of bits (eight.h), as CellLinks asks for: the surface goes on to the next boundary on the line, or to
+/// the same one on the next line; and where it does so between columns with standard deviations below
+/// kSure_px.
+struct LinkRow {
+  std::uint8_t *across, *along, *sure_along;
+};
+inline constexpr float kSure_px = 0.12F;
+
+/// A LinkRow for each line; nothing outside the grid, where lines -1 and `lines` can be asked for.
 class GridLinks {
  public:
   /// As large as `grid`, of undefined links but outside.
   void fit(const DecodedGrid& grid);
-  /// Links to the next boundary on a line, and to the same boundary on the next line. As long as its rows.
-  std::uint8_t* across(int line) { return across_.data() + row(line); }
-  const std::uint8_t* across(int line) const { return across_.data() + row(line); }
-  std::uint8_t* along(int line) { return along_.data() + row(line); }
-  const std::uint8_t* along(int line) const { return along_.data() + row(line); }
+  LinkRow row(int line) { return {of(line, 0), of(line, 1), of(line, 2)}; }
+  const std::uint8_t* across(int line) const { return of(line, 0); }
+  const std::uint8_t* along(int line) const { return of(line, 1); }
+  const std::uint8_t* sure_along(int line) const { return of(line, 2); }
 
  private:
-  std::size_t row(int line) const { return static_cast<std::size_t>(line + 1) * stride_; }
+  std::size_t first_of(int line, std::size_t which) const {
+    return (3 * static_cast<std::size_t>(line + 1) + which) * bytes_;
+  }
+  std::uint8_t* of(int line, std::size_t which) { return links_.data() + first_of(line, which); }
+  const std::uint8_t* of(int line, std::size_t which) const { return links_.data() + first_of(line, which); }
 
-  std::size_t stride_ = 0;
+  std::size_t bytes_ = 0;  // a row
   int lines_ = 0;
-  std::vector<std::uint8_t> across_, along_;
+  std::vector<std::uint8_t> links_;
 };
-
-/// kSureLink are those along of columns with standard deviations below this, both.
-inline constexpr float kSure_px = 0.12F;
 
 void find_links(const DecodedGrid& grid, const ColumnScale& scale, WorkerPool& pool, GridLinks& out);
 
@@ -49,8 +55,7 @@ struct LinkKernels {
   const char* name;
 
   /// Links of `count` boundaries, and none for up to 7 more. Rows are as those of a DecodedGrid.
-  void (*find)(const ColumnRows& rows, const ColumnScale& scale, int count, std::uint8_t* across,
-               std::uint8_t* along);
+  void (*find)(const ColumnRows& rows, const ColumnScale& scale, int count, const LinkRow& out);
 };
 
 /// Those that run on this machine, the reference first and the best last.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/eight.h"
+
 namespace relievo {
 namespace {
 
@@ -110,7 +112,7 @@ DenseCounts DenseSampler::sample(const DecodedGrid& measured, const GridLinks& l
         if (!(z[b] > 0)) continue;
         scratch.knots.push_back({measured.column_px(line)[b], measured.sigma_px(line)[b], 0,
                                  measured.slope(line)[b], filled != nullptr && filled[b] != 0});
-        if (across[b] != 0 && z[b + 1] > 0) continue;
+        if (bit_of(across, b) && z[b + 1] > 0) continue;
         sample_piece(b + 1 - static_cast<int>(scratch.knots.size()), line, triangulator, scratch, out);
         scratch.knots.clear();
       }

@@ -11,7 +11,7 @@ namespace relievo {
 
 using Eight = float __attribute__((vector_size(32)));
 using EightInts = std::int32_t __attribute__((vector_size(32)));  // as a mask: 0 or -1
-using EightBytes = std::uint8_t __attribute__((vector_size(8)));
+using FourLongs = std::int64_t __attribute__((vector_size(32)));
 
 #define RELIEVO_INLINE [[gnu::always_inline]] inline
 
@@ -21,14 +21,29 @@ RELIEVO_INLINE void load(const float* from, Eight& to) {
 RELIEVO_INLINE void store(const Eight& from, float* to) {
   std::memcpy(to, &from, sizeof from);
 }
-RELIEVO_INLINE void load(const std::uint8_t* from, EightInts& to) {
-  EightBytes bytes;
-  std::memcpy(&bytes, from, sizeof bytes);
-  to = __builtin_convertvector(bytes, EightInts);
-}
+/// Numbers from 0 to 255. Compilers convert them one by one.
 RELIEVO_INLINE void store(const EightInts& from, std::uint8_t* to) {
-  const EightBytes bytes = __builtin_convertvector(from, EightBytes);
-  std::memcpy(to, &bytes, sizeof bytes);
+  FourLongs pairs;
+  std::memcpy(&pairs, &from, sizeof pairs);
+  pairs = (pairs | pairs >> 24) & 0xffff;
+  const std::int64_t all = pairs[0] | pairs[1] << 16 | pairs[2] << 32 | pairs[3] << 48;
+  std::memcpy(to, &all, sizeof all);
+}
+
+/// Masks in rows of bits: place 0 is the lowest bit of the first byte.
+constexpr EightInts kBitOfEight = {1, 2, 4, 8, 16, 32, 64, 128};
+RELIEVO_INLINE void spread(int bits, EightInts& mask) {
+  mask = (kBitOfEight & bits) != 0;
+}
+RELIEVO_INLINE std::uint8_t gather(const EightInts& mask) {
+  const EightInts bits = mask & kBitOfEight;
+  FourLongs pairs;
+  std::memcpy(&pairs, &bits, sizeof pairs);
+  const std::int64_t both = pairs[0] | pairs[1] | pairs[2] | pairs[3];
+  return static_cast<std::uint8_t>(both | both >> 32);
+}
+inline bool bit_of(const std::uint8_t* row, int place) {
+  return (row[place / 8] >> (place % 8) & 1) != 0;
 }
 
 }  // namespace relievo

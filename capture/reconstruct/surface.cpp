@@ -17,7 +17,10 @@ class Builder {
     const auto lines = static_cast<std::size_t>(grid.lines());
     scratch.pieces.reset(grid.boundaries(), grid.lines());
     scratch.normals.resize(3 * lines * stride_);
-    if (options.links == nullptr) scratch.all_links.assign(stride_, kLink);
+    if (options.links == nullptr) {
+      scratch.all_links.assign(stride_ / 8 + 1, 0xff);
+      scratch.no_links.assign(stride_ / 8 + 1, 0);
+    }
     scratch.workers.resize(options.pool != nullptr ? static_cast<std::size_t>(options.pool->threads()) : 1);
     for (auto& worker : scratch.workers) {
       worker.counts = {};
@@ -67,9 +70,10 @@ class Builder {
   CellLinks links(int line) const {
     if (options_.links == nullptr) {
       const std::uint8_t* all = scratch_.all_links.data();
-      return {all, all, all};
+      return {all, scratch_.no_links.data(), all, all};
     }
-    return {options_.links->along(line), options_.links->across(line), options_.links->across(line + 1)};
+    return {options_.links->along(line), options_.links->sure_along(line), options_.links->across(line),
+            options_.links->across(line + 1)};
   }
 
   /// Cells above and below the lines [begin, end), and their vertices' normals. Lines outside of the grid

@@ -59,8 +59,8 @@ struct SurfaceScratch {
     SurfacePieces::Cells above, below;
     CellCounts counts;
   };
-  std::vector<float> normals;           // [line][x, y, z][place, padded]
-  std::vector<std::uint8_t> all_links;  // a row of links where there are none to keep to
+  std::vector<float> normals;                     // [line][x, y, z][place, padded]
+  std::vector<std::uint8_t> all_links, no_links;  // rows of links where there are none to keep to
   SurfacePieces pieces;
   std::vector<Worker> workers;
 };

@@ -129,15 +129,15 @@ RELIEVO_INLINE void make_body(const CellRow& row, const CellLimits& limits, std:
     const EightInts first_joins = first_one & good1;
     const EightInts second_joins = second_one & good2;
     // A triangle's sides but the diagonal must be linked.
-    EightInts down, down_right, across_above, across_below;
-    load(row.links.down + b, down);
-    load(row.links.down + b + 1, down_right);
-    load(row.links.across_above + b, across_above);
-    load(row.links.across_below + b, across_below);
-    const EightInts left_on = down != 0;
-    const EightInts right_on = down_right != 0;
-    const EightInts first = first_joins & (across_below != 0) & (straight ? left_on : right_on);
-    const EightInts second = second_joins & (across_above != 0) & (straight ? right_on : left_on);
+    EightInts left_on, right_on, lower_on, upper_on, sure_down;
+    const int at = b / 8;
+    spread(row.links.down[at], left_on);
+    spread((row.links.down[at] | row.links.down[at + 1] << 8) >> 1, right_on);
+    spread(row.links.across_above[at], upper_on);
+    spread(row.links.across_below[at], lower_on);
+    spread(row.links.sure_down[at], sure_down);
+    const EightInts first = first_joins & lower_on & (straight ? left_on : right_on);
+    const EightInts second = second_joins & upper_on & (straight ? right_on : left_on);
     steps += (first_there & ~first) & ~(first_one & ~good1);
     steps += (second_there & ~second) & ~(second_one & ~good2);
     edge_on += first_one & ~good1;
@@ -145,7 +145,7 @@ RELIEVO_INLINE void make_body(const CellRow& row, const CellLimits& limits, std:
 
     store((~straight & cell::kTurned) | (first & cell::kFirst) | (second & cell::kSecond) |
               (first_joins & cell::kFirstJoins) | (second_joins & cell::kSecondJoins) |
-              ((q0.z == q0.z) & cell::kCorner) | (((down & kSureLink) != 0) & cell::kSureDown),
+              ((q0.z == q0.z) & cell::kCorner) | (sure_down & cell::kSureDown),
           cells + b);
 
     keep(first, n1);
@@ -168,18 +168,23 @@ RELIEVO_INLINE void make_body(const CellRow& row, const CellLimits& limits, std:
   }
 }
 
+/// Of eight vertices.
 RELIEVO_INLINE void unit_body(int count, const NormalRow& row) {
-  float* __restrict x = row.axis(0);
-  float* __restrict y = row.axis(1);
-  float* __restrict z = row.axis(2);
-  for (int b = 0; b < count; ++b) {
-    const float square = x[b] * x[b] + y[b] * y[b] + z[b] * z[b];
-    const bool none = square <= 0;
-    const float per_length = 1 / std::sqrt(none ? 1 : square);
-    const float forward = z[b] * per_length;
-    x[b] *= per_length;
-    y[b] *= per_length;
-    z[b] = none ? -1 : forward;
+  const Eight zero{};
+  const Eight one = zero + 1;
+  for (int b = 0; b < count; b += 8) {
+    Eight x, y, z;
+    load(row.axis(0) + b, x);
+    load(row.axis(1) + b, y);
+    load(row.axis(2) + b, z);
+    const Eight square = x * x + y * y + z * z;
+    const EightInts none = square <= 0;
+    Eight length = none ? one : square;
+    for (int i = 0; i < 8; ++i) length[i] = std::sqrt(length[i]);
+    const Eight per_length = one / length;
+    store(x * per_length, row.axis(0) + b);
+    store(y * per_length, row.axis(1) + b);
+    store(none ? -one : z * per_length, row.axis(2) + b);
   }
 }
 
@@ -205,7 +210,7 @@ RELIEVO_INLINE void views_body(const float* x, const float* y, const float* z, i
     attributes static void make(const CellRow& row, const CellLimits& limits, std::uint8_t* cells,      \
                                 const NormalRow& unit, const NormalRow& next, CellCounts& counts) {     \
       make_body(row, limits, cells, unit, next, counts);                                                \
-      unit_body((row.count + 7) / 8 * 8, unit);                                                         \
+      unit_body(row.count, unit);                                                                       \
     }                                                                                                   \
   }
 

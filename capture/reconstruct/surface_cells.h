@@ -17,14 +17,11 @@ struct VertexRow {
   const float *x_z, *y_z;  // x / z, y / z
 };
 
-/// Where the surface goes on from a place to the next: a bit of those below.
-constexpr std::uint8_t kLink = 1;
-constexpr std::uint8_t kSureLink = 2;  // and both columns are so exact that it does beyond doubt
-
-/// From a vertex to the one below it, and to the next one on the upper and on the lower line. As long as a
-/// VertexRow.
+/// Where the surface goes on from a vertex to the one below it, of these where both columns are so exact that
+/// it does beyond doubt, and to the next one on the upper and on the lower line: rows of bits (eight.h) with
+/// a byte behind those of the places.
 struct CellLinks {
-  const std::uint8_t *down, *across_above, *across_below;
+  const std::uint8_t *down, *sure_down, *across_above, *across_below;
 };
 
 /// See SurfaceOptions.
@@ -40,7 +37,7 @@ constexpr std::uint8_t kTurned = 1;
 constexpr std::uint8_t kFirst = 2, kSecond = 4;             // the triangle is there
 constexpr std::uint8_t kFirstJoins = 8, kSecondJoins = 16;  // it is one surface in depth, linked or not
 constexpr std::uint8_t kCorner = 32;                        // corner 0 is there
-constexpr std::uint8_t kSureDown = 64;                      // CellLinks::down says kSureLink there
+constexpr std::uint8_t kSureDown = 64;                      // CellLinks::sure_down
 }  // namespace cell
 
 /// Three planes x, y, z, `stride` apart: of triangles' normals, each as long as twice its area.

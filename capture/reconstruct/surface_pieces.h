@@ -49,14 +49,15 @@ class SurfacePieces {
   std::uint32_t triangles_before(int line) const { return triangles_before_[static_cast<std::size_t>(line)]; }
 
   std::size_t words() const { return words_; }
-  const Word* bits(int line, PlaceBits which) const {
-    return bits_.data() + (static_cast<std::size_t>(line) * static_cast<std::size_t>(PlaceBits::kOfLines) +
-                           static_cast<std::size_t>(which)) *
-                              words_;
-  }
+  const Word* bits(int line, PlaceBits which) const { return bits_.data() + first_of(line, which); }
 
  private:
-  Word* bits_of(int line, PlaceBits which) { return const_cast<Word*>(bits(line, which)); }
+  std::size_t first_of(int line, PlaceBits which) const {
+    return (static_cast<std::size_t>(line) * static_cast<std::size_t>(PlaceBits::kOfLines) +
+            static_cast<std::size_t>(which)) *
+           words_;
+  }
+  Word* bits_of(int line, PlaceBits which) { return bits_.data() + first_of(line, which); }
   void find_runs();
   void join_runs();
   void join(std::int32_t a, std::int32_t b);

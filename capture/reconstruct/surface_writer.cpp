@@ -157,19 +157,19 @@ void SurfaceWriter::write_vertices(int line) {
                                      : 0.F;
   std::size_t first = scratch_.pieces.vertices_before(line);
   for_runs(scratch_.pieces.bits(line, PlaceBits::kVertex), scratch_.pieces.words(), [&](int begin, int end) {
-    GridPoint* at = out_.grid.data() + first - begin;
+    GridPoint* at = out_.grid.data() + first;
     interleave(x, y, z, begin, end, out_.positions.data() + first);
     interleave(normal, normal + stride, normal + 2 * stride, begin, end, out_.normals.data() + first);
     for (int b = begin; b < end; ++b) {
-      at[b] = {.boundary = boundaries != nullptr ? boundaries[b] : static_cast<std::uint16_t>(b),
+      *at++ = {.boundary = boundaries != nullptr ? boundaries[b] : static_cast<std::uint16_t>(b),
                .line = static_cast<std::uint16_t>(line),
                .column_px = column_px[b],
                .sigma_px = sigma_px[b],
                .interpolated = interpolated != nullptr && interpolated[b] != 0};
     }
     if (for_picture) {
-      Vec2f* texture = out_.texture_coordinates.data() + first - begin;
-      for (int b = begin; b < end; ++b) texture[b] = {texture_x_[b], texture_y};
+      Vec2f* texture = out_.texture_coordinates.data() + first;
+      for (int b = begin; b < end; ++b) *texture++ = {texture_x_[b], texture_y};
       std::copy(sigma_m_ + begin, sigma_m_ + end, out_.sigmas_m.data() + first);
       if (interpolated != nullptr) {
         std::copy(interpolated + begin, interpolated + end, out_.interpolated.data() + first);

@@ -7,6 +7,8 @@
 
 #include <random>
 
+#include "capture/reconstruct/eight.h"
+
 namespace relievo {
 namespace {
 
@@ -47,12 +49,13 @@ TEST(ColumnLinks, OfAWholeRowAreThoseOfEachPlace) {
         for (int b = 0; b < boundaries; ++b) {
           const bool pair = known(l, b) && known(l, b + 1);
           const bool across = pair && surface_goes_on_across({c[b - 1], c[b], c[b + 1], c[b + 2]}, 1, scale);
-          ASSERT_EQ(found.across(l)[b], across ? kLink : 0) << l << ", " << b;
+          ASSERT_EQ(bit_of(found.across(l), b), across) << l << ", " << b;
           const bool along =
               known(l, b) && known(l + 1, b) &&
               surface_goes_on_along({at(l - 1, b), at(l, b), at(l + 1, b), at(l + 2, b)}, 1, scale);
           const bool both = along && sure(l, b) && sure(l + 1, b);
-          ASSERT_EQ(found.along(l)[b], (along ? kLink : 0) | (both ? kSureLink : 0)) << l << ", " << b;
+          ASSERT_EQ(bit_of(found.along(l), b), along) << l << ", " << b;
+          ASSERT_EQ(bit_of(found.sure_along(l), b), both) << l << ", " << b;
           links += across;
           steps += pair && !across;
         }
@@ -69,10 +72,11 @@ TEST(ColumnLinks, AllKernelsFindTheSame) {
     const DecodedGrid grid = scattered(boundaries, 40, random);
     for (int l = 0; l < 40; ++l) {
       const auto find = [&](const LinkKernels& kernels) {
-        std::vector<std::uint8_t> out(2 * grid.stride(), 77);
+        const std::size_t bytes = grid.stride() / 8;
+        std::vector<std::uint8_t> out(3 * bytes, 77);
         kernels.find({grid.column_px(l - 1), grid.column_px(l), grid.column_px(l + 1), grid.column_px(l + 2),
                       grid.sigma_px(l), grid.sigma_px(l + 1)},
-                     {2, 0.05F}, boundaries, out.data(), out.data() + grid.stride());
+                     {2, 0.05F}, boundaries, {out.data(), out.data() + bytes, out.data() + 2 * bytes});
         return out;
       };
       const auto reference = find(all_link_kernels().front());
@@ -91,9 +95,12 @@ TEST(ColumnLinks, NoneLeadOutOfTheGrid) {
   WorkerPool pool(1);
   find_links(grid, {}, pool, links);
   for (int b = 0; b < 13; ++b) {
-    EXPECT_EQ(links.along(-1)[b] | links.along(3)[b] | links.across(-1)[b] | links.across(4)[b], 0) << b;
-    EXPECT_EQ(links.across(2)[b] != 0, b < 4) << b;
-    EXPECT_EQ(links.along(2)[b] != 0, b < 5) << b;
+    for (const std::uint8_t* row : {links.along(-1), links.along(3), links.across(-1), links.across(4),
+                                    links.sure_along(-1), links.sure_along(3)})
+      EXPECT_FALSE(bit_of(row, b)) << b;
+    EXPECT_EQ(bit_of(links.across(2), b), b < 4) << b;
+    EXPECT_EQ(bit_of(links.along(2), b), b < 5) << b;
+    EXPECT_EQ(bit_of(links.sure_along(2), b), b < 5) << b;
   }
 }
 

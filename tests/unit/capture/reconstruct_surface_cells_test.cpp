@@ -28,9 +28,9 @@ struct Rows {
     std::bernoulli_distribution missing(0.2), step(0.1), linked(0.9);
     planes.assign(10 * stride, kNone);
     for (auto& row : links) {
-      row.assign(stride, 0);
-      for (auto& link : row)
-        link = static_cast<std::uint8_t>(linked(random) ? kLink | (random() % 2 == 0 ? kSureLink : 0) : 0);
+      row.assign(stride / 8 + 2, 0);
+      for (std::size_t b = 0; b < stride; ++b)
+        row[b / 8] = static_cast<std::uint8_t>(row[b / 8] | (linked(random) ? 1U : 0U) << (b % 8));
     }
     for (std::size_t line = 0; line < 2; ++line) {
       for (std::size_t b = 0; b < static_cast<std::size_t>(count); ++b) {
@@ -50,7 +50,7 @@ struct Rows {
   }
   std::size_t stride;
   std::vector<float> planes;
-  std::array<std::vector<std::uint8_t>, 3> links;
+  std::array<std::vector<std::uint8_t>, 4> links;
 };
 
 struct Made {
@@ -77,7 +77,10 @@ Made make(const CellKernels& kernels, const Rows& rows, int count) {
   const VertexRow above = rows.row(0);
   const VertexRow below = rows.row(1);
   kernels.views(above.x, above.y, above.z, count, out.views.data(), out.views.data() + stride);
-  kernels.make({above, below, {rows.links[0].data(), rows.links[1].data(), rows.links[2].data()}, count},
+  kernels.make({above,
+                below,
+                {rows.links[0].data(), rows.links[1].data(), rows.links[2].data(), rows.links[3].data()},
+                count},
                {4, 0.2F}, out.cells.data(), {out.unit.data(), stride}, {out.next.data(), stride}, out.counts);
   return out;
 }
