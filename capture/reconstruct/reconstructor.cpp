@@ -20,7 +20,7 @@
 namespace relievo {
 namespace {
 
-constexpr int kDepthsQuickly = 8;        // one line in so many tells the range of depths
+constexpr int kDepthLines = 8;           // one line in so many tells the range of depths
 constexpr std::size_t kSpareFrames = 4;  // a stage's queue and what its neighbours hold
 
 int line_step(const Rig& rig) {
@@ -98,8 +98,7 @@ struct Reconstructor::State {
         pairs(p.scheme, r),
         decoder(r, p, o),
         triangulator(r, p, line_count(r), line_step(r)),
-        depths(p.boundaries(), r.camera.width, line_count(r),
-               o.decoder == Decoder::kQuick ? kDepthsQuickly : 1),
+        depths(p.boundaries(), r.camera.width, line_count(r), kDepthLines),
         white_texture(r.colour_matrix, o.decoder == Decoder::kQuick),
         half_way(p.boundaries(), line_count(r)),
         surface_builder(r, line_step(r), o.surface) {
