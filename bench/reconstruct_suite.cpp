@@ -72,7 +72,7 @@ struct Floor {
     WorkerPool pool(threads);
     QuickDifferencer differencer(frames.info().rig.colour_matrix);
     QuickSequence sequence(frames.info().pattern);
-    QuadImage image;
+    QuickImage image;
     for (std::uint64_t n = 0; n < kFloorFrames; ++n) {
       auto frame = reconstructor.add(frames.at(n));
       if (!frame) return frame.error();

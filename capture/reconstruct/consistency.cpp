@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "capture/reconstruct/consistency_rows.h"
 #include "capture/reconstruct/smooth_columns.h"
 
 namespace relievo {
@@ -56,36 +57,34 @@ constexpr float kWidest_px = 40.F;        // and with the next one over less
 constexpr std::int32_t kLeastPiece = 25;  // boundaries; smaller pieces of surface are wrong codes
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-constexpr int kMargin = 3;
 
-constexpr std::uint8_t kOpenAcross = 1;  // no neighbour on one side in the line
-constexpr std::uint8_t kBentAcross = 2;  // both, but not straight
-constexpr std::uint8_t kOpenAlong = 4;   // the same over lines
-constexpr std::uint8_t kBentAlong = 8;
+using Around = Neighbourhood;
+constexpr std::uint8_t kDiffers = BoundaryRow::kAboveDiffers | BoundaryRow::kBelowDiffers;
 
 /// Beside a depth step, as far as the neighbours tell: what is doubtful there is given up.
 bool beside_step(std::uint8_t state) {
-  return (state & kOpenAcross) || ((state & kBentAcross) && (state & (kOpenAlong | kBentAlong)));
+  return (state & Around::kOpenAcross) ||
+         ((state & Around::kBentAcross) && (state & (Around::kOpenAlong | Around::kBentAlong)));
 }
 
 bool known(float x) {
   return x == x;
 }
 
-/// True where a boundary, at x[0] among those of its line, is closer to its neighbours than these are to
-/// theirs. A depth step that hides the boundary's true place looks so: its two sides show the stripes of a
-/// boundary.
-bool squeezed(const float* x) {
-  const float left = x[0] - x[-1];
-  const float right = x[1] - x[0];
-  const float before = x[-1] - x[-2];
-  const float after = x[2] - x[1];
-  if (left < 0 || right < 0) return false;  // another surface in front
-  if (!known(right)) return left < kSqueezedAlone * before;
-  if (!known(left)) return right < kSqueezedAlone * after;
-  return left + right < 2 * kSqueezed * std::min(before, after) && left < kSqueezedEach * before &&
-         right < kSqueezedEach * after;
+/// Of a line's columns: whether boundary `b` and the one before are on one surface.
+bool hangs_together(const float* columns, int b) {
+  return std::fabs(columns[b] - columns[b - 1]) < kWidest_px;
 }
+
+/// A depth step that hides the boundary's true place looks squeezed: its two sides show the stripes of a
+/// boundary.
+constexpr NeighbourhoodLimits kLimits{.across_px = kBendAcross_px,
+                                      .across_share = kBendAcrossShare,
+                                      .along_px = kBendAlong_px,
+                                      .noise = kBendNoise,
+                                      .squeezed = kSqueezed,
+                                      .squeezed_each = kSqueezedEach,
+                                      .squeezed_alone = kSqueezedAlone};
 
 }  // namespace
 
@@ -95,6 +94,12 @@ float* ConsistencyCheck::row(std::vector<float>& grid, int line) const {
 const float* ConsistencyCheck::row(const std::vector<float>& grid, int line) const {
   return grid.data() + static_cast<std::size_t>(line + kMargin) * stride_ + kMargin;
 }
+std::uint8_t* ConsistencyCheck::bytes(std::vector<std::uint8_t>& grid, int line) const {
+  return grid.data() + static_cast<std::size_t>(line) * (stride_ - 2 * kMargin);
+}
+const std::uint8_t* ConsistencyCheck::bytes(const std::vector<std::uint8_t>& grid, int line) const {
+  return grid.data() + static_cast<std::size_t>(line) * (stride_ - 2 * kMargin);
+}
 
 void ConsistencyCheck::reset(int boundaries, int lines, int workers) {
   const std::size_t stride = (static_cast<std::size_t>(boundaries) + 7) / 8 * 8 + 2 * kMargin;
@@ -103,12 +108,13 @@ void ConsistencyCheck::reset(int boundaries, int lines, int workers) {
     lines_ = lines;
     stride_ = stride;
     // What lies around the lines stays as it is here.
-    for (auto* grid : {&measured_, &smooth_, &trusted_})
+    for (auto* grid : {&measured_, &smooth_, &trusted_, &settled_})
       grid->assign(stride_ * static_cast<std::size_t>(lines_ + 2 * kMargin), kNone);
-    noise_.assign(measured_.size(), 0);
+    for (auto* grid : {&noise_, &sigma_}) grid->assign(measured_.size(), 0);
   }
   const std::size_t cells = static_cast<std::size_t>(lines_) * static_cast<std::size_t>(boundaries_);
-  state_.resize(cells);
+  for (auto* grid : {&marks_, &state_})
+    grid->resize(static_cast<std::size_t>(lines_) * (stride_ - 2 * kMargin));
   piece_.resize(cells);
   size_.resize(cells);
   seams_.assign(static_cast<std::size_t>(workers), 0);
@@ -116,22 +122,19 @@ void ConsistencyCheck::reset(int boundaries, int lines, int workers) {
   for (RankedSample* sample : {&sigmas_, &bends_, &gaps_}) sample->reset(workers);
 }
 
-/// The columns of a line, and what they tell of all lines: standard deviations of every fourth edge, and the
-/// distances of neighbouring boundaries.
-void ConsistencyCheck::fill_line(const EdgeImage& edges, const SequenceResult& result, int line, int worker) {
-  float* columns = row(measured_, line);
-  float* noises = row(noise_, line);
-  std::fill_n(columns, boundaries_, kNone);
-  std::fill_n(noises, boundaries_, 0.F);
-  std::vector<float>& sigmas = sigmas_.of(worker);
-  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-    if (result.boundary[e] < 0) continue;
-    columns[result.boundary[e]] = edges.edges[e].column_px;
-    noises[result.boundary[e]] = edges.edges[e].noise_px;
-    if (e % 4 == 0) sigmas.push_back(edges.edges[e].sigma_px);
-  }
-  if (line % 2 != 0) return;
+void ConsistencyCheck::begin(int boundaries, int lines, WorkerPool& pool, int every) {
+  every_ = every;
+  reset(boundaries, lines, pool.threads());
+}
+
+BoundaryRow ConsistencyCheck::row(int line) {
+  return {row(measured_, line), row(sigma_, line), row(noise_, line), bytes(marks_, line)};
+}
+
+/// Distances of neighbouring boundaries, of every second line.
+void ConsistencyCheck::add_gaps(int line, int worker) {
+  if (line % (2 * every_) != 0) return;
+  const float* columns = row(measured_, line);
   std::vector<float>& gaps = gaps_.of(worker);
   std::size_t n = gaps.size();
   gaps.resize(n + static_cast<std::size_t>(boundaries_));
@@ -140,6 +143,39 @@ void ConsistencyCheck::fill_line(const EdgeImage& edges, const SequenceResult& r
     n += gaps[n] > 0;
   }
   gaps.resize(n);
+}
+
+/// What a line tells of all lines: standard deviations of every fourth boundary, and distances.
+void ConsistencyCheck::shown(int line, int worker) {
+  if (line % every_ != 0) return;
+  const BoundaryRow own = row(line);
+  std::vector<float>& sigmas = sigmas_.of(worker);
+  for (int b = line % 4; b < boundaries_; b += 4)
+    if (known(own.column_px[b])) sigmas.push_back(own.sigma_px[b]);
+  add_gaps(line, worker);
+}
+
+/// As shown() does, but that of every fourth edge the standard deviation is taken.
+void ConsistencyCheck::fill_line(const EdgeImage& edges, const SequenceResult& result, int line, int worker) {
+  const BoundaryRow to = row(line);
+  std::fill_n(to.column_px, boundaries_, kNone);
+  std::fill_n(to.noise_px, boundaries_, 0.F);
+  std::vector<float>& sigmas = sigmas_.of(worker);
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int b = result.boundary[e];
+    if (b < 0) continue;
+    const Edge& edge = edges.edges[e];
+    to.column_px[b] = edge.column_px;
+    to.sigma_px[b] = edge.sigma_px;
+    to.noise_px[b] = edge.noise_px;
+    to.marks[b] = static_cast<std::uint8_t>((result.still[e] != 0 ? BoundaryRow::kStill : 0) |
+                                            (edge.at_step ? BoundaryRow::kAtStep : 0) |
+                                            (edge.above_differs ? BoundaryRow::kAboveDiffers : 0) |
+                                            (edge.below_differs ? BoundaryRow::kBelowDiffers : 0));
+    if (e % 4 == 0) sigmas.push_back(edge.sigma_px);
+  }
+  add_gaps(line, worker);
 }
 
 /// Bends of the columns from one line to others: their standard deviation is that of the columns, speckle
@@ -166,29 +202,9 @@ void ConsistencyCheck::smooth_line(int line, float usual_px) {
 }
 
 void ConsistencyCheck::suspect_line(int line) {
-  const float* above = row(smooth_, line - 1);
-  const float* here = row(smooth_, line);
-  const float* below = row(smooth_, line + 1);
-  const float* noise = row(noise_, line);
-  std::uint8_t* state =
-      state_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
-  for (int b = 0; b < boundaries_; ++b) {
-    const float across = here[b - 1] - 2 * here[b] + here[b + 1];
-    const float spacing = 0.5F * (here[b + 1] - here[b - 1]);
-    const float along = above[b] - 2 * here[b] + below[b];
-    std::uint8_t s = 0;
-    if (!known(across)) {
-      s |= kOpenAcross;
-    } else if (std::fabs(across) > kBendAcross_px + kBendAcrossShare * spacing + kBendNoise * noise[b]) {
-      s |= kBentAcross;
-    }
-    if (!known(along)) {
-      s |= kOpenAlong;
-    } else if (std::fabs(along) > kBendAlong_px + kBendNoise * noise[b]) {
-      s |= kBentAlong;
-    }
-    state[b] = s;
-  }
+  consistency_kernels().neighbourhoods({row(smooth_, line - 1), row(smooth_, line), row(smooth_, line + 1)},
+                                       row(noise_, line), speckle_px_, boundaries_, kLimits,
+                                       bytes(state_, line));
 }
 
 /// Of a cell in piece_.
@@ -235,7 +251,7 @@ void ConsistencyCheck::measure_pieces(int begin, int end) {
         size_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
     std::int32_t start = 0;  // of what hangs together along the line
     for (int b = 0; b < boundaries_; ++b) {
-      if (!(std::fabs(here[b] - here[b - 1]) < kWidest_px)) start = b;
+      if (!hangs_together(here, b)) start = b;
       piece[b] = line * boundaries_ + start;
       size[b] = 1;
       size[start] = b - start + 1;
@@ -244,19 +260,19 @@ void ConsistencyCheck::measure_pieces(int begin, int end) {
   }
 }
 
-std::int32_t ConsistencyCheck::piece_size(std::size_t cell) const {
-  auto i = static_cast<std::int32_t>(cell);
+/// Of a cell in piece_.
+std::int32_t ConsistencyCheck::piece_size(std::int32_t i) const {
   while (piece_[static_cast<std::size_t>(i)] != i) i = piece_[static_cast<std::size_t>(i)];
   return size_[static_cast<std::size_t>(i)];
 }
 
 /// Weighs a suspect boundary's own place against what its neighbours predict. Nothing where it is to be given
 /// up.
-std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int boundary, const Edge& edge,
-                                                                   bool still) const {
-  const float sigma_px = edge.sigma_px;
-  const std::uint8_t state = state_[static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_) +
-                                    static_cast<std::size_t>(boundary)];
+std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int boundary, float sigma_px,
+                                                                   std::uint8_t marks) const {
+  const bool above_differs = marks & BoundaryRow::kAboveDiffers;
+  const bool below_differs = marks & BoundaryRow::kBelowDiffers;
+  const std::uint8_t state = bytes(state_, line)[boundary];
   const float own = row(smooth_, line)[boundary];
   std::array<Estimate, 4> predictions{};
   std::size_t count = 0;
@@ -277,27 +293,30 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
   predict(here[boundary - 1], here[boundary - 2], here[boundary - 3], kTwoAcross_px);
   predict(here[boundary + 1], here[boundary + 2], here[boundary + 3], kTwoAcross_px);
   const auto at = [&](int l) { return row(trusted_, line + l)[boundary]; };
-  if (!edge.above_differs) predict(at(-1), at(-2), at(-3), kTwoAlong_px);
-  if (!edge.below_differs) predict(at(1), at(2), at(3), kTwoAlong_px);
+  if (!above_differs) predict(at(-1), at(-2), at(-3), kTwoAlong_px);
+  if (!below_differs) predict(at(1), at(2), at(3), kTwoAlong_px);
   float own_variance = sigma_px * sigma_px + kOwn_px * kOwn_px;
-  if (state & (kOpenAlong | kBentAlong)) own_variance += kDoubtAlong_px * kDoubtAlong_px;
-  if (state & (kOpenAcross | kBentAcross)) own_variance += kDoubtAcross_px * kDoubtAcross_px;
+  if (state & (Around::kOpenAlong | Around::kBentAlong)) own_variance += kDoubtAlong_px * kDoubtAlong_px;
+  if (state & (Around::kOpenAcross | Around::kBentAcross)) own_variance += kDoubtAcross_px * kDoubtAcross_px;
   // Where lines above and below are other surfaces, the line itself may be a mixture of both.
   const auto goes_on = [&](int direction) {
     const float next = row(smooth_, line + direction)[boundary];
     const float second = row(smooth_, line + 2 * direction)[boundary];
     return std::fabs(next - own) < kGoesOn_px || std::fabs(2 * next - second - own) < kGoesOn_px;
   };
-  const bool above = !edge.above_differs && goes_on(-1);
-  const bool below = !edge.below_differs && goes_on(1);
+  const bool above = !above_differs && goes_on(-1);
+  const bool below = !below_differs && goes_on(1);
   // Unless each line differs from the next, as in fine texture, and this one goes straight on.
-  const bool textured = edge.above_differs && edge.below_differs && !(state & (kOpenAcross | kBentAcross));
-  if ((state & (kOpenAlong | kBentAlong)) && !above && !below && !textured) return std::nullopt;
+  const bool textured =
+      above_differs && below_differs && !(state & (Around::kOpenAcross | Around::kBentAcross));
+  if ((state & (Around::kOpenAlong | Around::kBentAlong)) && !above && !below && !textured)
+    return std::nullopt;
   const bool step = beside_step(state);
-  const float noise_px = kNoisy * row(noise_, line)[boundary];
+  const float noise_px = kNoisy * std::max(row(noise_, line)[boundary], speckle_px_);
   const float alone_px = std::max(kAlone_px * scale_, noise_px);
   const float at_step_px = std::max(kAtStep_px * scale_, noise_px);
-  const float at_most_px = std::max((still ? kAtMostStill_px : kAtMost_px) * scale_, noise_px);
+  const float at_most_px =
+      std::max((marks & BoundaryRow::kStill ? kAtMostStill_px : kAtMost_px) * scale_, noise_px);
   const auto by_itself = [&]() -> std::optional<Estimate> {
     if (!(sigma_px < (step ? alone_px : at_most_px))) return std::nullopt;
     return Estimate{own, sigma_px};
@@ -322,18 +341,47 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
   return weighed;
 }
 
-ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, SequenceResult& result,
-                                          EdgeImage& edges) {
-  reset(boundaries, edges.lines, pool.threads());
-  result.doubted.assign(result.boundary.size(), -1);
-  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
-    for (int line = begin; line < end; ++line) fill_line(edges, result, line, worker);
-  });
+void ConsistencyCheck::settle_line(int line, ConsistencyCounts& counts) {
+  const BoundaryRow own = row(line);
+  const float* smooth = row(smooth_, line);
+  const std::uint8_t* state = bytes(state_, line);
+  float* out = row(settled_, line);
+  consistency_kernels().average(own.column_px, smooth, own.noise_px, boundaries_, kAveraged, own.sigma_px);
+  bool small = false;  // the piece of surface at hand
+  for (int b = 0; b < boundaries_; ++b) {
+    out[b] = kNone;
+    const float measured = own.column_px[b];
+    if (!known(measured)) continue;
+    if (!hangs_together(own.column_px, b)) small = piece_size(line * boundaries_ + b) < kLeastPiece;
+    const std::uint8_t s = state[b];
+    const std::uint8_t marks = own.marks[b];
+    if (small || (s & Around::kSqueezed)) {
+      ++counts.rejected;
+      continue;
+    }
+    if (s == 0 && !(marks & kDiffers) && own.sigma_px[b] <= kSuspect_px) {
+      out[b] = smooth[b];
+      continue;
+    }
+    const bool is_step = (marks & BoundaryRow::kAtStep) && (s & Around::kOpenAcross);
+    const auto settled = settle(line, b, own.sigma_px[b], marks);
+    if (is_step || !settled) {
+      own.marks[b] = marks | BoundaryRow::kDoubted;
+      ++counts.rejected;
+      continue;
+    }
+    counts.moved += s != 0;
+    out[b] = settled->column_px;
+    own.sigma_px[b] = settled->sigma_px;
+  }
+}
+
+ConsistencyCounts ConsistencyCheck::settle(WorkerPool& pool) {
   pool.for_ranges(lines_, [&](int begin, int end, int worker) {
     seams_[static_cast<std::size_t>(worker)] = begin;
     measure_pieces(begin, end);
     for (int line = std::max(begin, kApart); line < std::min(end, lines_ - kApart); ++line)
-      bends_of_line(line, worker);
+      if (line % every_ == 0) bends_of_line(line, worker);
   });
   for (const int line : seams_)
     if (line > 0) join_to_above(line);
@@ -342,67 +390,64 @@ ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, Sequ
   scale_ = std::max(1.F, gaps_.median(0) / kStripe_px);
   const bool rough = scattered > kRough * noise;
   if (rough) noise = kSpeckleTail * scattered;
+  speckle_px_ = rough ? scattered : 0;
+  pool.for_ranges(lines_, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) smooth_line(line, noise);
+  });
   pool.for_ranges(lines_, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) {
-      float* noises = row(noise_, line);
-      for (int b = 0; rough && b < boundaries_; ++b) noises[b] = std::max(noises[b], scattered);
-      smooth_line(line, noise);
-    }
-  });
-  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
-    for (int line = begin; line < end; ++line) {
       suspect_line(line);
+      const float* smooth = row(smooth_, line);
+      const float* sigma = row(sigma_, line);
       float* trusted = row(trusted_, line);
-      std::copy_n(row(smooth_, line), boundaries_, trusted);
-      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-        if (result.boundary[e] >= 0 && edges.edges[e].sigma_px > kTrusted_px)
-          trusted[result.boundary[e]] = kNone;
-      }
+      for (int b = 0; b < boundaries_; ++b) trusted[b] = sigma[b] > kTrusted_px ? kNone : smooth[b];
     }
   });
-  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
-    ConsistencyCounts& counts = counts_[static_cast<std::size_t>(worker)];
-    for (int line = begin; line < end; ++line) {
-      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-        const int b = result.boundary[e];
-        if (b < 0) continue;
-        Edge& edge = edges.edges[e];
-        const auto cell = static_cast<std::size_t>(line * boundaries_ + b);
-        const std::uint8_t s = state_[cell];
-        if (row(smooth_, line)[b] != edge.column_px) {
-          const float averaged = kAveraged * edge.noise_px * edge.noise_px;
-          edge.sigma_px = std::sqrt(
-              std::max(0.5F * edge.sigma_px * edge.sigma_px, edge.sigma_px * edge.sigma_px - averaged));
-        }
-        std::optional<Estimate> settled = Estimate{row(smooth_, line)[b], edge.sigma_px};
-        const bool replaced = row(measured_, line)[b] != edge.column_px;
-        const bool is_step = edge.at_step && (s & kOpenAcross) != 0;
-        const bool suspect =
-            s != 0 || edge.above_differs || edge.below_differs || edge.sigma_px > kSuspect_px;
-        if (replaced || squeezed(row(smooth_, line) + b) || piece_size(cell) < kLeastPiece) {
-          result.boundary[e] = -1;
-          ++counts.rejected;
-          continue;
-        }
-        if (suspect) settled = settle(line, b, edge, result.still[e] != 0);
-        if (is_step || !settled) {
-          result.doubted[e] = std::exchange(result.boundary[e], std::int16_t{-1});
-          ++counts.rejected;
-          continue;
-        }
-        counts.moved += s != 0;
-        edge.column_px = settled->column_px;
-        edge.sigma_px = settled->sigma_px;
-      }
-    }
+  pool.for_ranges(lines_, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) settle_line(line, counts_[static_cast<std::size_t>(worker)]);
   });
   ConsistencyCounts total;
   for (const ConsistencyCounts& c : counts_) {
     total.rejected += c.rejected;
     total.moved += c.moved;
   }
+  return total;
+}
+
+ConsistencyCounts ConsistencyCheck::check(int boundaries, WorkerPool& pool, SequenceResult& result,
+                                          EdgeImage& edges) {
+  begin(boundaries, edges.lines, pool);
+  result.doubted.assign(result.boundary.size(), -1);
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) fill_line(edges, result, line, worker);
+  });
+  ConsistencyCounts total = settle(pool);
+  counts_.assign(counts_.size(), {});
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line) {
+      const BoundaryRow own = row(line);
+      const float* settled = row(settled_, line);
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+        std::int16_t& b = result.boundary[e];
+        if (b < 0) continue;
+        Edge& edge = edges.edges[e];
+        const bool replaced = own.column_px[b] != edge.column_px;
+        if (!replaced) edge.sigma_px = own.sigma_px[b];
+        if (!replaced && known(settled[b])) {
+          edge.column_px = settled[b];
+          continue;
+        }
+        if (replaced) {
+          ++counts_[static_cast<std::size_t>(worker)].rejected;
+        } else if (own.marks[b] & BoundaryRow::kDoubted) {
+          result.doubted[e] = b;
+        }
+        b = -1;
+      }
+    }
+  });
+  for (const ConsistencyCounts& c : counts_) total.rejected += c.rejected;
   return total;
 }
 

@@ -6,10 +6,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/quick_sequence.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
 
@@ -32,6 +35,9 @@ class Continuity {
   ContinuityCounts check(const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool,
                          SequenceResult& result, EdgeImage& edges);
 
+  /// The same of what a check left of the edges of `sequence`.
+  ContinuityCounts check(QuickSequence& sequence, ConsistencyCheck& checked, WorkerPool& pool);
+
  private:
   struct Motion {
     float px;
@@ -40,8 +46,13 @@ class Continuity {
   float* row(std::vector<float>& grid, int line) const;
   const float* row(const std::vector<float>& grid, int line) const;
   Motion motion(int line, int boundary) const;
+  bool moved_alone(int line, int boundary, bool plain) const;
+  ContinuityCounts end_frame();
   std::size_t drop_line(int line, SequenceResult& result, const EdgeImage& edges) const;
+  std::optional<float> expected_px(int line, int boundary) const;
+  bool goes_on(int line, int boundary, float column_px) const;
   std::size_t carry_line(int line, SequenceResult& result, EdgeImage& edges) const;
+  std::size_t carry_line(int line, const QuickLine& edges, ConsistencyCheck& checked) const;
 
   int boundaries_, lines_;
   std::size_t stride_;

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "capture/reconstruct/consistency_rows.h"
+
 namespace relievo {
 namespace {
 
@@ -82,34 +84,91 @@ bool InstantFilter::adjust_by_before(int line, int boundary, const Step& step, f
   return true;
 }
 
+InstantFilter::ByTime InstantFilter::by_time(std::int64_t time_ns) const {
+  const double frames = static_cast<double>(time_ns - before_ns_) / frame_ns_;
+  const bool before = have_before_ && frames > 0.5 && frames < kFrames + 0.5;
+  return {frames, before, static_cast<float>(before ? kPhase / frames : 0)};
+}
+
+void InstantFilter::adjust_one(const ByTime& by, const FieldMotion& motion, int line, int boundary,
+                               float& column_px, float& sigma_px) {
+  const float moved = motion.at(line, column_px);
+  const Step step{by.share, kFields * static_cast<float>(by.frames) * moved};
+  if (by.before && adjust_by_before(line, boundary, step, column_px, sigma_px)) return;
+  if (moved == 0) return;
+  column_px -= kHalfWay * moved;
+  sigma_px = std::hypot(sigma_px, kHalfWay * kMotion_px);
+}
+
+void InstantFilter::end_frame(std::int64_t time_ns) {
+  std::swap(now_, before_);
+  before_ns_ = time_ns;
+  have_before_ = true;
+}
+
 void InstantFilter::adjust(const FrameInstant& frame, const SequenceResult& result, EdgeImage& edges,
                            std::vector<RecoveredBoundary>& recovered, WorkerPool& pool) {
   fill(result, edges, recovered, pool);
-  const double frames = static_cast<double>(frame.time_ns - before_ns_) / frame_ns_;
-  const bool by_before = have_before_ && frames > 0.5 && frames < kFrames + 0.5;
-  const auto share = static_cast<float>(by_before ? kPhase / frames : 0);
-  const auto adjust_one = [&](int line, int boundary, float& column_px, float& sigma_px) {
-    const float moved = frame.motion.at(line, column_px);
-    const Step step{share, kFields * static_cast<float>(frames) * moved};
-    if (by_before && adjust_by_before(line, boundary, step, column_px, sigma_px)) return;
-    if (moved == 0) return;
-    column_px -= kHalfWay * moved;
-    sigma_px = std::hypot(sigma_px, kHalfWay * kMotion_px);
-  };
-  if (by_before || !frame.motion.moves.empty()) {
+  const ByTime by = by_time(frame.time_ns);
+  if (by.before || !frame.motion.moves.empty()) {
     pool.for_shares(edges.line_start, [&](int begin, int end, int) {
       for (int line = begin; line < end; ++line) {
         for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
              e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
           Edge& edge = edges.edges[e];
-          if (result.boundary[e] >= 0) adjust_one(line, result.boundary[e], edge.column_px, edge.sigma_px);
+          if (result.boundary[e] >= 0)
+            adjust_one(by, frame.motion, line, result.boundary[e], edge.column_px, edge.sigma_px);
         }
       }
     });
-    for (RecoveredBoundary& r : recovered) adjust_one(r.line, r.boundary, r.column_px, r.sigma_px);
+    for (RecoveredBoundary& r : recovered)
+      adjust_one(by, frame.motion, r.line, r.boundary, r.column_px, r.sigma_px);
   }
-  std::swap(now_, before_);
-  before_ns_ = frame.time_ns;
+  end_frame(frame.time_ns);
+}
+
+void InstantFilter::adjust(std::int64_t time_ns, ConsistencyCheck& checked, WorkerPool& pool,
+                           PlaceGrid& out) {
+  constexpr int kMargin = ConsistencyCheck::kMargin;
+  const auto stride = checked.stride();
+  const std::size_t cells = stride * static_cast<std::size_t>(lines_ + 2 * kMargin);
+  if (before_px_.size() != cells) {
+    before_px_.assign(cells, kNoColumn);
+    before_sigma_px_.assign(cells, 0);
+  }
+  const auto row = [&](std::vector<float>& grid, int line) {
+    return grid.data() + static_cast<std::size_t>(line + kMargin) * stride + kMargin;
+  };
+  moved_.resize(static_cast<std::size_t>(pool.threads()));
+  for (auto& own : moved_) own.resize(2 * stride);
+  if (out.boundaries() != boundaries_ || out.lines() != lines_) out.reset(boundaries_, lines_, {});
+  const ByTime by = by_time(time_ns);
+  const InstantRules rules{.share = by.share,
+                           .worst_px = by.before ? kWorst_px : 0,
+                           .still_px = kStill_px,
+                           .alike_px = kAlike_px,
+                           .alike_share = kAlikeShare,
+                           .furthest_px = kOffFields_px};
+  pool.for_ranges(lines_, [&](int begin, int end, int worker) {
+    float* column_px = moved_[static_cast<std::size_t>(worker)].data();
+    float* sigma_px = column_px + stride;
+    for (int line = begin; line < end; ++line) {
+      const auto beside = [&](const auto& of) { return ColumnRows{of(line - 1), of(line), of(line + 1)}; };
+      consistency_kernels().to_instant({beside([&](int l) { return checked.settled_px(l); }),
+                                        beside([&](int l) { return row(before_px_, l); }),
+                                        checked.row(line).sigma_px, row(before_sigma_px_, line)},
+                                       boundaries_, rules, column_px, sigma_px);
+      Place* to = out.line(line);
+      for (int b = 0; b < boundaries_; ++b) to[b] = {column_px[b], sigma_px[b]};
+    }
+  });
+  pool.for_ranges(lines_, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line) {
+      std::copy_n(checked.settled_px(line), boundaries_, row(before_px_, line));
+      std::copy_n(checked.row(line).sigma_px, boundaries_, row(before_sigma_px_, line));
+    }
+  });
+  before_ns_ = time_ns;
   have_before_ = true;
 }
 

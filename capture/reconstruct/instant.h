@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_motion.h"
+#include "capture/reconstruct/place_grid.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
 
@@ -33,6 +35,9 @@ class InstantFilter {
   void adjust(const FrameInstant& frame, const SequenceResult& result, EdgeImage& edges,
               std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
 
+  /// The same of what a check left, by the frame before alone, to `out`.
+  void adjust(std::int64_t time_ns, ConsistencyCheck& checked, WorkerPool& pool, PlaceGrid& out);
+
  private:
   struct Seen {
     float column_px;
@@ -46,6 +51,16 @@ class InstantFilter {
     float share;        // of the motion to here, to be taken back
     float expected_px;  // that motion, by what moves between the frame's fields
   };
+  /// What a frame's boundaries are adjusted by.
+  struct ByTime {
+    double frames;  // since the frame before
+    bool before;    // which is recent enough
+    float share;    // of the motion since then, to be taken back
+  };
+  ByTime by_time(std::int64_t time_ns) const;
+  void adjust_one(const ByTime& by, const FieldMotion& motion, int line, int boundary, float& column_px,
+                  float& sigma_px);
+  void end_frame(std::int64_t time_ns);
   bool adjust_by_before(int line, int boundary, const Step& step, float& column_px, float& sigma_px);
 
   int boundaries_, lines_;
@@ -53,7 +68,9 @@ class InstantFilter {
   std::size_t stride_;
   std::int64_t before_ns_ = 0;
   bool have_before_ = false;
-  std::vector<Seen> now_, before_;  // [line][boundary] with a margin of one
+  std::vector<Seen> now_, before_;                  // [line][boundary] with a margin of one
+  std::vector<float> before_px_, before_sigma_px_;  // of a check's rows, as they lie there
+  std::vector<std::vector<float>> moved_;           // a line's columns and standard deviations, one a worker
 };
 
 }  // namespace relievo

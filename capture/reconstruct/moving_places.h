@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/place_grid.h"
 #include "capture/reconstruct/sequence.h"
 
 namespace relievo {
@@ -18,6 +20,8 @@ class MovingPlaces {
 
   /// Of a frame `width` columns wide, by the decoded boundaries of `result`.
   void find(int width, const SequenceResult& result, const EdgeImage& edges);
+  /// The same by those of `places` that `checked` does not mark as still.
+  void find(int width, ConsistencyCheck& checked, const PlaceGrid& places);
 
   /// How many such boundaries are around a place, up to kMost.
   int around(int line, float column_px) const {
@@ -28,6 +32,10 @@ class MovingPlaces {
  private:
   static constexpr int kCell_px = 4;
 
+  void reset(int width, int lines);
+  void add(int line, float column_px);
+
+  int lines_ = 0;
   int cells_ = 0;                     // in a line
   std::vector<std::uint8_t> around_;  // [line][cell]
 };

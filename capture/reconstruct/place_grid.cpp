@@ -22,4 +22,16 @@ void PlaceGrid::fill(int boundaries, WorkerPool& pool, const SequenceResult& res
   for (const RecoveredBoundary& r : recovered) line(r.line)[r.boundary] = {r.column_px, r.sigma_px};
 }
 
+void PlaceGrid::fill(int boundaries, WorkerPool& pool, ConsistencyCheck& checked) {
+  if (boundaries != this->boundaries() || checked.lines() != lines()) reset(boundaries, checked.lines(), {});
+  pool.for_ranges(lines(), [&](int begin, int end, int) {
+    for (int l = begin; l < end; ++l) {
+      const float* column_px = checked.settled_px(l);
+      const float* sigma_px = checked.row(l).sigma_px;
+      Place* here = line(l);
+      for (int b = 0; b < boundaries; ++b) here[b] = {column_px[b], sigma_px[b]};
+    }
+  });
+}
+
 }  // namespace relievo

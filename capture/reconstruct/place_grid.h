@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/margin_grid.h"
 #include "capture/reconstruct/recover.h"
@@ -25,6 +26,8 @@ class PlaceGrid : public MarginGrid<Place, 3> {
   /// Those of `result` and `recovered`; memory is reused.
   void fill(int boundaries, WorkerPool& pool, const SequenceResult& result, const EdgeImage& edges,
             const std::vector<RecoveredBoundary>& recovered);
+  /// Those that a check left.
+  void fill(int boundaries, WorkerPool& pool, ConsistencyCheck& checked);
 };
 
 }  // namespace relievo

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "capture/reconstruct/edges.h"
@@ -101,26 +102,35 @@ float noise_across_lines(const Image& image, int every, float per_bin, Add add) 
   return seconds.at(3, 0) * per_bin / (kQuantile30 * kGain);
 }
 
-/// Share of the projector's light in what a frame shows: the rest is ambient. The median of the luma steps
-/// over those that white light alone would show; 1 where nothing tells it. `ratio(line, column)` is luma's
-/// difference over its sum. One edge in `every`, of one line in as many, is asked.
+/// Share of the projector's light in what is shown beside a boundary at `column_px`, of these colours to the
+/// left and right; the rest is ambient. Nothing where luma does not tell it. `ratio(column)` is luma's
+/// difference over its sum.
+template <class Ratio>
+std::optional<float> share_at(const LumaPlacer& placer, const std::array<Primary, 2>& colours,
+                              float column_px, int width, Ratio ratio) {
+  constexpr int kSide_px = 3;
+  const float step = placer.ratio(colours[1]) - placer.ratio(colours[0]);
+  const int centre = column_of(column_px);
+  if (std::fabs(step) < 0.5F || centre < kSide_px || centre + kSide_px >= width) return std::nullopt;
+  return (ratio(centre + kSide_px) - ratio(centre - kSide_px)) / step;
+}
+
+/// Of a frame: the median of the luma steps over those that white light alone would show; 1 where nothing
+/// tells it. `ratio(line, column)` is luma's difference over its sum. One edge in `every`, of one line in as
+/// many, is asked.
 template <class Ratio>
 float projected_share(const LumaPlacer& placer, const SequenceResult& result,
                       const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges, int width,
                       int every, Ratio ratio) {
   constexpr std::size_t kBins = 64;
-  constexpr int kSide_px = 3;
   BinnedQuantile<kBins> shares;
   for (int line = 0; line < edges.lines; line += every) {
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
          e < edges.line_start[static_cast<std::size_t>(line) + 1]; e += static_cast<std::uint32_t>(every)) {
       if (result.boundary[e] < 0) continue;
-      const auto [left, right] = colours[static_cast<std::size_t>(result.boundary[e])];
-      const float step = placer.ratio(right) - placer.ratio(left);
-      const int centre = column_of(edges.edges[e].column_px);
-      if (std::fabs(step) < 0.5F || centre < kSide_px || centre + kSide_px >= width) continue;
-      const float share = (ratio(line, centre + kSide_px) - ratio(line, centre - kSide_px)) / step;
-      shares.add(static_cast<std::size_t>(std::clamp(share, 0.F, 0.999F) * kBins));
+      const auto share = share_at(placer, colours[static_cast<std::size_t>(result.boundary[e])],
+                                  edges.edges[e].column_px, width, [&](int x) { return ratio(line, x); });
+      if (share) shares.add(static_cast<std::size_t>(std::clamp(*share, 0.F, 0.999F) * kBins));
     }
   }
   return shares.at(5, kBins) / kBins;

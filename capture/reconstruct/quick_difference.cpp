@@ -27,7 +27,7 @@ QuickDifferencer::QuickDifferencer(const std::array<double, 9>& colour_matrix) {
 }
 
 void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin, int end,
-                                           std::vector<std::int16_t>& scratch, QuadImage& out) const {
+                                           std::vector<std::int16_t>& scratch, QuickImage& out) const {
   const RowKernels& rows = row_kernels();
   const QuickKernels& kernels = quick_kernels();
   const bool interlaced = frame.scan == Scan::kInterlaced;
@@ -35,11 +35,12 @@ void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin
   const View8 own = interlaced ? frame.picture.view().field(0) : frame.picture.view();
   const View8 other = interlaced ? frame.picture.view().field(1) : frame.complement.view();
   if (other.empty()) {  // an interlaced picture of one row has no complement
-    std::fill(out.quads.begin(), out.quads.end(), std::int16_t{0});
+    std::fill(out.planes.begin(), out.planes.end(), std::int16_t{0});
     std::fill(out.luma.begin(), out.luma.end(), std::int16_t{0});
+    std::fill(out.codes.begin(), out.codes.end(), std::uint8_t{0});
     return;
   }
-  QuadWeights weights = weights_;
+  QuickWeights weights = weights_;
   if (interlaced && frame.field_order == FieldOrder::kBottom)  // the complement is on the even rows
     for (std::int16_t& w : weights.colour) w = static_cast<std::int16_t>(-std::max<int>(w, -32767));
   const int samples = 3 * out.width;
@@ -58,6 +59,7 @@ void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin
     rows.combine_fields(own.row(line), other.row(std::clamp(before, 0, other.height - 1)),
                         other.row(std::min(line, other.height - 1)), samples, fields_at(line));
   };
+  const auto doubt = static_cast<std::int16_t>(std::min(out.doubt(), 16383.F));
   std::int16_t* across = scratch_row(6);
   std::int16_t* difference = scratch_row(7);
   std::int16_t* sum = scratch_row(8);
@@ -70,33 +72,37 @@ void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin
     const FieldRows below = fields_at(line + 1);
     rows.low_pass(above.difference, here.difference, below.difference, samples, across, difference);
     rows.low_pass(above.sum, here.sum, below.sum, samples, across, sum);
-    const std::size_t at = static_cast<std::size_t>(line) * static_cast<std::size_t>(out.width);
-    kernels.to_quads(difference, sum, out.width, weights, out.quads.data() + 4 * at, out.luma.data() + at);
+    const std::size_t at = static_cast<std::size_t>(line) * static_cast<std::size_t>(out.stride);
+    kernels.to_planes(difference, sum, out.width, weights, out.planes.data() + 3 * at, out.stride,
+                      out.luma.data() + at);
+    kernels.codes(out.row(line), out.width, doubt, out.codes.data() + at);
   }
 }
 
-float QuickDifferencer::estimate_noise(const QuadImage& image) {
+float QuickDifferencer::estimate_noise(const QuickImage& image) {
   constexpr int kPerBin = QuickKernels::kScale / 4;
   return place_rules::noise_across_lines(
       image, 17, kPerBin,
       [&](const std::int16_t* above, const std::int16_t* here, const std::int16_t* below, auto& seconds) {
-        for (int i = 0; i < 4 * image.width; i += 5) {
-          if (i % 4 == 3) continue;
-          const int second = std::abs(above[i] - 2 * here[i] + below[i]);
-          seconds.add(static_cast<std::size_t>(second / kPerBin));
+        for (int c = 0; c < 3; ++c) {
+          for (int i = c * image.stride + c; i < c * image.stride + image.width; i += 5)
+            seconds.add(static_cast<std::size_t>(std::abs(above[i] - 2 * here[i] + below[i]) / kPerBin));
         }
       });
 }
 
-void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, QuadImage& out) {
+void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, QuickImage& out) {
   const View8 slide = frame.scan == Scan::kInterlaced ? frame.picture.view().field(0) : frame.picture.view();
   out.width = slide.width;
   out.lines = slide.height;
-  const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
-  out.quads.resize(4 * pixels);
-  out.luma.resize(pixels);
+  out.stride = (out.width + 15) / 16 * 16 + QuickImage::kPadding;
+  const std::size_t places = static_cast<std::size_t>(out.stride) * static_cast<std::size_t>(out.lines);
+  out.planes.resize(3 * places);
+  out.luma.resize(places);
+  out.codes.resize(places);
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   if (noise_ < 0) {
+    out.noise = 0;
     pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
       difference_of_lines(frame, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
     });
@@ -105,25 +111,23 @@ void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, QuadI
   out.noise = noise_;
 }
 
-bool same_slide(const QuadImage& a, const QuadImage& b) {
+bool same_slide(const QuickImage& a, const QuickImage& b) {
   constexpr int kEveryLine = 13;
-  constexpr int kEvery = 3;  // a column in so many; all channels come by turns, since a quad has four numbers
-  if (a.quads.size() != b.quads.size()) return false;
-  const float threshold_a = 4 * a.noise + QuickKernels::kScale;
-  const float threshold_b = 4 * b.noise + QuickKernels::kScale;
+  if (a.codes.size() != b.codes.size()) return false;
   std::uint32_t both = 0;
-  std::uint32_t equal = 0;
+  std::uint32_t differ = 0;
   for (int line = 0; line < a.lines; line += kEveryLine) {
-    const std::int16_t* va = a.line(line);
-    const std::int16_t* vb = b.line(line);
-    for (int i = 0; i < 4 * a.width; i += kEvery) {
-      const bool stand_out = (std::abs(va[i]) >= threshold_a) & (std::abs(vb[i]) >= threshold_b);
-      both += stand_out;
-      equal += stand_out & ((va[i] > 0) == (vb[i] > 0));
+    const std::uint8_t* ca = a.code_line(line);
+    const std::uint8_t* cb = b.code_line(line);
+    for (int x = 0; x < a.width; ++x) {
+      const bool clear = ca[x] & cb[x] & QuickKernels::kIsClear;
+      const unsigned other = clear ? (ca[x] ^ cb[x]) & QuickKernels::kSigns : 0U;
+      both += clear;
+      differ += (other & 1) + (other >> 1 & 1) + (other >> 2);
     }
   }
   // Channels of two slides agree about every second time; of the same slide, but for what moved, always.
-  return both > 0 && std::uint64_t{equal} * 10 > std::uint64_t{both} * 8;
+  return both > 0 && std::uint64_t{differ} * 10 < std::uint64_t{both} * 3 * 2;
 }
 
 }  // namespace relievo

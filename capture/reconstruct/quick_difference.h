@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The difference image (field_difference.h) as the quick decoder keeps it: whole numbers of 16 bits, a
-// pixel's channels beside each other, so that what is asked about a place is read at once. Fields are not
-// aligned.
+// The difference image (field_difference.h) as the quick decoder keeps it: whole numbers of 16 bits, and of
+// each pixel a byte that says which primary it shows and whether that is sure. Fields are not aligned.
 #pragma once
 
 #include <array>
@@ -15,20 +14,30 @@
 
 namespace relievo {
 
-/// Lines as of DifferenceImage. Numbers are grey levels times QuickKernels::kScale.
-struct QuadImage {
+/// Lines as of DifferenceImage. Numbers are grey levels times QuickKernels::kScale. Rows can be read for
+/// kPadding columns behind their last.
+struct QuickImage {
+  static constexpr int kPadding = 16;
+
   int width = 0;
   int lines = 0;
-  std::vector<std::int16_t> quads;  // [line][width][red, green, blue, 0]
-  std::vector<std::int16_t> luma;   // [line][width]: of the fields' sum
-  float noise = 0;                  // standard deviation of a value of quads
+  int stride = 0;                    // of a row, with what is behind it
+  std::vector<std::int16_t> planes;  // [line][red, green, blue][stride]
+  std::vector<std::int16_t> luma;    // [line][stride]: of the fields' sum
+  std::vector<std::uint8_t> codes;   // [line][stride]: as QuickKernels::codes makes them
+  float noise = 0;                   // standard deviation of a value of planes
 
-  const std::int16_t* line(int l) const {
-    return quads.data() + static_cast<std::size_t>(l) * 4 * static_cast<std::size_t>(width);
-  }
-  const std::int16_t* luma_line(int l) const {
-    return luma.data() + static_cast<std::size_t>(l) * static_cast<std::size_t>(width);
-  }
+  /// Red; green and blue lie `stride` and twice that behind.
+  const std::int16_t* line(int l) const { return planes.data() + 3 * at(l); }
+  QuickRow row(int l) const { return {line(l), line(l) + stride, line(l) + 2 * stride}; }
+  const std::int16_t* luma_line(int l) const { return luma.data() + at(l); }
+  const std::uint8_t* code_line(int l) const { return codes.data() + at(l); }
+
+  /// What a value must exceed for its sign to be believed.
+  float doubt() const { return 2 * noise + 0.5F * QuickKernels::kScale; }
+
+ private:
+  std::size_t at(int l) const { return static_cast<std::size_t>(l) * static_cast<std::size_t>(stride); }
 };
 
 /// Keeps its scratch memory from frame to frame. One thread.
@@ -39,7 +48,7 @@ class QuickDifferencer {
   /// `out` is overwritten; its memory is reused. Calls visit(begin, end, worker) for lines as soon as they
   /// are there, and the noise with them: that of the frame before, but for the first one's.
   template <typename Visit>
-  void difference(const CapturedFrame& frame, WorkerPool& pool, QuadImage& out, const Visit& visit) {
+  void difference(const CapturedFrame& frame, WorkerPool& pool, QuickImage& out, const Visit& visit) {
     start(frame, pool, out);
     pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
       for (int first = begin; first < end; first += kBlock) {
@@ -54,17 +63,17 @@ class QuickDifferencer {
  private:
   static constexpr int kBlock = 16;  // lines that stay in the processor's own memory
 
-  void start(const CapturedFrame& frame, WorkerPool& pool, QuadImage& out);
-  static float estimate_noise(const QuadImage& image);
+  void start(const CapturedFrame& frame, WorkerPool& pool, QuickImage& out);
+  static float estimate_noise(const QuickImage& image);
   void difference_of_lines(const CapturedFrame& frame, int begin, int end, std::vector<std::int16_t>& scratch,
-                           QuadImage& out) const;
+                           QuickImage& out) const;
 
-  QuadWeights weights_;
+  QuickWeights weights_;
   float noise_ = -1;                                // of the last frame; below 0: there was none
   std::vector<std::vector<std::int16_t>> scratch_;  // rows, one set a worker
 };
 
 /// As that of DifferenceImage (sequence.h).
-bool same_slide(const QuadImage& a, const QuadImage& b);
+bool same_slide(const QuickImage& a, const QuickImage& b);
 
 }  // namespace relievo

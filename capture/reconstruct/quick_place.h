@@ -4,48 +4,60 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "base/image.h"
 #include "base/parallel.h"
-#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/luma_place.h"
 #include "capture/reconstruct/quick_difference.h"
+#include "capture/reconstruct/quick_sequence.h"
 #include "capture/reconstruct/ranked_sample.h"
-#include "capture/reconstruct/sequence.h"
 
 namespace relievo {
 
-/// Keeps its scratch memory from frame to frame. One thread.
+/// A frame's boundaries as they were found.
+struct QuickFrame {
+  const QuickImage& image;
+  View8 slide;  // the field under the slide that `image` shows, a row a line
+  const std::vector<std::array<Primary, 2>>& colours;  // on both sides of each boundary, under that slide
+};
+
+/// Keeps its scratch memory, and what a frame tells of light and blur for the next one. One thread.
 class QuickPlacer {
  public:
   /// `colour_matrix` must have an inverse.
-  explicit QuickPlacer(const std::array<double, 9>& colour_matrix) : placer_(colour_matrix) {}
+  explicit QuickPlacer(const std::array<double, 9>& colour_matrix);
 
-  /// Sets contrast, steps and standard deviations of the decoded edges, and moves those in contrast.
-  /// `colours` are those on both sides of each boundary, under the slide that `image` shows; `slide` is the
-  /// field under that slide itself, a row a line.
-  void place(const QuadImage& image, View8 slide, const SequenceResult& result,
-             const std::vector<std::array<Primary, 2>>& colours, WorkerPool& pool, EdgeImage& edges);
+  /// Puts the boundaries of `sequence` into the rows of `check`, up to its settle(), with their standard
+  /// deviations, and those in contrast where luma has them. Of a boundary that a line has twice the steeper
+  /// edge counts. Returns how many others there were.
+  std::size_t place(const QuickFrame& frame, QuickSequence& sequence, WorkerPool& pool,
+                    ConsistencyCheck& check);
 
  private:
   /// Of an edge in contrast, what luma shows.
   struct Seen {
-    std::uint32_t edge;
     float column_px, sigma_px, level_px;  // 0 sigma: luma shows no step, though it should
   };
   struct Scratch {
     std::vector<std::int16_t> brightest, darkest;
-    std::vector<Seen> seen;  // of the worker's lines
+    std::size_t twice = 0;
   };
-  void look_at_line(const QuadImage& image, View8 slide, int line, const SequenceResult& result,
-                    const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges);
-  bool look_at_luma(const QuadImage& image, int line, const std::array<Primary, 2>& colours, const Edge& edge,
+  std::size_t place_all(const QuickFrame& frame, QuickSequence& sequence, WorkerPool& pool,
+                        ConsistencyCheck& check);
+  void place_line(const QuickFrame& frame, int line, const QuickLine& edges, int worker, BoundaryRow& row);
+  std::uint8_t steps_around(const QuickFrame& frame, int line, float column_px) const;
+  bool look_at_luma(const QuickFrame& frame, int line, const QuickLine& edges, int edge, float contrast,
                     Seen& out) const;
+  void tell_share(const QuickFrame& frame, int line, const QuickLine& edges, int worker);
 
   LumaPlacer placer_;
-  float share_ = 1;
-  RankedSample by_contrast_;  // how far contrast draws zero crossings
+  bool have_before_ = false;
+  float share_ = 1;  // of the projector's light in what the frame before showed
+  float drawn_px_;   // by a contrast of 1, in the frame before
+  RankedSample shares_, by_contrast_;
   std::vector<Scratch> scratch_;
 };
 

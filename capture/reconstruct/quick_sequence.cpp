@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -19,32 +18,27 @@ namespace {
 constexpr float kNoiseFactor = 4;
 constexpr float kLeastRise = 2;
 constexpr float kMaxReach_px = 6;
-constexpr float kReachShare = 0.55F;  // of the way to the next edge
-constexpr float kNoiseOfSign = 2;
-constexpr float kDoubt = 0.5F * QuickKernels::kScale;
+constexpr float kReachShare = 0.55F;       // of the way to the next edge
+constexpr float kSideAt = 0.85F;           // of a reach: where a side's own colour is seen best
 constexpr float kSettledGain = 2.F;        // of the edge from which a search starts
 constexpr float kLean_px = 2.5F;           // how far a boundary moves from one line to the next
 constexpr float kCompleteEvidence = 2.2F;  // gain for a boundary that a neighbouring line predicts
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-float doubt_of(const QuadImage& image) {
-  return kNoiseOfSign * image.noise + kDoubt;
-}
-
 /// Columns beside an edge from half its reach to a whole one away.
-QuadSpans spans_of(int width, float column_px, float left_reach_px, float right_reach_px) {
+QuickSpans spans_of(int width, float column_px, float left_reach_px, float right_reach_px) {
   const auto rounded = [width](float x) { return std::clamp(static_cast<int>(x + 0.5F), 0, width - 1); };
   const int left = rounded(column_px - left_reach_px);
   const int left_last = std::max(left, rounded(column_px - 0.5F * left_reach_px));
   const int right = rounded(column_px + 0.5F * right_reach_px);
   const int right_last = std::max(right, rounded(column_px + right_reach_px));
   return {static_cast<std::int16_t>(left), static_cast<std::int16_t>(right),
-          static_cast<std::int16_t>(std::min(QuadSpans::kMost, left_last - left + 1)),
-          static_cast<std::int16_t>(std::min(QuadSpans::kMost, right_last - right + 1))};
+          static_cast<std::int16_t>(std::min(QuickSpans::kMost, left_last - left + 1)),
+          static_cast<std::int16_t>(std::min(QuickSpans::kMost, right_last - right + 1))};
 }
 
 /// `px` further on, as far as the line goes.
-QuadSpans moved(const QuadSpans& spans, float px, int width) {
+QuickSpans moved(const QuickSpans& spans, float px, int width) {
   const int by = static_cast<int>(std::lround(px));
   const auto put = [&](int first, int count) {
     return static_cast<std::int16_t>(std::clamp(first + by, 0, width - count));
@@ -64,21 +58,25 @@ SideEvidence evidence(const std::array<float, 4>& sums, int count, float doubt) 
 struct SidesEvidence {
   SideEvidence left, right;
 };
-SidesEvidence evidence_of(const QuadSides& sides, const QuadSpans& spans, const QuadImage& image) {
-  return {evidence(sides.left, spans.left_count, doubt_of(image)),
-          evidence(sides.right, spans.right_count, doubt_of(image))};
-}
-SidesEvidence evidence_at(const QuadImage& image, int line, const QuadSpans& spans) {
-  QuadSides sides;
-  quick_kernels().sides(image.line(line), &spans, 1, doubt_of(image), &sides);
-  return evidence_of(sides, spans, image);
+SidesEvidence evidence_at(const QuickImage& image, int line, const QuickSpans& spans) {
+  QuickSides sides;
+  quick_kernels().sides(image.row(line), spans, sides);
+  return {evidence(sides.left, spans.left_count, image.doubt()),
+          evidence(sides.right, spans.right_count, image.doubt())};
 }
 
 /// Tells the processor that a line comes next: of frames that lie in memory, its edges are too far apart for
 /// it to see that coming.
-void read_ahead(const std::int16_t* quads, int width) {
-  constexpr int kCacheLine = 64 / sizeof(std::int16_t);
-  for (int i = 0; i < 4 * width; i += kCacheLine) __builtin_prefetch(quads + i);
+void read_ahead(const std::uint8_t* codes, int width) {
+  constexpr int kCacheLine = 64;
+  for (int i = 0; i < width; i += kCacheLine) __builtin_prefetch(codes + i);
+}
+
+/// Boundaries of the pattern between those of two settled edges; -1 where they are not in its order, or one
+/// of the two is none (-1 or the line's count).
+int missing_between(const QuickLine& line, int before, int behind) {
+  if (before < 0 || behind >= line.count) return -1;
+  return std::max(-1, line.boundary[behind] - line.boundary[before] - 1);
 }
 
 float reach_px(float gap_px) {
@@ -87,103 +85,161 @@ float reach_px(float gap_px) {
 
 }  // namespace
 
-QuickSequence::QuickSequence(const Pattern& pattern)
-    : slides_(slide_colours(pattern)), boundaries_(pattern.boundaries()) {}
-
-std::uint32_t QuickSequence::edges_of_line(const QuadImage& image, int line, Scratch& scratch) {
-  const float rise = std::max(kLeastRise * QuickKernels::kScale, kNoiseFactor * image.noise);
-  const QuickKernels& kernels = quick_kernels();
-  const int crossings =
-      kernels.crossings(image.line(line), image.width, static_cast<std::int16_t>(std::min(rise, 32767.F)),
-                        scratch.crossings.data());
-  return static_cast<std::uint32_t>(
-      kernels.gather(image.line(line), scratch.crossings.data(), crossings, scratch.places.data()));
+float QuickLine::left_reach_px(int i) const {
+  return i > 0 ? reach_px(edges[i].column_px - edges[i - 1].column_px) : kMaxReach_px;
+}
+float QuickLine::right_reach_px(int i) const {
+  return i + 1 < count ? reach_px(edges[i + 1].column_px - edges[i].column_px) : kMaxReach_px;
 }
 
-/// Of a line's edges, while it is at hand.
-void QuickSequence::look_at_sides(const QuadImage& image, int line, std::uint32_t count, Scratch& scratch) {
-  Found* found = found_on(line);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const float column = scratch.places[i].column_px;
-    const float left = i > 0 ? column - scratch.places[i - 1].column_px : 2 * kMaxReach_px;
-    const float right = i + 1 < count ? scratch.places[i + 1].column_px - column : 2 * kMaxReach_px;
-    scratch.spans[i] = spans_of(image.width, column, reach_px(left), reach_px(right));
+QuickSequence::QuickSequence(const Pattern& pattern)
+    : slides_(slide_colours(pattern)),
+      of_pair_{of_pairs(slides_[0]), of_pairs(slides_[1])},
+      boundaries_(pattern.boundaries()) {}
+
+QuickSequence::OfPair QuickSequence::of_pairs(const SlideColours& slide) {
+  OfPair out;
+  for (std::size_t code = 0; code < 64; ++code) {
+    for (std::size_t b = 0; b < slide.colours.size(); ++b) {
+      const auto [left, right] = slide.colours[b];
+      if (static_cast<std::size_t>(left) * 8 + right == code)
+        out.boundary.push_back(static_cast<std::int16_t>(b));
+    }
+    out.start[code + 1] = static_cast<std::uint32_t>(out.boundary.size());
   }
-  quick_kernels().sides(image.line(line), scratch.spans.data(), static_cast<int>(count), doubt_of(image),
-                        scratch.sides.data());
-  for (std::uint32_t i = 0; i < count; ++i) {
-    found[i] = {scratch.places[i].column_px, scratch.places[i].slope, scratch.spans[i], scratch.sides[i].code,
-                scratch.sides[i].clear};
+  return out;
+}
+
+/// The most likely boundaries of an edge by all that it shows, at most kPathCandidates, in the pattern's
+/// order; where its own colours are clear, of those alone that have them. Returns how many.
+int QuickSequence::likely(const QuickContext& context, const QuickLine& line, int edge, const Beside& beside,
+                          std::int32_t* boundary, float* gains) const {
+  const QuickEdge& own = line.edges[edge];
+  if (!own.clear) {
+    const EdgeAgreement seen =
+        edge_agreement(beside.left, beside.right, beside.other_left, beside.other_right, beside.tracked);
+    return path_kernels().choose(shown_slide(context).table, seen, kGains, boundary, gains);
   }
+  const OfPair& pairs = of_pair_[context.order == SlideOrder::kNewerIsFirst ? 0 : 1];
+  BestCandidates best(boundary, gains);
+  for (std::uint32_t i = pairs.start[own.code]; i < pairs.start[own.code + 1]; ++i)
+    best.add(pairs.boundary[i], gain(context, beside, pairs.boundary[i]).all - kGains.threshold);
+  return best.used();
+}
+
+/// Finds them, and looks at their sides while the line is at hand. Returns how many.
+std::uint32_t QuickSequence::edges_of_line(const QuickImage& image, int line, Scratch& scratch) {
+  const float rise = std::max(kLeastRise * QuickKernels::kScale, kNoiseFactor * image.noise);
+  const QuickKernels& kernels = quick_kernels();
+  const QuickRow row = image.row(line);
+  const int crossings = kernels.crossings(
+      row, image.width, static_cast<std::int16_t>(std::min(rise, 32767.F)), scratch.crossings.data());
+  const int count = kernels.gather(row, scratch.crossings.data(), crossings, scratch.places.data());
+  const std::uint8_t* codes = image.code_line(line);
+  const auto last = static_cast<float>(image.width - 1);
+  QuickEdge* out = edges_.data() + static_cast<std::size_t>(line) * most_on_line_;
+  float left_reach = kMaxReach_px;
+  for (int i = 0; i < count; ++i) {
+    const QuickPlace& place = scratch.places[static_cast<std::size_t>(i)];
+    const float right_reach =
+        i + 1 < count ? reach_px(scratch.places[static_cast<std::size_t>(i) + 1].column_px - place.column_px)
+                      : kMaxReach_px;
+    const auto left =
+        static_cast<std::uint16_t>(std::max(place.column_px - kSideAt * left_reach, 0.F) + 0.5F);
+    const auto right =
+        static_cast<std::uint16_t>(std::min(place.column_px + kSideAt * right_reach, last) + 0.5F);
+    left_reach = right_reach;
+    const unsigned l = codes[left];
+    const unsigned r = codes[right];
+    out[i] = {place.column_px,
+              place.slope,
+              left,
+              right,
+              static_cast<std::uint8_t>((l & QuickKernels::kSigns) << 3 | (r & QuickKernels::kSigns)),
+              (l & r & QuickKernels::kIsClear) != 0};
+  }
+  return static_cast<std::uint32_t>(count);
 }
 
 std::size_t QuickSequence::find_edges(const CapturedFrame& frame, QuickDifferencer& differencer,
-                                      WorkerPool& pool, QuadImage& image) {
+                                      WorkerPool& pool, QuickImage& image) {
   const View8 rows = frame.scan == Scan::kInterlaced ? frame.picture.view().field(0) : frame.picture.view();
+  const auto lines = static_cast<std::size_t>(rows.height);
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   most_on_line_ = static_cast<std::size_t>(rows.width) / QuickKernels::kMerge_px + 2;
   for (Scratch& s : scratch_) {
-    s.crossings.resize(static_cast<std::size_t>(rows.width));
-    s.places.resize(static_cast<std::size_t>(rows.width));
-    s.spans.resize(most_on_line_);
-    s.sides.resize(most_on_line_);
-    s.boundary.resize(most_on_line_);
-    s.settled.resize(most_on_line_);
+    s.crossings.resize(static_cast<std::size_t>(rows.width) + QuickKernels::kGathered);
+    s.places.resize(static_cast<std::size_t>(rows.width) + QuickKernels::kGathered);
     s.beside.resize(most_on_line_);
   }
-  found_.resize(most_on_line_ * static_cast<std::size_t>(rows.height));
-  line_start_.assign(static_cast<std::size_t>(rows.height) + 1, 0);
+  edges_.resize(most_on_line_ * lines);
+  boundary_.resize(most_on_line_ * lines);
+  still_.resize(most_on_line_ * lines);
+  settled_.resize(most_on_line_ * lines);
+  line_start_.assign(lines + 1, 0);
   differencer.difference(frame, pool, image, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-    for (int line = begin; line < end; ++line) {
-      const std::uint32_t count = edges_of_line(image, line, scratch);
-      look_at_sides(image, line, count, scratch);
-      line_start_[static_cast<std::size_t>(line) + 1] = count;
-    }
+    for (int line = begin; line < end; ++line)
+      line_start_[static_cast<std::size_t>(line) + 1] = edges_of_line(image, line, scratch);
   });
-  for (std::size_t line = 0; line < static_cast<std::size_t>(image.lines); ++line)
-    line_start_[line + 1] += line_start_[line];
+  for (std::size_t line = 0; line < lines; ++line) line_start_[line + 1] += line_start_[line];
   return line_start_.back();
 }
 
 /// Edges that all channels of both slides tell, where an edge beside them is the boundary beside theirs.
-void QuickSequence::settle(const QuickContext& context, const Line& line, Scratch& scratch) const {
-  const auto count = static_cast<std::size_t>(line.count);
-  std::fill_n(scratch.settled.data(), count, std::uint8_t{0});
-  std::fill_n(scratch.boundary.data(), count, std::int16_t{-1});
+void QuickSequence::settle(const QuickContext& context, int line, const QuickLine& edges) const {
+  std::fill_n(edges.settled, edges.count, std::uint8_t{0});
+  std::fill_n(edges.boundary, edges.count, std::int16_t{-1});
   if (context.other == nullptr) return;
-  const QuadImage& image = *context.other;
-  if (line.line + 1 < image.lines) read_ahead(image.line(line.line + 1), image.width);
-  for (std::size_t i = 0; i < count; ++i) scratch.spans[i] = line.found[i].spans;
-  quick_kernels().sides(image.line(line.line), scratch.spans.data(), line.count, doubt_of(image),
-                        scratch.sides.data());
-  const std::vector<std::int16_t>& by_code = shown_slide(context).by_code;
+  const QuickImage& image = *context.other;
+  if (line + 1 < image.lines) read_ahead(image.code_line(line + 1), image.width);
+  const std::uint8_t* codes = image.code_line(line);
+  const std::int16_t* by_code = shown_slide(context).by_code.data();
   int before = -2;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Found& own = line.found[i];
-    const QuadSides& other = scratch.sides[i];
-    const int b =
-        own.clear && other.clear ? by_code[static_cast<std::size_t>(own.code * 64 + other.code)] : -1;
-    scratch.boundary[i] = static_cast<std::int16_t>(b);
-    if (b >= 0 && b == before + 1) scratch.settled[i] = scratch.settled[i - 1] = 1;
+  for (int i = 0; i < edges.count; ++i) {
+    const QuickEdge& own = edges.edges[i];
+    const unsigned l = codes[own.left];
+    const unsigned r = codes[own.right];
+    const unsigned other = (l & QuickKernels::kSigns) << 3 | (r & QuickKernels::kSigns);
+    const bool clear = own.clear && (l & r & QuickKernels::kIsClear) != 0;
+    const int b = clear ? by_code[own.code * 64U + other] : -1;
+    edges.boundary[i] = static_cast<std::int16_t>(b);
+    if (b >= 0 && b == before + 1) edges.settled[i] = edges.settled[i - 1] = 1;
     before = b >= 0 ? b : -2;
   }
 }
 
+/// How far off the nearest place is where another frame shows the same signs on both sides; 0 where there is
+/// none.
+float QuickSequence::searched_px(const QuickImage& image, int line, const QuickEdge& edge) {
+  const std::uint8_t* codes = image.code_line(line);
+  const auto matches = [&](int px) {
+    const int left = edge.left + px;
+    const int right = edge.right + px;
+    return left >= 0 && right < image.width &&
+           ((static_cast<unsigned>(codes[left]) << 3 | (codes[right] & QuickKernels::kSigns)) & 0x3f) ==
+               edge.code;
+  };
+  constexpr int kStep = static_cast<int>(kSearchStep_px);
+  for (int px = kStep; px <= static_cast<int>(kSearch_px); px += kStep) {
+    if (matches(px)) return static_cast<float>(px);
+    if (matches(-px)) return static_cast<float>(-px);
+  }
+  return 0;
+}
+
 /// What is beside an edge in its frame and, where it stood then, in the other slide's.
-QuickSequence::Beside QuickSequence::look_beside(const QuadImage& image, const QuickContext& context,
-                                                 int line, const QuadSpans& spans) {
+QuickSequence::Beside QuickSequence::look_beside(const QuickImage& image, const QuickContext& context,
+                                                 int line, const QuickLine& edges, int edge) {
+  const QuickSpans spans = spans_of(image.width, edges.edges[edge].column_px, edges.left_reach_px(edge),
+                                    edges.right_reach_px(edge));
   const auto [left, right] = evidence_at(image, line, spans);
   Beside out{left, right, {}, {}, true};
   float off = 0;
   if (context.same != nullptr) {
-    const auto matches = [&](float px) {
-      const auto there = evidence_at(*context.same, line, moved(spans, px, image.width));
-      return alike(out.left, there.left) && alike(out.right, there.right);
-    };
-    out.tracked = matches(0);
-    for (float px = kSearchStep_px; !out.tracked && off == 0 && px <= kSearch_px; px += kSearchStep_px)
-      off = matches(px) ? px : matches(-px) ? -px : 0;
+    const auto there = evidence_at(*context.same, line, spans);
+    out.tracked = alike(out.left, there.left) && alike(out.right, there.right);
+    if (!out.tracked) off = searched_px(*context.same, line, edges.edges[edge]);
   }
   if (context.other == nullptr) return out;
   const auto there = evidence_at(*context.other, line, moved(spans, context.other_share * off, image.width));
@@ -216,13 +272,15 @@ bool QuickSequence::convincing(const QuickContext& context, const Beside& beside
 
 /// As SequenceDecoder::decode_line(), between two settled edges, `before` and `behind`; -1 and the line's
 /// count stand for its ends.
-void QuickSequence::search(const QuickContext& context, const Line& line, int before, int behind,
+void QuickSequence::search(const QuickContext& context, const QuickLine& line, int before, int behind,
                            Scratch& scratch) {
   constexpr int kPlaces = kPathCandidates;
   const PathKernels& kernels = path_kernels();
-  const BoundaryColours& table = shown_slide(context).table;
   const int begin = std::max(before, 0);
   const int end = std::min(behind + 1, line.count);
+  // Where few boundaries lie between the two it is one of them, or none.
+  const int missing = missing_between(line, before, behind);
+  const bool few = missing >= 0 && missing <= kPlaces;
   PathCandidates& candidates = scratch.candidates;
   candidates.resize(static_cast<std::size_t>(end - begin));
   BestPath path;
@@ -234,169 +292,148 @@ void QuickSequence::search(const QuickContext& context, const Line& line, int be
     int& used = candidates.used[static_cast<std::size_t>(place)];
     if (e == before || e == behind) {
       used = 1;
-      *boundary = scratch.boundary[static_cast<std::size_t>(e)];
+      *boundary = line.boundary[e];
       *gains = kSettledGain;
     } else {
       const Beside& beside = scratch.beside[static_cast<std::size_t>(e)];
-      const EdgeAgreement seen =
-          edge_agreement(beside.left, beside.right, beside.other_left, beside.other_right, beside.tracked);
-      used = kernels.choose(table, seen, kGains, boundary, gains);
-      doubt_unexpected(context.expected, line.found[e].column_px, used, boundary, gains);
+      if (few) {
+        used = 0;
+        for (int b = line.boundary[before] + 1; b < line.boundary[behind]; ++b) {
+          const Gain g = gain(context, beside, b);
+          if (g.left + g.right < 0) continue;
+          boundary[used] = b;
+          gains[used++] = g.all - kGains.threshold;
+        }
+      } else {
+        used = likely(context, line, e, beside, boundary, gains);
+      }
+      doubt_unexpected(context.expected, line.edges[e].column_px, used, boundary, gains);
     }
     path.extend(kernels, place, e == behind, candidates);
   }
   for (int e = begin; e < end; ++e)
-    if (e != before && e != behind) scratch.boundary[static_cast<std::size_t>(e)] = -1;
+    if (e != before && e != behind) line.boundary[e] = -1;
   for (std::int32_t a = path.end; a >= 0; a = candidates.from[static_cast<std::size_t>(a)]) {
-    const auto e = static_cast<std::size_t>(begin + a / kPlaces);
-    if (scratch.settled[e] != 0) continue;
+    const int e = begin + a / kPlaces;
+    if (line.settled[e] != 0) continue;
     const std::int32_t b = candidates.boundary[static_cast<std::size_t>(a)];
-    if (convincing(context, scratch.beside[e], b)) scratch.boundary[e] = static_cast<std::int16_t>(b);
+    if (convincing(context, scratch.beside[static_cast<std::size_t>(e)], b))
+      line.boundary[e] = static_cast<std::int16_t>(b);
   }
 }
 
-void QuickSequence::write_edges(const QuadImage& image, const Line& line, const Scratch& scratch,
-                                EdgeImage& edges, SequenceResult& out) {
-  const std::size_t begin = line_start_[static_cast<std::size_t>(line.line)];
-  float* seen = seen_px_.data() + static_cast<std::size_t>(line.line) * static_cast<std::size_t>(boundaries_);
-  std::fill_n(seen, boundaries_, kNone);
-  for (int i = 0; i < line.count; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const Found& f = line.found[i];
-    Edge& edge = edges.edges[begin + at];
-    edge.column_px = f.column_px;
-    edge.slope = f.slope * (1.F / QuickKernels::kScale);
-    edge.sigma_px = edge.noise_px = image.noise / f.slope;
-    edge.contrast = 0;
-    edge.at_step = edge.above_differs = edge.below_differs = false;
-    edge.left_reach_px = reach_px(i > 0 ? f.column_px - line.found[i - 1].column_px : 2 * kMaxReach_px);
-    edge.right_reach_px =
-        reach_px(i + 1 < line.count ? line.found[i + 1].column_px - f.column_px : 2 * kMaxReach_px);
-    const std::int16_t b = scratch.boundary[at];
-    out.boundary[begin + at] = b;
-    out.still[begin + at] = scratch.settled[at] != 0 || (b >= 0 && scratch.beside[at].tracked);
-    settled_[begin + at] = scratch.settled[at];
-    if (b >= 0) seen[b] = f.column_px;
+void QuickSequence::decode_line(const QuickImage& image, const QuickContext& context, int line,
+                                Scratch& scratch) {
+  const QuickLine edges = this->line(line);
+  settle(context, line, edges);
+  std::fill_n(edges.still, edges.count, std::uint8_t{1});
+  for (int before = -1; before < edges.count;) {
+    int behind = before + 1;
+    while (behind < edges.count && edges.settled[behind] == 0) ++behind;
+    if (missing_between(edges, before, behind) == 0) {  // no room for what else was found there
+      std::fill(edges.boundary + before + 1, edges.boundary + behind, std::int16_t{-1});
+    } else if (behind > before + 1) {
+      for (int e = before + 1; e < behind; ++e) {
+        Beside& beside = scratch.beside[static_cast<std::size_t>(e)];
+        beside = look_beside(image, context, line, edges, e);
+        edges.still[e] = beside.tracked;
+      }
+      search(context, edges, before, behind, scratch);
+    }
+    before = behind;
   }
+  float* seen = seen_px_.data() + static_cast<std::size_t>(line) * static_cast<std::size_t>(boundaries_);
+  std::fill_n(seen, boundaries_, kNone);
+  for (int e = 0; e < edges.count; ++e)
+    if (edges.boundary[e] >= 0) seen[edges.boundary[e]] = edges.edges[e].column_px;
 }
 
 /// What the search found stays where a line above or below, or both edges beside it, agree.
-void QuickSequence::drop_unsupported(int line, const EdgeImage& edges, Scratch& scratch,
-                                     SequenceResult& out) const {
-  const std::uint32_t begin = line_start_[static_cast<std::size_t>(line)];
-  const std::uint32_t end = line_start_[static_cast<std::size_t>(line) + 1];
-  for (std::uint32_t e = begin; e < end; ++e) {
-    const int b = out.boundary[e];
+void QuickSequence::drop_unsupported(int line, int lines, Scratch& scratch) {
+  const QuickLine edges = this->line(line);
+  for (int e = 0; e < edges.count; ++e) {
+    const int b = edges.boundary[e];
     if (b < 0) continue;
     ++scratch.in_order;
-    if (settled_[e] != 0) continue;
-    const auto seen = [&](int l, int boundary) {
-      return seen_px_[static_cast<std::size_t>(l * boundaries_ + boundary)];
-    };
+    if (edges.settled[e] != 0) continue;
     bool goes_on = false;
     for (const int d : {-1, 1, -2, 2}) {
-      if (line + d < 0 || line + d >= edges.lines) continue;
-      goes_on |= std::fabs(seen(line + d, b) - edges.edges[e].column_px) <=
+      if (line + d < 0 || line + d >= lines) continue;
+      goes_on |= std::fabs(seen_px(line + d)[b] - edges.edges[e].column_px) <=
                  kLean_px * static_cast<float>(std::abs(d));
     }
-    const auto follows = [&](std::uint32_t other, int boundary) {
-      return other >= begin && other < end && boundary >= 0 && boundary < boundaries_ &&
-             seen(line, boundary) == edges.edges[other].column_px;
+    const auto follows = [&](int other, int boundary) {
+      return other >= 0 && other < edges.count && boundary >= 0 && boundary < boundaries_ &&
+             seen_px(line)[boundary] == edges.edges[other].column_px;
     };
     if (goes_on || (follows(e - 1, b - 1) && follows(e + 1, b + 1))) continue;
-    out.boundary[e] = -1;
+    edges.boundary[e] = -1;
     ++scratch.unsupported;
   }
 }
 
 /// What a line did not decode, those beside it predict.
-void QuickSequence::complete(const QuadImage& image, const QuickContext& context, int line,
-                             const EdgeImage& edges, Scratch& scratch, SequenceResult& out) const {
-  const std::uint32_t begin = line_start_[static_cast<std::size_t>(line)];
-  const std::uint32_t end = line_start_[static_cast<std::size_t>(line) + 1];
-  scratch.taken.assign(static_cast<std::size_t>(boundaries_), 0);
-  for (std::uint32_t e = begin; e < end; ++e)
-    if (out.boundary[e] >= 0) scratch.taken[static_cast<std::size_t>(out.boundary[e])] = 1;
-  for (std::uint32_t e = begin; e < end; ++e) {
-    if (out.boundary[e] >= 0) continue;
+void QuickSequence::complete(const QuickImage& image, const QuickContext& context, int line,
+                             Scratch& scratch) {
+  const QuickLine edges = this->line(line);
+  const auto taken = [&](int b) {
+    return std::find(edges.boundary, edges.boundary + edges.count, static_cast<std::int16_t>(b)) !=
+           edges.boundary + edges.count;
+  };
+  for (int e = 0; e < edges.count; ++e) {
+    if (edges.boundary[e] >= 0) continue;
     const float column = edges.edges[e].column_px;
     std::optional<Beside> beside;
     float nearest = kLean_px;
     int best = -1;
     for (const int from : {line - 1, line + 1}) {
-      if (from < 0 || from >= edges.lines) continue;
-      const Edge* all = edges.edges.data();
-      const Edge* last = all + line_start_[static_cast<std::size_t>(from) + 1];
-      const Edge* n =
-          std::lower_bound(all + line_start_[static_cast<std::size_t>(from)], last, column - nearest,
-                           [](const Edge& other, float column_px) { return other.column_px < column_px; });
+      if (from < 0 || from >= image.lines) continue;
+      const QuickLine there = this->line(from);
+      const QuickEdge* last = there.edges + there.count;
+      const QuickEdge* n = std::lower_bound(
+          there.edges, last, column - nearest,
+          [](const QuickEdge& other, float column_px) { return other.column_px < column_px; });
       for (; n != last && n->column_px <= column + kLean_px; ++n) {
-        const int b = out.boundary[static_cast<std::size_t>(n - all)];
+        const int b = there.boundary[n - there.edges];
         const float distance = std::fabs(n->column_px - column);
-        if (b < 0 || distance >= nearest || scratch.taken[static_cast<std::size_t>(b)] != 0) continue;
-        if (!beside) beside = look_beside(image, context, line, found_on(line)[e - begin].spans);
+        if (b < 0 || distance >= nearest || taken(b)) continue;
+        if (!beside) beside = look_beside(image, context, line, edges, e);
         if (gain(context, *beside, b).all < kCompleteEvidence) continue;
         nearest = distance;
         best = b;
       }
     }
     if (best < 0) continue;
-    out.boundary[e] = static_cast<std::int16_t>(best);
-    out.still[e] = beside->tracked;
-    scratch.taken[static_cast<std::size_t>(best)] = 1;
+    edges.boundary[e] = static_cast<std::int16_t>(best);
+    edges.still[e] = beside->tracked;
     ++scratch.completed;
   }
 }
 
-void QuickSequence::decode(const QuadImage& image, const QuickContext& context, WorkerPool& pool,
-                           EdgeImage& edges, SequenceResult& out) {
-  const std::size_t count = line_start_.back();
-  edges.lines = image.lines;
-  edges.line_start = line_start_;
-  edges.edges.resize(count);
-  out.boundary.resize(count);
-  out.doubted.resize(count);
-  out.still.resize(count);
-  settled_.resize(count);
+SequenceCounts QuickSequence::decode(const QuickImage& image, const QuickContext& context, WorkerPool& pool) {
   seen_px_.resize(static_cast<std::size_t>(image.lines) * static_cast<std::size_t>(boundaries_));
   for (Scratch& s : scratch_) s.in_order = s.unsupported = s.completed = 0;
-  pool.for_shares(line_start_, [&](int begin, int end, int worker) {
-    Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-    for (int l = begin; l < end; ++l) {
-      const std::uint32_t first = line_start_[static_cast<std::size_t>(l)];
-      const Line line{l, found_on(l), static_cast<int>(line_start_[static_cast<std::size_t>(l) + 1] - first)};
-      settle(context, line, scratch);
-      int before = -1;
-      for (int e = 0; e <= line.count; ++e) {
-        if (e < line.count && scratch.settled[static_cast<std::size_t>(e)] == 0) {
-          scratch.beside[static_cast<std::size_t>(e)] = look_beside(image, context, l, line.found[e].spans);
-          continue;
-        }
-        if (e > before + 1) search(context, line, before, e, scratch);
-        before = e;
-      }
-      write_edges(image, line, scratch, edges, out);
-    }
-  });
+  const auto for_lines = [&](const auto& work) {
+    pool.for_shares(line_start_, [&](int begin, int end, int worker) {
+      for (int line = begin; line < end; ++line) work(line, scratch_[static_cast<std::size_t>(worker)]);
+    });
+  };
+  for_lines([&](int line, Scratch& scratch) { decode_line(image, context, line, scratch); });
   // Only now, since lines are asked about those beside them as they were.
-  pool.for_shares(line_start_, [&](int begin, int end, int worker) {
-    for (int line = begin; line < end; ++line)
-      drop_unsupported(line, edges, scratch_[static_cast<std::size_t>(worker)], out);
-  });
+  for_lines([&](int line, Scratch& scratch) { drop_unsupported(line, image.lines, scratch); });
   // Every second line by what is beside it, then those by these.
   for (const int odd : {0, 1}) {
-    pool.for_shares(line_start_, [&](int begin, int end, int worker) {
-      for (int line = begin + (begin + odd) % 2; line < end; line += 2)
-        complete(image, context, line, edges, scratch_[static_cast<std::size_t>(worker)], out);
+    for_lines([&](int line, Scratch& scratch) {
+      if (line % 2 == odd) complete(image, context, line, scratch);
     });
   }
-  out.counts = {};
+  SequenceCounts counts;
   for (const Scratch& s : scratch_) {
-    out.counts.in_order += s.in_order;
-    out.counts.unsupported += s.unsupported;
-    out.counts.completed += s.completed;
+    counts.in_order += s.in_order;
+    counts.unsupported += s.unsupported;
+    counts.completed += s.completed;
   }
-  out.score = static_cast<double>(out.counts.in_order);
+  return counts;
 }
 
 }  // namespace relievo

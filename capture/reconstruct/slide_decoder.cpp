@@ -33,6 +33,9 @@
 namespace relievo {
 namespace {
 
+// Of what the ordered decoder lets be unsure: less was asked about the quick one's boundaries before.
+constexpr float kQuickTolerance = 0.8F;
+
 SlideOrder other(SlideOrder order) {
   return order == SlideOrder::kNewerIsFirst ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst;
 }
@@ -42,7 +45,7 @@ struct Observation {
   std::int64_t time_ns = 0;
   Detection detection;         // the paper's
   DifferenceImage difference;  // the ordered one's
-  QuadImage quads;             // the quick one's
+  QuickImage quick;            // the quick one's
 };
 
 }  // namespace
@@ -97,6 +100,7 @@ struct SlideDecoder::State {
   FieldPlacer field_placer;
   Growth growth;
   PlaceGrid places;
+  SequenceCounts quick_counts;
   Persistence persistence;
   Weighing weighing;
 
@@ -124,14 +128,16 @@ struct SlideDecoder::State {
   bool match_paper(SlideOrder tried, Match& out);
   SequenceContext context(SlideOrder tried) const;
   bool match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out);
+  void match_quickly(SlideOrder predicted, WorkerPool& pool);
   QuickContext quick_context(SlideOrder tried) const;
-  void decode_quickly(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
+  void decode_quickly(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report,
+                      DecodedGrid& out);
   void match_in_order(SlideOrder predicted, WorkerPool& pool);
   std::size_t fill(WorkerPool& pool, DecodedGrid& out) const;
 };
 
 bool SlideDecoder::State::shows_same_slide() const {
-  if (quick) return same_slide(newer.quads, previous.quads);
+  if (quick) return same_slide(newer.quick, previous.quick);
   return paper ? same_slide(newer.detection, previous.detection)
                : same_slide(newer.difference, previous.difference);
 }
@@ -170,8 +176,8 @@ SequenceContext SlideDecoder::State::context(SlideOrder tried) const {
 
 QuickContext SlideDecoder::State::quick_context(SlideOrder tried) const {
   QuickContext out{.order = tried, .expected = expected};
-  if (have_older) out.other = &older.quads;
-  if (have_same) out.same = &same.quads;
+  if (have_older) out.other = &older.quick;
+  if (have_same) out.same = &same.quick;
   const auto back = static_cast<float>(newer.time_ns - same.time_ns);
   if (have_older && have_same && back > 0)
     out.other_share = static_cast<float>(newer.time_ns - older.time_ns) / back;
@@ -179,10 +185,6 @@ QuickContext SlideDecoder::State::quick_context(SlideOrder tried) const {
 }
 
 bool SlideDecoder::State::match_ordered(SlideOrder tried, WorkerPool& pool, SequenceResult& out) {
-  if (quick) {
-    quick_sequence.decode(newer.quads, quick_context(tried), pool, edges, out);
-    return out.counts.in_order * 2 > edges.edges.size();
-  }
   sequence.decode(edges, context(tried), pool, out);
   return out.counts.in_order * 2 > edges.edges.size();
 }
@@ -203,28 +205,45 @@ void SlideDecoder::State::match_in_order(SlideOrder predicted, WorkerPool& pool)
   }
 }
 
-/// After match_in_order().
+/// As match_in_order().
+void SlideDecoder::State::match_quickly(SlideOrder predicted, WorkerPool& pool) {
+  const auto try_order = [&](SlideOrder tried) {
+    order = tried;
+    quick_counts = quick_sequence.decode(newer.quick, quick_context(tried), pool);
+    return quick_counts.in_order;
+  };
+  const std::size_t most = quick_sequence.line_start().back();
+  const std::size_t found = try_order(predicted);
+  if (pattern.slides == 1 || (found * 2 > most && order_known)) return;
+  const std::size_t other_found = try_order(other(predicted));
+  order_known = std::max(found, other_found) * 2 > most;
+  if (other_found <= found) try_order(predicted);
+}
+
 void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& pool,
-                                         ReconstructReport& report) {
+                                         ReconstructReport& report, DecodedGrid& out) {
   const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();
+  report.filters.duplicate = quick_placer.place({newer.quick, rows, quick_sequence.shown_colours(order)},
+                                                quick_sequence, pool, consistency);
+  const ConsistencyCounts checked = consistency.settle(pool);
+  const ContinuityCounts by_before = continuity.check(quick_sequence, consistency, pool);
+  if (pattern.scheme == Scheme::kWhiteField) {
+    places.fill(pattern.boundaries(), pool, consistency);
+  } else {
+    instant.adjust(pair.time_ns, consistency, pool, places);
+  }
+  moving.find(newer.quick.width, consistency, places);
   recovered.clear();
-  quick_placer.place(newer.quads, rows, result, quick_sequence.shown_colours(order), pool, edges);
-  const ConsistencyCounts checked = consistency.check(pattern.boundaries(), pool, result, edges);
-  const ContinuityCounts by_before = continuity.check(recovered, pool, result, edges);
-  if (pattern.scheme != Scheme::kWhiteField)
-    instant.adjust({pair.time_ns, newer.difference.motion}, result, edges, recovered, pool);
-  moving.find(newer.quads.width, result, edges);
-  places.fill(pattern.boundaries(), pool, result, edges, recovered);
   const std::size_t carried = persistence.carry(moving, pool, places, recovered);
   const WeighingCounts weighed =
-      weighing.weigh(places, moving, consistency.scale(), pool, result, edges, recovered);
-  report.filters.unsupported = result.counts.unsupported;
-  report.filters.completed = result.counts.completed;
+      weighing.weigh(places, moving, kQuickTolerance * consistency.scale(), pool, out);
+  report.filters.unsupported = quick_counts.unsupported;
+  report.filters.completed = quick_counts.completed;
   report.filters.rejected = checked.rejected + by_before.rejected + weighed.rejected;
   report.filters.moved = checked.moved + weighed.moved;
   report.filters.recovered = by_before.carried + carried;
   report.matched =
-      result.counts.in_order - result.counts.unsupported + result.counts.completed + report.filters.recovered;
+      quick_counts.in_order - quick_counts.unsupported + quick_counts.completed + report.filters.recovered;
 }
 
 /// Puts each boundary in its place. Returns how many were in one that another one has.
@@ -271,7 +290,7 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
     s.detector.detect(pair, pool, s.newer.detection);
     report.boundaries = s.newer.detection.boundaries.size();
   } else if (s.quick) {
-    report.boundaries = s.quick_sequence.find_edges(pair, s.quick_differencer, pool, s.newer.quads);
+    report.boundaries = s.quick_sequence.find_edges(pair, s.quick_differencer, pool, s.newer.quick);
   } else {
     s.differencer.aligned_difference(pair, pool, s.newer.difference);
     s.weak_signal.average(pool, s.newer.difference);
@@ -300,11 +319,15 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   if (!s.have_older && s.pattern.slides == 2) return false;
   const CapturedFrame& pair = view.pair;
   s.expected = view.expected;
-  s.match_in_order(report.same_slide ? s.order : other(s.order), pool);
+  const SlideOrder predicted = report.same_slide ? s.order : other(s.order);
+  if (s.quick) {
+    s.match_quickly(predicted, pool);
+    s.decode_quickly(pair, pool, report, out);
+    return true;
+  }
+  s.match_in_order(predicted, pool);
   if (s.paper) {
     report.matched = s.match.valid;
-  } else if (s.quick) {
-    s.decode_quickly(pair, pool, report);
   } else {
     // A row a line, whichever of the two fields that is.
     const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();

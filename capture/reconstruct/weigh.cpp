@@ -98,6 +98,41 @@ bool Weighing::settle(const PlaceGrid& places, const MovingPlaces& moving, int l
   return true;
 }
 
+WeighingCounts Weighing::total() const {
+  WeighingCounts total;
+  for (const WeighingCounts& c : counts_) {
+    total.moved += c.moved;
+    total.rejected += c.rejected;
+  }
+  return total;
+}
+
+WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale,
+                               WorkerPool& pool, DecodedGrid& out) {
+  scale_ = scale;
+  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  pool.for_ranges(places.lines(), [&](int begin, int end, int worker) {
+    WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
+    for (int line = begin; line < end; ++line) {
+      const Place* from = places.line(line);
+      out.start_line(line);
+      for (int b = 0; b < places.boundaries(); ++b) {
+        Place place = from[b];
+        if (!place.known()) continue;
+        if (place.sigma_px >= kUnsure_px) {
+          if (!settle(places, moving, line, b, place.column_px, place.sigma_px)) {
+            ++counts.rejected;
+            continue;
+          }
+          ++counts.moved;
+        }
+        out.put(line, b, place.column_px, place.sigma_px, 1);
+      }
+    }
+  });
+  return total();
+}
+
 WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale,
                                WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
                                std::vector<RecoveredBoundary>& recovered) {
@@ -120,11 +155,7 @@ WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& movi
       }
     }
   });
-  WeighingCounts total;
-  for (const WeighingCounts& c : counts_) {
-    total.moved += c.moved;
-    total.rejected += c.rejected;
-  }
+  WeighingCounts total = this->total();
   const std::size_t found = recovered.size();
   std::size_t sure = 0;
   std::erase_if(recovered, [&](RecoveredBoundary& r) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/place_grid.h"
@@ -33,10 +34,16 @@ class Weighing {
   WeighingCounts weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale, WorkerPool& pool,
                        SequenceResult& result, EdgeImage& edges, std::vector<RecoveredBoundary>& recovered);
 
+  /// The same from `places` to `out`, whose boundaries are overwritten.
+  WeighingCounts weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale, WorkerPool& pool,
+                       DecodedGrid& out);
+
  private:
   std::optional<Place> weighed(const Place* own, std::ptrdiff_t stride, float most_px) const;
   bool settle(const PlaceGrid& places, const MovingPlaces& moving, int line, int boundary, float& column_px,
               float& sigma_px) const;
+
+  WeighingCounts total() const;
 
   float scale_ = 1;                     // of the frame at hand
   std::vector<WeighingCounts> counts_;  // one a worker

@@ -81,7 +81,7 @@ TEST(QuickDecoder, DecodesWhatHasContrast) {
 TEST(QuickDifference, TellsSlidesApart) {
   const test::StripedScene scene = test::striped_scene();
   WorkerPool pool(1);
-  std::array<QuadImage, 3> images;
+  std::array<QuickImage, 3> images;
   QuickDifferencer differencer(scene.rig.colour_matrix);
   int lines = 0;
   for (std::uint64_t n = 0; n < 3; ++n)
