@@ -12,6 +12,11 @@
 
 namespace relievo {
 
+/// What was decoded of a line: kNoColumn where nothing was, and then the other two tell nothing.
+struct DecodedRow {
+  float *column_px, *sigma_px, *slope;
+};
+
 /// Where points are; NaN where there is none.
 struct PointRow {
   float *x, *y, *z;  // metres, camera frame
@@ -52,6 +57,8 @@ class DecodedGrid {
   const float* column_px(int line) const { return row(line, kColumn); }
   const float* sigma_px(int line) const { return row(line, kSigma); }
   const float* slope(int line) const { return row(line, kSlope); }
+  /// To be written as a whole, instead of start_line() and put().
+  DecodedRow decoded(int line) { return {row(line, kColumn), row(line, kSigma), row(line, kSlope)}; }
   PointRow points(int line) { return {row(line, kX), row(line, kY), row(line, kZ)}; }
   const float* x(int line) const { return row(line, kX); }
   const float* y(int line) const { return row(line, kY); }

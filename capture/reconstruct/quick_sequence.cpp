@@ -330,9 +330,13 @@ void QuickSequence::decode_line(const QuickImage& image, const QuickContext& con
   for (int before = -1; before < edges.count;) {
     int behind = before + 1;
     while (behind < edges.count && edges.settled[behind] == 0) ++behind;
+    if (behind == before + 1) {
+      before = behind;
+      continue;
+    }
     if (missing_between(edges, before, behind) == 0) {  // no room for what else was found there
       std::fill(edges.boundary + before + 1, edges.boundary + behind, std::int16_t{-1});
-    } else if (behind > before + 1) {
+    } else {
       for (int e = before + 1; e < behind; ++e) {
         Beside& beside = scratch.beside[static_cast<std::size_t>(e)];
         beside = look_beside(image, context, line, edges, e);

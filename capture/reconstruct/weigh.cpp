@@ -115,18 +115,20 @@ WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& movi
     WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
       const Place* from = places.line(line);
-      out.start_line(line);
+      const DecodedRow to = out.decoded(line);
+      std::fill_n(to.slope, places.boundaries(), 1.F);
       for (int b = 0; b < places.boundaries(); ++b) {
-        Place place = from[b];
-        if (!place.known()) continue;
-        if (place.sigma_px >= kUnsure_px) {
-          if (!settle(places, moving, line, b, place.column_px, place.sigma_px)) {
-            ++counts.rejected;
-            continue;
-          }
+        to.column_px[b] = from[b].column_px;
+        to.sigma_px[b] = from[b].sigma_px;
+      }
+      for (int b = 0; b < places.boundaries(); ++b) {
+        if (!from[b].known() || from[b].sigma_px < kUnsure_px) continue;
+        if (settle(places, moving, line, b, to.column_px[b], to.sigma_px[b])) {
           ++counts.moved;
+        } else {
+          to.column_px[b] = kNoColumn;
+          ++counts.rejected;
         }
-        out.put(line, b, place.column_px, place.sigma_px, 1);
       }
     }
   });
