@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the service manager that started this process, systemd, is told of it; nothing where none did. Any
-// thread.
+// What the service manager that started this process, systemd, is told of it; nothing where none did, and
+// what it has no room for is left out: nobody waits. Any thread.
 #pragma once
 
 #include <string>

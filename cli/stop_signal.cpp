@@ -1,74 +1,121 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/stop_signal.h"
 
-#include <fcntl.h>
+#include <pthread.h>
 #include <signal.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cassert>
-#include <cerrno>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "base/thread_name.h"
+
 namespace relievo {
 namespace {
 
-constexpr char kStop = 's';
-constexpr char kReload = 'r';
-constexpr char kQuit = 'q';
 constexpr int kSignalsUntilExit = 3;
 
-int g_pipe_write = -1;  // set before the handler is, read by it
-volatile sig_atomic_t g_signals = 0;
+pthread_t g_taker;  // set before the handlers are
+std::atomic<bool> g_taken = false;
 
-// Only what may run in a signal handler: everything else happens on the thread that reads the pipe.
-void handle(int signal_number) {
-  const int saved = errno;
-  g_signals = g_signals + 1;
-  if (g_signals >= kSignalsUntilExit) _exit(128 + signal_number);
-  [[maybe_unused]] const auto written = write(g_pipe_write, &kStop, 1);
-  errno = saved;
+/// On threads that are older than ours, which block nothing: a library may start some when it is loaded.
+void pass_on(int signal_number) {
+  pthread_kill(g_taker, signal_number);
 }
 
-void handle_reload(int) {
-  const int saved = errno;
-  [[maybe_unused]] const auto written = write(g_pipe_write, &kReload, 1);
-  errno = saved;
+sigset_t taken_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int one : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, one);
+  return signals;
+}
+
+void set_handler(int signal_number, void (*handler)(int), struct sigaction& old) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(signal_number, &action, &old);
+}
+
+/// As if nobody had taken the signal over.
+void end_by(int signal_number) {
+  sigset_t only;
+  sigemptyset(&only);
+  sigaddset(&only, signal_number);
+  raise(signal_number);
+  pthread_sigmask(SIG_UNBLOCK, &only, nullptr);
 }
 
 }  // namespace
 
+// A handler interrupts whichever thread the kernel picks, where next to nothing may be done, and the thread
+// sanitizer puts it off until that thread comes by. So signals are blocked in every thread of ours, and wait
+// for the one that asks for them.
 struct StopSignal::State {
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
-  bool stopped = false;
+  bool stopped = false, ending = false;
+  int reloads = 0;            // asked for and not yet done
   std::mutex callback_mutex;  // held while the callback runs
   std::function<void()> callback, reload;
-  int pipe[2] = {-1, -1};
-  bool takes_hangup = false;
+  std::atomic<bool> takes_hangup = false;
+  std::atomic<bool> no_more_signals = false;
+  bool ignores_hangup = false;  // as under nohup
+  sigset_t old_mask{};
   struct sigaction old_int {
   }, old_term{}, old_pipe{}, old_hangup{};
-  std::thread thread;
+  std::thread takes_signals, calls;  // two: the third signal must end what hangs in a callback
 
-  void run() {
-    char byte = 0;
-    for (;;) {
-      const ssize_t n = read(pipe[0], &byte, 1);
-      if (n < 0 && errno == EINTR) continue;
-      if (n != 1 || byte == kQuit) return;
-      if (byte == kReload) {
-        std::lock_guard lock(callback_mutex);
-        if (reload) reload();
+  void take() {
+    name_this_thread("signals");
+    const sigset_t signals = taken_signals();
+    for (int stops = 0;;) {
+      int number = 0;
+      if (sigwait(&signals, &number) != 0) continue;
+      if (no_more_signals) return;
+      if (number == SIGHUP && !takes_hangup) {
+        if (!ignores_hangup) end_by(number);
         continue;
       }
+      if (number != SIGHUP && ++stops >= kSignalsUntilExit) _exit(128 + number);
       {
         std::lock_guard lock(mutex);
-        stopped = true;
+        if (number == SIGHUP) {
+          ++reloads;
+        } else {
+          stopped = true;
+        }
       }
       changed.notify_all();
-      call();
+    }
+  }
+
+  void run() {
+    name_this_thread("on-signal");
+    bool called = false;
+    std::unique_lock lock(mutex);
+    for (;;) {
+      changed.wait(lock, [&] { return ending || reloads > 0 || (stopped && !called); });
+      if (ending) return;
+      const bool again = reloads > 0;
+      if (again) {
+        --reloads;
+      } else {
+        called = true;
+      }
+      lock.unlock();
+      if (again) {
+        std::lock_guard callback_lock(callback_mutex);
+        if (reload) reload();
+      } else {
+        call();
+      }
+      lock.lock();
     }
   }
   void call() {
@@ -78,36 +125,37 @@ struct StopSignal::State {
 };
 
 StopSignal::StopSignal() : state_(new State) {
-  assert(g_pipe_write < 0);
-  if (pipe2(state_->pipe, O_CLOEXEC) != 0) {
-    state_->pipe[0] = state_->pipe[1] = -1;  // out of descriptors: signals keep their default, which ends us
-    return;
-  }
-  g_signals = 0;
-  g_pipe_write = state_->pipe[1];
-  state_->thread = std::thread([s = state_] { s->run(); });
+  [[maybe_unused]] const bool taken = g_taken.exchange(true);
+  assert(!taken);
+  const sigset_t signals = taken_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, &state_->old_mask);
   struct sigaction action {};
-  action.sa_handler = handle;
-  action.sa_flags = SA_RESTART;
-  sigemptyset(&action.sa_mask);
-  sigaction(SIGINT, &action, &state_->old_int);
-  sigaction(SIGTERM, &action, &state_->old_term);
-  action.sa_handler = SIG_IGN;
-  sigaction(SIGPIPE, &action, &state_->old_pipe);
+  sigaction(SIGHUP, nullptr, &action);
+  state_->ignores_hangup = action.sa_handler == SIG_IGN;
+  set_handler(SIGPIPE, SIG_IGN, state_->old_pipe);
+  state_->takes_signals = std::thread([s = state_] { s->take(); });
+  g_taker = state_->takes_signals.native_handle();
+  set_handler(SIGINT, pass_on, state_->old_int);
+  set_handler(SIGTERM, pass_on, state_->old_term);
+  state_->calls = std::thread([s = state_] { s->run(); });
 }
 
 StopSignal::~StopSignal() {
-  if (state_->thread.joinable()) {
-    sigaction(SIGINT, &state_->old_int, nullptr);
-    sigaction(SIGTERM, &state_->old_term, nullptr);
-    sigaction(SIGPIPE, &state_->old_pipe, nullptr);
-    if (state_->takes_hangup) sigaction(SIGHUP, &state_->old_hangup, nullptr);
-    [[maybe_unused]] const auto written = write(state_->pipe[1], &kQuit, 1);
-    state_->thread.join();
-    g_pipe_write = -1;
-    close(state_->pipe[0]);
-    close(state_->pipe[1]);
+  sigaction(SIGINT, &state_->old_int, nullptr);
+  sigaction(SIGTERM, &state_->old_term, nullptr);
+  if (state_->takes_hangup) sigaction(SIGHUP, &state_->old_hangup, nullptr);
+  state_->no_more_signals = true;
+  pthread_kill(state_->takes_signals.native_handle(), SIGTERM);
+  state_->takes_signals.join();
+  {
+    std::lock_guard lock(state_->mutex);
+    state_->ending = true;
   }
+  state_->changed.notify_all();
+  state_->calls.join();
+  sigaction(SIGPIPE, &state_->old_pipe, nullptr);
+  pthread_sigmask(SIG_SETMASK, &state_->old_mask, nullptr);
+  g_taken = false;
   delete state_;
 }
 
@@ -142,13 +190,7 @@ void StopSignal::clear_on_stop() {
 void StopSignal::on_reload(std::function<void()> callback) {
   std::lock_guard lock(state_->callback_mutex);
   state_->reload = std::move(callback);
-  if (state_->takes_hangup || !state_->thread.joinable()) return;
-  state_->takes_hangup = true;
-  struct sigaction action {};
-  action.sa_handler = handle_reload;
-  action.sa_flags = SA_RESTART;
-  sigemptyset(&action.sa_mask);
-  sigaction(SIGHUP, &action, &state_->old_hangup);
+  if (!state_->takes_hangup.exchange(true)) set_handler(SIGHUP, pass_on, state_->old_hangup);
 }
 
 void StopSignal::clear_on_reload() {

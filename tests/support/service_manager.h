@@ -18,10 +18,9 @@ class ServiceManager {
  public:
   explicit ServiceManager(const std::filesystem::path& path)
       : fd_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-    bound_ = bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    address_.sun_family = AF_UNIX;
+    std::strncpy(address_.sun_path, path.c_str(), sizeof address_.sun_path - 1);
+    bound_ = bind(fd_, reinterpret_cast<const sockaddr*>(&address_), sizeof address_) == 0;
   }
   ~ServiceManager() { close(fd_); }
   ServiceManager(const ServiceManager&) = delete;
@@ -35,12 +34,20 @@ class ServiceManager {
       said_ += std::string(text, static_cast<std::size_t>(n)) + "\n";
     return said_;
   }
+  /// Leaves no room for what is said until said() or hears().
+  void fill_up() const {
+    const int other = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    while (sendto(other, "X", 1, 0, reinterpret_cast<const sockaddr*>(&address_), sizeof address_) == 1) {
+    }
+    close(other);
+  }
   bool hears(const std::string& text) {
     return eventually([&] { return said().find(text) != std::string::npos; });
   }
 
  private:
   int fd_;
+  sockaddr_un address_{};
   bool bound_ = false;
   std::string said_;
 };

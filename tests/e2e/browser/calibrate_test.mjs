@@ -10,7 +10,7 @@ import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSyn
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 
-import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { eventually, kLongPatienceMs, kPatienceMs, launchChromium } from './chromium.mjs';
 import { Screen } from './screen.mjs';
 import { Server } from './server.mjs';
 
@@ -45,8 +45,9 @@ const order = (server, body, headers = {}) =>
     body: JSON.stringify(body),
   });
 const press = (page, action) => page.click(`#calibration [data-action=${action}]:enabled`);
+const kLong = { timeout: kLongPatienceMs }; // it detects, calculates and scores
 const reaches = (page, phase) =>
-  page.waitForFunction((wanted) => document.querySelector('#calibration').dataset.state === wanted, phase);
+  page.waitForFunction((wanted) => document.querySelector('#calibration').dataset.state === wanted, phase, kLong);
 const goesOn = (server, name) =>
   eventually('the stream does not go on', async () => (await streams(server, name))[0]?.frames > 0);
 const shot = async (page, name) => {
@@ -140,7 +141,7 @@ const checks = {
           await eventually('the projector shows no stripes', () => screen.seen().coloured > 0.9);
           await shot(page, 'geometry');
           await page.check('#calibration input[type=checkbox]');
-          await page.waitForFunction(() => document.querySelectorAll('#calibration-views [data-used=true]').length >= 8);
+          await page.waitForFunction(() => document.querySelectorAll('#calibration-views [data-used=true]').length >= 8, null, kLong);
           await press(page, 'calculate');
           await reaches(page, 'solved');
           assert.ok(parseFloat(await page.textContent('#calibration-result [data-figure=stereo]')) < 0.3);
@@ -282,7 +283,7 @@ const checks = {
       await shot(page, 'charuco');
       await page.check('#calibration input[type=checkbox]');
       for (let n = 2; n <= 6; ++n) {
-        await page.waitForFunction((least) => document.querySelectorAll('#calibration-views [data-used=true]').length >= least, n);
+        await page.waitForFunction((least) => document.querySelectorAll('#calibration-views [data-used=true]').length >= least, n, kLong);
       }
       await press(page, 'calculate');
       await reaches(page, 'solved');

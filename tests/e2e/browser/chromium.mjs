@@ -23,6 +23,8 @@ const kFlags = [
 
 /** For anything that happens by itself, however slow or loaded the machine. */
 export const kPatienceMs = 60_000;
+/** For a program that computes all the while: a calibration's views, and what is calculated of them. */
+export const kLongPatienceMs = 300_000;
 
 /** A browser of its own; who starts it closes it. */
 export const launchChromium = (flags = []) =>

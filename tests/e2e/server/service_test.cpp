@@ -23,5 +23,18 @@ TEST(Service, SaysThatItIsReadyAliveAndStopping) {
   EXPECT_TRUE(manager.hears("STOPPING=1"));
 }
 
+// It hung for ever, deaf to SIGTERM: sd_notify(3) waits for room.
+TEST(Service, AManagerThatReadsNothingKeepsNobodyWaiting) {
+  const TempFolder folder;
+  const auto path = folder / "notify";
+  const ServiceManager manager(path);
+  ASSERT_TRUE(manager.bound());
+  manager.fill_up();
+  Process serving(serve("sim:plane,width=160,height=120", {"--frames", "60"}),
+                  {"NOTIFY_SOCKET=" + path.string()});
+  EXPECT_EQ(serving.wait(), 0) << serving.err();
+  EXPECT_NE(serving.err().find("60 frames captured"), std::string::npos) << serving.err();
+}
+
 }  // namespace
 }  // namespace relievo::test

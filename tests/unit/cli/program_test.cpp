@@ -11,6 +11,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -29,14 +30,35 @@ struct Outcome {
   std::string err;
 };
 
-Outcome run(const std::vector<Command>& commands, std::vector<std::string> arguments) {
+/// A thread that blocks no signal, as libraries start them when they are loaded.
+class OlderThread {
+ public:
+  OlderThread() : thread_([this] { ended_.wait(false); }) {}
+  ~OlderThread() {
+    ended_ = true;
+    ended_.notify_one();
+    thread_.join();
+  }
+  OlderThread(const OlderThread&) = delete;
+  OlderThread& operator=(const OlderThread&) = delete;
+
+ private:
+  std::atomic<bool> ended_ = false;
+  std::thread thread_;
+};
+
+int exit_code(const std::vector<Command>& commands, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "tool");
   std::vector<char*> argv;
   for (std::string& a : arguments) argv.push_back(a.data());
+  return run_program("tool", "a tool", commands, static_cast<int>(argv.size()), argv.data());
+}
+
+Outcome run(const std::vector<Command>& commands, const std::vector<std::string>& arguments) {
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
   Outcome o;
-  o.code = run_program("tool", "a tool", commands, static_cast<int>(argv.size()), argv.data());
+  o.code = exit_code(commands, arguments);
   o.out = testing::internal::GetCapturedStdout();
   o.err = testing::internal::GetCapturedStderr();
   return o;
@@ -126,6 +148,91 @@ TEST(Program, SignalStopsTheCommandCleanly) {
                      {"work"});
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_EQ(called, 1);
+}
+
+bool blocks_signals() {
+  sigset_t blocked;
+  pthread_sigmask(SIG_SETMASK, nullptr, &blocked);
+  return sigismember(&blocked, SIGINT) && sigismember(&blocked, SIGTERM) && sigismember(&blocked, SIGHUP);
+}
+
+// A handler runs on any thread that lets it, however long that thread may keep it waiting.
+TEST(Program, SignalsComeToNoThreadOfTheCommand) {
+  ASSERT_FALSE(blocks_signals());
+  bool blocked_here = false, blocked_in_a_thread = false;
+  run(one_command([&](int, StopSignal&) {
+        blocked_here = blocks_signals();
+        std::thread([&] { blocked_in_a_thread = blocks_signals(); }).join();
+        return Status();
+      }),
+      {"work"});
+  EXPECT_TRUE(blocked_here);
+  EXPECT_TRUE(blocked_in_a_thread);
+  EXPECT_FALSE(blocks_signals()) << "what the command's end should have given back";
+}
+
+TEST(Program, ASignalOnAThreadThatIsOlderThanTheCommandStopsIt) {
+  const OlderThread older;
+  const auto o = run(one_command([](int, StopSignal& stop) {
+                       kill(getpid(), SIGTERM);
+                       return stop.wait_for(std::chrono::seconds(60)) ? Status() : Error{"never stopped"};
+                     }),
+                     {"work"});
+  EXPECT_EQ(o.code, 0) << o.err;
+}
+
+void stop_and_hang_in_the_callback() {
+  exit_code(one_command([](int, StopSignal& stop) {
+              std::atomic<bool> called = false;
+              stop.on_stop([&] {
+                called = true;
+                for (;;) pause();
+              });
+              kill(getpid(), SIGINT);
+              while (!called) usleep(1000);
+              for (;;) {  // two that come close to each other may be one
+                kill(getpid(), SIGTERM);
+                usleep(1000);
+              }
+              return Status();
+            }),
+            {"work"});
+}
+
+TEST(Program, TheThirdSignalEndsWhatHangsInItsCallback) {
+  EXPECT_EXIT(stop_and_hang_in_the_callback(), testing::ExitedWithCode(128 + SIGTERM), "");
+}
+
+void hang_up(bool ignored) {
+  signal(SIGHUP, ignored ? SIG_IGN : SIG_DFL);
+  _exit(exit_code(one_command([](int, StopSignal& stop) {
+                    kill(getpid(), SIGHUP);
+                    kill(getpid(), SIGTERM);  // comes behind it
+                    stop.wait();
+                    return Status();
+                  }),
+                  {"work"}));
+}
+
+TEST(Program, AHangupEndsWhatReadsNothingAgain) {
+  EXPECT_EXIT(hang_up(false), testing::KilledBySignal(SIGHUP), "");
+  EXPECT_EXIT(hang_up(true), testing::ExitedWithCode(0), "");  // under nohup
+}
+
+TEST(Program, AHangupReadsAgain) {
+  std::atomic<int> read = 0;
+  const auto o = run(one_command([&](int, StopSignal& stop) {
+                       stop.on_reload([&] { ++read; });
+                       for (int wanted = 1; wanted <= 3; ++wanted) {
+                         kill(getpid(), SIGHUP);
+                         for (int i = 0; i < 60000 && read < wanted; ++i) usleep(1000);
+                       }
+                       stop.clear_on_reload();
+                       return Status();
+                     }),
+                     {"work"});
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_EQ(read, 3);
 }
 
 TEST(Progress, LineShowsRateAndTimeLeft) {
