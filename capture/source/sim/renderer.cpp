@@ -264,25 +264,70 @@ void Renderer::render_field(const Field& field, Image8* out, ImageF* truth,
 void Renderer::trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const {
   const auto width = static_cast<std::size_t>(rig_.camera.width);
   const Vec3* rays = &rays_[static_cast<std::size_t>(y) * width];
+  const Vec3* above = &rays_[static_cast<std::size_t>(std::max(y - 1, 0)) * width];
+  const int next = std::min(y + 1, rig_.camera.height - 1);
+  const Vec3* below = &rays_[static_cast<std::size_t>(next) * width];
+  const float lines = 1 / static_cast<float>(std::max(next - std::max(y - 1, 0), 1));
   for (std::size_t x = 0; x < width; ++x) {
-    const Vec3 direction = rays[x];
+    const std::size_t left = x ? x - 1 : 0, right = std::min(x + 1, width - 1);
+    const Footprint pixel{rays[x], (rays[right] - rays[left]) * (1 / static_cast<float>(right - left)),
+                          (below[x] - above[x]) * lines};
     Hit hit;
-    const Placed* seen = nullptr;
-    for (const Placed& placed : shapes) {
-      if (placed.camera.contains(direction.x, direction.y) && placed.shape->hit(direction, hit))
-        seen = &placed;
-    }
+    const Placed* seen = meet(shapes, pixel.middle, hit);
     Vec3 value;
-    if (seen) {
-      const std::size_t left = x ? x - 1 : 0, right = std::min(x + 1, width - 1);
-      const Vec3 step = (rays[right] - rays[left]) * (1 / static_cast<float>(right - left));
-      value = shade(shapes, *seen, hit, field, direction, step);
+    if (options_.rays > 1 && is_mixed(shapes, pixel, seen, hit)) {
+      value = mixture(shapes, field, pixel);
+    } else if (seen) {
+      value = shade(shapes, *seen, hit, field, pixel.middle, pixel.across);
     }
     row.rgb[0][x] = value.x;
     row.rgb[1][x] = value.y;
     row.rgb[2][x] = value.z;
     row.depth[x] = seen ? hit.depth : 0;
   }
+}
+
+/// The nearest; null: nothing is there.
+const Renderer::Placed* Renderer::meet(const std::vector<Placed>& shapes, Vec3 direction, Hit& hit) {
+  const Placed* seen = nullptr;
+  for (const Placed& placed : shapes) {
+    if (placed.camera.contains(direction.x, direction.y) && placed.shape->hit(direction, hit)) seen = &placed;
+  }
+  return seen;
+}
+
+/// Whether a corner of the pixel sees another shape than its middle, or another face of it.
+bool Renderer::is_mixed(const std::vector<Placed>& shapes, const Footprint& pixel, const Placed* seen,
+                        const Hit& hit) {
+  constexpr float kSameFace = 0.95f;  // cosine between the normals
+  for (const float across : {-0.5f, 0.5f}) {
+    for (const float down : {-0.5f, 0.5f}) {
+      const Vec3 direction = pixel.at(across, down);
+      Hit other_hit;
+      const Placed* other = meet(shapes, direction, other_hit);
+      if (other != seen) return true;
+      if (seen != nullptr && dot(seen->shape->material(pixel.middle, hit).normal,
+                                 other->shape->material(direction, other_hit).normal) < kSameFace) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// The mean over the pixel.
+Vec3 Renderer::mixture(const std::vector<Placed>& shapes, const Field& field, const Footprint& pixel) const {
+  const int rays = options_.rays;
+  const float step = 1 / static_cast<float>(rays);
+  Vec3 sum{0, 0, 0};
+  for (int k = 0; k < rays * rays; ++k) {
+    const Vec3 direction = pixel.at((static_cast<float>(k % rays) + 0.5f) * step - 0.5f,
+                                    (static_cast<float>(k / rays) + 0.5f) * step - 0.5f);
+    Hit hit;
+    const Placed* seen = meet(shapes, direction, hit);
+    if (seen) sum = sum + shade(shapes, *seen, hit, field, direction, pixel.across * step);
+  }
+  return sum * (step * step);
 }
 
 Vec3 Renderer::shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit,

@@ -53,6 +53,11 @@ class Renderer {
     Light light;
     float share;  // of the exposure's time
   };
+  /// The rays of a pixel: through its middle, and by how much they change to the next pixel's.
+  struct Footprint {
+    Vec3 middle, across, down;
+    Vec3 at(float right, float low) const { return middle + across * right + down * low; }
+  };
   struct Field {
     std::array<Glow, 2> glows;  // the second of share 0 where one slide is shown all the time
     double time_s;
@@ -64,6 +69,10 @@ class Renderer {
   /// Rows of `out` and `truth`, those of which are not null.
   void render_field(const Field& field, Image8* out, ImageF* truth, const std::atomic<bool>& stop) const;
   void trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const;
+  static const Placed* meet(const std::vector<Placed>& shapes, Vec3 direction, Hit& hit);
+  static bool is_mixed(const std::vector<Placed>& shapes, const Footprint& pixel, const Placed* seen,
+                       const Hit& hit);
+  Vec3 mixture(const std::vector<Placed>& shapes, const Field& field, const Footprint& pixel) const;
   Vec3 shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,
              Vec3 direction, Vec3 direction_step) const;
   void blur_chroma(Row& row) const;

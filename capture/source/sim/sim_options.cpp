@@ -41,6 +41,8 @@ constexpr Key kKeys[] = {
     {"albedo", &SimOptions::albedo, 0, 2, "times each material's albedo"},
     {"crosstalk", &SimOptions::crosstalk, 0, 1, "of the colour channels, 0: none"},
     {"exposure", &SimOptions::exposure, 0.01, 100, "times the scene's own"},
+    {"rays", &SimOptions::rays, 1, 8,
+     "rays of a pixel each way where shapes meet, 1: one through its middle alone"},
     {"distortion", &SimOptions::distortion, 0, 2, "times a cheap lens's distortion"},
     {"seed", &SimOptions::seed, 0, 4294967295.0, "of the noise"},
 };

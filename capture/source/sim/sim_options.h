@@ -34,14 +34,15 @@ struct SimOptions {
   double drift = 0;
   double shutter = 1;  // exposure, of a field
 
-  double noise = 1.2;       // sigma, of 255
-  double chroma = 1.0;      // sigma of the chroma blur along a line, camera pixels
-  double defocus = 0.7;     // sigma of the projector's blur, projector pixels
-  double ambient = 0.04;    // light that is not the projector's, of its white
-  double gloss = 1.0;       // times each material's own gloss
-  double albedo = 1.0;      // times each material's own albedo: dark scenes
-  double crosstalk = 1.0;   // 0: the camera sees the projector's primaries as they are
-  double exposure = 1.0;    // times the exposure that puts white at working distance to 230
+  double noise = 1.2;      // sigma, of 255
+  double chroma = 1.0;     // sigma of the chroma blur along a line, camera pixels
+  double defocus = 0.7;    // sigma of the projector's blur, projector pixels
+  double ambient = 0.04;   // light that is not the projector's, of its white
+  double gloss = 1.0;      // times each material's own gloss
+  double albedo = 1.0;     // times each material's own albedo: dark scenes
+  double crosstalk = 1.0;  // 0: the camera sees the projector's primaries as they are
+  double exposure = 1.0;   // times the exposure that puts white at working distance to 230
+  int rays = 1;  // of a pixel, each way, where shapes and their faces meet; 1: one through its middle alone
   double distortion = 0.0;  // times the lens distortion of a cheap camera and projector
   std::uint32_t seed = 1;
 };

@@ -245,6 +245,30 @@ class Barrier : public sim::Shape, public sim::Scene {
 };
 
 // Proves: a stop does not wait for the frame in the making, which takes seconds on a slow machine.
+// Proves: pixels where shapes meet are a mixture of what is around them, all others stay as they are.
+TEST(Simulator, PixelsOfManyRaysMixWhereShapesMeet) {
+  const std::string plain = "object,scan=progressive,noise=0,chroma=0,defocus=0,frames=1";
+  const Image8 one = take(*open(plain, {})).picture, mixed = take(*open(plain + ",rays=4", {})).picture;
+  int changed = 0, strange = 0;
+  for (int y = 1; y + 1 < one.height(); ++y) {
+    for (int i = 3; i < 3 * (one.width() - 1); ++i) {
+      if (mixed.row(y)[i] == one.row(y)[i]) continue;
+      ++changed;
+      int least = 255, most = 0;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -3; dx <= 3; dx += 3) {
+          least = std::min<int>(least, one.row(y + dy)[i + dx]);
+          most = std::max<int>(most, one.row(y + dy)[i + dx]);
+        }
+      }
+      if (mixed.row(y)[i] < least - 2 || mixed.row(y)[i] > most + 2) ++strange;
+    }
+  }
+  EXPECT_GT(changed, 1000);
+  EXPECT_LT(changed, one.width() * one.height() * 3 / 40);
+  EXPECT_LT(strange, changed / 50);  // stripes narrower than a pixel there
+}
+
 TEST(RenderAhead, AStopLeavesTheFrameInTheMaking) {
   auto options = sim::parse_sim_options("plane,frames=2");
   ASSERT_TRUE(options);
