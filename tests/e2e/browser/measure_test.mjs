@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: what is measured with the mouse is true. First on the feeder's known surface, then
-// through the whole chain on the simulator's cube of 100 mm, with the standard deviations that the server sends.
+// through the whole chain on the simulator's cube of 100 mm, with the standard deviations that the server sends: on its face,
+// and from corner to corner, where clicks snap.
 // Run as: in_own_domain node measure_test.mjs GATEWAY_FEEDER RELIEVO_SERVER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, isRim, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, isRim, loaded, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
 import { Server } from './server.mjs';
 
 const [feederPath, serverPath] = process.argv.slice(2);
 const feeder = await Feeder.start(feederPath);
 const browser = await launchChromium();
 const complaints = [];
-const kPage = { viewport: { width: 1500, height: 800 } }; // the panel covers nothing that is measured
+const kPage = { viewport: { width: 1600, height: 800 } }; // the panel covers nothing that is measured
+const kLargePage = { viewport: { width: 2400, height: 1200 } }; // nor the time line of so wide a picture
 const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
 
 const click = async (page, point) => {
@@ -115,9 +117,9 @@ const onFeeder = {
 };
 
 /** Of the simulator's cube of 100 mm (capture/source/sim/scenes_simple.cpp), on the face to the camera's left. */
-function onCube(right, down) {
+function onCube(right, down, back = -0.05) {
   const [s, c] = [Math.sin(0.5), Math.cos(0.5)];
-  const local = [right, down, -0.05];
+  const local = [right, down, back];
   return [0.12 + c * local[0] + s * local[2], 0.078 + local[1], 0.95 - s * local[0] + c * local[2]];
 }
 
@@ -127,9 +129,9 @@ const onServer = {
     await page.keyboard.press('c');
     await page.keyboard.press('m');
     for (const [from, to] of [
-      [[-0.03, -0.04], [-0.03, 0.04]],
-      [[-0.042, 0], [0.042, 0]],
-      [[-0.04, -0.03], [0.03, 0.04]],
+      [[-0.03, -0.035], [-0.03, 0.035]],
+      [[-0.03, 0], [0.03, 0]],
+      [[-0.035, -0.03], [0.03, 0.035]],
     ]) {
       const [a, b] = [onCube(...from), onCube(...to)];
       const m = await measure(page, 'Distance', [a, b]);
@@ -149,14 +151,175 @@ const onServer = {
   },
 };
 
+const kEdge = 0.05; // half of it
+const kCorners = {
+  frontLeftTop: onCube(-kEdge, -kEdge),
+  frontRightTop: onCube(kEdge, -kEdge),
+  frontRightBottom: onCube(kEdge, kEdge),
+  frontLeftBottom: onCube(-kEdge, kEdge),
+  backRightBottom: onCube(kEdge, kEdge, kEdge),
+  backRightTop: onCube(kEdge, -kEdge, kEdge),
+};
+const kFront = [['frontLeftTop', 'frontRightTop'], ['frontRightTop', 'frontRightBottom'], ['frontRightBottom', 'frontLeftBottom'], ['frontLeftBottom', 'frontLeftTop'], ['frontLeftTop', 'frontRightBottom']];
+// At 640x480 the cube's upper face is two lines and the side face six stripes: where those end is not known so exactly.
+const kSide = [['frontRightBottom', 'backRightBottom']];
+const kFarTop = [['frontRightTop', 'backRightTop'], ['backRightTop', 'backRightBottom']];
+
+/** Clicks near corners, as a hand does. */
+async function cornerToCorner(page, pairs) {
+  for (const [from, to] of pairs) {
+    const ends = [kCorners[from], kCorners[to]];
+    const count = (await look(page)).measurements.length;
+    for (const [i, corner] of ends.entries()) {
+      const at = await page.evaluate((p) => window.relievo.toPage(p), corner);
+      await page.mouse.click(at.x + (i === 0 ? -4 : 3), at.y + 3);
+    }
+    await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count).catch(async () => assert.fail(`${from} to ${to}: ${await page.textContent('#panel-measure')}`));
+    const m = (await look(page)).measurements.at(-1);
+    const truth = away(...ends);
+    console.log(`      ${from} to ${to}: ${(truth * 1000).toFixed(1)} mm reads ${(m.value * 1000).toFixed(2)} ± ${(m.sigma * 1000).toFixed(2)} mm`);
+    assert.deepEqual(m.spots.map(({ kind }) => kind), ['corner', 'corner'], `${from} to ${to}`);
+    near(m.value, truth, 0.0005, `${from} to ${to}`);
+    assert.ok(Math.abs(m.value - truth) < 4 * m.sigma && m.sigma < 0.0008, `${m.value} ± ${m.sigma}`);
+  }
+}
+
+async function beginMeasuring(page) {
+  await shownPast(page, 2);
+  await page.keyboard.press('c');
+  await page.keyboard.press('m');
+  await choose(page, 'Distance');
+  await page.waitForFunction(() => window.relievo.diagnostics().shown > 4); // with its standard deviations
+}
+
+const corners = {
+  async 'from corner to corner of the front face'(page) {
+    await beginMeasuring(page);
+    await cornerToCorner(page, kFront);
+    const { text } = await saved(page, 'CSV');
+    const [head, line] = text.split('\n').map((row) => row.split(','));
+    assert.equal(line[head.indexOf('kind1')], 'corner');
+    assert.match(await page.textContent('#panel-measure .measurements'), /corner – corner/);
+  },
+
+  async 'a point on an edge is on it, and Alt leaves a click where it is'(page) {
+    await choose(page, 'Point');
+    const place = onCube(-0.02, kEdge - 0.002);
+    const at = await page.evaluate((p) => window.relievo.toPage(p), place);
+    await page.mouse.click(at.x, at.y);
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.at(-1)?.tool === 'point');
+    const [edge] = (await look(page)).measurements.at(-1).spots;
+    assert.equal(edge.kind, 'edge');
+    near(edge.point[1], onCube(0, kEdge)[1], 0.0004, 'height of the lower edge');
+    const count = (await look(page)).measurements.length;
+    const inside = await page.evaluate((p) => window.relievo.toPage(p), onCube(-0.02, kEdge - 0.006));
+    await page.keyboard.down('Alt');
+    await page.mouse.click(inside.x, inside.y);
+    await page.keyboard.up('Alt');
+    await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count);
+    const [free] = (await look(page)).measurements.at(-1).spots;
+    assert.equal(free.kind, 'surface');
+    near(free.point[1], onCube(0, kEdge - 0.006)[1], 0.001, 'height of the place');
+  },
+
+  async 'what a click would be on is shown before'(page) {
+    const at = await page.evaluate((p) => window.relievo.toPage(p), kCorners.frontRightTop);
+    await page.mouse.move(at.x + 3, at.y + 3);
+    await page.waitForFunction(() => /^corner · depth/.test(document.querySelector('#cursor')?.textContent));
+    const middle = await page.evaluate((p) => window.relievo.toPage(p), onCube(0, 0));
+    await page.mouse.move(middle.x, middle.y);
+    await page.waitForFunction(() => /^depth/.test(document.querySelector('#cursor')?.textContent));
+  },
+
+  async 'by a switch it is off, and stays so'(page) {
+    const snapping = page.getByLabel('Snap to edges and corners');
+    await snapping.uncheck();
+    const count = (await look(page)).measurements.length;
+    const at = await page.evaluate((p) => window.relievo.toPage(p), onCube(0.04, 0.03));
+    await page.mouse.click(at.x, at.y);
+    await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count);
+    assert.equal((await look(page)).measurements.at(-1).spots[0].kind, 'surface');
+    await page.reload();
+    await loaded(page);
+    await shownPast(page, 1);
+    await page.keyboard.press('m');
+    await page.waitForSelector('#panel-measure .segments');
+    assert.equal(await snapping.isChecked(), false);
+    await snapping.check();
+  },
+
+  async 'by keys: arrows bring the place to the middle, Enter measures there'(page) {
+    await choose(page, 'Point');
+    await page.keyboard.press('o');
+    await page.focus('#view');
+    const count = (await look(page)).measurements.length;
+    await page.keyboard.press('ArrowLeft');
+    await page.waitForFunction(() => /depth/.test(document.querySelector('#cursor')?.textContent));
+    await page.keyboard.press('Enter');
+    await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count);
+  },
+};
+
+const edgesOf = (pairs) => ({
+  async 'from corner to corner'(page) {
+    await beginMeasuring(page);
+    await cornerToCorner(page, pairs);
+  },
+});
+
+const byFinger = {
+  async 'a tap near a corner is on it'(page) {
+    await beginMeasuring(page);
+    await choose(page, 'Point');
+    const at = await page.evaluate((p) => window.relievo.toPage(p), kCorners.frontLeftBottom);
+    await page.touchscreen.tap(at.x + 9, at.y - 9);
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length > 0);
+    const [spot] = (await look(page)).measurements.at(-1).spots;
+    assert.equal(spot.kind, 'corner');
+    assert.ok(away(spot.point, kCorners.frontLeftBottom) < 0.0006, `${away(spot.point, kCorners.frontLeftBottom)}`);
+  },
+};
+
+const onFace = {
+  async 'a face has no edges'(page) {
+    await shownPast(page, 2);
+    await page.keyboard.press('c');
+    await page.keyboard.press('m');
+    await choose(page, 'Point');
+    await page.waitForFunction(() => window.relievo.diagnostics().shown > 4);
+    for (let y = 120; y < 640; y += 65) for (let x = 420; x < 1080; x += 65) await page.mouse.click(x, y);
+    const { measurements } = await look(page);
+    assert.ok(measurements.length > 30, `${measurements.length} places`);
+    const caught = measurements.flatMap(({ spots }) => spots).filter(({ kind }) => kind !== 'surface');
+    assert.deepEqual(caught.map(({ kind, point }) => ({ kind, point })), []);
+  },
+};
+
 let failed = 1;
 let server;
+/** On a server of its own. */
+async function checkOn(source, checks, page = kPage) {
+  server = await Server.start(serverPath, ['--source', source]);
+  const opened = await pagesOf(browser, server.address, complaints).open('/', page);
+  failed += await runChecks(checks, opened);
+  await opened.close();
+  await server.kill();
+}
 try {
-  failed = await runChecks(onFeeder, await open('/', kPage));
+  const onBall = await open('/', kPage);
+  failed = await runChecks(onFeeder, onBall);
+  await onBall.close();
   await feeder.kill();
-  server = await Server.start(serverPath, ['--source', 'sim:object,rate=5']);
-  const pages = pagesOf(browser, server.address, complaints);
-  failed += await runChecks(onServer, await pages.open('/', kPage));
+  await checkOn('sim:object,rate=5', onServer);
+  await checkOn('sim:object,rate=5', corners);
+  // Of pixels that are the mean of what falls on them, as a camera's are.
+  await checkOn('sim:object,rate=5,rays=6', edgesOf([...kFront, ...kSide]));
+  const large = 'width=1920,height=1080,projector_width=1920,projector_height=1080,stripes=300';
+  await checkOn(`sim:object,rate=2,period=4,${large},rays=4`, edgesOf([...kFront, ...kSide, ...kFarTop]), kLargePage);
+  const phone = { viewport: { width: 844, height: 780 }, hasTouch: true, isMobile: true };
+  await checkOn('sim:object,rate=5', byFinger, phone);
+  await checkOn('sim:face,rate=5', onFace);
+  assert.deepEqual(complaints, []);
 } finally {
   await browser.close();
   await feeder.kill();

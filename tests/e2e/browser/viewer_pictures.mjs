@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes the pictures of docs/viewer.md that no test takes. To be looked at: they prove nothing.
-// Run as: in_own_domain node viewer_pictures.mjs RELIEVO_SERVER FOLDER, in web/viewer. Exit 77: no Chromium here.
+// Run as: in_own_domain node viewer_pictures.mjs RELIEVO_SERVER FOLDER [NAME...], in web/viewer; names: of these alone. Exit 77: no Chromium here.
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { inState, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
 
-const [serverPath, folder] = process.argv.slice(2);
+const [serverPath, folder, ...wanted] = process.argv.slice(2);
 const kRate = 8; // what a processor that draws can follow
 const kFrames = 60; // until the time line has something to show
 const [kDesktop, kWide, kPhone] = [{ width: 1100, height: 680 }, { width: 1280, height: 800 }, { width: 390, height: 780 }];
@@ -23,6 +23,7 @@ const browser = await launchChromium();
 const server = await Server.start(serverPath, ['--config', config, '--record-dir', scratch, '--pre-roll', '2s']);
 
 async function picture(name, path, { viewport = kDesktop, colorScheme = 'dark', hasTouch = false } = {}, act = async () => {}) {
+  if (wanted.length > 0 && !wanted.includes(name)) return;
   const context = await browser.newContext({ viewport, colorScheme, hasTouch });
   const page = await context.newPage();
   page.setDefaultTimeout(kPatienceMs);
@@ -70,11 +71,29 @@ try {
     await page.keyboard.press('m');
     await page.keyboard.press(' ');
     await still(page);
-    const [left, right] = [[-0.03, 0.02, -0.05], [0.05, 0.02, 0.03]]; // on either face
-    await measure(page, 'Distance', [[-0.02, -0.04, -0.05], [-0.02, 0.04, -0.05]]);
+    const [left, right] = [[-0.03, 0.02, -0.05], [0.05, 0.02, 0.02]]; // on either face
+    await measure(page, 'Distance', [[-0.02, -0.03, -0.05], [-0.02, 0.03, -0.05]]);
     await measure(page, 'Section', [left, right]);
     await page.mouse.move(0, 0);
     await page.waitForTimeout(1000);
+  });
+  await picture('snap', '/?stream=object', {}, async (page) => {
+    await page.keyboard.press('m');
+    await shownPast(page, 10);
+    await page.keyboard.press(' ');
+    await still(page);
+    const middle = await page.evaluate((point) => window.relievo.toPage(point), onCube([0.01, 0, -0.05]));
+    await page.mouse.dblclick(middle.x, middle.y); // turns around the cube from now on
+    await page.click('#panel-measure button:text-is("Clear")');
+    await page.focus('#view');
+    for (let i = 0; i < 9; ++i) await page.keyboard.press('+');
+    await still(page);
+    const corners = [[-0.05, -0.05, -0.05], [0.05, -0.05, -0.05], [0.05, 0.05, -0.05], [-0.05, 0.05, -0.05]];
+    for (const i of [0, 1, 2]) await measure(page, 'Distance', [corners[i], corners[i + 1]]);
+    await page.focus('#view');
+    const over = await page.evaluate((point) => window.relievo.toPage(point), onCube(corners[3]));
+    await page.mouse.move(over.x + 4, over.y - 4);
+    await page.waitForTimeout(2000);
   });
   await picture('camera', '/?stream=object', {}, presses('c', 'v'));
   await picture('split', '/?stream=face', { viewport: kWide }, presses('v', 'v', 'v'));

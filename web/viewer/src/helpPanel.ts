@@ -9,6 +9,7 @@ export function fillHelp(body: HTMLElement): void {
     [help.view, help.viewKeys],
     [help.show, help.showKeys],
     [help.time, help.timeKeys],
+    [help.measure, help.measureKeys],
     [help.panels, help.panelKeys],
   ] as const) {
     const list = make('dl', {});

@@ -13,9 +13,13 @@ export type Tool = (typeof kTools)[number];
 /** How many places a tool needs. */
 export const kSpots: Record<Tool, number> = { point: 1, distance: 2, angle: 3, section: 2 };
 
+/** What of a surface a place is on; edges and corners are fitted to what is around (snap.ts). */
+export type Kind = 'surface' | 'edge' | 'corner';
+
 export interface Spot {
   point: Vec3;
-  sigma: number | null; // of its depth, metres; null: not known
+  kind: Kind;
+  errors: readonly Vec3[] | null; // independent of each other, each of one standard deviation; metres; null: not known
   stream: string; // whose camera's frame it is in
   pose: Rigid; // of that frame in one that all spots of a measurement share
   rig: RigError | null; // of that stream; null: not known
@@ -44,6 +48,13 @@ const unit = (a: Vec3): Vec3 => {
   return [a[0] / size, a[1] / size, a[2] / size];
 };
 
+/** The error of a vertex or a place between some: of its depth, along its ray. */
+export const alongRay = (point: Vec3, sigma: number): Vec3[] => [point.map((c) => (c * sigma) / point[2]) as Vec3];
+
+/** Of a place's depth. */
+export const depthSigma = ({ errors }: Pick<Spot, 'errors'>): number | null =>
+  errors === null ? null : Math.hypot(...errors.map(([, , z]) => z));
+
 /** Of places in one frame, but for a depth, which is of its own camera's. */
 const values: Record<Tool, (points: Vec3[]) => number> = {
   point: ([a]) => a![2],
@@ -60,14 +71,18 @@ export function measure(tool: Tool, spots: Spot[], surface: Surface | null, eye:
   const points = spots.map((s) => s.point);
   const inOneFrame = (points: Vec3[]): Vec3[] => (tool === 'point' ? points : points.map((p, i) => moved(spots[i]!.pose, p)));
   const value = (points: Vec3[]): number => values[tool](inOneFrame(points));
-  const alone = (i: number) => (j: number) => i === j;
-  const own = propagate(value, points, spots.map(({ sigma, point }, i) => [alone(i), sigma === null ? null : sigma / point[2]]));
-  const rig = propagate(value, points, [
-    ...spots.map(({ rig, point }, i): Moving => [alone(i), rig && rigDepthError(rig, point) / point[2]]),
-    ...spots
-      .filter(({ stream }, i) => spots.findIndex((s) => s.stream === stream) === i)
-      .map(({ rig, stream }): Moving => [(j) => spots[j]!.stream === stream, rig && rig.scale]),
-  ]);
+  const alone = (i: number, error: Vec3): Moving => points.map((_, j) => (j === i ? error : null));
+  const own = spots.some(({ errors }) => errors === null)
+    ? null
+    : propagate(value, points, spots.flatMap(({ errors }, i) => errors!.map((error) => alone(i, error))));
+  const rig = spots.some((spot) => spot.rig === null)
+    ? null
+    : propagate(value, points, [
+        ...spots.map(({ rig, point }, i) => alone(i, alongRay(point, rigDepthError(rig!, point))[0]!)),
+        ...spots
+          .filter(({ stream }, i) => spots.findIndex((s) => s.stream === stream) === i)
+          .map(({ rig, stream }): Moving => spots.map((s) => (s.stream === stream ? (s.point.map((c) => c * rig!.scale) as Vec3) : null))),
+      ]);
   return {
     tool,
     spots,
@@ -92,17 +107,18 @@ export function markOf({ spots, profile }: Pick<Measurement, 'spots' | 'profile'
 const together = (surface: number | null, rig: number | null): number | null =>
   surface === null && rig === null ? null : Math.hypot(surface ?? 0, rig ?? 0);
 
-// An error: the places that it moves together, along their rays, and by what share of their distances; null: not known.
-type Moving = [moves: (i: number) => boolean, sigma: number | null];
+// An error of one standard deviation: by what it moves each of the places; null: not at all.
+type Moving = readonly (Vec3 | null)[];
 
 // By central differences.
-function propagate(value: (points: Vec3[]) => number, points: Vec3[], errors: Moving[]): number | null {
-  const step = 1e-4;
+function propagate(value: (points: Vec3[]) => number, points: Vec3[], errors: readonly Moving[]): number {
   let variance = 0;
-  for (const [moves, sigma] of errors) {
-    if (sigma === null) return null;
-    const off = (by: number): number => value(points.map((p, i) => (moves(i) ? (p.map((c) => c * (1 + by)) as Vec3) : p)));
-    variance += (((off(step) - off(-step)) / (2 * step)) * sigma) ** 2;
+  for (const moves of errors) {
+    const most = Math.max(...moves.map((by, i) => (by === null ? 0 : length(by) / length(points[i]!))));
+    if (most === 0) continue;
+    const step = 1e-4 / most; // of the error
+    const off = (by: number): number => value(points.map((p, i) => p.map((c, k) => c + by * (moves[i]?.[k] ?? 0)) as Vec3));
+    variance += ((off(step) - off(-step)) / (2 * step)) ** 2;
   }
   return Math.sqrt(variance);
 }
@@ -219,14 +235,14 @@ export function valueText({ tool, value, sigma }: Measurement): string {
 
 const number = (value: number | null | undefined): string => (value === null || value === undefined ? '' : value.toPrecision(9));
 
-/** A line a measurement; metres and radians, each place in the frame of its own stream's camera. */
+/** A line a measurement; metres and radians, each place in the frame of its own stream's camera; the sigmas of places are their depths'. */
 export function measurementsCsv(measurements: readonly Measurement[]): string {
-  const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`, `stream${i}`].join(',');
+  const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`, `kind${i}`, `stream${i}`].join(',');
   const lines = [`tool,value,unit,sigma,sigma_surface,sigma_rig,${[1, 2, 3].map(spot).join(',')}`];
   for (const m of measurements) {
     const spots = [0, 1, 2].flatMap((i) => {
       const s = m.spots[i];
-      return s === undefined ? ['', '', '', '', ''] : [...s.point.map(number), number(s.sigma), s.stream];
+      return s === undefined ? ['', '', '', '', '', ''] : [...s.point.map(number), number(depthSigma(s)), s.kind, s.stream];
     });
     lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), number(m.surface), number(m.rig), ...spots].join(','));
   }

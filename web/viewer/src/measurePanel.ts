@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measuring with the mouse or a finger: which tool, what was measured, and the place under the cursor.
-import { button, element, make, setText } from './dom';
+import { button, element, make, setText, toggle } from './dom';
 import { copy, download, fileName } from './download';
 import {
+  alongRay,
   kSpots,
   kTools,
   markOf,
@@ -20,11 +21,30 @@ import { plot } from './plot';
 import type { StreamInfo } from './protocol';
 import { inverse, moved } from './rigid';
 import { rigErrorOf } from './rigError';
+import { Snapper, type Caught } from './snapper';
 import { text } from './strings';
 import type { Hit, View } from './view';
 
 const kStill_px = 5; // a click moves no further
+const kSlack_px = 10; // from an edge or corner that is meant
+const kFinger_px = 20;
+const kHint_ms = 120; // between two looks for what a click would be on, at least
+const kRest = 4; // times that long it is left in peace after one
+const kStored = 'relievo.snap';
 const say = text.measure;
+
+/** A place of the page, and how exactly it is pointed at. */
+interface Pointed {
+  readonly x: number;
+  readonly y: number;
+  readonly slack: number; // 0: exactly there
+}
+
+const pointedBy = (event: PointerEvent): Pointed => ({
+  x: event.offsetX,
+  y: event.offsetY,
+  slack: event.altKey ? 0 : event.pointerType === 'touch' ? kFinger_px : kSlack_px,
+});
 
 /** What its ± is of. */
 const partsText = ({ surface, rig }: Measurement): string =>
@@ -34,8 +54,15 @@ export class MeasurePanel {
   private tool: Tool | null = null;
   private spots: Spot[] = [];
   readonly measurements: Measurement[] = [];
-  private cursor: { x: number; y: number } | null = null;
+  private cursor: Pointed | null = null;
   private pressed: { x: number; y: number } | null = null;
+  private caught: Caught | null = null; // what a click would be on
+  private caughtAt = 0;
+  private caughtIn = 0; // ms that looking for it took
+  private catching = 0; // a timer
+  private aiming = false; // by keys, in the middle
+  private snaps = loadSnaps();
+  private readonly snapper: Snapper;
   private readonly tools: Map<Tool, HTMLButtonElement>;
   private readonly hint = make('p', { className: 'quiet' });
   private readonly sigmas = make('p', { className: 'quiet', hidden: true });
@@ -51,6 +78,11 @@ export class MeasurePanel {
     private readonly described: (stream: string) => StreamInfo | null,
   ) {
     this.tools = new Map(kTools.map((tool) => [tool, button(say.tools[tool], say.hints[tool], () => this.choose(tool))]));
+    this.snapper = new Snapper(view, described);
+    const snapping = toggle(say.snap, (on) => this.setSnaps(on));
+    snapping.row.title = say.snapTitle;
+    snapping.set(this.snaps);
+    this.hint.setAttribute('role', 'status');
     const group = make('div', { className: 'segments' }, ...this.tools.values());
     group.setAttribute('role', 'group');
     this.plot.setAttribute('role', 'img');
@@ -62,7 +94,8 @@ export class MeasurePanel {
     const csv = button(say.csv, say.csvTitle, () => this.save('measurements', measurementsCsv(this.measurements)));
     const section = button(say.sectionCsv, say.sectionCsvTitle, () => this.save('section', sectionCsv(this.lastSection?.profile ?? [])));
     const clear = button(say.clear, say.clear, () => this.clear());
-    body.append(group, this.hint, this.list, this.sigmas, this.plot, make('div', { className: 'buttons' }, copied, csv, section, clear));
+    const buttons = make('div', { className: 'buttons' }, copied, csv, section, clear);
+    body.append(group, this.hint, snapping.row, this.list, buttons, this.plot, this.sigmas); // what is read once, last
     this.listen(view.canvas);
     const others = view.overlay.marks; // loaded before or behind this
     view.overlay.marks = () => [...others(), ...this.marks()];
@@ -81,13 +114,49 @@ export class MeasurePanel {
   /** After each drawing of a new surface, and when the cursor moves. */
   readCursor(): void {
     const hit = this.cursor === null ? null : this.view.pick(this.cursor);
-    this.readout.hidden = hit === null;
     this.pointed(hit !== null && hit.stream === this.view.name ? coordinatesAt(hit.surface, hit) : null);
-    if (hit === null) return;
-    const [x, y] = hit.point;
+    this.lookForEdges();
+    const spot = this.caught !== null ? this.caughtSpot(this.caught) : hit !== null ? this.spot(hit) : null;
+    this.readout.hidden = spot === null;
+    if (spot === null) return;
+    const [x, y] = spot.point;
     const mm = (v: number): string => (v * 1000).toFixed(1);
-    const read = say.cursor(valueText(measure('point', [this.spot(hit)], null, [0, 0, 0])), mm(x), mm(-y));
-    setText(this.readout, this.view.isAlone ? read : say.cursorOf(hit.stream, read));
+    const read = say.cursor(say.kinds[spot.kind], valueText(measure('point', [spot], null, [0, 0, 0])), mm(x), mm(-y));
+    setText(this.readout, this.view.isAlone ? read : say.cursorOf(spot.stream, read));
+  }
+
+  // Takes some milliseconds: not with each movement, but with the last one.
+  private lookForEdges(): void {
+    if (this.tool === null || this.cursor === null || this.cursor.slack === 0 || !this.snaps) return this.hold(null);
+    if (this.catching !== 0) return;
+    const wait = Math.max(0, this.caughtAt + Math.max(kHint_ms, kRest * this.caughtIn) - performance.now());
+    this.catching = window.setTimeout(() => {
+      this.catching = 0;
+      const start = performance.now();
+      this.hold(this.cursor === null || this.tool === null ? null : this.catchAt(this.cursor));
+      this.caughtAt = performance.now();
+      this.caughtIn = this.caughtAt - start;
+    }, wait);
+  }
+
+  private hold(caught: Caught | null): void {
+    if (caught === null && this.caught === null) return;
+    this.caught = caught;
+    this.view.invalidate();
+  }
+
+  private catchAt(at: Pointed): Caught | null {
+    return this.snaps && at.slack > 0 ? this.snapper.at(at, at.slack, this.view.pick(at)) : null;
+  }
+
+  private setSnaps(on: boolean): void {
+    this.snaps = on;
+    try {
+      localStorage.setItem(kStored, on ? '1' : '0');
+    } catch {
+      // it lasts as long as the page
+    }
+    this.readCursor();
   }
 
   private choose(tool: Tool | null): void {
@@ -113,7 +182,8 @@ export class MeasurePanel {
   private listen(canvas: HTMLCanvasElement): void {
     let scheduled = false;
     canvas.addEventListener('pointermove', (event) => {
-      this.cursor = { x: event.offsetX, y: event.offsetY };
+      this.cursor = pointedBy(event);
+      this.aim(false);
       if (scheduled) return;
       scheduled = true;
       requestAnimationFrame(() => {
@@ -129,21 +199,40 @@ export class MeasurePanel {
       this.pressed = event.isPrimary && event.button === 0 ? { x: event.offsetX, y: event.offsetY } : null;
     });
     canvas.addEventListener('pointerup', (event) => {
-      const at = { x: event.offsetX, y: event.offsetY };
+      const at = pointedBy(event);
       const isClick = this.pressed !== null && Math.hypot(at.x - this.pressed.x, at.y - this.pressed.y) < kStill_px;
       if (isClick && this.tool !== null) this.add(at);
     });
+    // The same by keys, in the middle of the view, which arrows turn and move.
+    canvas.addEventListener('keydown', (event) => {
+      if (this.tool === null || event.key === 'Escape') return;
+      if (event.key !== 'Enter') return this.aim(event.key.startsWith('Arrow') || this.aiming);
+      event.preventDefault();
+      if (this.aiming) this.add({ ...this.view.navigator.middle, slack: event.altKey ? 0 : kSlack_px });
+      this.aim(true);
+    });
+    canvas.addEventListener('blur', () => this.aim(false));
   }
 
-  private add(at: { x: number; y: number }): void {
-    const hit = this.view.pick(at);
+  private aim(aiming: boolean): void {
+    if (aiming) this.cursor = { ...this.view.navigator.middle, slack: kSlack_px };
+    if (!aiming && !this.aiming) return;
+    this.aiming = aiming;
+    this.readCursor();
+    this.view.invalidate();
+  }
+
+  private add(at: Pointed): void {
     if (this.tool === null) return;
-    if (hit === null) return setText(this.hint, say.nothingThere);
-    const { surface, stream, pose } = hit;
+    const caught = this.catchAt(at);
+    const hit = caught === null ? this.view.pick(at) : null;
+    const on = caught ?? hit;
+    if (on === null) return setText(this.hint, say.nothingThere);
+    const { surface, stream, pose } = on;
     const other = this.spots.some((spot) => spot.stream !== stream);
     const isTrue = [...this.spots.map((spot) => spot.stream), stream].every((name) => this.view.standsTrue(name));
     if (other && (!isTrue || this.tool === 'section')) return setText(this.hint, say.otherStream);
-    this.spots.push(this.spot(hit));
+    this.spots.push(caught !== null ? this.caughtSpot(caught) : this.spot(hit!));
     if (this.spots.length === kSpots[this.tool]) {
       const origin = this.view.navigator.ray(at)?.origin;
       const eye: Vec3 = origin === undefined ? [0, 0, 0] : moved(inverse(pose), origin);
@@ -155,7 +244,14 @@ export class MeasurePanel {
 
   private spot(hit: Hit): Spot {
     const { point, surface, stream, pose } = hit;
-    return { point, sigma: sigmaAt(surface, hit), stream, pose, rig: rigErrorOf(this.described(stream)) };
+    const sigma = sigmaAt(surface, hit);
+    const errors = sigma === null ? null : alongRay(point, sigma);
+    return { point, kind: 'surface', errors, stream, pose, rig: rigErrorOf(this.described(stream)) };
+  }
+
+  private caughtSpot({ snapped, stream, pose }: Caught): Spot {
+    const { point, kind, errors } = snapped;
+    return { point, kind, errors, stream, pose, rig: rigErrorOf(this.described(stream)) };
   }
 
   private refresh(): void {
@@ -167,7 +263,9 @@ export class MeasurePanel {
           this.measurements.splice(i, 1);
           this.refresh();
         });
-        return make('li', {}, make('span', { className: 'quiet' }, say.tools[m.tool]), make('b', {}, valueText(m)), remove);
+        const on = say.spots(m.spots.map(({ kind }) => kind));
+        const what = make('span', { className: 'quiet' }, say.tools[m.tool], ...(on === '' ? [] : [make('small', {}, on)]));
+        return make('li', {}, what, make('b', {}, valueText(m)), remove);
       }),
     );
     const { measurements } = this;
@@ -183,7 +281,14 @@ export class MeasurePanel {
       if (of.spots.length === 0 || poses.length < of.spots.length) return []; // of a stream that is not to be seen
       return [markOf(of, poses, text)];
     };
-    return [...this.measurements.flatMap((m) => mark(m, valueText(m))), ...mark({ spots: this.spots, profile: [] }, '')];
+    const { caught } = this;
+    const pose = caught && this.view.poseOf(caught.stream);
+    const hint: Mark[] = [];
+    if (caught !== null && pose !== null && this.tool !== null) {
+      const { kind, point, line } = caught.snapped;
+      hint.push({ points: (line ?? [point]).map((p) => moved(pose, p)), dots: [], ring: moved(pose, point), text: say.kinds[kind] });
+    }
+    return [...this.measurements.flatMap((m) => mark(m, valueText(m))), ...mark({ spots: this.spots, profile: [] }, ''), ...hint];
   }
 
   private drawPlot(): void {
@@ -198,5 +303,14 @@ export class MeasurePanel {
     );
     const axes = { x: { from: 0, to: section.value * 1000 }, y: { from: least - room, to: most + room }, unit: 'mm' };
     plot(this.plot, axes, [{ points, colour: '--mark' }]);
+  }
+}
+
+/** Unless a person has said otherwise before; the browser may forbid a store. */
+function loadSnaps(): boolean {
+  try {
+    return localStorage.getItem(kStored) !== '0';
+  } catch {
+    return true;
   }
 }

@@ -285,6 +285,11 @@ export class Navigator {
     return { x: ((point.x + 1) / 2) * this.size.width, y: ((1 - point.y) / 2) * this.size.height };
   }
 
+  /** Of what nothing lies over, on the page. */
+  get middle(): { x: number; y: number } {
+    return freeOf(this.size, this.isRigView ? kNoInsets : this.insets);
+  }
+
   private enterRig(): void {
     if (this.rig === null) return;
     this.placing = true;

@@ -6,6 +6,7 @@ import type { Vec3 } from './pick';
 export interface Mark {
   points: Vec3[]; // of the scene; joined by lines
   dots: Vec3[]; // where a person has clicked
+  ring?: Vec3; // what a click would be on
   text: string; // at the middle of the points
 }
 
@@ -21,6 +22,16 @@ interface Box {
 
 export const overlap = (a: Box, b: Box): boolean =>
   Math.abs(a.x - b.x) < (a.width + b.width) / 2 && Math.abs(a.y - b.y) < (a.height + b.height) / 2;
+
+type Place = Readonly<{ x: number; y: number }>;
+
+/** Where a mark's text may stand, the best first: over or below its middle, or beside that on its way. */
+export function placesOf(points: readonly Place[]): Place[] {
+  const mean = (of: 'x' | 'y'): number => points.reduce((sum, p) => sum + p[of], 0) / points.length;
+  const [x, y] = [mean('x'), mean('y')];
+  const [dx, dy] = [points.at(-1)!.x - points[0]!.x, points.at(-1)!.y - points[0]!.y];
+  return [0, -0.25, 0.25].flatMap((share) => [-14, 14].map((off) => ({ x: x + share * dx, y: y + share * dy + off })));
+}
 
 const kApart = 3; // pixels between two words
 const kLine = 11;
@@ -61,10 +72,10 @@ export class Overlay {
       taken.push(box);
       this.text(text, box.x, box.y, style.getPropertyValue(colour), halo);
     }
-    for (const mark of this.marks()) this.mark(mark, project, accent, halo);
+    for (const mark of this.marks()) this.mark(mark, project, taken, [accent, halo]);
   }
 
-  private mark({ points, dots, text }: Mark, project: Project, accent: string, halo: string): void {
+  private mark({ points, dots, ring, text }: Mark, project: Project, taken: Box[], [accent, halo]: readonly [string, string]): void {
     const places = points.map(project);
     const seen = places.filter((p) => p !== null);
     if (seen.length === 0) return;
@@ -89,9 +100,22 @@ export class Overlay {
       c.fill();
       c.stroke();
     }
-    const x = seen.reduce((sum, p) => sum + p.x, 0) / seen.length;
-    const y = seen.reduce((sum, p) => sum + p.y, 0) / seen.length;
-    if (text !== '') this.text(text, x, y - 14, accent, halo);
+    const around = ring === undefined ? null : project(ring);
+    if (around !== null) {
+      for (const [colour, width] of [[halo, 4], [accent, 1.75]] as const) {
+        c.strokeStyle = colour;
+        c.lineWidth = width;
+        c.beginPath();
+        c.arc(around.x, around.y, 8, 0, 2 * Math.PI);
+        c.stroke();
+      }
+    }
+    if (text === '') return;
+    const width = this.context.measureText(text).width + kApart;
+    const free = placesOf(seen).find(({ x, y }) => !taken.some((other) => overlap({ x, y, width, height: kLine }, other)));
+    const { x, y } = free ?? placesOf(seen)[0]!;
+    taken.push({ x, y, width, height: kLine });
+    this.text(text, x, y, accent, halo);
   }
 
   private text(text: string, x: number, y: number, colour: string, halo: string): void {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says, in one place.
+import type { Kind } from './measure';
 import type { Background, Mode, Split, Theme, Way } from './display';
 import type { Placement } from './placement';
 import type { Quality, StreamStatus } from './protocol';
@@ -98,6 +99,11 @@ export const text = {
       angle: 'Click three places: the angle is at the second.',
       section: 'Click two ends of a line: the surface is cut along it, as you see it now.',
     },
+    snap: 'Snap to edges and corners',
+    snapTitle: 'Where flat faces meet or end, a click is on their edge or corner; with Alt held down, exactly where it is',
+    kinds: { surface: '', edge: 'edge', corner: 'corner' },
+    spots: (kinds: readonly Kind[]) =>
+      kinds.every((kind) => kind === 'surface') ? '' : kinds.map((kind) => (kind === 'surface' ? 'face' : kind)).join(' – '),
     nothingThere: 'There is no surface at that place.',
     sigmaOfBoth: '±: one standard deviation, of the surface as it was measured and of the rig as its calibration found it.',
     sigmaOfSurface: "±: one standard deviation, of the surface as it was measured. The rig's calibration adds its own error, which the stream does not say.",
@@ -117,7 +123,7 @@ export const text = {
     otherStream:
       'That place is of another stream. Lengths between streams are true only where their rigs say where they stand, or all are of one camera and in one frame; a section is of one.',
     cursorOf: (stream: string, read: string) => `${stream} · ${read}`,
-    cursor: (depth: string, x: string, y: string) => `depth ${depth} · right ${x} · up ${y}`,
+    cursor: (kind: string, depth: string, x: string, y: string) => `${kind === '' ? '' : `${kind} · `}depth ${depth} · right ${x} · up ${y}`,
   },
   picture: "The camera's picture",
   noPicture: 'This surface has no picture',
@@ -324,6 +330,11 @@ export const text = {
       ['Home End', 'first, last frame'],
       ['L', 'back to live'],
       ['X', 'record, stop recording'],
+    ],
+    measure: 'Measuring',
+    measureKeys: [
+      ['Click, or Enter', 'a place; by Enter that in the middle'],
+      ['Alt', 'held down: no snapping to edges and corners'],
     ],
     panels: 'Panels',
     panelKeys: [

@@ -43,6 +43,14 @@ export interface Hit extends Picked {
   readonly pose: Rigid; // of that frame in the scene's
 }
 
+/** A stream's surface as it is shown. */
+export interface Seen {
+  readonly stream: string;
+  readonly surface: DecodedFrame;
+  readonly pose: Rigid; // of its camera in the scene
+  readonly picture: ImageBitmap | null; // of that surface; open until the next is shown
+}
+
 export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
   beforeDraw(): void;
@@ -249,15 +257,21 @@ export class View {
     const ray = this.navigator.ray(at);
     if (ray === null) return null;
     let first: Hit | null = null;
-    for (const [i, { frame: surface }] of this.surfaces.entries()) {
-      const stream = this.names[i]!;
-      const pose = this.poseOf(stream);
-      if (surface === null || pose === null) continue;
+    for (const { stream, surface, pose } of this.seen) {
       const back = inverse(pose);
       const picked = pick(surface, moved(back, ray.origin), turned(back, ray.direction));
       if (picked !== null && (first === null || picked.along < first.along)) first = { ...picked, stream, surface, pose };
     }
     return first;
+  }
+
+  /** All surfaces that are to be seen. */
+  get seen(): Seen[] {
+    return this.surfaces.flatMap(({ frame: surface, picture }, i) => {
+      const stream = this.names[i]!;
+      const pose = this.poseOf(stream);
+      return surface === null || pose === null ? [] : [{ stream, surface, pose, picture }];
+    });
   }
 
   /** Of a stream's camera in the scene; null: its surface is not to be seen. */

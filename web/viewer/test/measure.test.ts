@@ -1,13 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: lengths, angles and sections of known shapes are true, and errors of depth go into them as they should.
 import { describe, expect, it } from 'vitest';
-import { lengthText, markOf, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
+import { alongRay, lengthText, markOf, measure, measurementsCsv, section, sectionCsv, type Spot } from '../src/measure';
 import type { Surface, Vec3 } from '../src/pick';
 import type { StreamInfo } from '../src/protocol';
 import { rigDepthError, rigErrorOf } from '../src/rigError';
 import { kNowhere, rigidOf } from '../src/rigid';
 
-const spot = (point: Vec3, sigma: number | null = null): Spot => ({ point, sigma, stream: 'face', pose: kNowhere, rig: null });
+const errorsOf = (point: Vec3, sigma: number | null) => (sigma === null ? null : alongRay(point, sigma));
+const spot = (point: Vec3, sigma: number | null = null): Spot => ({
+  point,
+  kind: 'surface',
+  errors: errorsOf(point, sigma),
+  stream: 'face',
+  pose: kNowhere,
+  rig: null,
+});
 const eye: Vec3 = [0, 0, 0];
 
 /** A roof: z = 2 + |x| / 2 for x, y in -1..1. */
@@ -43,7 +51,7 @@ describe('measure', () => {
     // One that looks across: its errors of depth are none of the length.
     const across = measure('distance', [here, of([0, 0, 1], Math.PI / 2, [-1, 0, 2])], null, eye);
     expect(across).toMatchObject({ value: expect.closeTo(1, 9), sigma: expect.closeTo(3e-4, 9) });
-    expect(measure('angle', [{ ...here, point: [1, 0, 2] }, of([0, 0, 1], Math.PI / 2, [-1, 0, 2]), here], null, eye).value).toBeCloseTo(Math.PI / 2, 9);
+    expect(measure('angle', [{ ...here, point: [1, 0, 2] as Vec3 }, of([0, 0, 1], Math.PI / 2, [-1, 0, 2]), here], null, eye).value).toBeCloseTo(Math.PI / 2, 9);
     expect(measure('point', [of([0, 0, 1.5], Math.PI, [0, 0, 3])], null, eye).value).toBe(1.5); // its own camera's depth
   });
 
@@ -54,9 +62,9 @@ describe('measure', () => {
     const spots = [spot([-0.3, 0.1, 1], 1e-3), spot([0.2, -0.2, 1.2], 2e-3), spot([0.3, 0.3, 0.9], 1.5e-3)];
     const told = measure('angle', spots, null, eye);
     const drawn = Array.from({ length: 20_000 }, () => {
-      const moved = spots.map(({ point, sigma }) => {
-        const scale = 1 + (normal() * sigma!) / point[2];
-        return spot(point.map((c) => c * scale) as Vec3);
+      const moved = spots.map(({ point, errors }) => {
+        const by = normal();
+        return spot(point.map((c, i) => c + by * errors![0]![i]!) as Vec3);
       });
       return measure('angle', moved, null, eye).value - told.value;
     });
@@ -169,6 +177,15 @@ describe('section', () => {
     expect(lines[0]).toBe('along_m,height_m,sigma_m,x_m,y_m,z_m');
     expect(lines.length).toBe(6); // the roof's four triangles meet: five points
   });
+});
+
+it('takes errors of edges and corners whichever way they go', () => {
+  const corner = (x: number, errors: Vec3[]): Spot => ({ ...spot([x, 0, 1]), kind: 'corner', errors });
+  const m = measure('distance', [corner(0, [[3e-4, 0, 0], [0, 5e-4, 0]]), corner(0.1, [[4e-4, 0, 0], [0, 0, 1e-3]])], null, eye);
+  expect(m.sigma).toBeCloseTo(5e-4, 8); // along the length alone
+  expect(measure('point', [corner(0, [[1e-3, 0, 3e-4], [0, 0, 4e-4]])], null, eye).sigma).toBeCloseTo(5e-4, 8);
+  const lines = measurementsCsv([m]).split('\n').map((line) => line.split(','));
+  expect(lines[1]![lines[0]!.indexOf('kind2')]).toBe('corner');
 });
 
 describe('text', () => {
