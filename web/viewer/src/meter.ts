@@ -163,7 +163,7 @@ export class Meter {
   }
 }
 
-function grouped(n: number): string {
+export function grouped(n: number): string {
   return String(n).replace(/\B(?=(\d{3})+$)/g, '\u202f');
 }
 

@@ -2,7 +2,7 @@
 // Figures on the stream in full: rates, sizes, where the time goes, where frames are lost.
 import { make, setText } from './dom';
 import { kParts, kStages } from './journal';
-import type { Meter } from './meter';
+import { grouped, type Meter } from './meter';
 import { plot, type Line } from './plot';
 import type { StreamStatus } from './protocol';
 import type { Kept } from './source';
@@ -72,7 +72,7 @@ export class StatisticsPanel {
     const chosen = !VideoTextures.possible && status?.rungs?.some(({ quality }) => quality === 'full-jpeg') === true;
     const codecs = `${journal.codecs}${chosen ? say.insteadOfVideo : ''}${journal.isKey ? '' : say.delta}`;
     this.set('codecs', journal.codecs === '' ? null : codecs);
-    this.set('vertices', `${figures.vertices}, ${figures.triangles}`);
+    this.set('vertices', `${grouped(figures.vertices)}, ${grouped(figures.triangles)}`);
     const total = journal.parts === null ? 0 : kParts.reduce((sum, part) => sum + journal.parts![part], 0);
     for (const part of kParts) {
       const bytes = journal.parts?.[part];
