@@ -25,6 +25,7 @@
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/render_place.h"
+#include "capture/reconstruct/rim_codes.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/sharp_luma.h"
 #include "capture/reconstruct/trace.h"
@@ -250,7 +251,7 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
       quick_counts.in_order - quick_counts.unsupported + quick_counts.completed + report.filters.recovered;
 }
 
-/// What is still unsure after all, against the picture itself.
+/// What is still unsure after all, against the picture itself, and rims that look like boundaries.
 void SlideDecoder::State::look_again(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report) {
   const auto& shown = sequence.shown_colours(order);
   const RenderCounts rendered = render_placer.place({.frame = pair,
@@ -260,7 +261,9 @@ void SlideDecoder::State::look_again(const CapturedFrame& pair, WorkerPool& pool
                                                      .blur_px = refiner.blur_px(),
                                                      .ambient = refiner.ambient()},
                                                     pool, result, edges, recovered);
-  report.filters.rejected += rendered.rejected;
+  const std::size_t rims = drop_rims(newer.difference, shown, sequence.shown_colours(other(order)), pool,
+                                     places, result, edges, recovered);
+  report.filters.rejected += rendered.rejected + rims;
   report.filters.moved += rendered.moved;
   report.filters.recovered += rendered.restored;
   report.matched += rendered.restored;
