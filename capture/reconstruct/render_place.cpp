@@ -27,8 +27,8 @@ constexpr float kNowhere_px = 30;  // off: it is not there
 constexpr float kOfCurvature = 2.3F;  // over the curvature of the unlikeness
 constexpr float kOwn = 1.5F;          // times a place's own
 constexpr float kOwnLeast_px = 0.02F;
-constexpr float kApart = 0.4F;        // of how far apart the two are
-constexpr float kMost_px = 0.55F;     // doubt:
+constexpr float kApart = 0.4F;        // of how much farther apart the two are than they may be
+constexpr float kMost_px = 1.F;       // doubt:
 constexpr float kUnlikeShare = 0.6F;  // by how unlike it is, of what is usual; the rest is always there
 constexpr float kLeastUsual = 0.2F;   // of unlikeness
 constexpr float kLeastGain = -0.1F;   // less, and nothing is there
@@ -197,6 +197,16 @@ bool RenderPlacer::look(const RenderView& view, int line, int boundary, float co
   return true;
 }
 
+/// A place as it was, and as the picture has it; less sure where these are farther apart than the latter is
+/// unsure.
+Place RenderPlacer::weighed(float column_px, float sigma_px, const Found& found) {
+  const float own_weight = 1 / (sigma_px * sigma_px);
+  const float weight = 1 / (found.sigma_px * found.sigma_px);
+  const float weights = weight + own_weight;
+  const float apart = std::max(0.F, std::fabs(found.off_px) - found.sigma_px);
+  return {column_px + weight / weights * found.off_px, std::hypot(1 / std::sqrt(weights), kApart * apart)};
+}
+
 /// A standard deviation, by how unlike what is shown there is.
 float RenderPlacer::doubt(float sigma_px, const Found& found) const {
   return sigma_px * (1 - kUnlikeShare + kUnlikeShare * found.unlike / usual_);
@@ -208,11 +218,9 @@ bool RenderPlacer::settle(const RenderView& view, int line, int boundary, int wo
   Found found;
   if (!look(view, line, boundary, column_px, found)) return true;
   unlikes_.of(worker).push_back(found.unlike);
-  const float own = kOwn * sigma_px + kOwnLeast_px;
-  const float own_weight = 1 / (own * own);
-  const float weight = 1 / (found.sigma_px * found.sigma_px);
-  column_px += weight / (weight + own_weight) * found.off_px;
-  sigma_px = std::hypot(1 / std::sqrt(weight + own_weight), kApart * found.off_px);
+  const Place place = weighed(column_px, kOwn * sigma_px + kOwnLeast_px, found);
+  column_px = place.column_px;
+  sigma_px = place.sigma_px;
   return found.gain >= kLeastGain && doubt(sigma_px, found) <= kMost_px;
 }
 
@@ -228,13 +236,10 @@ bool RenderPlacer::restore(const RenderView& view, const Candidate& candidate,
   if (found.gain < kRestoredGain || found.unlike > kRestoredUnlike * usual_ ||
       found.sigma_px > kRestoredSigma_px || std::fabs(found.off_px) > kRestoredOff_px)
     return false;
-  const float own_weight = 1 / (sigma_px * sigma_px);
-  const float weight = 1 / (found.sigma_px * found.sigma_px);
-  const float column = column_px + weight / (weight + own_weight) * found.off_px;
-  const float sigma = std::hypot(1 / std::sqrt(weight + own_weight), kApart * found.off_px);
-  if (doubt(sigma, found) > kRestoredMost_px) return false;
-  *here = {column, sigma};
-  recovered.push_back({line, boundary, column, sigma, 0});
+  const Place place = weighed(column_px, sigma_px, found);
+  if (doubt(place.sigma_px, found) > kRestoredMost_px) return false;
+  *here = place;
+  recovered.push_back({line, boundary, place.column_px, place.sigma_px, 0});
   return true;
 }
 

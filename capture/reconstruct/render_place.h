@@ -61,6 +61,7 @@ class RenderPlacer {
   };
 
   bool look(const RenderView& view, int line, int boundary, float column_px, Found& out) const;
+  static Place weighed(float column_px, float sigma_px, const Found& found);
   float doubt(float sigma_px, const Found& found) const;
   bool settle(const RenderView& view, int line, int boundary, int worker, float& column_px, float& sigma_px);
   struct Candidate {

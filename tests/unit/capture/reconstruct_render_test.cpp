@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Places by the picture that they would give: every set of instructions against the portable one; where a
-// picture is known, a place is found, given up where other colours are, and taken back where it is.
+// picture is known, a place is found, and a boundary that was given up is taken back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -137,13 +137,6 @@ TEST_F(RenderTest, ASurePlaceStays) {
   const float before = edge(3, 5).column_px;
   EXPECT_EQ(place().moved, 0U);
   EXPECT_EQ(edge(3, 5).column_px, before);
-}
-
-TEST_F(RenderTest, WhereThePictureShowsOtherColoursItIsGivenUp) {
-  std::swap_ranges(frame_.picture.row(3), frame_.picture.row(3) + 3 * kWidth, frame_.complement.row(3));
-  edge(3, 5).sigma_px = 0.4F;
-  EXPECT_EQ(place().rejected, 1U);
-  EXPECT_EQ(boundary(3, 5), -1);
 }
 
 TEST_F(RenderTest, WhatALineBesideHasAndThePictureShowsIsTakenBack) {
