@@ -8,6 +8,7 @@ namespace {
 
 constexpr int kCellsAround = 8;
 constexpr int kLinesAround = 2;
+constexpr float kMuch = 0.03F;  // of all boundaries
 
 }  // namespace
 
@@ -30,11 +31,19 @@ void MovingPlaces::add(int line, float column_px) {
 
 void MovingPlaces::find(int width, const SequenceResult& result, const EdgeImage& edges) {
   reset(width, edges.lines);
+  std::size_t decoded = 0;
+  std::size_t moving = 0;
   for (int line = 0; line < edges.lines; ++line) {
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
-      if (result.boundary[e] >= 0 && result.still[e] == 0) add(line, edges.edges[e].column_px);
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+      if (result.boundary[e] < 0) continue;
+      ++decoded;
+      if (result.still[e] != 0) continue;
+      ++moving;
+      add(line, edges.edges[e].column_px);
+    }
   }
+  much_ = static_cast<float>(moving) > kMuch * static_cast<float>(decoded);
 }
 
 void MovingPlaces::find(int width, ConsistencyCheck& checked, const PlaceGrid& places) {

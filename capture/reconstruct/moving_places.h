@@ -23,6 +23,10 @@ class MovingPlaces {
   /// The same by those of `places` that `checked` does not mark as still.
   void find(int width, ConsistencyCheck& checked, const PlaceGrid& places);
 
+  /// After the first find(): whether so much moves that what holds still by itself may be seen past it in one
+  /// field only.
+  bool much() const { return much_; }
+
   /// How many such boundaries are around a place, up to kMost.
   int around(int line, float column_px) const {
     const int cell = static_cast<int>(column_px) / kCell_px;
@@ -36,6 +40,7 @@ class MovingPlaces {
   void add(int line, float column_px);
 
   int lines_ = 0;
+  bool much_ = false;
   int cells_ = 0;                     // in a line
   std::vector<std::uint8_t> around_;  // [line][cell]
 };

@@ -36,6 +36,8 @@ class Refiner {
 
   /// Share of ambient light, 0..1, in what the field refined last shows where a stripe is lit.
   float ambient() const;
+  /// Standard deviation of the blur of chroma over luma's, as the frames refined so far tell it.
+  float blur_px() const { return ColourShift::kBlur_px[blur_]; }
 
   using Sides = LumaSides;
   struct Place {

@@ -24,6 +24,8 @@
 #include "capture/reconstruct/readmit.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/refine.h"
+#include "capture/reconstruct/render_place.h"
+#include "capture/reconstruct/rim_codes.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/sharp_luma.h"
 #include "capture/reconstruct/trace.h"
@@ -74,7 +76,8 @@ struct SlideDecoder::State {
                 1e9 / rig.frame_rate),
         field_placer(rig.colour_matrix, p.boundaries()),
         growth(rig.colour_matrix, p.boundaries(),
-               rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height) {}
+               rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
+        render_placer(rig.colour_matrix) {}
 
   Pattern pattern;
   double field_ns;  // between a slide's exposure and its complement's
@@ -103,6 +106,7 @@ struct SlideDecoder::State {
   SequenceCounts quick_counts;
   Persistence persistence;
   Weighing weighing;
+  RenderPlacer render_placer;
 
   Observation newer;
   Observation previous;  // the frame before
@@ -133,6 +137,7 @@ struct SlideDecoder::State {
   void decode_quickly(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report,
                       DecodedGrid& out);
   void match_in_order(SlideOrder predicted, WorkerPool& pool);
+  void look_again(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
   std::size_t fill(WorkerPool& pool, DecodedGrid& out) const;
 };
 
@@ -244,6 +249,24 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
   report.filters.recovered = by_before.carried + carried;
   report.matched =
       quick_counts.in_order - quick_counts.unsupported + quick_counts.completed + report.filters.recovered;
+}
+
+/// What is still unsure after all, against the picture itself, and rims that look like boundaries.
+void SlideDecoder::State::look_again(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report) {
+  const auto& shown = sequence.shown_colours(order);
+  const RenderCounts rendered = render_placer.place({.frame = pair,
+                                                     .colours = shown,
+                                                     .places = places,
+                                                     .moving = moving,
+                                                     .blur_px = refiner.blur_px(),
+                                                     .ambient = refiner.ambient()},
+                                                    pool, result, edges, recovered);
+  const std::size_t rims = drop_rims(newer.difference, shown, sequence.shown_colours(other(order)), pool,
+                                     places, result, edges, recovered);
+  report.filters.rejected += rendered.rejected + rims;
+  report.filters.moved += rendered.moved;
+  report.filters.recovered += rendered.restored;
+  report.matched += rendered.restored;
 }
 
 /// Puts each boundary in its place. Returns how many were in one that another one has.
@@ -382,6 +405,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
         s.weighing.weigh(s.places, s.moving, s.consistency.scale(), pool, s.result, s.edges, s.recovered);
     report.filters.rejected += weighed.rejected;
     report.filters.moved += weighed.moved;
+    // Without an earlier frame under the slide nothing tells what moves.
+    if (s.have_same && !s.moving.much()) s.look_again(pair, pool, report);
   }
   report.filters.duplicate = s.fill(pool, out);
   return true;
