@@ -66,6 +66,8 @@ class ConsistencyCheck {
 
   /// Of what is tolerated in pixels, in the frame checked last: more where stripes are wide. At least 1.
   float scale() const { return scale_; }
+  /// In the frame checked last columns scattered over lines as no noise does: by a texture finer than pixels.
+  bool speckled() const { return speckle_px_ > 0; }
 
  private:
   struct Estimate {

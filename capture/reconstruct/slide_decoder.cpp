@@ -406,7 +406,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.filters.rejected += weighed.rejected;
     report.filters.moved += weighed.moved;
     // Without an earlier frame under the slide nothing tells what moves.
-    if (s.have_same && !s.moving.much()) s.look_again(pair, pool, report);
+    // Of speckle no picture can be told.
+    if (s.have_same && !s.moving.much() && !s.consistency.speckled()) s.look_again(pair, pool, report);
   }
   report.filters.duplicate = s.fill(pool, out);
   return true;
