@@ -2,26 +2,13 @@
 #include "capture/reconstruct/consistency_rows.h"
 
 #include <cmath>
-#include <cstring>
 
 #include "base/variants.h"
+#include "capture/reconstruct/eight.h"
 
 namespace relievo {
 namespace {
 
-#define RELIEVO_INLINE [[gnu::always_inline]] inline
-
-// Eight boundaries at once; a processor with narrower registers takes several for them.
-using Eight = float __attribute__((vector_size(32)));
-using EightInts = std::int32_t __attribute__((vector_size(32)));
-using EightBytes = std::uint8_t __attribute__((vector_size(8)));
-
-RELIEVO_INLINE void load(const float* from, Eight& to) {
-  std::memcpy(&to, from, sizeof to);
-}
-RELIEVO_INLINE void store(const Eight& from, float* to) {
-  std::memcpy(to, &from, sizeof from);
-}
 RELIEVO_INLINE void size_of(const Eight& v, Eight& out) {
   out = v < 0 ? -v : v;
 }
@@ -73,8 +60,7 @@ RELIEVO_INLINE void neighbourhoods_body(const ColumnRows& rows, const float* noi
                            (bent_across & Neighbourhood::kBentAcross) |
                            ((along != along) & Neighbourhood::kOpenAlong) |
                            (bent_along & Neighbourhood::kBentAlong) | (squeezed & Neighbourhood::kSqueezed);
-    const EightBytes bytes = __builtin_convertvector(bits, EightBytes);
-    std::memcpy(out + b, &bytes, sizeof bytes);
+    store(bits, out + b);
   }
 }
 

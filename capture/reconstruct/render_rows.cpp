@@ -4,19 +4,12 @@
 #include <algorithm>
 #include <cstring>
 
+#include "capture/reconstruct/eight.h"
+
 namespace relievo {
 namespace {
 
 constexpr float kRamp_px = 3.2F;  // from one stripe's colour to the next one's, of lens, pixel and projector
-
-// Eight columns at once; a processor with narrower registers takes several for them.
-using Eight = float __attribute__((vector_size(32)));
-
-#define RELIEVO_INLINE [[gnu::always_inline]] inline
-
-RELIEVO_INLINE void load(const float* from, Eight& to) {
-  std::memcpy(&to, from, sizeof to);
-}
 
 /// Adds how unlike `picture` is to `shown`.
 RELIEVO_INLINE void compare(const Eight& picture, const float* shown, const Eight& scale, Eight& sum) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/smooth_columns.h"
 
-#include <cstdint>
 #include <cstring>
+
+#include "capture/reconstruct/eight.h"
 
 namespace relievo {
 namespace {
@@ -11,16 +12,6 @@ namespace {
 // quadratic to within the second (the worst of its lines).
 constexpr float kStraightFit = 1.4F;
 constexpr float kBentFit = 3.F;
-
-// Eight boundaries at once; a processor with narrower registers takes several for them.
-using Eight = float __attribute__((vector_size(32)));
-using EightInts = std::int32_t __attribute__((vector_size(32)));
-
-#define RELIEVO_INLINE [[gnu::always_inline]] inline
-
-RELIEVO_INLINE void load(const float* from, Eight& to) {
-  std::memcpy(&to, from, sizeof to);
-}
 
 /// `worst` becomes |off| where that is greater; a NaN that is there first stays.
 RELIEVO_INLINE void take(const Eight& off, Eight& worst) {
