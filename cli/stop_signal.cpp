@@ -27,6 +27,13 @@ void pass_on(int signal_number) {
   pthread_kill(g_taker, signal_number);
 }
 
+/// Once the command has ended: its result stays, but what hangs on the way out can still be ended.
+void come_late(int signal_number) {
+  static volatile sig_atomic_t times = 0;
+  times = times + 1;
+  if (times >= kSignalsUntilExit) _exit(128 + signal_number);
+}
+
 sigset_t taken_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -34,12 +41,12 @@ sigset_t taken_signals() {
   return signals;
 }
 
-void set_handler(int signal_number, void (*handler)(int), struct sigaction& old) {
+void set_handler(int signal_number, void (*handler)(int), struct sigaction* old = nullptr) {
   struct sigaction action {};
   action.sa_handler = handler;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
-  sigaction(signal_number, &action, &old);
+  sigaction(signal_number, &action, old);
 }
 
 /// As if nobody had taken the signal over.
@@ -67,8 +74,7 @@ struct StopSignal::State {
   std::atomic<bool> no_more_signals = false;
   bool ignores_hangup = false;  // as under nohup
   sigset_t old_mask{};
-  struct sigaction old_int {
-  }, old_term{}, old_pipe{}, old_hangup{};
+  struct sigaction old_pipe {};
   std::thread takes_signals, calls;  // two: the third signal must end what hangs in a callback
 
   void take() {
@@ -132,18 +138,18 @@ StopSignal::StopSignal() : state_(new State) {
   struct sigaction action {};
   sigaction(SIGHUP, nullptr, &action);
   state_->ignores_hangup = action.sa_handler == SIG_IGN;
-  set_handler(SIGPIPE, SIG_IGN, state_->old_pipe);
+  set_handler(SIGPIPE, SIG_IGN, &state_->old_pipe);
   state_->takes_signals = std::thread([s = state_] { s->take(); });
   g_taker = state_->takes_signals.native_handle();
-  set_handler(SIGINT, pass_on, state_->old_int);
-  set_handler(SIGTERM, pass_on, state_->old_term);
+  set_handler(SIGINT, pass_on);
+  set_handler(SIGTERM, pass_on);
   state_->calls = std::thread([s = state_] { s->run(); });
 }
 
 StopSignal::~StopSignal() {
-  sigaction(SIGINT, &state_->old_int, nullptr);
-  sigaction(SIGTERM, &state_->old_term, nullptr);
-  if (state_->takes_hangup) sigaction(SIGHUP, &state_->old_hangup, nullptr);
+  set_handler(SIGINT, come_late);
+  set_handler(SIGTERM, come_late);
+  if (state_->takes_hangup) set_handler(SIGHUP, SIG_IGN);
   state_->no_more_signals = true;
   pthread_kill(state_->takes_signals.native_handle(), SIGTERM);
   state_->takes_signals.join();
@@ -190,7 +196,7 @@ void StopSignal::clear_on_stop() {
 void StopSignal::on_reload(std::function<void()> callback) {
   std::lock_guard lock(state_->callback_mutex);
   state_->reload = std::move(callback);
-  if (!state_->takes_hangup.exchange(true)) set_handler(SIGHUP, pass_on, state_->old_hangup);
+  if (!state_->takes_hangup.exchange(true)) set_handler(SIGHUP, pass_on);
 }
 
 void StopSignal::clear_on_reload() {

@@ -10,7 +10,8 @@ namespace relievo {
 
 /// Takes over SIGINT and SIGTERM and ignores SIGPIPE for its life; one a process, made by run_program before
 /// any other thread: all block them, and children until they unblock them. The third signal ends the process
-/// at once, for a command that hangs while stopping. Every function may be called from any thread.
+/// at once, for a command that hangs while stopping; one that comes after its life changes nothing, but the
+/// third ends the process, too. Every function may be called from any thread.
 class StopSignal {
  public:
   StopSignal();

@@ -203,6 +203,18 @@ TEST(Program, TheThirdSignalEndsWhatHangsInItsCallback) {
   EXPECT_EXIT(stop_and_hang_in_the_callback(), testing::ExitedWithCode(128 + SIGTERM), "");
 }
 
+void signal_after_the_end(int times) {
+  const int code = exit_code(one_command([](int, StopSignal&) { return Status(); }), {"work"});
+  for (int i = 0; i < times; ++i) raise(SIGINT);
+  _exit(code);
+}
+
+// What a signal finds done stays done, until it has come as often as ends what hangs.
+TEST(Program, ASignalThatComesAfterTheCommandChangesNothing) {
+  EXPECT_EXIT(signal_after_the_end(2), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(signal_after_the_end(3), testing::ExitedWithCode(128 + SIGINT), "");
+}
+
 void hang_up(bool ignored) {
   signal(SIGHUP, ignored ? SIG_IGN : SIG_DFL);
   _exit(exit_code(one_command([](int, StopSignal& stop) {
