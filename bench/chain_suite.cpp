@@ -45,13 +45,14 @@ struct Options {
   std::uint64_t frames = 0;  // 0: as many as `seconds` take
   DomainOptions domain{.domain = 1 + static_cast<int>(getpid() % 200), .interface = ""};
   int threads = 1;
+  int line_stride = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
   std::string geometry = "grid", texture = "jpeg";
   bool json = false;
 };
 
 ReconstructOptions reconstruct_options(const Options& options) {
-  return {.decoder = options.decoder, .threads = options.threads};
+  return {.decoder = options.decoder, .threads = options.threads, .line_stride = options.line_stride};
 }
 
 /// As `serve` makes of them.
@@ -69,7 +70,7 @@ struct Serial {
 };
 
 Result<Serial> run_serially(const FrameLoop& frames, const Options& options, StopSignal& stop) {
-  FrameEncoder encoder(frames.info().rig, frames.info().pattern);
+  FrameEncoder encoder(frames.info().rig, frames.info().pattern, options.line_stride);
   FrameDecoder decoder;
   Frame3D decoded;
   const EncodeOptions encode = coded_as(options);
@@ -287,6 +288,7 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
                    {"web_clients", count(options.web_clients)},
                    {"threads", count(options.threads)},
                    {"decoder", std::string(decoder_name(options.decoder))},
+                   {"line_stride", count(options.line_stride)},
                    {"geometry", options.geometry},
                    {"texture", options.texture},
                    {"domain", count(options.domain.domain)},
@@ -376,6 +378,7 @@ Command chain_suite() {
                 ->type_name("NAME");
             add_threads_option(app, options->threads);
             add_decoder_option(app, options->decoder);
+            add_half_lines_option(app, options->line_stride);
             add_codec_options(app, options->geometry, options->texture);
             add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };

@@ -29,6 +29,7 @@ struct Options {
   Size size;        // 0: the source's
   int stripes = 0;  // 0: the source's
   int threads = 1;
+  int line_stride = 1;
   std::uint64_t frames = 0;  // 0: kFrames and kTime_ns, both
   Decoder decoder = ReconstructOptions{}.decoder;
   bool json = false;
@@ -98,8 +99,9 @@ Status run(const Options& options, StopSignal& stop) {
   if (!loop) return loop.error();
   if (!*loop) return {};
   const FrameLoop& frames = **loop;
-  auto reconstructor = Reconstructor::create(frames.info().rig, frames.info().pattern,
-                                             {.decoder = options.decoder, .threads = options.threads});
+  auto reconstructor = Reconstructor::create(
+      frames.info().rig, frames.info().pattern,
+      {.decoder = options.decoder, .threads = options.threads, .line_stride = options.line_stride});
   if (!reconstructor) return reconstructor.error();
 
   Samples samples;
@@ -137,6 +139,7 @@ Status run(const Options& options, StopSignal& stop) {
                    {"stripes", static_cast<double>(frames.info().pattern.stripes())},
                    {"threads", static_cast<double>(options.threads)},
                    {"decoder", std::string(decoder_name(options.decoder))},
+                   {"line_stride", static_cast<double>(options.line_stride)},
                    {"distinct_frames", static_cast<double>(frames.size())}},
       .figures = {{"frame_ms", frame_ms},
                   {"cpu_ms", spread_of(samples.cpu)},
@@ -175,6 +178,7 @@ Command reconstruct_suite() {
             app.add_option("--frames", options->frames, "Timed frames (default 100 and 3 s at least)")
                 ->check(CLI::PositiveNumber);
             add_decoder_option(app, options->decoder);
+            add_half_lines_option(app, options->line_stride);
             add_json_option(app, options->json);
             return [options](StopSignal& stop) { return run(*options, stop); };
           }};

@@ -39,6 +39,7 @@ struct StreamConfig {
   bool fast = false;
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
+  bool half_lines = false;
   SurfaceBuilderOptions surface;
   TextureCodec texture = TextureCodec::kJpeg;
   std::optional<int>

@@ -310,6 +310,7 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.flag("fast", config.fast);
   reader.integer("threads", 1, 64, config.threads);
   reader.decoder("decoder", config.decoder);
+  reader.flag("half_lines", config.half_lines);
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);
   reader.one_of("texture", texture_codec_named, texture_codec_names(), config.texture);

@@ -47,9 +47,11 @@ struct Ladder::Step {
   bool takes() const { return output.readers() > 0 && (!output.due || output.due()); }
 };
 
-Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution)
+Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution,
+               int line_stride)
     : rig_(rig),
       pattern_(pattern),
+      line_stride_(line_stride),
       encode_(encode),
       depth_resolution_(depth_resolution),
       volume_(encode.volume) {}
@@ -60,10 +62,10 @@ Ladder::~Ladder() {
 
 void Ladder::add(Output output) {
   const Rung rung = output.rung;
-  steps_.emplace_back(
-      new Step{.output = std::move(output),
-               .options = rung_options(encode_, rung),
-               .encoder = FrameEncoder(rig_, pattern_, detail_of(rung) == Rung::kReduced ? 2 : 1)});
+  steps_.emplace_back(new Step{
+      .output = std::move(output),
+      .options = rung_options(encode_, rung),
+      .encoder = FrameEncoder(rig_, pattern_, line_stride_ * (detail_of(rung) == Rung::kReduced ? 2 : 1))});
 }
 
 bool Ladder::wanted() {

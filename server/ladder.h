@@ -30,8 +30,10 @@ EncodeOptions rung_options(const EncodeOptions& full, Rung rung);
 
 class Ladder final : public LowerRungs {
  public:
-  /// `encode` and `depth_resolution`: the stream's own, see PipelineOptions.
-  Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution);
+  /// `encode` and `depth_resolution`: the stream's own, see PipelineOptions. `line_stride`: as
+  /// FrameEncoder has it.
+  Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution,
+         int line_stride = 1);
   Ladder(const Ladder&) = delete;
   Ladder& operator=(const Ladder&) = delete;
   ~Ladder() override;
@@ -79,6 +81,7 @@ class Ladder final : public LowerRungs {
 
   const Rig rig_;
   const Pattern pattern_;
+  const int line_stride_;
   const EncodeOptions encode_;
   const double depth_resolution_;
   std::vector<std::unique_ptr<Step>> steps_;

@@ -19,6 +19,11 @@ void add_decoder_option(CLI::App& app, Decoder& decoder) {
       ->type_name("NAME");
 }
 
+void add_half_lines_option(CLI::App& app, int& line_stride) {
+  app.add_flag_callback(
+      "--half-lines", [&line_stride] { line_stride = 2; }, kHalfLinesHelp);
+}
+
 void add_surface_options(CLI::App& app, SurfaceBuilderOptions& options) {
   app.add_flag("--dense", options.dense,
                "A vertex at each pixel of a line, interpolated between boundaries of one surface");

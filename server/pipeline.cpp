@@ -63,7 +63,7 @@ class ThreadedPipeline final : public Pipeline {
         sinks_(std::move(sinks)),
         options_(options),
         reconstructor_(std::move(reconstructor)),
-        encoder_(source.info().rig, source.info().pattern),
+        encoder_(source.info().rig, source.info().pattern, options.reconstruct.line_stride),
         volume_(options.encode.volume) {}
 
   Status run() override {

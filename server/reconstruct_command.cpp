@@ -27,6 +27,7 @@ struct Options {
   std::string take;
   std::string out;
   int threads = 1;
+  int line_stride = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
   SurfaceBuilderOptions surface;
   bool json = false;
@@ -119,9 +120,11 @@ Status run(const Options& options, StopSignal& stop) {
   const bool is_uri = options.take.starts_with("take:") || options.take.starts_with("sim:");
   auto source = open_source(is_uri ? options.take : "take:" + options.take, {});
   if (!source) return source.error();
-  auto reconstructor = Reconstructor::create(
-      (*source)->info().rig, (*source)->info().pattern,
-      {.decoder = options.decoder, .threads = options.threads, .surface = options.surface});
+  auto reconstructor = Reconstructor::create((*source)->info().rig, (*source)->info().pattern,
+                                             {.decoder = options.decoder,
+                                              .threads = options.threads,
+                                              .line_stride = options.line_stride,
+                                              .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
   std::error_code failed;
   const bool made = fs::create_directories(options.out, failed);
@@ -193,6 +196,7 @@ Command reconstruct_command() {
             ->check(CLI::Range(1, 64))
             ->capture_default_str();
         add_decoder_option(app, options->decoder);
+        add_half_lines_option(app, options->line_stride);
         add_surface_options(app, options->surface);
         app.add_flag("--json", options->json, "Print the summary as JSON");
         app.footer(

@@ -32,7 +32,7 @@ struct Flags {
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<double> bound_px, deadline_ms, texture_db;
   std::optional<std::uint64_t> frames;
-  bool loop = false, fast = false, dense = false;
+  bool loop = false, fast = false, half_lines = false, dense = false;
   CameraOptions camera;
 };
 
@@ -64,6 +64,7 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   set(flags.draco_speed, config.draco_speed);
   if (flags.ladder) config.ladder = parse_ladder(*flags.ladder).value();  // the option is checked
   set(flags.fill_holes, config.surface.fill_holes);
+  config.half_lines = config.half_lines || flags.half_lines;
   config.surface.dense = config.surface.dense || flags.dense;
   if (flags.frames) config.frames = flags.frames;
   config.loop = config.loop || flags.loop;
@@ -181,6 +182,7 @@ Command serve_command() {
                "paper (as published)")
             ->check(CLI::IsMember({"ordered", "quick", "paper"}))
             ->type_name("NAME");
+        app.add_flag("--half-lines", f->half_lines, kHalfLinesHelp);
         app.add_flag("--dense", f->dense,
                      "A vertex at each pixel of a line, interpolated between boundaries of one surface");
         app.add_option("--fill-holes", f->fill_holes,

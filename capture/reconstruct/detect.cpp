@@ -75,20 +75,18 @@ void Detector::boundaries_of_line(int line, float scale, LineScratch& scratch, D
   }
 }
 
-void Detector::detect(const CapturedFrame& frame, WorkerPool& pool, Detection& out) {
-  const View8 slide = frame.slide_field();
-  const View8 complement = frame.complement_field();
-  out.width = slide.width;
-  out.lines = slide.height;
+void Detector::detect(const DetectionLines& rows, WorkerPool& pool, Detection& out) {
+  out.width = rows.own.width;
+  out.lines = rows.own.height;
   const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
-  if (slide.empty() || complement.empty()) {  // an interlaced picture of one row has no complement
+  if (rows.own.empty() || rows.other.empty()) {  // an interlaced picture of one row has no complement
     out.line_start.assign(static_cast<std::size_t>(out.lines) + 1, 0);
     out.boundaries.clear();
     out.colours.assign(pixels, 0);
     return;
   }
-  differencer_.difference(frame, pool, image_);
-  const float scale = 255.F / std::max(differencer_.largest(frame, pool), 1.F);
+  differencer_.difference(rows, pool, image_);
+  const float scale = 255.F / std::max(differencer_.largest(rows, pool), 1.F);
 
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   for (LineScratch& scratch : scratch_) {  // a worker without a line leaves its own as it was

@@ -32,7 +32,7 @@ struct Boundary {
   Primary right = 0;
 };
 
-/// What one frame shows. Line l of an interlaced frame lies at camera row 2 l, of a progressive one at row l.
+/// What one frame shows, on its detection lines.
 struct Detection {
   int width = 0;
   int lines = 0;
@@ -49,7 +49,7 @@ class Detector {
 
   /// Low-pass, colour matrix (Eq. 3), normalisation, difference, zero crossings (Eq. 4), colours (Eq. 5).
   /// `out` is overwritten; its memory is reused.
-  void detect(const CapturedFrame& frame, WorkerPool& pool, Detection& out);
+  void detect(const DetectionLines& rows, WorkerPool& pool, Detection& out);
 
  private:
   struct Crossing {

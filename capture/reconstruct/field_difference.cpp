@@ -37,21 +37,6 @@ float estimate_noise(const DifferenceImage& image) {
       });
 }
 
-struct Rows {
-  View8 own, other;
-};
-
-/// Lines lie at the even rows of an interlaced picture, whichever field was first.
-Rows rows_of(const CapturedFrame& frame) {
-  if (frame.scan == Scan::kProgressive) return {frame.picture.view(), frame.complement.view()};
-  return {frame.picture.view().field(0), frame.picture.view().field(1)};
-}
-
-/// Then the rows' difference has the other sign.
-bool complement_on_even_rows(const CapturedFrame& frame) {
-  return frame.scan == Scan::kInterlaced && frame.field_order == FieldOrder::kBottom;
-}
-
 /// `out` is `row` of RGB where columns are `share` of `motion_px` further on, its ends beyond them.
 void shift_row(const std::uint8_t* row, const float* motion_px, float share, int width, std::uint8_t* out) {
   std::copy_n(row, 3 * static_cast<std::size_t>(width), out);  // most holds still on most lines
@@ -79,12 +64,11 @@ Differencer::Differencer(const std::array<double, 9>& colour_matrix) {
   weights_.luma = {0.299F * kScale, 0.587F * kScale, 0.114F * kScale};  // Rec. 601, of the captured colours
 }
 
-void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int end, Scratch& scratch,
+void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int end, Scratch& scratch,
                                       DifferenceImage& out) const {
   const RowKernels& kernels = row_kernels();
-  const Rows rows = rows_of(frame);
   PlaneWeights weights = weights_;
-  if (complement_on_even_rows(frame))
+  if (!rows.shows_slide)
     for (float& w : weights.colour) w = -w;
   const int samples = 3 * out.width;
   const auto row = static_cast<std::size_t>(samples);
@@ -97,14 +81,11 @@ void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int
   };
   scratch.shifted.resize(3 * row);
   scratch.motion.resize(static_cast<std::size_t>(out.width));
-  const float own_share = complement_on_even_rows(frame) ? 0.5F : -0.5F;
+  const float own_share = -0.5F * static_cast<float>(rows.sign());
   const auto read = [&](int line) {
     if (line < 0 || line >= out.lines) return;
-    // An interlaced picture's other rows lie half a line off: their mean is what they show at this row.
-    const int before = frame.scan == Scan::kInterlaced ? line - 1 : line;
-    std::array<const std::uint8_t*, 3> read_rows{rows.own.row(line),
-                                                 rows.other.row(std::clamp(before, 0, rows.other.height - 1)),
-                                                 rows.other.row(std::min(line, rows.other.height - 1))};
+    std::array<const std::uint8_t*, 3> read_rows{rows.own.row(line), rows.other_above(line),
+                                                 rows.other_below(line)};
     if (out.motion.line_moves(line)) {
       out.motion.of_columns(line, out.width, scratch.motion.data());
       for (std::size_t i = 0; i < read_rows.size(); ++i) {
@@ -134,34 +115,33 @@ void Differencer::difference_of_lines(const CapturedFrame& frame, int begin, int
   }
 }
 
-void Differencer::difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
+void Differencer::difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out) {
   out.motion.moves.clear();
-  difference_of_all(frame, pool, out);
+  difference_of_all(rows, pool, out);
 }
 
-void Differencer::aligned_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
-  motion_finder_.find(frame.slide_field(), frame.complement_field(), pool, out.motion);
-  difference_of_all(frame, pool, out);
+void Differencer::aligned_difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out) {
+  motion_finder_.find(rows.slide(), rows.complement(), pool, out.motion);
+  difference_of_all(rows, pool, out);
 }
 
-void Differencer::difference_of_all(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out) {
-  const View8 lines = rows_of(frame).own;
-  out.width = lines.width;
-  out.lines = lines.height;
+void Differencer::difference_of_all(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out) {
+  out.width = rows.own.width;
+  out.lines = rows.own.height;
   const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
   out.values.resize(3 * pixels);
   out.white.resize(pixels);
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
-    difference_of_lines(frame, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
+    difference_of_lines(rows, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
   });
   out.noise = estimate_noise(out);
 }
 
-float Differencer::largest(const CapturedFrame& frame, WorkerPool& pool) {
+float Differencer::largest(const DetectionLines& rows, WorkerPool& pool) {
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
   for (Scratch& s : scratch_) s.largest = 0;
-  for (const View8& field : {frame.slide_field(), frame.complement_field()}) {
+  for (const View8& field : {rows.slide(), rows.complement()}) {
     pool.for_ranges(field.height, [&](int begin, int end, int worker) {
       float& largest = scratch_[static_cast<std::size_t>(worker)].largest;
       for (int line = begin; line < end; ++line)

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/field_motion.h"
 #include "capture/reconstruct/rows.h"
-#include "capture/source/field_source.h"
 
 namespace relievo {
 
@@ -59,13 +59,13 @@ class Differencer {
   explicit Differencer(const std::array<double, 9>& colour_matrix);
 
   /// Low-pass, colour matrix (Eq. 3) and difference. `out` is overwritten; its memory is reused.
-  void difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+  void difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out);
 
   /// The same, of the fields where each shows its stripes half way between both exposures.
-  void aligned_difference(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+  void aligned_difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out);
 
   /// Of the calibrated fields, low-passed along the line, all channels: 255 of the paper's normalised scale.
-  float largest(const CapturedFrame& frame, WorkerPool& pool);
+  float largest(const DetectionLines& rows, WorkerPool& pool);
 
  private:
   struct Scratch {
@@ -74,10 +74,10 @@ class Differencer {
     std::vector<std::uint8_t> shifted;  // rows of the fields
     float largest = 0;
   };
-  void difference_of_lines(const CapturedFrame& frame, int begin, int end, Scratch& scratch,
+  void difference_of_lines(const DetectionLines& rows, int begin, int end, Scratch& scratch,
                            DifferenceImage& out) const;
 
-  void difference_of_all(const CapturedFrame& frame, WorkerPool& pool, DifferenceImage& out);
+  void difference_of_all(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out);
 
   std::array<float, 9> matrix_;
   PlaneWeights weights_;

@@ -26,22 +26,18 @@ QuickDifferencer::QuickDifferencer(const std::array<double, 9>& colour_matrix) {
   weights_.luma = {weight_of(0.299), weight_of(0.587), weight_of(0.114)};  // Rec. 601
 }
 
-void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin, int end,
+void QuickDifferencer::difference_of_lines(const DetectionLines& lines, int begin, int end,
                                            std::vector<std::int16_t>& scratch, QuickImage& out) const {
   const RowKernels& rows = row_kernels();
   const QuickKernels& kernels = quick_kernels();
-  const bool interlaced = frame.scan == Scan::kInterlaced;
-  // Lines lie at the even rows of an interlaced picture, whichever field was first.
-  const View8 own = interlaced ? frame.picture.view().field(0) : frame.picture.view();
-  const View8 other = interlaced ? frame.picture.view().field(1) : frame.complement.view();
-  if (other.empty()) {  // an interlaced picture of one row has no complement
+  if (lines.other.empty()) {  // an interlaced picture of one row has no complement
     std::fill(out.planes.begin(), out.planes.end(), std::int16_t{0});
     std::fill(out.luma.begin(), out.luma.end(), std::int16_t{0});
     std::fill(out.codes.begin(), out.codes.end(), std::uint8_t{0});
     return;
   }
   QuickWeights weights = weights_;
-  if (interlaced && frame.field_order == FieldOrder::kBottom)  // the complement is on the even rows
+  if (!lines.shows_slide)
     for (std::int16_t& w : weights.colour) w = static_cast<std::int16_t>(-std::max<int>(w, -32767));
   const int samples = 3 * out.width;
   const auto row = static_cast<std::size_t>(samples);
@@ -54,10 +50,8 @@ void QuickDifferencer::difference_of_lines(const CapturedFrame& frame, int begin
   };
   const auto read = [&](int line) {
     if (line < 0 || line >= out.lines) return;
-    // An interlaced picture's other rows lie half a line off: their mean is what they show at this row.
-    const int before = interlaced ? line - 1 : line;
-    rows.combine_fields(own.row(line), other.row(std::clamp(before, 0, other.height - 1)),
-                        other.row(std::min(line, other.height - 1)), samples, fields_at(line));
+    rows.combine_fields(lines.own.row(line), lines.other_above(line), lines.other_below(line), samples,
+                        fields_at(line));
   };
   const auto doubt = static_cast<std::int16_t>(std::min(out.doubt(), 16383.F));
   std::int16_t* across = scratch_row(6);
@@ -91,10 +85,9 @@ float QuickDifferencer::estimate_noise(const QuickImage& image) {
       });
 }
 
-void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, QuickImage& out) {
-  const View8 slide = frame.scan == Scan::kInterlaced ? frame.picture.view().field(0) : frame.picture.view();
-  out.width = slide.width;
-  out.lines = slide.height;
+void QuickDifferencer::start(const DetectionLines& lines, WorkerPool& pool, QuickImage& out) {
+  out.width = lines.own.width;
+  out.lines = lines.own.height;
   out.stride = (out.width + 15) / 16 * 16 + QuickImage::kPadding;
   const std::size_t places = static_cast<std::size_t>(out.stride) * static_cast<std::size_t>(out.lines);
   out.planes.resize(3 * places);
@@ -104,7 +97,7 @@ void QuickDifferencer::start(const CapturedFrame& frame, WorkerPool& pool, Quick
   if (noise_ < 0) {
     out.noise = 0;
     pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
-      difference_of_lines(frame, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
+      difference_of_lines(lines, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
     });
     noise_ = estimate_noise(out);
   }

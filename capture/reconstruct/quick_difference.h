@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/quick_rows.h"
-#include "capture/source/field_source.h"
 
 namespace relievo {
 
@@ -48,12 +48,12 @@ class QuickDifferencer {
   /// `out` is overwritten; its memory is reused. Calls visit(begin, end, worker) for lines as soon as they
   /// are there, and the noise with them: that of the frame before, but for the first one's.
   template <typename Visit>
-  void difference(const CapturedFrame& frame, WorkerPool& pool, QuickImage& out, const Visit& visit) {
-    start(frame, pool, out);
+  void difference(const DetectionLines& lines, WorkerPool& pool, QuickImage& out, const Visit& visit) {
+    start(lines, pool, out);
     pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
       for (int first = begin; first < end; first += kBlock) {
         const int last = first + kBlock < end ? first + kBlock : end;
-        difference_of_lines(frame, first, last, scratch_[static_cast<std::size_t>(worker)], out);
+        difference_of_lines(lines, first, last, scratch_[static_cast<std::size_t>(worker)], out);
         visit(first, last, worker);
       }
     });
@@ -63,10 +63,10 @@ class QuickDifferencer {
  private:
   static constexpr int kBlock = 16;  // lines that stay in the processor's own memory
 
-  void start(const CapturedFrame& frame, WorkerPool& pool, QuickImage& out);
+  void start(const DetectionLines& lines, WorkerPool& pool, QuickImage& out);
   static float estimate_noise(const QuickImage& image);
-  void difference_of_lines(const CapturedFrame& frame, int begin, int end, std::vector<std::int16_t>& scratch,
-                           QuickImage& out) const;
+  void difference_of_lines(const DetectionLines& lines, int begin, int end,
+                           std::vector<std::int16_t>& scratch, QuickImage& out) const;
 
   QuickWeights weights_;
   float noise_ = -1;                                // of the last frame; below 0: there was none

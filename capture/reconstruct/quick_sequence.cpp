@@ -161,15 +161,15 @@ std::uint32_t QuickSequence::edges_of_line(const QuickImage& image, int line, Sc
   return static_cast<std::uint32_t>(count);
 }
 
-std::size_t QuickSequence::find_edges(const CapturedFrame& frame, QuickDifferencer& differencer,
+std::size_t QuickSequence::find_edges(const DetectionLines& rows, QuickDifferencer& differencer,
                                       WorkerPool& pool, QuickImage& image) {
-  const View8 rows = frame.scan == Scan::kInterlaced ? frame.picture.view().field(0) : frame.picture.view();
-  const auto lines = static_cast<std::size_t>(rows.height);
+  const int width = rows.own.width;
+  const auto lines = static_cast<std::size_t>(rows.own.height);
   scratch_.resize(static_cast<std::size_t>(pool.threads()));
-  most_on_line_ = static_cast<std::size_t>(rows.width) / QuickKernels::kMerge_px + 2;
+  most_on_line_ = static_cast<std::size_t>(width) / QuickKernels::kMerge_px + 2;
   for (Scratch& s : scratch_) {
-    s.crossings.resize(static_cast<std::size_t>(rows.width) + QuickKernels::kGathered);
-    s.places.resize(static_cast<std::size_t>(rows.width) + QuickKernels::kGathered);
+    s.crossings.resize(static_cast<std::size_t>(width) + QuickKernels::kGathered);
+    s.places.resize(static_cast<std::size_t>(width) + QuickKernels::kGathered);
     s.beside.resize(most_on_line_);
   }
   edges_.resize(most_on_line_ * lines);
@@ -177,7 +177,7 @@ std::size_t QuickSequence::find_edges(const CapturedFrame& frame, QuickDifferenc
   still_.resize(most_on_line_ * lines);
   settled_.resize(most_on_line_ * lines);
   line_start_.assign(lines + 1, 0);
-  differencer.difference(frame, pool, image, [&](int begin, int end, int worker) {
+  differencer.difference(rows, pool, image, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line)
       line_start_[static_cast<std::size_t>(line) + 1] = edges_of_line(image, line, scratch);

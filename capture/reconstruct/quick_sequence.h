@@ -54,8 +54,8 @@ class QuickSequence {
  public:
   explicit QuickSequence(const Pattern& pattern);
 
-  /// Makes `image` of `frame` and finds its edges, as EdgeFinder::find(); returns how many.
-  std::size_t find_edges(const CapturedFrame& frame, QuickDifferencer& differencer, WorkerPool& pool,
+  /// Makes `image` of a frame and finds its edges, as EdgeFinder::find(); returns how many.
+  std::size_t find_edges(const DetectionLines& rows, QuickDifferencer& differencer, WorkerPool& pool,
                          QuickImage& image);
 
   /// Of the edges found last in `image`.

@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "base/time.h"
 #include "capture/reconstruct/depth_range.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/field_pairs.h"
 #include "capture/reconstruct/half_way.h"
 #include "capture/reconstruct/slide_decoder.h"
@@ -22,13 +23,6 @@ namespace {
 
 constexpr int kDepthLines = 8;           // one line in so many tells the range of depths
 constexpr std::size_t kSpareFrames = 4;  // a stage's queue and what its neighbours hold
-
-int line_step(const Rig& rig) {
-  return rig.scan == Scan::kInterlaced ? 2 : 1;
-}
-int line_count(const Rig& rig) {
-  return (rig.camera.height + line_step(rig) - 1) / line_step(rig);
-}
 
 Status check_fits(const CapturedFrame& frame, const Rig& rig) {
   const std::string name = "frame " + std::to_string(frame.number) + " is ";
@@ -52,6 +46,16 @@ Status check_fits(const CapturedFrame& frame, const Rig& rig) {
     if (picture->channels() != 3) {
       return Error{name + "of " + std::to_string(picture->channels()) + " channels instead of three: RGB"};
     }
+  }
+  return {};
+}
+
+Status check_lines(const Rig& rig, int stride) {
+  if (stride != 1 && stride != 2) return Error{"line_stride is 1 or 2, not " + std::to_string(stride)};
+  if (stride == 2 && rig.scan == Scan::kInterlaced) {
+    return Error{
+        "half_lines leaves out every second row of a progressive camera; a field of this interlaced one has "
+        "no others: do without it"};
   }
   return {};
 }
@@ -97,13 +101,14 @@ struct Reconstructor::State {
         steps(p, r),
         pairs(p.scheme, r),
         decoder(r, p, o),
-        triangulator(r, p, line_count(r), line_step(r)),
-        depths(p.boundaries(), r.camera.width, line_count(r), kDepthLines),
-        white_texture(r.colour_matrix, o.decoder == Decoder::kQuick),
-        half_way(p.boundaries(), line_count(r)),
-        surface_builder(r, line_step(r), o.surface) {
-    decoded.reset(p.boundaries(), line_count(r));
-    if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), line_count(r));
+        lines(line_count(r, o.line_stride)),
+        triangulator(r, p, lines, line_step_px(r.scan, o.line_stride)),
+        depths(p.boundaries(), r.camera.width, lines, kDepthLines),
+        white_texture(r.colour_matrix, o.decoder == Decoder::kQuick, o.line_stride),
+        half_way(p.boundaries(), lines),
+        surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface) {
+    decoded.reset(p.boundaries(), lines);
+    if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), lines);
     spare.reserve(kSpareFrames);
   }
 
@@ -114,6 +119,7 @@ struct Reconstructor::State {
   StepKeeper steps;
   FieldPairs pairs;
   SlideDecoder decoder;
+  int lines;  // of a frame
   Triangulator triangulator;
   DepthRange depths;
   WhiteTexture white_texture;
@@ -142,7 +148,7 @@ struct Reconstructor::State {
 void Reconstructor::State::forget() {
   pairs.forget();
   decoder = SlideDecoder(rig, pattern, options);
-  half_way = HalfWay(pattern.boundaries(), line_count(rig));
+  half_way = HalfWay(pattern.boundaries(), lines);
 }
 
 /// Whatever it holds is overwritten.
@@ -216,6 +222,7 @@ Result<Reconstructor> Reconstructor::create(const Rig& rig, const Pattern& patte
                  " slides; two frames in a row decode one or two: use a pattern with slides: 2"};
   }
   if (pattern.stripes() < 2) return Error{"the pattern has no boundary: it needs two stripes or more"};
+  if (auto status = check_lines(rig, options.line_stride); !status) return status.error();
   if (pattern.scheme == Scheme::kOneSlide && options.decoder == Decoder::kPaper) {
     return Error{
         "the paper's decoder reads each code by itself, and those of scheme one-slide repeat: use the "

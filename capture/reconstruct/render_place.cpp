@@ -56,15 +56,11 @@ struct Sharp {
 };
 
 /// The first RenderedRow::kRead from `first` on.
-Sharp read(const CapturedFrame& frame, int line, int first) {
-  const bool interlaced = frame.scan == Scan::kInterlaced;
-  const View8 own = interlaced ? frame.picture.view().field(0) : frame.picture.view();
-  const View8 other = interlaced ? frame.picture.view().field(1) : frame.complement.view();
-  const float sign = interlaced && frame.field_order == FieldOrder::kBottom ? -1.F : 1.F;
-  const int before = std::max(0, interlaced ? line - 1 : line);
-  const std::uint8_t* here = own.row(line) + 3 * first;
-  const std::uint8_t* above = other.row(std::min(before, other.height - 1)) + 3 * first;
-  const std::uint8_t* below = other.row(std::min(line, other.height - 1)) + 3 * first;
+Sharp read(const DetectionLines& rows, int line, int first) {
+  const auto sign = static_cast<float>(rows.sign());
+  const std::uint8_t* here = rows.own.row(line) + 3 * first;
+  const std::uint8_t* above = rows.other_above(line) + 3 * first;
+  const std::uint8_t* below = rows.other_below(line) + 3 * first;
   Sharp out;
   for (std::size_t i = 0; i < RenderedRow::kRead; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -97,8 +93,8 @@ RenderPlacer::RenderPlacer(const std::array<double, 9>& colour_matrix)
 bool RenderPlacer::look(const RenderView& view, int line, int boundary, float column_px, Found& out) const {
   constexpr int kColumnsBefore = RenderedRow::kReach_px + RenderedRow::kBlurReach;
   const int first = static_cast<int>(column_px + 0.5F) - kColumnsBefore;
-  if (first < 0 || first + RenderedRow::kRead > view.frame.picture.width()) return false;
-  const Sharp sharp = read(view.frame, line, first);
+  if (first < 0 || first + RenderedRow::kRead > view.rows.own.width) return false;
+  const Sharp sharp = read(view.rows, line, first);
 
   // The nearest on the line, which may be another surface's, and those that follow in the pattern.
   const Place* here = view.places.line(line);

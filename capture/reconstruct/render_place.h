@@ -12,6 +12,7 @@
 
 #include "base/parallel.h"
 #include "base/pattern.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/place_grid.h"
@@ -19,13 +20,12 @@
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/render_rows.h"
 #include "capture/reconstruct/sequence.h"
-#include "capture/source/field_source.h"
 
 namespace relievo {
 
 /// The frame's places, all of one instant, and what is known of how it shows them.
 struct RenderView {
-  const CapturedFrame& frame;
+  const DetectionLines& rows;
   const std::vector<std::array<Primary, 2>>& colours;  // of each boundary, left and right
   PlaceGrid& places;                                   // follows what changes
   const MovingPlaces& moving;

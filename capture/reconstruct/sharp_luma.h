@@ -4,15 +4,14 @@
 // the boundary along; the ratio of difference to sum, taken pixel by pixel, stays where the boundary is.
 #pragma once
 
-#include "base/image.h"
-#include "capture/source/field_source.h"
+#include "capture/reconstruct/detection_lines.h"
 
 namespace relievo {
 
 /// Refers to the frame it was made of. Any thread.
 class SharpLuma {
  public:
-  explicit SharpLuma(const CapturedFrame& frame);
+  explicit SharpLuma(const DetectionLines& rows) : rows_(rows) {}
 
   /// Slide minus complement over their sum plus `dark`, at columns [first, first + count) of `line` (as
   /// DifferenceImage's) and, with half its weight each, of the lines above and below. All must be inside the
@@ -20,9 +19,7 @@ class SharpLuma {
   void ratio(int line, int first, int count, float dark, float* ratio) const;
 
  private:
-  View8 own_, other_;
-  bool interlaced_;
-  float sign_;  // -1: the even rows show the complement
+  DetectionLines rows_;
 };
 
 }  // namespace relievo

@@ -55,6 +55,7 @@ struct Observation {
 struct SlideDecoder::State {
   State(const Rig& rig, const Pattern& p, const ReconstructOptions& options)
       : pattern(p),
+        line_stride(options.line_stride),
         field_ns(0.5e9 / rig.frame_rate),
         paper(options.decoder == Decoder::kPaper),
         quick(options.decoder == Decoder::kQuick),
@@ -67,19 +68,15 @@ struct SlideDecoder::State {
         front_edges(rig),
         refiner(rig.colour_matrix),
         quick_placer(rig.colour_matrix),
-        continuity(p.boundaries(),
-                   rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
-        readmission(p.boundaries(),
-                    rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
-        instant(p.boundaries(),
-                rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height,
-                1e9 / rig.frame_rate),
+        continuity(p.boundaries(), line_count(rig, options.line_stride)),
+        readmission(p.boundaries(), line_count(rig, options.line_stride)),
+        instant(p.boundaries(), line_count(rig, options.line_stride), 1e9 / rig.frame_rate),
         field_placer(rig.colour_matrix, p.boundaries()),
-        growth(rig.colour_matrix, p.boundaries(),
-               rig.scan == Scan::kInterlaced ? (rig.camera.height + 1) / 2 : rig.camera.height),
+        growth(rig.colour_matrix, p.boundaries(), line_count(rig, options.line_stride)),
         render_placer(rig.colour_matrix) {}
 
   Pattern pattern;
+  int line_stride;
   double field_ns;  // between a slide's exposure and its complement's
   bool paper, quick;
   Detector detector;
@@ -137,7 +134,7 @@ struct SlideDecoder::State {
   void decode_quickly(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report,
                       DecodedGrid& out);
   void match_in_order(SlideOrder predicted, WorkerPool& pool);
-  void look_again(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report);
+  void look_again(const DetectionLines& rows, WorkerPool& pool, ReconstructReport& report);
   std::size_t fill(WorkerPool& pool, DecodedGrid& out) const;
 };
 
@@ -227,8 +224,8 @@ void SlideDecoder::State::match_quickly(SlideOrder predicted, WorkerPool& pool) 
 
 void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& pool,
                                          ReconstructReport& report, DecodedGrid& out) {
-  const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();
-  report.filters.duplicate = quick_placer.place({newer.quick, rows, quick_sequence.shown_colours(order)},
+  const DetectionLines rows(pair, line_stride);
+  report.filters.duplicate = quick_placer.place({newer.quick, rows.own, quick_sequence.shown_colours(order)},
                                                 quick_sequence, pool, consistency);
   const ConsistencyCounts checked = consistency.settle(pool);
   const ContinuityCounts by_before = continuity.check(quick_sequence, consistency, pool);
@@ -252,9 +249,10 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
 }
 
 /// What is still unsure after all, against the picture itself, and rims that look like boundaries.
-void SlideDecoder::State::look_again(const CapturedFrame& pair, WorkerPool& pool, ReconstructReport& report) {
+void SlideDecoder::State::look_again(const DetectionLines& rows, WorkerPool& pool,
+                                     ReconstructReport& report) {
   const auto& shown = sequence.shown_colours(order);
-  const RenderCounts rendered = render_placer.place({.frame = pair,
+  const RenderCounts rendered = render_placer.place({.rows = rows,
                                                      .colours = shown,
                                                      .places = places,
                                                      .moving = moving,
@@ -309,13 +307,14 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
   State& s = *state_;
   std::swap(s.newer, s.previous);
   s.newer.time_ns = pair.time_ns;
+  const DetectionLines rows(pair, s.line_stride);
   if (s.paper) {
-    s.detector.detect(pair, pool, s.newer.detection);
+    s.detector.detect(rows, pool, s.newer.detection);
     report.boundaries = s.newer.detection.boundaries.size();
   } else if (s.quick) {
-    report.boundaries = s.quick_sequence.find_edges(pair, s.quick_differencer, pool, s.newer.quick);
+    report.boundaries = s.quick_sequence.find_edges(rows, s.quick_differencer, pool, s.newer.quick);
   } else {
-    s.differencer.aligned_difference(pair, pool, s.newer.difference);
+    s.differencer.aligned_difference(rows, pool, s.newer.difference);
     s.weak_signal.average(pool, s.newer.difference);
     s.edge_finder.find(s.newer.difference, pool, s.edges);
     report.boundaries = s.edges.edges.size();
@@ -352,8 +351,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   if (s.paper) {
     report.matched = s.match.valid;
   } else {
-    // A row a line, whichever of the two fields that is.
-    const View8 rows = pair.scan == Scan::kInterlaced ? pair.picture.view().field(0) : pair.picture.view();
+    const DetectionLines rows(pair, s.line_stride);
     const std::size_t traced =
         s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
     report.filters.traced = traced;
@@ -362,8 +360,8 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     std::swap(s.before_px, s.result.seen_px);
     s.before_motion = s.newer.difference.motion;
     s.before_ns = pair.time_ns;
-    const SharpLuma sharp(pair);
-    s.refiner.refine(s.newer.difference, rows, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
+    const SharpLuma sharp(rows);
+    s.refiner.refine(s.newer.difference, rows.own, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
                      &sharp);
     const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
     const SequenceCounts& counts = s.result.counts;
@@ -372,7 +370,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.filters.rejected = checked.rejected;
     report.filters.moved = checked.moved;
     s.recovery.recover({.shown = s.newer.difference,
-                        .slide = rows,
+                        .slide = rows.own,
                         .shown_colours = s.sequence.shown_colours(s.order),
                         .other = s.have_older ? &s.older.difference : nullptr,
                         .other_colours = s.sequence.shown_colours(other(s.order))},
@@ -389,10 +387,10 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
       s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
     s.moving.find(s.newer.difference.width, s.result, s.edges);
     const bool first_slide = s.pattern.slides == 1 || s.order == SlideOrder::kNewerIsFirst;
-    const SlideFieldView field{pair.slide_field(),         s.sequence.shown_colours(s.order),
-                               &s.newer.difference.motion, first_slide ? 0 : 1,
-                               s.newer.difference.noise,   &s.moving,
-                               s.refiner.ambient()};
+    const SlideFieldView field{
+        rows.slide(),        s.sequence.shown_colours(s.order), &s.newer.difference.motion,
+        first_slide ? 0 : 1, s.newer.difference.noise,          &s.moving,
+        s.refiner.ambient()};
     s.field_placer.place(field, s.result, pool, s.edges);
     const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
     report.filters.recovered += grown;
@@ -407,7 +405,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.filters.moved += weighed.moved;
     // Without an earlier frame under the slide nothing tells what moves.
     // Of speckle no picture can be told.
-    if (s.have_same && !s.moving.much() && !s.consistency.speckled()) s.look_again(pair, pool, report);
+    if (s.have_same && !s.moving.much() && !s.consistency.speckled()) s.look_again(rows, pool, report);
   }
   report.filters.duplicate = s.fill(pool, out);
   return true;

@@ -108,8 +108,8 @@ const Loops& loops() {
 
 }  // namespace
 
-WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly)
-    : quickly_(quickly), every_(quickly ? kEveryQuickly : kEvery) {
+WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly, int line_stride)
+    : line_stride_(line_stride), quickly_(quickly), every_(quickly ? kEveryQuickly : kEvery) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
   for (std::size_t i = 0; i < 9; ++i) {
@@ -123,8 +123,9 @@ WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quic
 /// side.
 void WhiteTexture::measure_gains(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool) {
   for (RankedSample& r : ratios_) r.reset(pool.threads());
+  const DetectionLines rows(frame, line_stride_);
   pool.for_ranges(grid.lines(), [&](int begin, int end, int worker) {
-    for (int line = begin; line < end; ++line) measure_ratios(frame, grid, line, worker);
+    for (int line = begin; line < end; ++line) measure_ratios(rows, grid, line, worker);
   });
   level_ = false;
   for (std::size_t c = 0; c < 3; ++c) {
@@ -146,19 +147,18 @@ void WhiteTexture::measure_gains(const CapturedFrame& frame, const DecodedGrid& 
 }
 
 /// Of every every_-th boundary on a line.
-void WhiteTexture::measure_ratios(const CapturedFrame& frame, const DecodedGrid& grid, int line, int worker) {
-  const bool interlaced = frame.scan == Scan::kInterlaced;
-  const int y = interlaced ? 2 * line : line;
-  if (y + 1 >= frame.picture.height()) return;
+void WhiteTexture::measure_ratios(const DetectionLines& rows, const DecodedGrid& grid, int line, int worker) {
+  const View8 slides = rows.slide();
+  const View8 complements = rows.complement();
+  if (line >= std::min(slides.height, complements.height)) return;
   const float* column_px = grid.column_px(line);
   const std::uint8_t* interpolated = grid.interpolated(line);
   for (int b = every_ - 1 - (kEachLine * line + every_ - 1) % every_; b < grid.boundaries(); b += every_) {
     if (!(column_px[b] >= 0) || (interpolated != nullptr && interpolated[b] != 0)) continue;
     const int x = static_cast<int>(column_px[b] + 0.5F);
-    if (x < kBeside_px || x + kBeside_px >= frame.picture.width()) continue;
-    const std::uint8_t* slide = frame.picture.row(y);
-    const std::uint8_t* complement = interlaced ? frame.picture.row(y + 1) : frame.complement.row(y);
-    if (interlaced && first_row(frame.field_order, 0) == 1) std::swap(slide, complement);
+    if (x < kBeside_px || x + kBeside_px >= slides.width) continue;
+    const std::uint8_t* slide = slides.row(line);
+    const std::uint8_t* complement = complements.row(line);
     std::array<float, 3> slide_step{};
     std::array<float, 3> complement_step{};
     for (std::size_t c = 0; c < 3; ++c) {

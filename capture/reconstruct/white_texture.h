@@ -12,6 +12,7 @@
 #include "base/image.h"
 #include "base/parallel.h"
 #include "capture/reconstruct/decoded_grid.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/ranked_sample.h"
 #include "capture/source/field_source.h"
 
@@ -21,8 +22,9 @@ namespace relievo {
 class WhiteTexture {
  public:
   /// `colour_matrix` is M of Eq. 1. `quickly`: by fewer boundaries, and where nothing is to be brought level
-  /// by adding the fields.
-  explicit WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly = false);
+  /// by adding the fields. `line_stride` is that of the grids, as in ReconstructOptions.
+  explicit WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly = false,
+                        int line_stride = 1);
 
   /// RGB, the size of the camera's picture; values saturate at 255. Across each boundary of `grid`, what the
   /// slide loses of a primary its complement gains, so they tell how bright one is by the other. `out` is
@@ -39,7 +41,7 @@ class WhiteTexture {
     std::vector<std::uint8_t> differences;   // as weave_rows() asks for
   };
   void measure_gains(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool);
-  void measure_ratios(const CapturedFrame& frame, const DecodedGrid& grid, int line, int worker);
+  void measure_ratios(const DetectionLines& rows, const DecodedGrid& grid, int line, int worker);
   void level(float* row, int width) const;
   void progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
   void interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
@@ -50,6 +52,7 @@ class WhiteTexture {
       levelled_{};  // of captured colours, those of the complement made as bright as the slide's
   std::array<float, 3> gains_{1, 1, 1};
   bool level_ = false;
+  int line_stride_;
   bool quickly_;
   int every_;  // boundaries looked at
   std::vector<Scratch> scratch_;

@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "capture/evaluate/score.h"
 #include "tests/support/striped_scene.h"
@@ -229,6 +231,39 @@ TEST_P(ReconstructorTest, AFrameThatDoesNotFitTheRigSaysHow) {
   // And it goes on with frames that do.
   add(reconstructor, draw_frame(scene, 11));
   EXPECT_TRUE(add(reconstructor, draw_frame(scene, 12)));
+}
+
+// A line's own row alone tells where its vertices are: they lie where those of all lines lie on that row.
+TEST_P(ReconstructorTest, HalfOfTheLinesAreEverySecondRow) {
+  const StripedScene scene = test::striped_scene(scan());
+  if (scan() == Scan::kInterlaced) {
+    const auto made = Reconstructor::create(scene.rig, scene.pattern, {.line_stride = 2});
+    ASSERT_FALSE(made);
+    EXPECT_NE(made.error().message.find("progressive"), std::string::npos) << made.error().message;
+    return;
+  }
+  Reconstructor whole = make(scene);
+  Reconstructor half = make(scene, {.line_stride = 2});
+  for (std::uint64_t n = 0; n < 4; ++n) {
+    const auto all = add(whole, draw_frame(scene, n));
+    const auto some = add(half, draw_frame(scene, n));
+    ASSERT_EQ(all.has_value(), some.has_value());
+    if (!all) continue;
+    std::map<std::pair<int, int>, Vec3f> at;
+    for (std::size_t v = 0; v < all->surface.grid.size(); ++v)
+      at[{all->surface.grid[v].line, all->surface.grid[v].boundary}] = all->surface.positions[v];
+    EXPECT_GT(some->surface.positions.size(), all->surface.positions.size() * 2 / 5);
+    EXPECT_FALSE(some->surface.triangles.empty());
+    for (std::size_t v = 0; v < some->surface.grid.size(); ++v) {
+      const GridPoint& p = some->surface.grid[v];
+      ASSERT_LT(p.line, 60);
+      const auto there = at.find({2 * p.line, p.boundary});
+      if (there == at.end()) continue;
+      for (std::size_t i = 0; i < 3; ++i)
+        EXPECT_NEAR(some->surface.positions[v][i], there->second[i], 2e-3) << p.line;
+    }
+    EXPECT_EQ(some->texture.height(), 120);
+  }
 }
 
 TEST(Reconstructor, RefusesPatternsItCannotDecode) {

@@ -104,7 +104,7 @@ class RenderTest : public ::testing::Test {
     decoded_.result.doubted.assign(decoded_.result.boundary.size(), -1);
     places_.fill(kBoundaries, pool_, decoded_.result, decoded_.edges, recovered_);
     return RenderPlacer({1, 0, 0, 0, 1, 0, 0, 0, 1})
-        .place({.frame = frame_,
+        .place({.rows = frame_,
                 .colours = colours(),
                 .places = places_,
                 .moving = moving_,

@@ -111,6 +111,7 @@ geometry = "draco-mesh"
 step_bits = 5
 key_interval = 15
 bound = 0.25
+half_lines = true
 dense = true
 fill_holes = 3
 )");
@@ -137,6 +138,7 @@ fill_holes = 3
   EXPECT_EQ(r.config.step_bits, 5);
   EXPECT_EQ(r.config.key_interval, 15);
   EXPECT_EQ(r.config.bound_px, 0.25);
+  EXPECT_TRUE(r.config.half_lines);
   EXPECT_TRUE(r.config.surface.dense);
   EXPECT_EQ(r.config.surface.fill_holes, 3);
 }

@@ -56,6 +56,31 @@ TEST_F(PipelineTest, LosslessEqualsTheSerialLoopByteForByte) {
   }
 }
 
+TEST(HalfLines, ReachReadersWhereTheirRowsAre) {
+  const StripedScene scene = striped_scene(Scan::kProgressive);
+  const Frames frames(scene);
+  ScriptedSource source(scene, count_to(frames, 4));
+  CollectingSink sink;
+  PipelineOptions options = fast_and_lossless();
+  options.reconstruct.line_stride = 2;
+  options.encode.geometry = GeometryCodec::kGrid;
+  ASSERT_TRUE(make(source, {&sink}, options)->run());
+  FrameDecoder decoder;
+  ASSERT_EQ(sink.frames().size(), 3U);
+  for (const FrameMessage& message : sink.frames()) {
+    const auto frame = decoder.decode(*message.data);
+    ASSERT_TRUE(frame) << frame.error().message;
+    const Surface& surface = frame->surface;
+    EXPECT_GT(surface.grid.size(), 60U * 12);
+    for (std::size_t v = 0; v < surface.grid.size(); ++v) {
+      const Vec3f& p = surface.positions[v];
+      ASSERT_LT(surface.grid[v].line, 60);
+      EXPECT_NEAR(scene.rig.camera.fy() * p[1] / p[2] + scene.rig.camera.cy(), 2 * surface.grid[v].line,
+                  0.01);
+    }
+  }
+}
+
 /// Vertices in triangles, which are those that a mesh carries.
 std::size_t in_triangles(const Surface& surface) {
   std::set<std::uint32_t> used;

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rows of a frame that are detection lines. Line l is row 2 l of an interlaced picture, whichever field
+// was first, and row l * stride of a progressive one.
+#pragma once
+
+#include <algorithm>
+
+#include "base/image.h"
+#include "base/rig.h"
+#include "capture/source/field_source.h"
+
+namespace relievo {
+
+/// Rows of the camera from line to line; `stride` is 1 or 2, as ReconstructOptions::line_stride.
+inline int line_step_px(Scan scan, int stride) {
+  return scan == Scan::kInterlaced ? 2 : stride;
+}
+inline int line_count(const Rig& rig, int stride) {
+  const int step = line_step_px(rig.scan, stride);
+  return (rig.camera.height + step - 1) / step;
+}
+
+/// Refers to the frame it was made of.
+struct DetectionLines {
+  View8 own, other;         // the exposure on the lines, and the other one
+  bool between = false;     // the other's rows lie half a line below: on a line lies the mean of two
+  bool shows_slide = true;  // `own` does, and `other` the complement; or the other way round
+
+  DetectionLines(const CapturedFrame& frame, int stride = 1)
+      : own(frame.picture.view()), other(frame.complement.view()) {
+    if (frame.scan == Scan::kInterlaced) {
+      other = own.field(1);
+      own = own.field(0);
+      between = true;
+      shows_slide = frame.field_order == FieldOrder::kTop;
+    } else if (stride == 2) {
+      own = own.field(0);
+      other = other.field(0);
+    }
+  }
+
+  View8 slide() const { return shows_slide ? own : other; }
+  View8 complement() const { return shows_slide ? other : own; }
+  /// Of own less other: slide less complement.
+  int sign() const { return shows_slide ? 1 : -1; }
+  /// The other exposure's rows whose mean lies on line l. It must have one.
+  const std::uint8_t* other_above(int l) const {
+    return other.row(std::clamp(between ? l - 1 : l, 0, other.height - 1));
+  }
+  const std::uint8_t* other_below(int l) const { return other.row(std::min(l, other.height - 1)); }
+};
+
+}  // namespace relievo
