@@ -101,6 +101,12 @@ Status to_rgb(const VideoView& view, Image8& out) {
   return {};
 }
 
+/// Of 1920x1080 a frame a sixtieth of a second is all that there is for everything.
+VideoSpeed speed_for(const VideoFormat& format) {
+  constexpr int kLarge = 1600 * 900;
+  return format.width * format.height < kLarge ? VideoSpeed::kSuperfast : VideoSpeed::kUltrafast;
+}
+
 class Encoder final : public TextureEncoder {
  public:
   Result<bool> encode(View8 picture, const TextureEncodeOptions& options, Bytes& out) override {
@@ -108,7 +114,7 @@ class Encoder final : public TextureEncoder {
       return Error{"texture has " + std::to_string(picture.channels) + " channels, not 3 (RGB) or 1 (grey)"};
     const VideoFormat format = h264_texture_format(picture.width, picture.height);
     if (!video_ || format_ != format || encoder_ != options.encoder) {
-      auto made = VideoEncoder::create(format, VideoSpeed::kSuperfast, options.encoder);
+      auto made = VideoEncoder::create(format, speed_for(format), options.encoder);
       if (!made) return made.error();
       video_.emplace(std::move(*made));
       format_ = format;
