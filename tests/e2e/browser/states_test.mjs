@@ -100,6 +100,19 @@ const checks = {
     await inspect('Starting', made, /first frame/);
   },
 
+  async 'a card about a file stays under the hand when the first picture comes'() {
+    const page = await open('/', kDesktop); // nothing has come yet
+    await inState(page, 'starting');
+    await page.setInputFiles('#file', { name: 'notes.mcap', mimeType: 'text/plain', buffer: Buffer.from('some words') });
+    const box = await (await page.waitForSelector('#dismiss:visible')).boundingBox();
+    feeder.say('start ball');
+    await page.waitForFunction(() => document.body.classList.contains('seen'));
+    assert.deepEqual(await page.locator('#dismiss').boundingBox(), box);
+    await page.click('#dismiss');
+    await page.waitForSelector('#card', { state: 'hidden' });
+    await page.close();
+  },
+
   async 'stalled, with the reason'() {
     feeder.say('start ball');
     const made = await pages(async (options) => {

@@ -50,11 +50,13 @@ class Cursor {
   skip(count: number): void {
     this.take(count, 1);
   }
-  /** Whether a struct, of which read() gives the members, holds more than was read. */
+  /** `more`: whether a struct, of which read() gives the members, holds more than was read. What a newer server adds is left out. */
   appendable<T>(read: (more: () => boolean) => T): T {
     const length = this.u32();
     const end = this.at + length;
-    return read(() => this.at < end);
+    const value = read(() => this.at < end);
+    this.at = Math.max(this.at, end);
+    return value;
   }
 
   private take(size: number, align: number): number {
@@ -97,6 +99,11 @@ export function readStreamInfo(bytes: Uint8Array): StreamInfo {
   cursor.u32();
   const [stream, source] = [cursor.text(), cursor.text()];
   cursor.time(); // started
+  const rig = readRig(cursor);
+  return { stream, source, ...rig, stripes: cursor.appendable(() => readStripes(cursor)) };
+}
+
+function readRig(cursor: Cursor): Omit<StreamInfo, 'stream' | 'source' | 'stripes'> {
   return cursor.appendable((more) => {
     const scan = cursor.u32() === 0 ? 'interlaced' : 'progressive';
     const frame_rate = cursor.double();
@@ -113,8 +120,18 @@ export function readStreamInfo(bytes: Uint8Array): StreamInfo {
     const [rotation, translation] = more() ? [cursor.doubles(9), cursor.doubles(3)] : [[], []];
     const isPlaced = rotation.some((v) => v !== 0); // else it is not said
     const place = isPlaced ? { world_from_camera_rotation: rotation, world_from_camera_translation: translation } : {};
-    return { stream, source, frame_rate, scan, stripes: 0, camera, ...pose, stereo_rms_px, scale_error, ...place };
+    return { frame_rate, scan, camera, ...pose, stereo_rms_px, scale_error, ...place };
   });
+}
+
+/** How many there are, of a relievo::Pattern. */
+function readStripes(cursor: Cursor): number {
+  cursor.u32(); // colours
+  cursor.u32(); // slides
+  cursor.skip(cursor.u32()); // palette
+  const stripes = cursor.u32();
+  cursor.skip(4 * stripes); // throws where they are not all there
+  return stripes;
 }
 
 function readPinhole(cursor: Cursor): Pinhole {

@@ -69,7 +69,7 @@ class Viewer {
   private triedRecording = false; // of that stream
   private file: string | null = null; // shown instead of a stream
   private serverFile: string | null = null; // the same where it is one of the server's
-  private fileProblem: { name: string; why: string } | null = null;
+  private fileProblem: { name: string; why: string; overPicture: boolean } | null = null; // the card stays where it was shown first
   private presentation: Presentation | null = null;
 
   constructor() {
@@ -368,7 +368,7 @@ class Viewer {
       if (opened.kind === 'surface') this.show(opened.frame);
       shown = true;
     } catch (error) {
-      this.fileProblem = { name, why: error instanceof Error ? error.message : String(error) };
+      this.fileProblem = { name, why: error instanceof Error ? error.message : String(error), overPicture: this.session.seen };
     }
     this.refresh();
     return shown;
@@ -447,8 +447,8 @@ class Viewer {
       shifted: following === false ? playing : null,
     });
     if (this.fileProblem !== null) {
-      const { name, why } = this.fileProblem;
-      this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: seen };
+      const { name, why, overPicture } = this.fileProblem;
+      this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: overPicture };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
     this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? []);

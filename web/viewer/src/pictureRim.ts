@@ -85,7 +85,8 @@ export function pictureRim(rim: Rim, crop: Crop): Rim | null {
   // normal · ray = out + tilt (along · ray - middle), turned to a unit normal.
   const turned: [number, number] = [normal[0] + tilt * normal[1], normal[1] - tilt * normal[0]];
   const size = Math.hypot(...turned);
-  const floor = (kPixel / perOut) ** 2;
+  const late = Math.max(0, out - meshAt - step); // a mesh ends a step too early: beyond that it may be another's edge
+  const floor = (kPixel / perOut) ** 2 + late ** 2;
   const centre = (along[0]! + along[count - 1]!) / 2;
   return {
     normal: [turned[0] / size, turned[1] / size],

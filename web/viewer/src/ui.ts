@@ -88,6 +88,7 @@ export class Ui {
     element('card-hint').hidden = state.hint === '';
     element('retry').hidden = state.state !== 'lost' || dismissible;
     element('dismiss').hidden = !dismissible;
+    element('spinner').hidden = dismissible; // what is said is said: nothing is waited for
   }
 
   /** A line over the picture, which stays visible; null: none. */

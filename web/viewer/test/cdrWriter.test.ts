@@ -42,12 +42,16 @@ describe('a frame', () => {
 describe('a description', () => {
   it('is read back', () => {
     const { started_ns: _started, field_order: _order, colour_matrix: _colour, pattern: _pattern, ...kept } = kInfo;
-    expect(readStreamInfo(writeStreamInfo(kInfo)!)).toEqual({ ...kept, stripes: 0 });
+    expect(readStreamInfo(writeStreamInfo(kInfo)!)).toEqual(kept);
   });
   it('of a server that did not say how good its rig is', () => {
     const { stereo_rms_px: _rms, scale_error: _scale, world_from_camera_rotation: _r, world_from_camera_translation: _t, ...older } = kInfo;
     expect(readStreamInfo(writeStreamInfo(older)!)).toMatchObject({ stereo_rms_px: 0, scale_error: 0 });
     expect(readStreamInfo(writeStreamInfo(older)!)).not.toHaveProperty('world_from_camera_rotation');
+  });
+  it('of stripes that are not all there is none', () => {
+    const whole = writeStreamInfo(kInfo)!;
+    expect(() => readStreamInfo(whole.subarray(0, whole.length - 8))).toThrow(/ends too early/);
   });
   it('is none where the server did not say enough', () => {
     const { pattern: _, ...older } = kInfo;
