@@ -165,20 +165,31 @@ const kFront = [['frontLeftTop', 'frontRightTop'], ['frontRightTop', 'frontRight
 const kSide = [['frontRightBottom', 'backRightBottom']];
 const kFarTop = [['frontRightTop', 'backRightTop'], ['backRightTop', 'backRightBottom']];
 
-/** Clicks near corners, as a hand does. */
+/** Clicks near two corners, as a hand does, and gives what was measured. */
+async function clickCorners(page, from, to) {
+  const count = (await look(page)).measurements.length;
+  for (const [i, corner] of [kCorners[from], kCorners[to]].entries()) {
+    const at = await page.evaluate((p) => window.relievo.toPage(p), corner);
+    await page.mouse.click(at.x + (i === 0 ? -4 : 3), at.y + 3);
+  }
+  await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count).catch(async () => assert.fail(`${from} to ${to}: ${await page.textContent('#panel-measure')}`));
+  return (await look(page)).measurements.at(-1);
+}
+
+/** A frame may lack a corner's narrow face; the ring shows it, and who measures clicks again on a later one. */
 async function cornerToCorner(page, pairs) {
   for (const [from, to] of pairs) {
-    const ends = [kCorners[from], kCorners[to]];
-    const count = (await look(page)).measurements.length;
-    for (const [i, corner] of ends.entries()) {
-      const at = await page.evaluate((p) => window.relievo.toPage(p), corner);
-      await page.mouse.click(at.x + (i === 0 ? -4 : 3), at.y + 3);
+    const kinds = (m) => m.spots.map(({ kind }) => kind).join();
+    let m = await clickCorners(page, from, to);
+    for (let again = 0; again < 2 && kinds(m) !== 'corner,corner'; ++again) {
+      console.log(`      ${from} to ${to}: ${kinds(m)}, again`);
+      const shown = (await look(page)).shown;
+      await page.waitForFunction((n) => window.relievo.diagnostics().shown > n, shown);
+      m = await clickCorners(page, from, to);
     }
-    await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count).catch(async () => assert.fail(`${from} to ${to}: ${await page.textContent('#panel-measure')}`));
-    const m = (await look(page)).measurements.at(-1);
-    const truth = away(...ends);
+    const truth = away(kCorners[from], kCorners[to]);
     console.log(`      ${from} to ${to}: ${(truth * 1000).toFixed(1)} mm reads ${(m.value * 1000).toFixed(2)} ± ${(m.sigma * 1000).toFixed(2)} mm`);
-    assert.deepEqual(m.spots.map(({ kind }) => kind), ['corner', 'corner'], `${from} to ${to}`);
+    assert.equal(kinds(m), 'corner,corner', `${from} to ${to}`);
     near(m.value, truth, 0.0005, `${from} to ${to}`);
     assert.ok(Math.abs(m.value - truth) < 4 * m.sigma && m.sigma < 0.0008, `${m.value} ± ${m.sigma}`);
   }
