@@ -84,7 +84,7 @@ struct Coded {
 
 /// Completes a frame; `texture` is of the codec that the options name, and may be null where none is sent.
 Result<Bytes> with_texture(const Frame3D& frame, const EncodeOptions& options, TextureEncoder* texture,
-                           bool key, const Coded& coded) {
+                           bool key, double rate_hz, const Coded& coded) {
   FrameHeader header = coded.header;
   header.number = frame.number;
   header.time_ns = frame.time_ns;
@@ -94,9 +94,12 @@ Result<Bytes> with_texture(const Frame3D& frame, const EncodeOptions& options, T
   if (sends_texture(frame, options)) {
     header.texture_width = static_cast<std::uint32_t>(frame.texture.width());
     header.texture_height = static_cast<std::uint32_t>(frame.texture.height());
-    const auto alone = texture->encode(
-        frame.texture.view(),
-        {.quality = options.texture_quality, .key = key, .encoder = options.texture_encoder}, section);
+    const auto alone = texture->encode(frame.texture.view(),
+                                       {.quality = options.texture_quality,
+                                        .key = key,
+                                        .encoder = options.texture_encoder,
+                                        .rate_hz = rate_hz},
+                                       section);
     if (!alone) return alone.error();
     header.is_key = header.is_key && *alone;
   }
@@ -146,12 +149,13 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
     return Error{"a grid needs its calibration: encode it with a FrameEncoder"};
   const auto coded = encode_mesh(frame.surface, options);
   if (!coded) return coded.error();
-  return with_texture(frame, options, make_texture_encoder(options.texture).get(), true, *coded);
+  return with_texture(frame, options, make_texture_encoder(options.texture).get(), true, 0, *coded);
 }
 
 struct FrameEncoder::State {
   GridCalibration calibration;  // of the lines that go
   int line_step_px = 1;         // of the surfaces' lines
+  double rate_hz = 0;           // of the camera
   Surface halved;               // of a mesh
   GridEncoder encoder;
   StripeGrid grid;
@@ -244,6 +248,7 @@ FrameEncoder::FrameEncoder(const Rig& rig, const Pattern& pattern, int line_stri
   state_->calibration = grid_calibration(rig, pattern);
   state_->calibration.line_step_px *= line_stride;
   state_->line_step_px = state_->calibration.line_step_px;
+  state_->rate_hz = rig.frame_rate;
 }
 FrameEncoder::FrameEncoder(FrameEncoder&&) noexcept = default;
 FrameEncoder& FrameEncoder::operator=(FrameEncoder&&) noexcept = default;
@@ -272,7 +277,7 @@ Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& op
   const auto coded = s.encode_geometry(frame.surface, options, want_key);
   if (!coded) return coded.error();
   if (geometry_done) geometry_done();
-  auto bytes = with_texture(frame, options, s.texture.get(), want_key, *coded);
+  auto bytes = with_texture(frame, options, s.texture.get(), want_key, s.rate_hz, *coded);
   if (!bytes) {
     s.since_key = -1;  // what receivers would have to build on never reached them
     return bytes;

@@ -21,6 +21,7 @@ struct TextureEncodeOptions {
   int quality = 80;                                    // 1..100; lossless codecs do not look at it
   bool key = false;                                    // must decode alone
   VideoEncoderKind encoder = VideoEncoderKind::kAuto;  // of H.264; another one begins with a key picture
+  double rate_hz = 0;  // pictures a second, of one stream always as many; 0: nobody waits for them
 };
 
 /// Of one stream: the pictures of a codec may build on each other. One thread at a time.
