@@ -4,7 +4,7 @@
 // no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { inState, pagesOf, press, runChecks, shownPast } from './feeder.mjs';
+import { inState, look, pagesOf, press, runChecks, shownPast } from './feeder.mjs';
 import { Server } from './server.mjs';
 
 const kSource = 'sim:object,width=320,height=240,stripes=60,rate=5,distortion=1';
@@ -39,14 +39,14 @@ const checks = {
       return [...document.querySelector('#picture').getContext('2d').getImageData(0, 0, width, height).data];
     });
     const seenAt = (column, row) => picture.slice(4 * (Math.round(row) * camera.width + Math.round(column)), 4 * (Math.round(row) * camera.width + Math.round(column)) + 3);
-    const { width, height } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
-    const scale = Math.min(width / camera.width, height / camera.height);
+    const { cameraPicture } = await look(page);
+    const scale = cameraPicture.width / camera.width;
     const off = { lens: [], straight: [] };
     for (let row = 6; row < camera.height - 6; row += 11) {
       for (let column = 6; column < camera.width - 6; column += 11) {
         const [x, y] = bent(column, row);
         if (Math.hypot(x - column, y - row) < 2) continue; // the two lenses hardly differ there
-        const at = [(width - camera.width * scale) / 2 + (column + 0.5) * scale, (height - camera.height * scale) / 2 + (row + 0.5) * scale];
+        const at = [cameraPicture.x + (column + 0.5) * scale, cameraPicture.y + (row + 0.5) * scale];
         const [r, g, b, alpha] = await page.evaluate(([px, py]) => window.relievo.pixelAt(px, py), at);
         if (alpha < 255) continue;
         const away = (rgb) => Math.hypot(...[r, g, b].map((c, i) => c - rgb[i]));

@@ -17,13 +17,26 @@ const browser = await launchChromium();
 const complaints = [];
 const { newPage, open } = pagesOf(browser, origin, complaints);
 
-/** Where a pixel of the camera's picture (its upper left corner) is on the page in the rig camera's view. */
-const onPage = (column, row) => {
-  const scale = Math.min(kPage.width / kPicture.width, kPage.height / kPicture.height);
-  return {
-    x: (kPage.width - kPicture.width * scale) / 2 + column * scale,
-    y: (kPage.height - kPicture.height * scale) / 2 + row * scale,
-  };
+let picture; // of the camera, where it is on the page
+/** Where a pixel of it (its upper left corner) is on the page in the rig camera's view. */
+const onPage = (column, row) => ({
+  x: picture.x + (column / kPicture.width) * picture.width,
+  y: picture.y + (row / kPicture.height) * picture.height,
+});
+/** It is whole where nothing lies over the page, sides of which these are. */
+const free = (page) =>
+  page.evaluate(() => {
+    const of = (selector) => document.querySelector(selector).getBoundingClientRect();
+    const panel = [...document.querySelectorAll('#panels aside:not([hidden])')].map((e) => e.getBoundingClientRect()).find(({ width }) => width > 0);
+    const readout = of('#cursor'); // comes and goes with the mouse
+    return { top: of('header').bottom, bottom: of('footer').top + (readout.height > 0 ? readout.height + 7 : 0), right: Math.min(of('#rail').left, panel?.left ?? Infinity) };
+  });
+const placed = async (page) => {
+  picture = (await look(page)).cameraPicture;
+  const { top, bottom, right } = await free(page);
+  const { x, y, width, height } = picture;
+  assert.ok(x >= -0.01 && y >= top - 2 && x + width <= right + 2 && y + height <= bottom + 2, JSON.stringify([picture, { top, bottom, right }]));
+  near(width / height, kPicture.width / kPicture.height, 1e-6, 'its sides');
 };
 const pixel = (page, { x, y }) => page.evaluate(([px, py]) => window.relievo.pixelAt(px, py), [x, y]);
 const near = (a, b, within, what) => assert.ok(Math.abs(a - b) <= within, `${what}: ${a}, not ${b}`);
@@ -64,6 +77,7 @@ const checks = {
     await still(page);
     await press(page, 'c');
     assert.equal((await look(page)).way, 'camera');
+    await placed(page);
     const isRed = ([r, g, b]) => r > 180 && g < 90 && b < 90;
     const isGreen = ([r, g, b]) => r < 90 && g > 150 && b < 90;
     for (const at of [[4, 30], [57, 30], [30, 4], [30, 57]]) {
@@ -78,6 +92,7 @@ const checks = {
   },
 
   async "the depth under the cursor is the surface's"(page) {
+    await placed(page);
     const { frame } = await look(page);
     for (const [u, v] of kPlaces) {
       const picked = await pick(page, onPage(u * kPicture.width, v * kPicture.height));
@@ -87,6 +102,7 @@ const checks = {
   },
 
   async 'depth has the colour that the legend says'(page) {
+    await placed(page);
     await press(page, '6');
     const { frame, depthRange } = await look(page);
     const legend = await page.evaluate(() => {
@@ -109,6 +125,7 @@ const checks = {
   },
 
   async 'normals have the colour of their direction'(page) {
+    await placed(page);
     await press(page, '5');
     const { frame } = await look(page);
     for (const [u, v] of kPlaces) {
@@ -133,6 +150,7 @@ const checks = {
       const marks = [...document.querySelectorAll('#legend li')].map((li) => [li.textContent, parseFloat(li.style.top) / 100]);
       return { rgba: [...canvas.getContext('2d').getImageData(0, 0, 1, canvas.height).data], marks, unknown: getComputedStyle(document.querySelector('#legend i')).backgroundColor };
     });
+    await placed(page);
     const sigmaOf = (name) => parseFloat(name) * (/µm/.test(name) ? 1e-6 : 1e-3);
     const [[least, top], [most, bottom]] = [legend.marks[0], legend.marks.at(-1)].map(([name, share]) => [sigmaOf(name), share]);
     const expected = (sigma) => {

@@ -4,7 +4,7 @@
 // Run as: in_own_domain node timeshift_test.mjs GATEWAY_FEEDER RELIEVO_SERVER [h264], in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
-import { depthOf, Feeder, inState, kPicture, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { depthOf, Feeder, inState, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
 import { Server } from './server.mjs';
 import { marksAt, pointAt } from './timeline.mjs';
 
@@ -117,10 +117,9 @@ const onFeeder = {
     for (const i of [first + 1, index - 2]) {
       await seek(page, i);
       const { number } = await surface(page);
-      const { width, height } = await page.evaluate(() => document.querySelector('#view').getBoundingClientRect());
-      const scale = Math.min(width / kPicture.width, height / kPicture.height);
+      const { cameraPicture: picture } = await look(page);
       for (const [u, v] of [[0.1, 0.15], [0.85, 0.8]]) {
-        const at = [width / 2 + (u - 0.5) * kPicture.width * scale, height / 2 + (v - 0.5) * kPicture.height * scale];
+        const at = [picture.x + u * picture.width, picture.y + v * picture.height];
         const picked = await page.evaluate(([x, y]) => window.relievo.pick(x, y), at);
         assert.ok(Math.abs(picked.point[2] - depthOf(u, v, number)) < 0.0006, `frame ${number}: ${picked.point[2]}`);
       }

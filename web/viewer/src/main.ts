@@ -171,6 +171,7 @@ class Viewer {
       playback: playbackReport(this.session.source?.playback ?? null),
       mode: this.view?.mode,
       way: this.view?.navigator.way,
+      cameraPicture: this.view?.navigator.picture, // where it lies on the page
       drawn: this.view?.drawn,
       busy: this.view?.isBusy,
       scale: this.view?.movingScale,

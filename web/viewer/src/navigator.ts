@@ -7,7 +7,7 @@ import { Fly } from './fly';
 import { freeOf, kNoInsets, viewOffset, type Insets } from './insets';
 import type { Vec3 } from './pick';
 import type { Pinhole } from './protocol';
-import { lensOf, rigFrustum, rigRay, type Size } from './rigCamera';
+import { lensOf, pictureRectangle, rigFrustum, rigRay, type Rectangle, type Size } from './rigCamera';
 import { firstView, Framing } from './firstView';
 import { distortPoint } from './lens';
 import type { Extent } from './surface';
@@ -162,10 +162,19 @@ export class Navigator {
 
   /** The projection as it is while no panel is open. */
   get bareProjection(): number[] {
-    if (this.isRigView || this.insets === this.heeded.parts) return this.camera.projectionMatrix.toArray();
+    if (this.insets === this.heeded.parts) return this.camera.projectionMatrix.toArray();
     const camera = this.camera.clone();
-    camera.setViewOffset(...viewOffset(this.size, this.heeded.parts));
+    if (this.isRigView) {
+      this.projectRig(camera, this.heeded.parts);
+    } else {
+      camera.setViewOffset(...viewOffset(this.size, this.heeded.parts));
+    }
     return camera.projectionMatrix.toArray();
+  }
+
+  /** Where on the page the picture of the rig's camera lies, while that is what is seen. */
+  get picture(): Rectangle | null {
+    return this.isRigView ? pictureRectangle(this.rig!, this.size, this.insets) : null;
   }
 
   /** Back to the first view, of the surface as it is now. */
@@ -266,7 +275,7 @@ export class Navigator {
   /** The ray through a place on the page, in the rig camera's frame. */
   ray(at: { x: number; y: number }): { origin: Vec3; direction: Vec3 } | null {
     if (this.isRigView) {
-      const direction = rigRay(this.rig!, this.size, at);
+      const direction = rigRay(this.rig!, this.size, this.insets, at);
       return direction === null ? null : { origin: [0, 0, 0], direction };
     }
     const ndc = new THREE.Vector3((at.x / this.size.width) * 2 - 1, 1 - (at.y / this.size.height) * 2, 0.5);
@@ -287,7 +296,7 @@ export class Navigator {
 
   /** Of what nothing lies over, on the page. */
   get middle(): { x: number; y: number } {
-    return freeOf(this.size, this.isRigView ? kNoInsets : this.insets);
+    return freeOf(this.size, this.insets);
   }
 
   private enterRig(): void {
@@ -306,14 +315,14 @@ export class Navigator {
     return this.camera.position.lengthSq() > 1e-10 || Math.abs(this.camera.quaternion.w) < 1 - 1e-9;
   }
 
-  private projectRig(): void {
-    const { left, right, top, bottom } = rigFrustum(this.rig!, this.size);
+  private projectRig(camera = this.camera, insets = this.insets): void {
+    const { left, right, top, bottom } = rigFrustum(this.rig!, this.size, insets);
     const near = (this.extent?.min[2] ?? 1) / 50;
     const far = near * 5000;
-    this.camera.near = near;
-    this.camera.far = far;
-    this.camera.projectionMatrix.makePerspective(left * near, right * near, top * near, bottom * near, near, far);
-    this.camera.projectionMatrixInverse.copy(this.camera.projectionMatrix).invert();
+    camera.near = near;
+    camera.far = far;
+    camera.projectionMatrix.makePerspective(left * near, right * near, top * near, bottom * near, near, far);
+    camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
   }
 
   private project(): void {

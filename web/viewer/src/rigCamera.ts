@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rig's camera as a camera of the scene: what it sees, at its place in the page. Pure.
 // Pixels of the picture: the centre of the first is (0, 0). Pixels of the page: its upper left corner is (0, 0).
+import { freeOf, type Insets } from './insets';
 import { undistort, type Lens } from './lens';
 import type { Pinhole } from './protocol';
 
@@ -14,11 +15,12 @@ export interface Rectangle extends Size {
   y: number;
 }
 
-/** The whole picture, as large as it fits, centred. */
-export function pictureRectangle(camera: Size, page: Size): Rectangle {
-  const scale = Math.min(page.width / camera.width, page.height / camera.height);
+/** The whole picture, as large as it fits where nothing lies over the page, and in the middle of that. */
+export function pictureRectangle(camera: Size, page: Size, insets: Insets): Rectangle {
+  const free = freeOf(page, insets);
+  const scale = Math.min(free.width / camera.width, free.height / camera.height);
   const [width, height] = [camera.width * scale, camera.height * scale];
-  return { x: (page.width - width) / 2, y: (page.height - height) / 2, width, height };
+  return { x: free.x - width / 2, y: free.y - height / 2, width, height };
 }
 
 export interface Frustum {
@@ -29,8 +31,8 @@ export interface Frustum {
 }
 
 /** What the page shows where the rig's picture lies in pictureRectangle(). */
-export function rigFrustum(camera: Pinhole, page: Size): Frustum {
-  const { x, y, width } = pictureRectangle(camera, page);
+export function rigFrustum(camera: Pinhole, page: Size, insets: Insets): Frustum {
+  const { x, y, width } = pictureRectangle(camera, page, insets);
   const scale = width / camera.width;
   const column = (at: number): number => ((at - x) / scale - 0.5 - camera.cx) / camera.fx;
   const row = (at: number): number => ((at - y) / scale - 0.5 - camera.cy) / camera.fy;
@@ -44,8 +46,8 @@ export function lensOf(camera: Pinhole): Lens {
 }
 
 /** The direction in the camera's frame (x right, y down, z 1) of a place on the page; null where the lens shows nothing. */
-export function rigRay(camera: Pinhole, page: Size, at: { x: number; y: number }): [number, number, number] | null {
-  const picture = pictureRectangle(camera, page);
+export function rigRay(camera: Pinhole, page: Size, insets: Insets, at: { x: number; y: number }): [number, number, number] | null {
+  const picture = pictureRectangle(camera, page, insets);
   const scale = picture.width / camera.width;
   const ray = undistort(lensOf(camera), (at.x - picture.x) / scale - 0.5, (at.y - picture.y) / scale - 0.5);
   return ray === null ? null : [ray[0], ray[1], 1];

@@ -8,6 +8,7 @@ import type { Presentation } from './state';
 import { text } from './strings';
 
 const kFactsGap = 7; // pixels, of style.css
+const kClear = 8; // pixels, between what is looked at and what lies over the picture's sides
 
 /** A cell of the statistics line. `minor` ones give way on a narrow screen. */
 export interface Statistic {
@@ -69,9 +70,9 @@ export class Ui {
     const cursor = element('cursor'); // comes and goes with the mouse
     const [header, rail, footer] = this.parts.map((part) => part.getBoundingClientRect()) as [DOMRect, DOMRect, DOMRect];
     return {
-      top: Math.max(0, header.bottom - picture.top), // 0 where it is hidden
-      right: rail.width === 0 ? 0 : Math.max(0, picture.right - rail.left),
-      bottom: footer.height === 0 ? 0 : Math.max(0, picture.bottom - footer.top - (cursor.hidden ? 0 : cursor.offsetHeight + kFactsGap)),
+      top: header.height === 0 ? 0 : Math.max(0, header.bottom + kClear - picture.top), // 0 where it is hidden
+      right: rail.width === 0 ? 0 : Math.max(0, picture.right - rail.left + kClear),
+      bottom: footer.height === 0 ? 0 : Math.max(0, picture.bottom - footer.top + kClear - (cursor.hidden ? 0 : cursor.offsetHeight + kFactsGap)),
       left: 0,
     };
   }

@@ -105,12 +105,26 @@ describe('a panel', () => {
     expect(of.bareProjection).toEqual(before);
   });
 
-  it("does not move what the rig's camera sees", () => {
+  it("leaves the picture of the rig's camera whole, where its rays are, and as it was to a picture", () => {
     const of = navigator();
+    expect(of.picture).toBeNull();
     of.way = 'camera';
+    of.camera.updateMatrixWorld();
     const before = of.camera.projectionMatrix.toArray();
     of.setInsets(parts, beside);
-    expect(of.camera.projectionMatrix.toArray()).toEqual(before);
+    const { x, y, width, height } = of.picture!;
+    expect(width / height).toBeCloseTo(640 / 480, 9);
+    expect(x).toBeGreaterThanOrEqual(0);
+    expect(x + width).toBeLessThanOrEqual(size.width - beside.right + 1e-9);
+    expect(y).toBeGreaterThanOrEqual(beside.top - 1e-9);
+    expect(y + height).toBeLessThanOrEqual(size.height - beside.bottom + 1e-9);
+    expect(of.middle).toMatchObject({ x: expect.closeTo(x + width / 2, 9), y: expect.closeTo(y + height / 2, 9) });
+    const point: [number, number, number] = [0.1, -0.12, 1.05];
+    const at = of.toPage(point)!;
+    expect(at.x).toBeCloseTo(x + ((320 + (800 * point[0]) / point[2] + 0.5) / 640) * width, 6);
+    const { direction } = of.ray(at)!;
+    expect(direction[0] / direction[2]).toBeCloseTo(point[0] / point[2], 6);
+    expect(of.camera.projectionMatrix.toArray()).not.toEqual(before);
     expect(of.bareProjection).toEqual(before);
   });
 

@@ -2,6 +2,7 @@
 // Proves: a ray meets the surface where geometry says, the nearest first, and says how exactly that is known.
 import { describe, expect, it } from 'vitest';
 import { coordinatesAt, pick, sigmaAt, type Surface } from '../src/pick';
+import { kNoInsets } from '../src/insets';
 import { lensOf, pictureRectangle, rigFrustum, rigRay } from '../src/rigCamera';
 
 /** Two squares of 2 m across the axis, at 1 m and 3 m. */
@@ -49,17 +50,29 @@ describe("the rig's camera", () => {
   const page = { width: 1000, height: 500 };
 
   it('shows the whole picture in the middle', () => {
-    expect(pictureRectangle(camera, page)).toEqual({
+    expect(pictureRectangle(camera, page, kNoInsets)).toEqual({
       x: expect.closeTo(166.667, 3),
       y: expect.closeTo(0, 9),
       width: expect.closeTo(666.667, 3),
       height: expect.closeTo(500, 9),
     });
-    const { left, right, top, bottom } = rigFrustum(camera, page);
+    const { left, right, top, bottom } = rigFrustum(camera, page, kNoInsets);
     expect(right - left).toBeCloseTo(960 / 800, 9);
     expect(top - bottom).toBeCloseTo(480 / 810, 9);
     expect(left).toBeCloseTo((-160 - 0.5 - 300) / 800, 9);
     expect(top).toBeCloseTo(250.5 / 810, 9);
+  });
+
+  it('shows it whole where nothing lies over the page', () => {
+    const insets = { top: 60, right: 58, bottom: 140, left: 0 };
+    const { x, y, width, height } = pictureRectangle(camera, page, insets);
+    expect([width, height]).toEqual([expect.closeTo(400, 9), expect.closeTo(300, 9)]);
+    expect([x, y]).toEqual([expect.closeTo((1000 - 58 - 400) / 2, 9), expect.closeTo(60, 9)]);
+    const { left, right } = rigFrustum(camera, page, insets);
+    expect(right - left).toBeCloseTo((1000 * 640) / 400 / 800, 9);
+    const ray = rigRay({ ...camera, distortion: [] }, page, insets, { x: x + (420.5 / 640) * width, y: y + (90.5 / 480) * height })!;
+    expect(ray[0]).toBeCloseTo((420 - 300) / 800, 6);
+    expect(ray[1]).toBeCloseTo((90 - 250) / 810, 6);
   });
 
   it('looks along the ray of the pixel under the cursor, through the lens', () => {
@@ -67,10 +80,10 @@ describe("the rig's camera", () => {
     const straight = { ...camera, distortion: [0, 0, 0, 0, 0] };
     const scale = 500 / 480;
     const at = { x: 500 / 3 + (420 + 0.5) * scale, y: (90 + 0.5) * scale };
-    const ray = rigRay(straight, page, at)!;
+    const ray = rigRay(straight, page, kNoInsets, at)!;
     expect(ray[0]).toBeCloseTo((420 - 300) / 800, 6);
     expect(ray[1]).toBeCloseTo((90 - 250) / 810, 6);
-    const bent = rigRay(camera, page, at)!;
+    const bent = rigRay(camera, page, kNoInsets, at)!;
     expect(Math.hypot(bent[0], bent[1])).toBeGreaterThan(Math.hypot(ray[0], ray[1])); // barrel: the corners are drawn in
   });
 });
