@@ -45,10 +45,11 @@ bool QuickPlacer::look_at_luma(const QuickFrame& frame, int line, const QuickLin
     window.green[x] = kPerUnit * static_cast<float>(row.green[column]);
     window.blue[x] = kPerUnit * static_cast<float>(row.blue[column]);
   }
-  for (int x = 0; x < static_cast<int>(window.white.size()); ++x) {
-    const int column = std::clamp(first + x - 1, 0, image.width - 1);
-    window.white[static_cast<std::size_t>(x)] = kPerUnit * static_cast<float>(white[column]);
-  }
+  // Where the line ends there is none, and what stands for it has no meaning.
+  const std::size_t before = first == 0 ? 1 : 0;
+  const std::size_t whites = window.white.size() - (first + LumaWindow::kColumns == image.width ? 1 : 0);
+  for (std::size_t x = before; x < whites; ++x)
+    window.white[x] = kPerUnit * static_cast<float>(white[static_cast<std::size_t>(first) + x - 1]);
   // A reach is a little more than half the way to the next edge.
   const auto& colours = frame.colours[static_cast<std::size_t>(edges.boundary[edge])];
   const LumaQuery query{column_px,
