@@ -16,9 +16,9 @@ namespace relievo {
 /// --decoder ordered|paper. `decoder` must outlive the parsing.
 void add_decoder_option(CLI::App& app, Decoder& decoder);
 
-/// --half-lines, which makes `line_stride` 2. It must outlive the parsing.
 inline constexpr const char* kHalfLinesHelp =
     "Of a progressive camera reconstruct every second row alone, in little more than half the time";
+/// --half-lines, which makes `line_stride` 2. It must outlive the parsing.
 void add_half_lines_option(CLI::App& app, int& line_stride);
 
 /// --dense and --fill-holes. `options` must outlive the parsing.

@@ -164,11 +164,7 @@ export class Navigator {
   get bareProjection(): number[] {
     if (this.insets === this.heeded.parts) return this.camera.projectionMatrix.toArray();
     const camera = this.camera.clone();
-    if (this.isRigView) {
-      this.projectRig(camera, this.heeded.parts);
-    } else {
-      camera.setViewOffset(...viewOffset(this.size, this.heeded.parts));
-    }
+    this.project(camera, this.heeded.parts);
     return camera.projectionMatrix.toArray();
   }
 
@@ -325,9 +321,9 @@ export class Navigator {
     camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
   }
 
-  private project(): void {
-    if (this.isRigView) return this.projectRig();
-    this.camera.setViewOffset(...viewOffset(this.size, this.insets)); // and the matrix
+  private project(camera = this.camera, insets = this.insets): void {
+    if (this.isRigView) return this.projectRig(camera, insets);
+    camera.setViewOffset(...viewOffset(this.size, insets)); // and the matrix
   }
 
   private limits(distance: number): void {
