@@ -12,7 +12,7 @@ export interface Face {
   readonly members: Uint8Array; // 1: a vertex of the patch that is on it, in one piece with the others
   readonly fits: Uint8Array; // the same, in any piece
   readonly step: Step;
-  readonly tolerance: number; // of a vertex's error, in its standard deviations
+  readonly scatter: number; // of its members' errors, in their standard deviations
 }
 
 const kMost = 5; // faces of a patch
@@ -25,7 +25,8 @@ const kMembers = 150; // at least
 const kStripes = 2.8; // steps, at least that wide
 const kLines = 7;
 const kClose = [1.5, 2.5] as const; // stripes and lines: cells that are next to each other hang together
-const kBend = 0.36; // of the tolerance, at most, from a plane to what is bent
+const kBend = 1.26; // of the scatter: less is flat
+const kBent = 0.5; // of the scatter's square, that what is bent explains where the surface is
 const kForBend = 1500; // vertices, that tell it
 const kCells = 7; // each way, for how errors hang together
 
@@ -106,6 +107,7 @@ function spread(values: Float64Array, of: readonly number[]): number {
 function settle(patch: Patch, free: Uint8Array, first: Vec3, cells: Cells): Face | null {
   let plane = first;
   let tolerance = kFirstTolerance;
+  let scatter = 1;
   let fits = new Uint8Array(patch.count);
   let members = fits;
   for (let round = 0; round < kRounds; ++round) {
@@ -118,13 +120,14 @@ function settle(patch: Patch, free: Uint8Array, first: Vec3, cells: Cells): Face
     const off: number[] = [];
     for (let i = 0; i < patch.count; ++i) if (members[i] === 1) off.push(offBy(patch, plane, i));
     if (off.length < kMembers) return null;
-    tolerance = kTolerance * Math.min(3, Math.max(0.7, 1.4826 * median(off)));
+    scatter = Math.max(0.7, 1.4826 * median(off));
+    tolerance = kTolerance * Math.min(3, scatter);
   }
   const step = stepOf(patch, (i) => members[i] === 1);
   const inside = indicesOf(members);
   if (step === null || spread(patch.u, inside) < kStripes * step.u || spread(patch.v, inside) < kLines * step.v) return null;
   const covariance = covarianceOf(patch, members, plane);
-  return covariance === null ? null : { plane, covariance, members, fits, step, tolerance };
+  return covariance === null ? null : { plane, covariance, members, fits, step, scatter };
 }
 
 /** The patch in cells, which hang together where they are next to each other: at rims single vertices and their triangles are missing. */
@@ -254,8 +257,8 @@ function bounds(values: Float64Array, of: readonly number[]): [number, number] {
   return [least, most];
 }
 
-/** Whether a bent surface does not fit it much better. */
-function isFlat(patch: Patch, { members, tolerance, plane }: Face): boolean {
+/** Whether a bent surface does not fit it much better than the plane. */
+function isFlat(patch: Patch, { members, scatter, plane }: Face): boolean {
   const all = indicesOf(members);
   const stride = Math.max(1, Math.floor(all.length / kForBend));
   const inside = all.filter((_, n) => n % stride === 0);
@@ -265,10 +268,11 @@ function isFlat(patch: Patch, { members, tolerance, plane }: Face): boolean {
     const [x, y] = [(2 * u[i]! - u0 - u1) / (u1 - u0), (2 * v[i]! - v0 - v1) / (v1 - v0)];
     return [1, x, y, x * x, x * y, y * y];
   };
+  const leftOf = (i: number): number => (w[i]! - (plane[0] * u[i]! + plane[1] * v[i]! + plane[2])) / sigma[i]!;
   const rows = Array.from({ length: 6 }, () => new Float64Array(7));
   for (const i of inside) {
     const t = terms(i);
-    const left = (w[i]! - (plane[0] * u[i]! + plane[1] * v[i]! + plane[2])) / sigma[i]!;
+    const left = leftOf(i);
     for (let r = 0; r < 6; ++r) {
       for (let c = 0; c < 6; ++c) rows[r]![c]! += t[r]! * t[c]!;
       rows[r]![6]! += t[r]! * left;
@@ -278,11 +282,15 @@ function isFlat(patch: Patch, { members, tolerance, plane }: Face): boolean {
   if (bent === null) return false;
   // What it adds to the plane, in standard deviations: a plane that cuts a bent surface is off by its tolerance both ways.
   let [least, most] = [Infinity, -Infinity];
+  let [before, after] = [0, 0];
   for (const i of inside) {
     const off = terms(i).reduce((sum, term, n) => sum + term * bent[n]!, 0);
     [least, most] = [Math.min(least, off), Math.max(most, off)];
+    before += leftOf(i) ** 2;
+    after += (leftOf(i) - off) ** 2;
   }
-  return most - least < kBend * tolerance;
+  // Of a flat face of few stripes, each with an error of its own, a bent surface explains a part by chance.
+  return most - least < kBend * scatter || before - after < kBent * before;
 }
 
 /** Solves by elimination; the last column is the right side. */

@@ -41,6 +41,8 @@ const seen = seenOf(pictureOf(scene, 2, kCamera), kCamera);
 const corner = (x: number, y: number, z: number): Vec3 => onBox(kAt, 0.5, [x * kHalf, y * kHalf, z * kHalf]);
 const corners = [corner(-1, -1, -1), corner(1, -1, -1), corner(1, 1, -1), corner(-1, 1, -1)];
 
+const onFront = (place: Vec3): boolean => Math.abs((place[0] - kAt[0]) * Math.sin(0.5) + (place[2] - kAt[2]) * Math.cos(0.5) + kHalf) < 0.003;
+
 describe('a cube of 100 mm before a wall', () => {
   it('has its corners and edges to a fifth of a pixel', () => {
     const found = corners.map((place) => clicked(mesh, seen, place)!);
@@ -84,6 +86,14 @@ describe('a cube of 100 mm before a wall', () => {
     }
   });
 
+  it('has its edge beside a face of few stripes, each with an error of its own', () => {
+    const middle = corner(1, 0.2, -1);
+    for (let seed = 1; seed <= 3; ++seed) {
+      const uneven = meshOf(scene, 0.06, kCamera, undefined, { by: 0.12, seed: 7919 * seed });
+      expect(clicked(uneven, null, middle)?.kind, `${seed}`).toBe('edge');
+    }
+  });
+
   it('is known to a step of the mesh where there is no picture', () => {
     const found = clicked(mesh, seenOf(null, kCamera), corners[0]!)!;
     expect(found.kind).toBe('corner');
@@ -97,6 +107,35 @@ describe('a cube of 100 mm before a wall', () => {
     expect(clicked(mesh, null, middle)?.kind).toBe('edge');
     expect(clicked(mesh, null, corners[0]!)).toBeNull();
   });
+});
+
+/** What is left of it without some of its vertices. */
+function without({ positions, triangles, quality }: Surface, isLost: (place: Vec3) => boolean): Surface {
+  const placeOf = (i: number): Vec3 => [positions[3 * i]!, positions[3 * i + 1]!, positions[3 * i + 2]!];
+  const kept = Array.from({ length: positions.length / 3 }, (_, i) => i).filter((i) => !isLost(placeOf(i)));
+  const now = new Map(kept.map((i, at) => [i, at]));
+  const whole: number[] = [];
+  for (let t = 0; t < triangles.length; t += 3) {
+    const corners = [0, 1, 2].map((k) => now.get(triangles[t + k]!));
+    if (corners.every((corner) => corner !== undefined)) whole.push(...corners);
+  }
+  return {
+    positions: Float32Array.from(kept.flatMap(placeOf)),
+    coordinates: null,
+    triangles: Uint32Array.from(whole),
+    quality: { sigmas: Float32Array.from(kept, (i) => quality!.sigmas[i]!), interpolated: new Uint8Array(kept.length) },
+  };
+}
+
+it('a rim in the picture is known the worse the more of a step it is beyond its mesh', () => {
+  const left = corners[0]!.map((c, i) => 0.5 * c + 0.5 * corners[3]![i]!) as Vec3;
+  const right = corners[1]!.map((c, i) => (c - corners[0]![i]!) / 0.1) as Vec3;
+  const inwards = (place: Vec3): number => place.reduce((sum, c, i) => sum + (c - left[i]!) * right[i]!, 0);
+  const whole = meshOf(scene, 0.06, kCamera, 89); // its outermost stripe is 2.4 mm from the rim, the next one 13.6
+  const cut = without(whole, (place) => onFront(place) && inwards(place) < 0.008);
+  const [near, far] = [whole, cut].map((surface) => Math.hypot(...clicked(surface, seen, left)!.errors.flat()));
+  expect(near).toBeLessThan(0.0002);
+  expect(far).toBeGreaterThan(0.0023); // 13.6 mm less a step, about
 });
 
 /** Of a sphere. */

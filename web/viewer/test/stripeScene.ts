@@ -51,9 +51,13 @@ export interface Scene {
   lit?: Lit;
 }
 
-/** `noise`: of a boundary's column, pixels. A boundary within a pixel of another part is lost, as decoders lose it. */
-export function meshOf({ shapes, lit }: Scene, noise = 0.06, camera = kCamera, stripes = kLight.stripes): Surface {
+/**
+ * `noise`: of a boundary's column, pixels; `shared`: what all places of a boundary are off by besides, which no deviation says.
+ * A boundary within a pixel of another part is lost, as decoders lose it.
+ */
+export function meshOf({ shapes, lit }: Scene, noise = 0.06, camera = kCamera, stripes = kLight.stripes, shared = { by: 0, seed: 1 }): Surface {
   const normal = randomNormal(7);
+  const ofBoundary = Array.from({ length: stripes + 1 }, ((random) => () => shared.by * random())(randomNormal(shared.seed)));
   const [positions, coordinates, triangles, sigmas]: [number[], number[], number[], number[]] = [[], [], [], []];
   let above = new Map<number, { index: number; part: string }>();
   const finer = 4;
@@ -82,7 +86,7 @@ export function meshOf({ shapes, lit }: Scene, noise = 0.06, camera = kCamera, s
           const u0 = (exact - camera.cx) / camera.fx;
           const z0 = nearest(shapes, u0, v)!.z;
           const slope = (z0 * z0) / (camera.fx * 0.25);
-          const z = z0 + normal() * noise * slope;
+          const z = z0 + (normal() * noise + ofBoundary[boundary]!) * slope;
           line.set(boundary, { index: positions.length / 3, part: met.part });
           positions.push(u0 * z, v * z, z);
           coordinates.push((exact + 0.5) / camera.width, (row + 0.5) / camera.height);
