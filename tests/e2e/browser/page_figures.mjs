@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page costs while it streams, in headless Chromium from `relievo-server serve`: the time to the first live
-// picture, tasks of the main thread, how far behind live a page is that needs 100 ms a frame, and memory over time.
+// picture, tasks of the main thread, drawings while a person turns the surface, how far behind live a page is that needs 100 ms a
+// frame, and memory over time.
 // Run as: in_own_domain node page_figures.mjs RELIEVO_SERVER [--minutes N] [--memory] [--check], in web/viewer. Memory is
 // told each half minute, of one without --minutes; --memory: nothing else is measured. --check: exit 1 where a figure that does not depend on how loaded
 // the machine is falls short. Exit 77: no Chromium here.
@@ -19,6 +20,7 @@ const kSource = 'sim:object,stripes=120'; // over 20,000 vertices
 const kStarts = 5;
 const kTasksS = check ? 10 : 20;
 const kTaskMs = 50;
+const kTurnMs = check ? 3000 : 8000;
 const kSlowMs = 100; // a frame
 const kSlowLooks = check ? 10 : 20; // half a second apart
 const kBehindMs = 300;
@@ -37,8 +39,8 @@ const report = (page) => page.evaluate(() => window.relievo.diagnostics());
 const failures = [];
 const expect = (condition, what) => condition || failures.push(what);
 
-async function open(path = '/', script = null) {
-  const page = await browser.newPage({ viewport: { width: 800, height: 500 } });
+async function open(path = '/', script = null, viewport = { width: 800, height: 500 }) {
+  const page = await browser.newPage({ viewport });
   page.setDefaultTimeout(kPatienceMs);
   if (script !== null) await page.addInitScript(script);
   await page.goto(server.address + path);
@@ -105,6 +107,35 @@ async function tasks() {
   expect(after.vertices >= 20_000, `only ${after.vertices} vertices`);
   expect(worst.tdur < kTaskMs * 1000, `a task took ${worst.tdur / 1000} ms of the processor`);
   await page.context().close();
+}
+
+/** Drawings a second while the mouse turns the surface, as it streams and at rest: here the processor draws. */
+async function turning() {
+  for (const viewport of [{ width: 800, height: 500 }, { width: 360, height: 280 }]) {
+    const page = await open('/', null, viewport);
+    await shownPast(page, 20);
+    const from = await page.evaluate(() => {
+      for (let y = innerHeight / 2; y > 20; y -= 10)
+        for (let x = 40; x < innerWidth - 40; x += 10) if (document.elementFromPoint(x, y)?.id === 'view') return [x, y];
+      return null;
+    });
+    assert.ok(from !== null, 'nothing of the view is free');
+    const turned = async () => {
+      const before = await report(page);
+      const begin = Date.now();
+      await page.mouse.move(...from);
+      await page.mouse.down();
+      for (let i = 0; Date.now() - begin < kTurnMs; ++i) await page.mouse.move(from[0] + 10 * Math.cos(i / 20), from[1] + 10 * Math.sin(i / 20));
+      await page.mouse.up();
+      const after = await report(page);
+      return ['drawn', 'shown'].map((name) => (((after[name] - before[name]) * 1000) / (Date.now() - begin)).toFixed(1));
+    };
+    const [drawn, shown] = await turned();
+    await page.keyboard.press(' ');
+    const [atRest] = await turned();
+    console.log(`turned by hand at ${viewport.width}x${viewport.height}: ${drawn} drawings a second, of ${shown} frames; of one frame: ${atRest}`);
+    await page.context().close();
+  }
 }
 
 /** A page whose every drawing takes 100 ms: since publication, by the server's clock. */
@@ -221,6 +252,7 @@ try {
   if (!memoryAlone) {
     await starts();
     await tasks();
+    await turning();
     await slowPage();
   }
   await memory();
