@@ -147,7 +147,7 @@ const checks = {
     await press(page, '7'); // no frame comes from here on
     const legend = await page.evaluate(() => {
       const canvas = document.querySelector('#legend canvas');
-      const marks = [...document.querySelectorAll('#legend li')].map((li) => [li.textContent, parseFloat(li.style.top) / 100]);
+      const marks = [...document.querySelectorAll('#legend li')].map((li) => [li.textContent, parseFloat(li.style.getPropertyValue('--at')) / 100]);
       return { rgba: [...canvas.getContext('2d').getImageData(0, 0, 1, canvas.height).data], marks, unknown: getComputedStyle(document.querySelector('#legend i')).backgroundColor };
     });
     await placed(page);
@@ -169,6 +169,27 @@ const checks = {
     feeder.say('sigmas');
     feeder.say(`frame ${kFrame}`);
     await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+  },
+
+  async 'on a phone the legend is a strip beside the tools, and its marks have room'(page) {
+    const before = page.viewportSize();
+    await page.setViewportSize({ width: 360, height: 740 });
+    for (const mode of ['5', '6', '7']) {
+      await press(page, mode);
+      const { legend, rail, marks } = await page.evaluate(() => {
+        const box = (element) => element.getBoundingClientRect().toJSON();
+        const marks = [...document.querySelectorAll('#legend li')].map(box).filter(({ width }) => width > 0);
+        return { legend: box(document.querySelector('#legend')), rail: box(document.querySelector('#rail')), marks };
+      });
+      assert.ok(legend.height > 20 && legend.height < 90, `mode ${mode}: ${legend.height} px high`);
+      assert.ok(legend.right < rail.left, `mode ${mode}: over the tools`);
+      for (const [k, mark] of marks.entries()) {
+        assert.ok(mark.left >= legend.left && mark.right <= legend.right && mark.bottom <= legend.bottom, `mode ${mode}: a mark is outside`);
+        assert.ok(k === 0 || mark.left > marks[k - 1].right, `mode ${mode}: marks ${k - 1} and ${k} run into each other`);
+      }
+      assert.ok(mode === '5' || marks.length >= 4, `mode ${mode}: ${marks.length} marks`);
+    }
+    await page.setViewportSize(before);
   },
 
   async "light falls on relief as its normals say, from over the viewer's shoulder"(page) {

@@ -8,6 +8,7 @@ import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
 import { Feeder, inState, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { makeSheet } from './sheet.mjs';
 import { withoutWebGl } from './web.mjs';
 
 const [feederPath, screenshots] = process.argv.slice(2);
@@ -22,7 +23,6 @@ const kAllLooks = {
 // What is checked is where things are: each size and each theme once suffices.
 const kChecked = ['desktop-light', 'phone-dark'];
 const kLooks = screenshots ? kAllLooks : Object.fromEntries(kChecked.map((look) => [look, kAllLooks[look]]));
-const kJpegQuality = 80;
 let feeder = await Feeder.start(feederPath);
 const origin = `http://127.0.0.1:${feeder.port}`;
 const browser = await launchChromium();
@@ -216,24 +216,10 @@ const checks = {
   },
 };
 
-/** All states of one look on one picture. */
-async function makeSheet(look, states) {
-  const isPhone = look.startsWith('phone');
-  const width = isPhone ? 240 : 400;
-  const page = await newPage({ viewport: { width: isPhone ? 1270 : 1240, height: 100 }, colorScheme: look.endsWith('light') ? 'light' : 'dark' });
-  const figures = states.map(({ name, png }) => `<figure><img width=${width} src="data:image/png;base64,${png}"><figcaption>${name}</figcaption></figure>`);
-  await page.setContent(`<meta name="color-scheme" content="dark light"><style>
-    body { margin: 8px; display: flex; flex-wrap: wrap; gap: 8px; font: 13px sans-serif; background: light-dark(#fff, #000); }
-    figure { margin: 0; text-align: center } img { display: block; margin-bottom: 3px; border-radius: 6px; outline: 1px solid #8886 }</style>${figures.join('')}`);
-  await page.waitForTimeout(300);
-  await page.screenshot({ path: join(screenshots, `viewer-states-${look}.jpg`), quality: kJpegQuality, fullPage: true });
-  await page.close();
-}
-
 let failed = 1;
 try {
   failed = await runChecks(checks, await newPage());
-  if (screenshots) for (const [look, states] of taken) await makeSheet(look, states);
+  if (screenshots) for (const [look, states] of taken) await makeSheet(newPage, join(screenshots, `viewer-states-${look}.jpg`), look, states);
 } finally {
   await browser.close();
   await feeder.kill();

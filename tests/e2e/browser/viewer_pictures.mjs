@@ -8,6 +8,7 @@ import { kPatienceMs, launchChromium } from './chromium.mjs';
 import { inState, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
+import { makeSheet } from './sheet.mjs';
 
 const [serverPath, folder, ...wanted] = process.argv.slice(2);
 const kRate = 8; // what a processor that draws can follow
@@ -34,6 +35,33 @@ async function picture(name, path, { viewport = kDesktop, colorScheme = 'dark', 
   await context.close();
   console.log(name);
 }
+const kModes = ['textured', 'shaded', 'wire', 'points', 'normals', 'depth', 'confidence']; // keys 1 to 7
+
+/** Each mode, in each look, on a sheet a look. */
+async function modes() {
+  if (wanted.length > 0 && !wanted.includes('modes')) return;
+  for (const [size, viewport] of [['desktop', kDesktop], ['phone', kPhone]]) {
+    for (const colorScheme of ['dark', 'light']) {
+      const context = await browser.newContext({ viewport, colorScheme, hasTouch: size === 'phone' });
+      const page = await context.newPage();
+      page.setDefaultTimeout(kPatienceMs);
+      await page.goto(`${server.address}/?stream=object`);
+      await shownPast(page, 3);
+      await page.keyboard.press(' ');
+      await still(page);
+      const shots = [];
+      for (const [i, name] of kModes.entries()) {
+        await page.keyboard.press(String(i + 1));
+        await still(page);
+        shots.push({ name, png: (await page.screenshot()).toString('base64') });
+      }
+      const look = `${size}-${colorScheme}`;
+      await makeSheet((options) => browser.newPage(options), join(folder, `viewer-modes-${look}.jpg`), look, shots);
+      await context.close();
+      console.log(`modes, ${look}`);
+    }
+  }
+}
 const presses = (...keys) => async (page) => {
   for (const key of keys) await page.keyboard.press(key);
   await page.waitForTimeout(1500); // for the look of it
@@ -52,7 +80,6 @@ async function measure(page, tool, places) {
   }
 }
 
-const kModes = ['shaded', 'wire', 'points', 'normals', 'depth', 'confidence']; // keys 2 to 7
 
 try {
   await picture('', '/?stream=object', {}, async (page) => {
@@ -60,13 +87,11 @@ try {
     await page.keyboard.press(' ');
     await still(page);
   });
-  for (const [i, mode] of kModes.entries()) {
-    await picture(mode, '/?stream=object', { colorScheme: mode === 'depth' ? 'light' : 'dark' }, async (page) => {
-      await page.keyboard.press(String(i + 2));
-      await page.keyboard.press(' ');
-      await still(page);
-    });
-  }
+  await picture('confidence', '/?stream=object', {}, async (page) => {
+    await page.keyboard.press('7');
+    await page.keyboard.press(' ');
+    await still(page);
+  });
   await picture('measure', '/?stream=object', {}, async (page) => {
     await page.keyboard.press('m');
     await page.keyboard.press(' ');
@@ -121,6 +146,7 @@ try {
     await page.keyboard.press(' ');
     await still(page);
   });
+  await modes();
   await picture('phone', '/?stream=face', { viewport: kPhone, hasTouch: true });
   await picture('phone-light', '/?stream=object', { viewport: kPhone, colorScheme: 'light', hasTouch: true }, presses('m'));
 } finally {

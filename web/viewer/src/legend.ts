@@ -8,6 +8,7 @@ import { text } from './strings';
 
 const kBar = { width: 14, height: 168 };
 const kDisc = 72;
+const kMostOnPhones = 6; // marks that have room beside each other
 const kSigmaTicks: readonly (readonly [number, string])[] = [
   [20e-6, '20 µm'],
   [50e-6, '50 µm'],
@@ -78,7 +79,7 @@ function normalLegend(): Node[] {
 const toSrgb = (linear: number): number =>
   Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
 
-/** A bar with 0 on top; marks by their share of its height. */
+/** A bar with 0 on top, on phones at the left; marks by their share of its length. */
 function bar(colour: (share: number) => readonly number[], marks: readonly (readonly [number, string])[]): HTMLElement {
   const canvas = make('canvas', { width: 1, height: kBar.height });
   const context = canvas.getContext('2d')!;
@@ -86,10 +87,10 @@ function bar(colour: (share: number) => readonly number[], marks: readonly (read
     context.fillStyle = `rgb(${colour(y / (kBar.height - 1)).join(' ')})`;
     context.fillRect(0, y, 1, 1);
   }
-  const scale = make('ol', {});
+  const scale = make('ol', { className: marks.length > kMostOnPhones ? 'crowded' : '' });
   for (const [share, name] of marks) {
     const mark = make('li', {}, name);
-    mark.style.top = `${share * 100}%`;
+    mark.style.setProperty('--at', `${share * 100}%`);
     scale.append(mark);
   }
   return make('div', { className: 'bar' }, canvas, scale);
