@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/lens.h"
+#include "base/line_step.h"
 
 namespace relievo::bench {
 namespace {
@@ -52,7 +53,7 @@ std::optional<Place> place_of(const Surface& surface, std::size_t vertex, const 
     out.column_px = static_cast<double>(u) * rig.camera.width - 0.5;
   }
   const double column = distort(rig.projector, qx / qz, qy / qz)[0];
-  out.line = std::lround(row / (rig.scan == Scan::kInterlaced ? 2 : 1));
+  out.line = std::lround(row / line_step_px(rig.scan));
   const double stripes = (column + 0.5) * pattern.stripes() / rig.projector.width;
   out.boundary = std::lround(stripes) - 1;
   out.off_boundary = std::abs(stripes - std::round(stripes));

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "base/line_step.h"
+
 namespace relievo {
 namespace {
 
@@ -30,7 +32,7 @@ GridCalibration grid_calibration(const Rig& rig, const Pattern& pattern) {
   out.projector_from_camera_rotation = rounded(rig.projector_from_camera_rotation);
   out.projector_from_camera_translation = rounded(rig.projector_from_camera_translation);
   out.stripes = pattern.stripes();
-  out.line_step_px = rig.scan == Scan::kInterlaced ? 2 : 1;
+  out.line_step_px = relievo::line_step_px(rig.scan);
   return out;
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/line_step.h"
 #include "capture/evaluate/drawing.h"
 #include "capture/reconstruct/field_difference.h"
 
@@ -143,7 +144,7 @@ Image8 draw_difference(const CapturedFrame& frame, const Rig& rig) {
   DifferenceImage image;
   differencer.difference(frame, pool, image);
   Image8 out = blank(rig.camera.width, rig.camera.height);
-  const int step = frame.scan == Scan::kInterlaced ? 2 : 1;
+  const int step = line_step_px(frame.scan);
   float largest = 1;
   for (const float d : image.values) largest = std::max(largest, std::fabs(d));
   const float unit = 0.5F / (0.7F * largest);
@@ -163,7 +164,7 @@ Image8 draw_boundaries(const CapturedFrame& frame, const Surface& surface, const
   const auto light = [](Primary p) {
     return Colour{p & 1 ? 1.F : 0.F, p & 2 ? 1.F : 0.F, p & 4 ? 1.F : 0.F};
   };
-  const int step = frame.scan == Scan::kInterlaced ? 2 : 1;
+  const int step = line_step_px(frame.scan);
   for (const GridPoint& at : surface.grid) {
     if (at.interpolated) continue;
     const int x = static_cast<int>(std::floor(at.column_px + 0.5F));
@@ -212,7 +213,7 @@ Image8 draw_sigma(const Surface& surface, const Rig& rig) {
 
 Image8 draw_errors(const CapturedFrame& frame, const Judgement& judgement, float range) {
   Image8 out = dimmed(frame.picture);
-  const int step = frame.scan == Scan::kInterlaced ? 2 : 1;
+  const int step = line_step_px(frame.scan);
   const auto dot = [&](const JudgedVertex& v, int from, int to, const Colour& colour) {
     const int x = static_cast<int>(std::lround(v.column_px));
     const int y = static_cast<int>(std::lround(v.row_px));
@@ -232,7 +233,7 @@ Image8 draw_completeness(const CapturedFrame& frame, const Judgement& judgement)
   constexpr Colour kFound{0.15F, 0.85F, 0.35F};
   constexpr Colour kMissed{1, 0.15F, 0.1F};
   Image8 out = dimmed(frame.picture);
-  const int step = frame.scan == Scan::kInterlaced ? 2 : 1;
+  const int step = line_step_px(frame.scan);
   for (const bool found : {true, false}) {
     for (const JudgedBoundary& b : judgement.boundaries) {
       if (b.found != found) continue;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/line_step.h"
 #include "capture/evaluate/drawing.h"
 #include "capture/evaluate/pictures.h"
 #include "capture/evaluate/rig_check.h"
@@ -12,10 +13,6 @@ constexpr Colour kFound{0.15F, 0.75F, 0.35F};
 constexpr Colour kMissed{0.95F, 0.2F, 0.15F};
 constexpr Colour kOrder{1, 0, 1};
 constexpr float kTint = 0.55F;  // of a mark over the frame
-
-int lines_apart(const CapturedFrame& frame) {
-  return frame.scan == Scan::kInterlaced ? 2 : 1;
-}
 
 /// Mixed with what is there.
 void tint(Image8& picture, int x, int y, const Colour& colour) {
@@ -32,7 +29,7 @@ void tint(Image8& picture, int x, int y, const Colour& colour) {
 Image8 draw_exposure(const CapturedFrame& captured) {
   Image8 out = draw_field(captured, false);
   const View8 slide = captured.slide_field(), complement = captured.complement_field();
-  const int step = lines_apart(captured);
+  const int step = line_step_px(captured.scan);
   for (int y = 0; y < out.height(); ++y) {
     const int line = std::min({y / step, slide.height - 1, complement.height - 1});
     for (int x = 0; x < out.width(); ++x) {
@@ -48,7 +45,7 @@ Image8 draw_exposure(const CapturedFrame& captured) {
 
 Image8 draw_coverage(const CapturedFrame& decoded, const RigCheck& check) {
   Image8 out = dimmed(decoded.picture);
-  const int step = lines_apart(decoded);
+  const int step = line_step_px(decoded.scan);
   for (int y = 0; y < out.height() && !check.cover.empty(); ++y) {
     const std::uint8_t* cover = check.cover.row(std::min(y / step, check.cover.height() - 1));
     for (int x = 0; x < out.width(); ++x)
@@ -59,7 +56,7 @@ Image8 draw_coverage(const CapturedFrame& decoded, const RigCheck& check) {
 
 Image8 draw_order(const CapturedFrame& decoded, const RigCheck& check) {
   Image8 out = dimmed(decoded.picture);
-  const int step = lines_apart(decoded);
+  const int step = line_step_px(decoded.scan);
   for (const OrderError& error : check.order_errors) {
     const int x = static_cast<int>(std::lround(error.column_px));
     for (int dy = 0; dy < step; ++dy)

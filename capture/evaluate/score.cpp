@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/line_step.h"
 #include "capture/reconstruct/triangulate.h"
 
 namespace relievo {
@@ -97,7 +98,7 @@ std::vector<Scorer::Expected> Scorer::expected(const ImageF& truth) const {
     return bin[i] >= 0 && distance[i] < nearest[static_cast<std::size_t>(bin[i])] * kShadowSlack;
   };
   std::vector<Expected> out;
-  const int step = rig_.scan == Scan::kInterlaced ? 2 : 1;
+  const int step = line_step_px(rig_.scan);
   for (int y = 0; y < height; y += step) {
     const float* z = truth.row(y);
     for (int x = 0; x + 1 < width; ++x) {

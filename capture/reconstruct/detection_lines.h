@@ -6,15 +6,13 @@
 #include <algorithm>
 
 #include "base/image.h"
+#include "base/line_step.h"
 #include "base/rig.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
 
-/// Rows of the camera from line to line; `stride` is 1 or 2, as ReconstructOptions::line_stride.
-inline int line_step_px(Scan scan, int stride) {
-  return scan == Scan::kInterlaced ? 2 : stride;
-}
+/// `stride` is 1 or 2, as ReconstructOptions::line_stride.
 inline int line_count(const Rig& rig, int stride) {
   const int step = line_step_px(rig.scan, stride);
   return (rig.camera.height + step - 1) / step;
