@@ -111,31 +111,32 @@ async function tasks() {
 
 /** Drawings a second while the mouse turns the surface, as it streams and at rest: here the processor draws. */
 async function turning() {
-  for (const viewport of [{ width: 800, height: 500 }, { width: 360, height: 280 }]) {
-    const page = await open('/', null, viewport);
-    await shownPast(page, 20);
-    const from = await page.evaluate(() => {
-      for (let y = innerHeight / 2; y > 20; y -= 10)
-        for (let x = 40; x < innerWidth - 40; x += 10) if (document.elementFromPoint(x, y)?.id === 'view') return [x, y];
-      return null;
-    });
-    assert.ok(from !== null, 'nothing of the view is free');
-    const turned = async () => {
-      const before = await report(page);
-      const begin = Date.now();
-      await page.mouse.move(...from);
-      await page.mouse.down();
-      for (let i = 0; Date.now() - begin < kTurnMs; ++i) await page.mouse.move(from[0] + 10 * Math.cos(i / 20), from[1] + 10 * Math.sin(i / 20));
-      await page.mouse.up();
-      const after = await report(page);
-      return ['drawn', 'shown'].map((name) => (((after[name] - before[name]) * 1000) / (Date.now() - begin)).toFixed(1));
-    };
-    const [drawn, shown] = await turned();
-    await page.keyboard.press(' ');
-    const [atRest] = await turned();
-    console.log(`turned by hand at ${viewport.width}x${viewport.height}: ${drawn} drawings a second, of ${shown} frames; of one frame: ${atRest}`);
-    await page.context().close();
-  }
+  const page = await open();
+  await shownPast(page, 20);
+  const whole = await browser.newBrowserCDPSession();
+  /** Seconds of the processor so far. */
+  const spent = async () => {
+    const { processInfo } = await whole.send('SystemInfo.getProcessInfo');
+    const of = (wanted) => processInfo.filter(({ type }) => type === wanted).reduce((sum, { cpuTime }) => sum + cpuTime, 0);
+    return { page: of('renderer'), graphics: of('GPU') };
+  };
+  const turned = async () => {
+    const [before, spentBefore] = [await report(page), await spent()];
+    const begin = Date.now();
+    await page.mouse.move(300, 200);
+    await page.mouse.down();
+    for (let i = 0; Date.now() - begin < kTurnMs; ++i) await page.mouse.move(300 + 20 * Math.cos(i / 20), 200 + 20 * Math.sin(i / 20));
+    await page.mouse.up();
+    const [after, spentAfter] = [await report(page), await spent()];
+    const rate = (name) => (((after[name] - before[name]) * 1000) / (Date.now() - begin)).toFixed(1);
+    const each = (of) => (((spentAfter[of] - spentBefore[of]) * 1000) / (after.drawn - before.drawn)).toFixed(1);
+    return { drawn: rate('drawn'), shown: rate('shown'), page: each('page'), graphics: each('graphics') };
+  };
+  const live = await turned();
+  await page.keyboard.press(' ');
+  const atRest = await turned();
+  console.log(`turned by hand: ${live.drawn} drawings a second, of ${live.shown} frames; of one frame ${atRest.drawn}, for which the page and its workers take ${atRest.page} ms of the processor each, and what draws in place of a graphics card ${atRest.graphics}`);
+  await page.context().close();
 }
 
 /** A page whose every drawing takes 100 ms: since publication, by the server's clock. */
