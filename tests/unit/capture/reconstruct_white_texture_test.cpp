@@ -157,6 +157,38 @@ TEST(WhiteTexture, RowsComeFromTheirOwnSurface) {
   EXPECT_GT(psnr(texture, white, 40), psnr(sum, white, 40) + 5);
 }
 
+/// dB, over the pixels that are others a frame later.
+double psnr_moving(const Image8& texture, const Image8& white, const Image8& later) {
+  constexpr int kOther = 6;  // grey levels of all channels
+  double sum = 0;
+  std::size_t count = 0;
+  for (int y = 0; y < white.height(); ++y) {
+    for (int x = 0; x < white.width(); ++x) {
+      int step = 0;
+      for (int c = 3 * x; c < 3 * x + 3; ++c) step += std::abs(white.row(y)[c] - later.row(y)[c]);
+      if (step < kOther) continue;
+      for (int c = 3 * x; c < 3 * x + 3; ++c) {
+        const double e = texture.row(y)[c] - white.row(y)[c];
+        sum += e * e;
+        ++count;
+      }
+    }
+  }
+  return 10 * std::log10(255.0 * 255.0 * static_cast<double>(count) / sum);
+}
+
+TEST(WhiteTexture, IsNoWorseOfWhatMoves) {
+  for (const std::string scene : {"walk", "face"}) {
+    const Filmed filmed(scene);
+    const CapturedFrame second = filmed.frame(21);
+    const Image8 white = filmed.white(21);
+    const Image8 later = filmed.white(22);
+    const double texture = psnr_moving(reconstructed(filmed, filmed.frame(20), second), white, later);
+    RecordProperty("psnr_moving_" + scene, std::to_string(texture));
+    EXPECT_GT(texture, psnr_moving(added(second), white, later) - 0.3) << scene;
+  }
+}
+
 TEST(WhiteTexture, IsNoWorseWhereNothingIsAmiss) {
   for (const char* spec : {"plane", "plane,scan=progressive", "face"}) {
     const Filmed filmed(spec);
