@@ -101,6 +101,20 @@ const checks = {
     assert.equal(await pick(page, onPage(-5, 100)), null);
   },
 
+  async 'a line more below does not cover the picture of the rig camera'(page) {
+    const lines = (height) =>
+      page.evaluate((h) => {
+        document.querySelector('#statistics').style.paddingBottom = h;
+      }, height);
+    await lines('21px');
+    await page.waitForTimeout(300); // observers, and a drawing
+    await still(page);
+    await placed(page);
+    await lines('');
+    await still(page);
+    await placed(page);
+  },
+
   async 'depth has the colour that the legend says'(page) {
     await placed(page);
     await press(page, '6');

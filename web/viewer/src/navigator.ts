@@ -21,7 +21,8 @@ export interface Pose {
 }
 
 const kRest = 1e-4; // of the distance, or radians a drawing: less is not seen
-const kJitter = 24; // pixels of the page: so much they may change before the view follows
+const kJitter = 24; // pixels of the page: so much less may lie over the view before it follows,
+const kCover = 8; // and so much more: what is kept clear
 
 export interface NavigatorEvents {
   changed(): void;
@@ -32,7 +33,7 @@ export interface NavigatorEvents {
 /** `wanted`, or `before` where that is nearly the same. */
 function follow(before: Insets, wanted: Insets): Insets {
   const moved = [wanted.top - before.top, wanted.right - before.right, wanted.bottom - before.bottom, wanted.left - before.left];
-  return moved.every((by) => Math.abs(by) < kJitter) ? before : wanted;
+  return moved.every((by) => by > -kJitter && by < kCover) ? before : wanted;
 }
 
 export class Navigator {
