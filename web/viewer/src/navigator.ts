@@ -21,8 +21,8 @@ export interface Pose {
 }
 
 const kRest = 1e-4; // of the distance, or radians a drawing: less is not seen
-const kJitter = 24; // pixels of the page: so much less may lie over the view before it follows,
-const kCover = 8; // and so much more: what is kept clear
+const kJitter = 24; // pixels of the page: so much they may change before the view follows,
+const kCover = 8; // and grow before the picture of the rig's camera does, which is to be whole
 
 export interface NavigatorEvents {
   changed(): void;
@@ -30,10 +30,10 @@ export interface NavigatorEvents {
   way(way: Way): void;
 }
 
-/** `wanted`, or `before` where that is nearly the same. */
-function follow(before: Insets, wanted: Insets): Insets {
+/** `wanted`, or `before` where that is nearly the same; `most`: pixels that more may lie over the view. */
+function follow(before: Insets, wanted: Insets, most: number): Insets {
   const moved = [wanted.top - before.top, wanted.right - before.right, wanted.bottom - before.bottom, wanted.left - before.left];
-  return moved.every((by) => by > -kJitter && by < kCover) ? before : wanted;
+  return moved.every((by) => by > -kJitter && by < most) ? before : wanted;
 }
 
 export class Navigator {
@@ -46,6 +46,7 @@ export class Navigator {
   size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
   // What the view heeds of what lies over it: the page's parts, and they with the panel that is open; else both the same.
   private heeded = { parts: kNoInsets, withPanel: kNoInsets };
+  private said = this.heeded; // last
   private insets = kNoInsets; // one of them
   private ignoresPanels_ = false;
   private way_: Way = 'orbit';
@@ -91,8 +92,12 @@ export class Navigator {
     this.way_ = way;
     this.controls.enableRotate = way !== 'fly';
     this.controls.enableZoom = this.controls.enablePan = true;
-    if (way === 'camera') this.enterRig();
-    else if (before === 'camera') this.project();
+    if (way === 'camera') {
+      this.enterRig();
+      this.setInsets(this.said.parts, this.said.withPanel); // which that view heeds more closely
+    } else if (before === 'camera') {
+      this.project();
+    }
     this.events.changed();
   }
 
@@ -143,8 +148,10 @@ export class Navigator {
    * they leave free is what is turned around, and the first view lies within.
    */
   setInsets(parts: Insets, withPanel: Insets): void {
-    const heeded = follow(this.heeded.parts, parts);
-    this.heeded = { parts: heeded, withPanel: parts === withPanel ? heeded : follow(this.heeded.withPanel, withPanel) };
+    this.said = { parts, withPanel };
+    const most = this.isRigView ? kCover : kJitter;
+    const heeded = follow(this.heeded.parts, parts, most);
+    this.heeded = { parts: heeded, withPanel: parts === withPanel ? heeded : follow(this.heeded.withPanel, withPanel, most) };
     this.heed();
   }
 
