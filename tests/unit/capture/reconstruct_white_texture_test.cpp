@@ -78,15 +78,19 @@ Image8 reconstructed(const Filmed& filmed, const CapturedFrame& first, const Cap
   return std::move((*frame)->texture);
 }
 
-/// dB, over the pixels where the white picture differs by more than `contrast` from row to row.
-double psnr(const Image8& texture, const Image8& white, int contrast) {
+/// Sum of what the channels of two pixels differ by.
+int difference(const std::uint8_t* a, const std::uint8_t* b) {
+  return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
+}
+
+/// dB, over the pixels that `counts(x, y)`; `margin` rows at either end do not.
+template <typename Counts>
+double psnr_where(const Image8& texture, const Image8& white, int margin, const Counts& counts) {
   double sum = 0;
   std::size_t count = 0;
-  for (int y = 2; y + 2 < white.height(); ++y) {
+  for (int y = margin; y + margin < white.height(); ++y) {
     for (int x = 0; x < white.width(); ++x) {
-      int step = 0;
-      for (int c = 3 * x; c < 3 * x + 3; ++c) step += std::abs(white.row(y + 1)[c] - white.row(y - 1)[c]);
-      if (step < contrast) continue;
+      if (!counts(x, y)) continue;
       for (int c = 3 * x; c < 3 * x + 3; ++c) {
         const double e = texture.row(y)[c] - white.row(y)[c];
         sum += e * e;
@@ -95,6 +99,21 @@ double psnr(const Image8& texture, const Image8& white, int contrast) {
     }
   }
   return 10 * std::log10(255.0 * 255.0 * static_cast<double>(count) / sum);
+}
+
+/// Over the pixels where the white picture differs by `contrast` or more from row to row.
+double psnr(const Image8& texture, const Image8& white, int contrast) {
+  return psnr_where(texture, white, 2, [&](int x, int y) {
+    return difference(white.row(y + 1) + 3 * x, white.row(y - 1) + 3 * x) >= contrast;
+  });
+}
+
+/// Over the pixels that are others a frame later.
+double psnr_moving(const Image8& texture, const Image8& white, const Image8& later) {
+  constexpr int kOther = 6;  // grey levels of all channels
+  return psnr_where(texture, white, 0, [&](int x, int y) {
+    return difference(white.row(y) + 3 * x, later.row(y) + 3 * x) >= kOther;
+  });
 }
 
 /// Root mean square of what differs from the mean over some stripes on the line, as a share of that mean.
@@ -155,26 +174,6 @@ TEST(WhiteTexture, RowsComeFromTheirOwnSurface) {
   RecordProperty("psnr", std::to_string(psnr(texture, white, 0)));
   EXPECT_GT(psnr(texture, white, 0), psnr(sum, white, 0) + 2);
   EXPECT_GT(psnr(texture, white, 40), psnr(sum, white, 40) + 5);
-}
-
-/// dB, over the pixels that are others a frame later.
-double psnr_moving(const Image8& texture, const Image8& white, const Image8& later) {
-  constexpr int kOther = 6;  // grey levels of all channels
-  double sum = 0;
-  std::size_t count = 0;
-  for (int y = 0; y < white.height(); ++y) {
-    for (int x = 0; x < white.width(); ++x) {
-      int step = 0;
-      for (int c = 3 * x; c < 3 * x + 3; ++c) step += std::abs(white.row(y)[c] - later.row(y)[c]);
-      if (step < kOther) continue;
-      for (int c = 3 * x; c < 3 * x + 3; ++c) {
-        const double e = texture.row(y)[c] - white.row(y)[c];
-        sum += e * e;
-        ++count;
-      }
-    }
-  }
-  return 10 * std::log10(255.0 * 255.0 * static_cast<double>(count) / sum);
 }
 
 TEST(WhiteTexture, IsNoWorseOfWhatMoves) {
