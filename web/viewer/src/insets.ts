@@ -13,6 +13,9 @@ export interface Insets {
 /** Sides of a rectangle of the page. */
 export type Box = Readonly<Insets>;
 
+/** Pixels, between what is looked at and what lies over the picture's sides. */
+export const kClear = 8;
+
 export const kNoInsets: Insets = { top: 0, right: 0, bottom: 0, left: 0 };
 
 const kLeast = 1 / 3; // of the picture, else its parts count as not there

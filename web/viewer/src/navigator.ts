@@ -4,7 +4,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { kFov, type Way } from './display';
 import { Fly } from './fly';
-import { freeOf, kNoInsets, viewOffset, type Insets } from './insets';
+import { freeOf, kClear, kNoInsets, viewOffset, type Insets } from './insets';
 import type { Vec3 } from './pick';
 import type { Pinhole } from './protocol';
 import { lensOf, pictureRectangle, rigFrustum, rigRay, type Rectangle, type Size } from './rigCamera';
@@ -21,8 +21,7 @@ export interface Pose {
 }
 
 const kRest = 1e-4; // of the distance, or radians a drawing: less is not seen
-const kJitter = 24; // pixels of the page: so much they may change before the view follows,
-const kCover = 8; // and grow before the picture of the rig's camera does, which is to be whole
+const kJitter = 24; // pixels of the page: so much they may change before the view follows
 
 export interface NavigatorEvents {
   changed(): void;
@@ -46,7 +45,7 @@ export class Navigator {
   size: Readonly<Size> = { width: 1, height: 1 }; // of what is seen, pixels of the page
   // What the view heeds of what lies over it: the page's parts, and they with the panel that is open; else both the same.
   private heeded = { parts: kNoInsets, withPanel: kNoInsets };
-  private said = this.heeded; // last
+  private said = this.heeded; // of them, last, however little it changed
   private insets = kNoInsets; // one of them
   private ignoresPanels_ = false;
   private way_: Way = 'orbit';
@@ -149,7 +148,7 @@ export class Navigator {
    */
   setInsets(parts: Insets, withPanel: Insets): void {
     this.said = { parts, withPanel };
-    const most = this.isRigView ? kCover : kJitter;
+    const most = this.isRigView ? kClear : kJitter; // its picture is to be whole
     const heeded = follow(this.heeded.parts, parts, most);
     this.heeded = { parts: heeded, withPanel: parts === withPanel ? heeded : follow(this.heeded.withPanel, withPanel, most) };
     this.heed();

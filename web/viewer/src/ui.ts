@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page around the picture: badge, card, list of streams, statistics line.
 import { element, setText } from './dom';
-import { withPanel, type Insets } from './insets';
+import { kClear, withPanel, type Insets } from './insets';
 import type { Notice } from './messages';
 import type { ListedStream } from './protocol';
 import type { Presentation } from './state';
 import { text } from './strings';
 
 const kFactsGap = 7; // pixels, of style.css
-const kClear = 8; // pixels, between what is looked at and what lies over the picture's sides
 
 /** A cell of the statistics line. `minor` ones give way on a narrow screen. */
 export interface Statistic {
