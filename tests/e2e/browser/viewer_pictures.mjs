@@ -35,6 +35,7 @@ async function picture(name, path, { viewport = kDesktop, colorScheme = 'dark', 
   await context.close();
   console.log(name);
 }
+
 const kModes = ['textured', 'shaded', 'wire', 'points', 'normals', 'depth', 'confidence']; // keys 1 to 7
 
 /** Each mode, in each look, on a sheet a look. */
@@ -62,6 +63,7 @@ async function modes() {
     }
   }
 }
+
 const presses = (...keys) => async (page) => {
   for (const key of keys) await page.keyboard.press(key);
   await page.waitForTimeout(1500); // for the look of it
@@ -79,7 +81,6 @@ async function measure(page, tool, places) {
     await page.mouse.click(at.x, at.y);
   }
 }
-
 
 try {
   await picture('', '/?stream=object', {}, async (page) => {
