@@ -18,10 +18,12 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  int threads() const;
+  /// Ranges that rows are shared out in: 1 of one thread; several of each of more, so that one kept from
+  /// running leaves little for the others to wait for.
+  int workers() const;
 
   /// Calls work(begin, end, worker) over disjoint ranges that cover [0, count); returns when all are done.
-  /// `worker` in [0, threads()) tells which scratch memory a call may use: range i always has worker i's, on
+  /// `worker` in [0, workers()) tells which scratch memory a call may use: range i always has worker i's, on
   /// whichever thread it runs, so a run repeats exactly. Allocates nothing.
   template <typename Work>
   void for_ranges(int count, const Work& work) {

@@ -124,7 +124,7 @@ void ConsistencyCheck::reset(int boundaries, int lines, int workers) {
 
 void ConsistencyCheck::begin(int boundaries, int lines, WorkerPool& pool, int every) {
   every_ = every;
-  reset(boundaries, lines, pool.threads());
+  reset(boundaries, lines, pool.workers());
 }
 
 BoundaryRow ConsistencyCheck::row(int line) {

@@ -171,7 +171,7 @@ ContinuityCounts Continuity::check(const std::vector<RecoveredBoundary>& recover
     }
   });
   for (const RecoveredBoundary& r : recovered) row(now_, r.line)[r.boundary] = r.column_px;
-  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
   if (have_before_) {
     pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
       ContinuityCounts& counts = counts_[static_cast<std::size_t>(worker)];
@@ -185,7 +185,7 @@ ContinuityCounts Continuity::check(const std::vector<RecoveredBoundary>& recover
 }
 
 ContinuityCounts Continuity::check(QuickSequence& sequence, ConsistencyCheck& checked, WorkerPool& pool) {
-  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
   pool.for_ranges(lines_, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line)
       std::copy_n(checked.settled_px(line), boundaries_, row(now_, line));

@@ -97,7 +97,7 @@ DenseCounts DenseSampler::sample(const DecodedGrid& measured, const GridLinks& l
     pixels.start_interpolated();
     out.boundaries.resize(static_cast<std::size_t>(measured.lines()) * pixels.stride());
   }
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) s.counts = {};
   pool.for_ranges(measured.lines(), [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];

@@ -24,7 +24,7 @@ DepthRange::DepthRange(int boundaries, int width, int lines, int every)
 void DepthRange::update(const DecodedGrid& grid, std::size_t points, const Triangulator& triangulator,
                         WorkerPool& pool) {
   if (points < kLeastPoints) return;
-  depths_.reset(pool.threads());
+  depths_.reset(pool.workers());
   pool.for_ranges((grid.lines() + every_ - 1) / every_, [&](int begin, int end, int worker) {
     std::vector<float>& own = depths_.of(worker);
     own.resize(static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(grid.boundaries()));

@@ -88,7 +88,7 @@ void Detector::detect(const DetectionLines& rows, WorkerPool& pool, Detection& o
   differencer_.difference(rows, pool, image_);
   const float scale = 255.F / std::max(differencer_.largest(rows, pool), 1.F);
 
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (LineScratch& scratch : scratch_) {  // a worker without a line leaves its own as it was
     scratch.found.clear();
     scratch.counts.clear();

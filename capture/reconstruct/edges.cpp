@@ -193,7 +193,7 @@ void EdgeFinder::make_edges(const DifferenceImage& image, int line, const Found*
 }
 
 void EdgeFinder::find(const DifferenceImage& image, WorkerPool& pool, EdgeImage& out) {
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   // Crossings that lie closer together are one edge.
   most_on_line_ = static_cast<std::size_t>(image.width) / static_cast<std::size_t>(kMerge_px) + 2;
   found_.resize(most_on_line_ * static_cast<std::size_t>(image.lines));

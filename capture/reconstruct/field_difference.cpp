@@ -131,7 +131,7 @@ void Differencer::difference_of_all(const DetectionLines& rows, WorkerPool& pool
   const std::size_t pixels = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.lines);
   out.values.resize(3 * pixels);
   out.white.resize(pixels);
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   pool.for_ranges(out.lines, [&](int begin, int end, int worker) {
     difference_of_lines(rows, begin, end, scratch_[static_cast<std::size_t>(worker)], out);
   });
@@ -139,7 +139,7 @@ void Differencer::difference_of_all(const DetectionLines& rows, WorkerPool& pool
 }
 
 float Differencer::largest(const DetectionLines& rows, WorkerPool& pool) {
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) s.largest = 0;
   for (const View8& field : {rows.slide(), rows.complement()}) {
     pool.for_ranges(field.height, [&](int begin, int end, int worker) {

@@ -155,7 +155,7 @@ void MotionFinder::find(View8 slide, View8 complement, WorkerPool& pool, FieldMo
   out.moves.assign(static_cast<std::size_t>(rows_), 0);
   costs_.resize(cells * kShifts);
   measured_.resize(static_cast<std::size_t>(rows_));
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   pool.for_ranges(rows_, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     const auto samples = static_cast<std::size_t>(cells_) * kSamples;

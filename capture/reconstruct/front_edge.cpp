@@ -70,7 +70,7 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
 
 std::size_t FrontEdges::correct(const EdgeImage& edges, const Colours& shown, const Colours& other,
                                 WorkerPool& pool, SequenceResult& result) {
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) s.corrected = 0;
   const std::size_t boundaries = shown.size();
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {

@@ -139,7 +139,7 @@ void InstantFilter::adjust(std::int64_t time_ns, ConsistencyCheck& checked, Work
   const auto row = [&](std::vector<float>& grid, int line) {
     return grid.data() + static_cast<std::size_t>(line + kMargin) * stride + kMargin;
   };
-  moved_.resize(static_cast<std::size_t>(pool.threads()));
+  moved_.resize(static_cast<std::size_t>(pool.workers()));
   for (auto& own : moved_) own.resize(2 * stride);
   if (out.boundaries() != boundaries_ || out.lines() != lines_) out.reset(boundaries_, lines_, {});
   const ByTime by = by_time(time_ns);

@@ -53,7 +53,7 @@ void Persistence::carry_line(const MovingPlaces& moving, const PlaceGrid& places
 
 std::size_t Persistence::carry(const MovingPlaces& moving, WorkerPool& pool, PlaceGrid& places,
                                std::vector<RecoveredBoundary>& recovered) {
-  carried_.resize(static_cast<std::size_t>(pool.threads()));
+  carried_.resize(static_cast<std::size_t>(pool.workers()));
   for (auto& one : carried_) one.clear();
   if (before_.lines() == places.lines() && before_.boundaries() == places.boundaries()) {
     pool.for_ranges(places.lines(), [&](int begin, int end, int worker) {

@@ -93,7 +93,7 @@ void QuickDifferencer::start(const DetectionLines& lines, WorkerPool& pool, Quic
   out.planes.resize(3 * places);
   out.luma.resize(places);
   out.codes.resize(places);
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   if (noise_ < 0) {
     out.noise = 0;
     pool.for_ranges(out.lines, [&](int begin, int end, int worker) {

@@ -154,9 +154,9 @@ std::size_t QuickPlacer::place_all(const QuickFrame& frame, QuickSequence& seque
                                    ConsistencyCheck& check) {
   const auto boundaries = static_cast<int>(frame.colours.size());
   check.begin(boundaries, frame.image.lines, pool, kSampleEvery);
-  by_contrast_.reset(pool.threads());
-  shares_.reset(pool.threads());
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  by_contrast_.reset(pool.workers());
+  shares_.reset(pool.workers());
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) {
     s.brightest.resize(static_cast<std::size_t>(frame.image.width));
     s.darkest.resize(static_cast<std::size_t>(frame.image.width));

@@ -165,7 +165,7 @@ std::size_t QuickSequence::find_edges(const DetectionLines& rows, QuickDifferenc
                                       WorkerPool& pool, QuickImage& image) {
   const int width = rows.own.width;
   const auto lines = static_cast<std::size_t>(rows.own.height);
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   most_on_line_ = static_cast<std::size_t>(width) / QuickKernels::kMerge_px + 2;
   for (Scratch& s : scratch_) {
     s.crossings.resize(static_cast<std::size_t>(width) + QuickKernels::kGathered);

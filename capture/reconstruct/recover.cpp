@@ -219,7 +219,7 @@ void Recovery::recover(const RecoveryView& view, const Refiner& refiner, const E
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) fill_line(result, edges, line, false, columns_);
   });
-  found_.resize(static_cast<std::size_t>(pool.threads()));
+  found_.resize(static_cast<std::size_t>(pool.workers()));
   for (auto& found : found_) found.clear();
   pool.for_ranges(edges.lines, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line)

@@ -281,9 +281,9 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
   });
   wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   seen_.resize(edges.edges.size());
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
-  always_.reset(pool.threads());
-  by_contrast_.reset(pool.threads());
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
+  always_.reset(pool.workers());
+  by_contrast_.reset(pool.workers());
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) look_at_line(image, line, result, colours, worker, edges);
   });

@@ -281,8 +281,8 @@ RenderCounts RenderPlacer::place(const RenderView& view, WorkerPool& pool, Seque
   const auto asks = [&](int line, float column_px, float sigma_px) {
     return sigma_px > kUnsure_px && view.moving.around(line, column_px) == 0;
   };
-  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
-  unlikes_.reset(pool.threads());
+  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
+  unlikes_.reset(pool.workers());
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     RenderCounts& counts = counts_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {

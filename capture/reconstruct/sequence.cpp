@@ -236,7 +236,7 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
                              SequenceResult& out) {
   out.boundary.assign(edges.edges.size(), -1);
   out.counts = {};
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) {
     s.score = 0;
     s.in_order = 0;

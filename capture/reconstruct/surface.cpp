@@ -21,7 +21,7 @@ class Builder {
       scratch.all_links.assign(stride_ / 8 + 1, 0xff);
       scratch.no_links.assign(stride_ / 8 + 1, 0);
     }
-    scratch.workers.resize(options.pool != nullptr ? static_cast<std::size_t>(options.pool->threads()) : 1);
+    scratch.workers.resize(options.pool != nullptr ? static_cast<std::size_t>(options.pool->workers()) : 1);
     for (auto& worker : scratch.workers) {
       worker.counts = {};
       worker.rows.resize(SurfaceScratch::Worker::kRows * stride_);

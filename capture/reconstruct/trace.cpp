@@ -299,7 +299,7 @@ std::size_t Tracer::trace(const DifferenceImage& image, const SequenceDecoder& s
       }
     }
   });
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) {
     s.added.clear();
   }

@@ -95,7 +95,7 @@ void WeakSignal::average(WorkerPool& pool, DifferenceImage& image) {
   image.cells = (image.width + kWidth - 1) / kWidth;
   image.signal.resize(static_cast<std::size_t>(image.cells) * static_cast<std::size_t>(rows));
   image.weak_noise = kNoiseLeft * image.noise;
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   const auto weak = [&](int cell_row, int cell) {
     return image.signal[static_cast<std::size_t>(cell_row * image.cells + cell)] == Signal::kWeak;
   };

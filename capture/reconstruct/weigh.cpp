@@ -110,7 +110,7 @@ WeighingCounts Weighing::total() const {
 WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale,
                                WorkerPool& pool, DecodedGrid& out) {
   scale_ = scale;
-  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
   pool.for_ranges(places.lines(), [&](int begin, int end, int worker) {
     WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
@@ -139,7 +139,7 @@ WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& movi
                                WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
                                std::vector<RecoveredBoundary>& recovered) {
   scale_ = scale;
-  counts_.assign(static_cast<std::size_t>(pool.threads()), {});
+  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {

@@ -122,7 +122,7 @@ WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quic
 /// complement, where it is switched. An edge of the scene there changes both alike and is as often on one
 /// side.
 void WhiteTexture::measure_gains(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool) {
-  for (RankedSample& r : ratios_) r.reset(pool.threads());
+  for (RankedSample& r : ratios_) r.reset(pool.workers());
   const DetectionLines rows(frame, line_stride_);
   pool.for_ranges(grid.lines(), [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) measure_ratios(rows, grid, line, worker);
@@ -224,7 +224,7 @@ void WhiteTexture::make(const CapturedFrame& frame, const DecodedGrid& grid, Wor
     return;
   }
   if (out.width() != width || out.height() != height || out.channels() != 3) out = Image8(width, height, 3);
-  scratch_.resize(static_cast<std::size_t>(pool.threads()));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) {
     const std::size_t samples = static_cast<std::size_t>(width) * 3;
     s.above.resize(samples + 2);
