@@ -29,6 +29,12 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat&, VideoSpeed, VideoE
 Result<bool> VideoEncoder::encode(const VideoView&, const VideoPictureOptions&, Bytes&) {
   return kMissing;
 }
+Result<VideoPlanes> VideoEncoder::next_picture() {
+  return kMissing;
+}
+Result<bool> VideoEncoder::encode(const VideoPictureOptions&, Bytes&) {
+  return kMissing;
+}
 std::string VideoEncoder::take_notice() {
   return {};
 }

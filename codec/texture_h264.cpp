@@ -51,42 +51,28 @@ Image8 enlarged(View8 picture, int width, int height) {
   return out;
 }
 
-/// Planes of one picture, 4:2:0, full range, BT.601.
-class Planes {
- public:
-  /// `picture` is of the coded format's size.
-  Status fill(View8 picture) {
+/// A picture as 4:2:0, full range, BT.601, in planes of its size.
+Status to_planes(View8 picture, const VideoPlanes& to) {
+  if (picture.channels == 1) {
     const auto width = static_cast<std::size_t>(picture.width);
-    const auto height = static_cast<std::size_t>(picture.height);
-    luma_.resize(width * height);
-    blue_.resize(width * height / 4);
-    red_.resize(width * height / 4);
-    strides_ = {picture.width, picture.width / 2, picture.width / 2};
-    if (picture.channels == 1) {
-      for (int y = 0; y < picture.height; ++y)
-        std::copy_n(picture.row(y), width, luma_.data() + static_cast<std::size_t>(y) * width);
-      std::fill(blue_.begin(), blue_.end(), 128);
-      std::fill(red_.begin(), red_.end(), 128);
-      return {};
-    }
-    thread_local const Handle handle(tjInitCompress());
-    std::array<unsigned char*, 3> planes{luma_.data(), blue_.data(), red_.data()};
-    if (!handle ||
-        tjEncodeYUVPlanes(handle.get(), picture.data, picture.width, static_cast<int>(picture.stride),
-                          picture.height, TJPF_RGB, planes.data(), strides_.data(), TJSAMP_420, 0) != 0)
-      return Error{std::string("texture cannot be turned into luma and chroma: ") +
-                   tjGetErrorStr2(handle.get())};
+    for (int y = 0; y < picture.height; ++y)
+      std::copy_n(picture.row(y), width, to.planes[0] + y * to.stride_bytes[0]);
+    for (const std::size_t p : {1U, 2U})
+      for (int y = 0; y < picture.height / 2; ++y)
+        std::fill_n(to.planes[p] + y * to.stride_bytes[p], width / 2, std::uint8_t{128});
     return {};
   }
-  VideoView view() const {
-    return {.planes = {luma_.data(), blue_.data(), red_.data()},
-            .stride_bytes = {strides_[0], strides_[1], strides_[2]}};
-  }
-
- private:
-  Bytes luma_, blue_, red_;
-  std::array<int, 3> strides_{};
-};
+  thread_local const Handle handle(tjInitCompress());
+  std::array<unsigned char*, 3> planes = to.planes;
+  std::array<int, 3> strides{static_cast<int>(to.stride_bytes[0]), static_cast<int>(to.stride_bytes[1]),
+                             static_cast<int>(to.stride_bytes[2])};
+  if (!handle ||
+      tjEncodeYUVPlanes(handle.get(), picture.data, picture.width, static_cast<int>(picture.stride),
+                        picture.height, TJPF_RGB, planes.data(), strides.data(), TJSAMP_420, 0) != 0)
+    return Error{std::string("texture cannot be turned into luma and chroma: ") +
+                 tjGetErrorStr2(handle.get())};
+  return {};
+}
 
 Status to_rgb(const VideoView& view, Image8& out) {
   thread_local const Handle handle(tjInitDecompress());
@@ -126,11 +112,12 @@ class Encoder final : public TextureEncoder {
       larger = enlarged(picture, format.width, format.height);
       picture = larger.view();
     }
-    if (auto status = planes_.fill(picture); !status) return status.error();
+    const auto planes = video_->next_picture();
+    if (!planes) return planes.error();
+    if (auto status = to_planes(picture, *planes); !status) return status.error();
     const std::size_t start = out.size();
     append(out, last_);
-    const auto key = video_->encode(planes_.view(),
-                                    {.rate_factor = rate_factor(options.quality), .key = options.key}, out);
+    const auto key = video_->encode({.rate_factor = rate_factor(options.quality), .key = options.key}, out);
     if (!key) {
       out.resize(start);
       return key.error();
@@ -151,7 +138,6 @@ class Encoder final : public TextureEncoder {
   std::optional<VideoEncoder> video_;
   VideoFormat format_;
   VideoEncoderKind encoder_{};
-  Planes planes_;
   std::uint32_t last_ = kNothing;
 };
 

@@ -90,9 +90,13 @@ struct VideoEncoder::State {
     codec.reset();
   }
 
-  Status copy(const VideoView& from) {
+  Status make_writable() {
     if (const int code = av_frame_make_writable(picture.get()); code < 0)
       return Error{"no memory for a picture: " + av_text(code)};
+    return {};
+  }
+
+  void copy(const VideoView& from) {
     const int sample_bytes = format.bits > 8 ? 2 : 1;
     for (int p = 0; p < planes_of(format); ++p) {
       const auto plane = static_cast<std::size_t>(p);
@@ -102,7 +106,6 @@ struct VideoEncoder::State {
         std::copy_n(from.planes[plane] + y * from.stride_bytes[plane], row,
                     picture->data[plane] + y * picture->linesize[plane]);
     }
-    return {};
   }
 };
 
@@ -140,9 +143,25 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed 
   return VideoEncoder(std::move(state));
 }
 
-Result<bool> VideoEncoder::encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out) {
+Result<VideoPlanes> VideoEncoder::next_picture() {
   State& s = *state_;
-  if (auto status = s.copy(picture); !status) return status.error();
+  if (auto status = s.make_writable(); !status) return status.error();
+  VideoPlanes out;
+  for (std::size_t p = 0; p < static_cast<std::size_t>(planes_of(s.format)); ++p) {
+    out.planes[p] = s.picture->data[p];
+    out.stride_bytes[p] = s.picture->linesize[p];
+  }
+  return out;
+}
+
+Result<bool> VideoEncoder::encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out) {
+  if (auto status = state_->make_writable(); !status) return status.error();
+  state_->copy(picture);
+  return encode(options, out);
+}
+
+Result<bool> VideoEncoder::encode(const VideoPictureOptions& options, Bytes& out) {
+  State& s = *state_;
   Bytes unit;
   auto key = s.encode(options, unit);
   if (!key && s.kind != VideoEncoderKind::kX264) {

@@ -24,6 +24,12 @@ struct VideoView {
   std::array<std::ptrdiff_t, 3> stride_bytes{};  // may be below 0
 };
 
+/// The same, to be written.
+struct VideoPlanes {
+  std::array<std::uint8_t*, 3> planes{};
+  std::array<std::ptrdiff_t, 3> stride_bytes{};
+};
+
 /// Of libx264: each takes more time, and fewer bytes, than the one before.
 enum class VideoSpeed : std::uint8_t { kUltrafast, kSuperfast, kVeryfast };
 
@@ -50,6 +56,11 @@ class VideoEncoder {
   /// encoder fails, does not open anew, or gives what decoders would not take, libx264 codes this picture, as
   /// an IDR picture, and all that follow.
   Result<bool> encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out);
+
+  /// The same without a copy: what was put into the planes that next_picture() gave last, which are the
+  /// encoder's, hold anything before, and are valid until encode().
+  Result<VideoPlanes> next_picture();
+  Result<bool> encode(const VideoPictureOptions& options, Bytes& out);
 
   /// What a log should say of it, once: that another encoder than the one asked for makes the pictures from
   /// now on, and why. Else empty.

@@ -8,6 +8,7 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 }
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -140,6 +141,27 @@ TEST(VideoCoder, TheSamePicturesGiveTheSameBytes) {
       ASSERT_TRUE(encoder.encode(film.picture(number), {}, bytes).ok());
   }
   EXPECT_EQ(all[0], all[1]);
+}
+
+TEST_P(VideoFormats, WhatIsPutIntoTheEncodersPlanesIsCodedAsACopyIs) {
+  Film film{GetParam()};
+  VideoEncoder copies = encoder_of(film.format), in_place = encoder_of(film.format);
+  const std::uint8_t* first = nullptr;
+  for (int number = 0; number < 4; ++number) {
+    const VideoView picture = film.picture(number);
+    const auto to = in_place.next_picture();
+    ASSERT_TRUE(to.ok()) << to.error().message;
+    if (first == nullptr) first = to->planes[0];
+    EXPECT_EQ(to->planes[0], first) << "the encoder keeps pictures, so that each is in new memory";
+    for (std::size_t p = 0; p < film.bytes.size(); ++p)
+      for (int y = 0; y < film.height(p); ++y)
+        std::copy_n(picture.planes[p] + y * picture.stride_bytes[p], picture.stride_bytes[p],
+                    to->planes[p] + y * to->stride_bytes[p]);
+    Bytes copied, placed;
+    ASSERT_TRUE(copies.encode(picture, {}, copied).ok());
+    ASSERT_TRUE(in_place.encode({}, placed).ok());
+    EXPECT_EQ(copied, placed) << number;
+  }
 }
 
 TEST(VideoCoder, APictureIsNotDecodedWithoutTheOneItBuildsOn) {
