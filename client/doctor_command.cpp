@@ -85,6 +85,7 @@ Status run(const Options& options, StopSignal& stop) {
       check_streams(options, stop), check_keys(options.domain->keys),
       check_disk(options.folder),   check_clock("/"),
       check_cameras("/"),           check_processor("/"),
+      check_huge_pages("/"),
   };
   options.json ? print_json(findings) : print(findings);
   const auto count = std::ranges::count(findings, Grade::kTrouble, &Finding::grade);

@@ -28,6 +28,8 @@ Finding check_clock(const std::filesystem::path& root);
 /// Cameras, and whether this user may open them.
 Finding check_cameras(const std::filesystem::path& root);
 Finding check_processor(const std::filesystem::path& root);
+/// Whether large memory lies in huge pages (cli/huge_pages.cpp).
+Finding check_huge_pages(const std::filesystem::path& root);
 
 /// What the kernel says of the system's clock, and what was seen beside it.
 struct ClockState {

@@ -89,6 +89,22 @@ TEST(Doctor, ProcessorThatIsKeptSlowIsSaid) {
   EXPECT_EQ(check_processor(machine.root.path()).grade, Grade::kAdvice);
 }
 
+TEST(Doctor, HugePagesThatAreSwitchedOffAreSaid) {
+  const Machine machine;
+  EXPECT_EQ(check_huge_pages(machine.root.path()).grade, Grade::kGood);
+  EXPECT_THAT(check_huge_pages(machine.root.path()).found, HasSubstr("none"));
+  const char* file = "sys/kernel/mm/transparent_hugepage/enabled";
+  for (const char* given : {"[always] madvise never\n", "always [madvise] never\n"}) {
+    machine.says(file, given);
+    EXPECT_EQ(check_huge_pages(machine.root.path()).grade, Grade::kGood) << given;
+    EXPECT_THAT(check_huge_pages(machine.root.path()).found, HasSubstr("ask")) << given;
+  }
+  machine.says(file, "always madvise [never]\n");
+  const Finding off = check_huge_pages(machine.root.path());
+  EXPECT_EQ(off.grade, Grade::kAdvice);
+  EXPECT_THAT(off.mend, HasSubstr("madvise"));
+}
+
 TEST(Doctor, WhatKeepsTheClockAndPtpClocksAreSaid) {
   const Finding alone = judge_clock({});
   EXPECT_EQ(alone.grade, Grade::kAdvice);
