@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// operator new of a program that works on pictures: what is large lies in huge pages, where the system gives
-// them to those that ask (transparent_hugepage: madvise, as many distributions have it). Rows that lie pages
-// apart are read side by side, and in a virtual machine each page of 4 kB that the processor has to look up
-// anew costs microseconds (docs/BENCHMARKS.md, "The whole chain").
+// operator new and delete of a program that works on pictures: what is large lies in huge pages, where the
+// system gives them to those that ask (transparent_hugepage: madvise, as many distributions have it). Rows
+// that lie pages apart are read side by side, and in a virtual machine each page of 4 kB that the processor
+// has to look up anew costs microseconds (docs/BENCHMARKS.md, "The whole chain").
 #include <sys/mman.h>
 
 #include <cstdint>
@@ -23,14 +23,40 @@ void* allocate(std::size_t size) noexcept {
   return block;
 }
 
-}  // namespace
-
-// What goes with it, operator delete, is the library's: free().
-void* operator new(std::size_t size) {
+void* allocate_or_throw(std::size_t size) {
   for (;;) {
     if (void* block = allocate(size)) return block;
     const std::new_handler handler = std::get_new_handler();
     if (handler == nullptr) throw std::bad_alloc();
     handler();
   }
+}
+
+}  // namespace
+
+// All of them, so that memory checkers see what malloc() gave come back to free(). Those for types of a
+// larger alignment stay the library's.
+void* operator new(std::size_t size) {
+  return allocate_or_throw(size);
+}
+void* operator new[](std::size_t size) {
+  return allocate_or_throw(size);
+}
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  return allocate(size);
+}
+void* operator new[](std::size_t size, const std::nothrow_t&) noexcept {
+  return allocate(size);
+}
+void operator delete(void* block) noexcept {
+  std::free(block);
+}
+void operator delete[](void* block) noexcept {
+  std::free(block);
+}
+void operator delete(void* block, std::size_t) noexcept {
+  std::free(block);
+}
+void operator delete[](void* block, std::size_t) noexcept {
+  std::free(block);
 }
