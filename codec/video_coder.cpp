@@ -90,12 +90,6 @@ struct VideoEncoder::State {
     codec.reset();
   }
 
-  Status make_writable() {
-    if (const int code = av_frame_make_writable(picture.get()); code < 0)
-      return Error{"no memory for a picture: " + av_text(code)};
-    return {};
-  }
-
   void copy(const VideoView& from) {
     const int sample_bytes = format.bits > 8 ? 2 : 1;
     for (int p = 0; p < planes_of(format); ++p) {
@@ -145,7 +139,8 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed 
 
 Result<VideoPlanes> VideoEncoder::next_picture() {
   State& s = *state_;
-  if (auto status = s.make_writable(); !status) return status.error();
+  if (const int code = av_frame_make_writable(s.picture.get()); code < 0)
+    return Error{"no memory for a picture: " + av_text(code)};
   VideoPlanes out;
   for (std::size_t p = 0; p < static_cast<std::size_t>(planes_of(s.format)); ++p) {
     out.planes[p] = s.picture->data[p];
@@ -155,7 +150,7 @@ Result<VideoPlanes> VideoEncoder::next_picture() {
 }
 
 Result<bool> VideoEncoder::encode(const VideoView& picture, const VideoPictureOptions& options, Bytes& out) {
-  if (auto status = state_->make_writable(); !status) return status.error();
+  if (const auto planes = next_picture(); !planes) return planes.error();
   state_->copy(picture);
   return encode(options, out);
 }
