@@ -43,7 +43,7 @@ Spread measure_read_bandwidth(int threads) {
   // Pages of zeros would all be one page: write them.
   for (std::size_t i = 0; i < buffer.size(); ++i) buffer[i] = i;
   WorkerPool pool(threads);
-  std::vector<std::uint64_t> sums(static_cast<std::size_t>(threads));
+  std::vector<std::uint64_t> sums(static_cast<std::size_t>(pool.workers()));
   std::vector<double> rates;
   volatile std::uint64_t kept = 0;  // so that nothing is optimised away
   const int chunks = static_cast<int>(bytes / kChunk);
