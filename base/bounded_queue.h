@@ -54,6 +54,23 @@ class BoundedQueue {
     return take_front(lock);
   }
 
+  /// As pop(); where wanted(item) is true the one behind it as well, waited for like the first. Nothing is
+  /// dropped between the two. Of a capacity of two or more.
+  template <typename Wanted>
+  std::pair<std::optional<T>, std::optional<T>> pop_with_next_if(const Wanted& wanted) {
+    std::unique_lock lock(mutex_);
+    not_empty_.wait(lock, [&] { return closed_ || !items_.empty(); });
+    std::pair<std::optional<T>, std::optional<T>> out;
+    if (items_.empty()) return out;
+    const bool both = wanted(std::as_const(items_.front()));
+    if (both) not_empty_.wait(lock, [&] { return closed_ || items_.size() > 1; });
+    out.first = take_front();
+    if (both && !items_.empty()) out.second = take_front();
+    lock.unlock();
+    not_full_.notify_all();
+    return out;
+  }
+
   /// As pop(), but gives up after `timeout`; finished() tells the two kinds of nothing apart.
   std::optional<T> pop_for(std::chrono::nanoseconds timeout) {
     std::unique_lock lock(mutex_);
@@ -89,10 +106,14 @@ class BoundedQueue {
  private:
   std::optional<T> take_front(std::unique_lock<std::mutex>& lock) {
     if (items_.empty()) return std::nullopt;
-    std::optional<T> item(std::move(items_.front()));
-    items_.pop_front();
+    std::optional<T> item = take_front();
     lock.unlock();
     not_full_.notify_one();
+    return item;
+  }
+  std::optional<T> take_front() {
+    std::optional<T> item(std::move(items_.front()));
+    items_.pop_front();
     return item;
   }
 

@@ -132,12 +132,13 @@ struct Reconstructor::State {
   Image8 last_texture;  // white-field: of the frame before
   std::int64_t last_texture_time_ns = 0;
   ReconstructReport report;
-  const CapturedFrame* pair = nullptr;  // of the last add()
+  const CapturedFrame* pair = nullptr;  // what the last frame's exposures show; null: no slide
 
   std::mutex spare_mutex;
   std::vector<Frame3D> spare;  // handed back; guarded by spare_mutex
 
   void forget();
+  Result<const CapturedFrame*> observe(const CapturedFrame& captured);
   Frame3D blank_frame();
   void make_surface(DecodedGrid& grid, Surface& out);
   void make_texture(const CapturedFrame& frame, Image8& out);
@@ -149,6 +150,25 @@ void Reconstructor::State::forget() {
   pairs.forget();
   decoder = SlideDecoder(rig, pattern, options);
   half_way = HalfWay(pattern.boundaries(), lines);
+}
+
+/// The frame in step of which `pair` is made; null where there is none yet.
+Result<const CapturedFrame*> Reconstructor::State::observe(const CapturedFrame& captured) {
+  if (auto fits = check_fits(captured, rig); !fits) return fits.error();
+  report = {};
+  waiting.reset();
+  pair = nullptr;
+  StageClock clock;
+  const CapturedFrame* frame = steps.read(captured);
+  report.step = steps.report();
+  if (report.step.restarted) forget();
+  if (frame == nullptr) return frame;
+  pair = pairs.read(*frame, pool);
+  report.white = pair == nullptr;
+  if (pair == nullptr) return frame;
+  decoder.observe(*pair, pool, report);
+  report.detect_ms = clock.lap_ms();
+  return frame;
 }
 
 /// Whatever it holds is overwritten.
@@ -252,25 +272,19 @@ std::optional<Frame3D> Reconstructor::next() {
   return std::exchange(state_->waiting, std::nullopt);
 }
 
+Status Reconstructor::observe(const CapturedFrame& captured) {
+  const auto seen = state_->observe(captured);
+  return seen ? Status() : Status(seen.error());
+}
+
 Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured) {
   State& s = *state_;
-  if (auto fits = check_fits(captured, s.rig); !fits) return fits.error();
-  s.report = {};
-  s.waiting.reset();
-  s.pair = nullptr;
+  const auto seen = s.observe(captured);
+  if (!seen) return seen.error();
+  if (s.pair == nullptr) return std::optional<Frame3D>();
+  const CapturedFrame& frame = **seen;
   StageClock clock;
-  const CapturedFrame* in_step = s.steps.read(captured);
-  s.report.step = s.steps.report();
-  if (s.report.step.restarted) s.forget();
-  if (in_step == nullptr) return std::optional<Frame3D>();
-  const CapturedFrame& frame = *in_step;
-  const CapturedFrame* pair = s.pairs.read(frame, s.pool);
-  s.report.white = pair == nullptr;
-  if (pair == nullptr) return std::optional<Frame3D>();
-  s.pair = pair;
-  s.decoder.observe(*pair, s.pool, s.report);
-  s.report.detect_ms = clock.lap_ms();
-  const bool complete = s.decoder.decode({*pair, s.depths.columns()}, s.pool, s.report, s.decoded);
+  const bool complete = s.decoder.decode({*s.pair, s.depths.columns()}, s.pool, s.report, s.decoded);
   s.report.match_ms = clock.lap_ms();
   if (!complete) return std::optional<Frame3D>();
 

@@ -63,6 +63,11 @@ class Reconstructor {
   /// exposure is under two slides (report().step). Fails where the frame's size is not the rig's.
   Result<std::optional<Frame3D>> add(const CapturedFrame& frame);
 
+  /// Looks at a frame that is to give no surface, in the time of report().detect_ms, so that the next one has
+  /// the other slide close by: where frames were dropped for want of time, the last one under it can lie far
+  /// back, and what moves is then decoded with something else. Fails as add() does.
+  Status observe(const CapturedFrame& frame);
+
   /// Takes back a surface that nobody needs any more, so that a later one is made in its memory. A stream
   /// whose frames all come back allocates nothing once it is warm. Any thread.
   void recycle(Frame3D&& used);
@@ -74,7 +79,7 @@ class Reconstructor {
   /// Textures made so far: fewer than surfaces under white-frame, half as many under white-field.
   std::uint64_t textures() const;
 
-  /// Of the last add().
+  /// Of the last add() or observe().
   const ReconstructReport& report() const;
 
   /// What the last add() decoded: a slide and its complement, of the frame itself or made of it as the scheme

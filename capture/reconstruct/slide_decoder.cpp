@@ -113,7 +113,8 @@ struct SlideDecoder::State {
   bool have_previous = false;
   bool have_same = false;
   bool have_older = false;
-  SlideOrder order = SlideOrder::kNewerIsSecond;  // of the last decoded pair
+  SlideOrder order =
+      SlideOrder::kNewerIsSecond;  // of the last pair; until it is decoded, if slides alternate
   bool order_known = false;
 
   std::vector<float> before_px;                        // SequenceResult::seen_px of the frame decoded last,
@@ -323,6 +324,7 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
   // the one before, as in the paper, and is decoded all the same, with the last frame under the other slide.
   const bool have_previous = std::exchange(s.have_previous, true);
   report.same_slide = s.pattern.slides == 2 && have_previous && s.shows_same_slide();
+  if (!report.same_slide) s.order = other(s.order);
   if (s.pattern.slides == 1 && have_previous) {
     std::swap(s.same, s.previous);
     s.have_same = true;
@@ -341,13 +343,12 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   if (!s.have_older && s.pattern.slides == 2) return false;
   const CapturedFrame& pair = view.pair;
   s.expected = view.expected;
-  const SlideOrder predicted = report.same_slide ? s.order : other(s.order);
   if (s.quick) {
-    s.match_quickly(predicted, pool);
+    s.match_quickly(s.order, pool);
     s.decode_quickly(pair, pool, report, out);
     return true;
   }
-  s.match_in_order(predicted, pool);
+  s.match_in_order(s.order, pool);
   if (s.paper) {
     report.matched = s.match.valid;
   } else {

@@ -51,5 +51,24 @@ TEST(BoundedQueue, CloseWakesAWaitingConsumer) {
   consumer.join();
 }
 
+TEST(BoundedQueue, TheNextOneComesAlongWhereItIsWanted) {
+  BoundedQueue<int> queue(3);
+  const auto odd = [](int i) { return i % 2 == 1; };
+  using Both = std::pair<std::optional<int>, std::optional<int>>;
+  for (const int i : {1, 2, 4}) queue.push_wait(i);
+  EXPECT_EQ(queue.pop_with_next_if(odd), (Both{1, 2}));
+  EXPECT_EQ(queue.pop_with_next_if(odd), (Both{4, {}}));
+  queue.push_wait(5);
+  std::thread producer([&] {
+    queue.push_wait(6);
+    queue.push_wait(7);
+    queue.close();
+  });
+  EXPECT_EQ(queue.pop_with_next_if(odd), (Both{5, 6}));   // waits for it
+  EXPECT_EQ(queue.pop_with_next_if(odd), (Both{7, {}}));  // which will never come
+  EXPECT_EQ(queue.pop_with_next_if(odd), Both());
+  producer.join();
+}
+
 }  // namespace
 }  // namespace relievo

@@ -2,7 +2,12 @@
 // The quick decoder on scenes whose boundaries are known.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
 
 #include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/quick_difference.h"
@@ -52,29 +57,86 @@ TEST(QuickDecoder, GivesTheSameForAnyNumberOfThreads) {
   }
 }
 
+/// A simulated rig and its frames.
+struct Simulated {
+  explicit Simulated(const std::string& spec)
+      : options(*sim::parse_sim_options(spec)),
+        scene(*sim::make_scene(options.scene)),
+        rig(sim::make_rig(options, scene->view())),
+        pattern(*make_pattern(options.base, options.slides, options.first, options.stripes)),
+        renderer(options, rig, pattern, scene) {}
+
+  CapturedFrame frame(std::uint64_t n) const {
+    CapturedFrame out;
+    out.number = n;
+    out.time_ns = std::llround(static_cast<double>(n) * 1e9 / rig.frame_rate);
+    out.scan = rig.scan;
+    out.picture = renderer.render(n, false).picture;
+    return out;
+  }
+  Reconstructor reconstructor() const {
+    return *Reconstructor::create(rig, pattern, {.decoder = Decoder::kQuick, .texture = false});
+  }
+
+  const sim::SimOptions options;
+  const std::shared_ptr<const sim::Scene> scene;
+  const Rig rig;
+  const Pattern pattern;
+  const sim::Renderer renderer;
+};
+
 // What the scenes above lack: contrast, where luma is asked for the place, also beside the picture's sides.
 TEST(QuickDecoder, DecodesWhatHasContrast) {
-  const auto options = sim::parse_sim_options("object,width=320,height=240,stripes=45");
-  ASSERT_TRUE(options);
-  const auto scene = sim::make_scene(options->scene);
-  ASSERT_TRUE(scene);
-  const Rig rig = sim::make_rig(*options, (*scene)->view());
-  const auto pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
-  ASSERT_TRUE(pattern);
-  const sim::Renderer renderer(*options, rig, *pattern, *scene);
-  auto reconstructor = Reconstructor::create(rig, *pattern, {.decoder = Decoder::kQuick, .texture = false});
-  ASSERT_TRUE(reconstructor);
+  const Simulated object("object,width=320,height=240,stripes=45");
+  Reconstructor reconstructor = object.reconstructor();
   for (std::uint64_t n = 0; n < 3; ++n) {
-    CapturedFrame frame;
-    frame.number = n;
-    frame.time_ns = static_cast<std::int64_t>(n) * 33'366'667;
-    frame.scan = rig.scan;
-    frame.picture = renderer.render(n, false).picture;
-    const auto out = reconstructor->add(frame);
+    const auto out = reconstructor.add(object.frame(n));
     ASSERT_TRUE(out) << out.error().message;
     if (n > 0) {
       EXPECT_GT((*out)->surface.grid.size(), 2000U);
     }
+  }
+}
+
+// Where frames are dropped: a person who walks at 1 m/s has gone 0.3 m since the other slide was seen, or 33
+// mm where the frame before was observed.
+TEST(QuickDecoder, AnObservedFrameIsTheNextOnesOther) {
+  const Simulated walk("walk,width=320,height=240,stripes=45");
+  constexpr std::uint64_t kBefore = 20, kAfter = 29;  // after an even number of frames and an odd one
+  using Places = std::map<std::pair<int, int>, float>;
+  enum class Between { kEach, kNone, kLast };
+  const auto places = [&](Between between, std::uint64_t last) {
+    Reconstructor reconstructor = walk.reconstructor();
+    Places out;
+    for (std::uint64_t n = kBefore - 3; n <= last; ++n) {
+      if (n > kBefore && n < last && between != Between::kEach) {
+        if (between == Between::kLast && n == last - 1) {
+          EXPECT_TRUE(reconstructor.observe(walk.frame(n)));
+        }
+        continue;
+      }
+      const auto frame = reconstructor.add(walk.frame(n));
+      EXPECT_TRUE(frame);
+      if (n < last) continue;
+      for (const GridPoint& p : (*frame)->surface.grid) out[{p.line, p.boundary}] = p.column_px;
+    }
+    return out;
+  };
+  for (const std::uint64_t last : {kAfter, kAfter + 1}) {
+    const Places all = places(Between::kEach, last);
+    const auto found = [&](const Places& some) {
+      return std::count_if(some.begin(), some.end(), [&](const auto& place) {
+        const auto same = all.find(place.first);
+        return same != all.end() && std::abs(same->second - place.second) < 1;
+      });
+    };
+    const Places direct = places(Between::kNone, last), observed = places(Between::kLast, last);
+    const auto elsewhere = [&](const Places& some) {
+      return static_cast<std::ptrdiff_t>(some.size()) - found(some);
+    };
+    EXPECT_GT(static_cast<double>(found(observed)), 0.97 * static_cast<double>(all.size()));
+    EXPECT_GT(found(observed), found(direct));
+    EXPECT_LT(elsewhere(observed), elsewhere(direct));
   }
 }
 

@@ -238,6 +238,42 @@ TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction)
   }));
 }
 
+// A slide of now and one from before the wall jumped make few points. The paper's decoder knows nothing else
+// of the past.
+TEST_F(PipelineTest, WhereFramesAreDroppedASurfaceIsStillOfTwoInARow) {
+  constexpr std::uint64_t kJump = 16, kLeast = 400, kSurfaces = 60;
+  StripedScene far = scene_;
+  far.depth_m = 1.6;
+  const Frames far_frames(far);
+  Pipeline* running = nullptr;
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        const bool late = std::chrono::steady_clock::now() > end;
+        const ServerStatus s = running->status();
+        if (late || (n >= kLeast && s.drops_reconstruct > kLeast / 2 && s.frames_published > kSurfaces))
+          return ScriptedSource::end();
+        return std::optional(n / kJump % 2 == 0 ? frames_(n) : far_frames(n));
+      },
+      true);
+  PipelineOptions options;
+  options.reconstruct.decoder = Decoder::kPaper;
+  options.encode.key_interval = 1;
+  const auto pipeline = make(source, {&sink_}, options);
+  running = pipeline.get();
+  ASSERT_TRUE(pipeline->run());
+  EXPECT_GT(pipeline->status().drops_reconstruct, kLeast / 2);
+  const auto got = sink_.frames();
+  EXPECT_GT(got.size(), kSurfaces);
+  for (const FrameMessage& message : got) {
+    if (message.number % kJump == 0) continue;  // the wall jumps between its own two frames
+    const auto frame = decode_frame(*message.data);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_GT(frame->surface.positions.size(), 60U * 13) << message.number;
+  }
+}
+
 TEST_F(PipelineTest, EndsAfterAsManyFramesAsAsked) {
   PipelineOptions options = fast_and_lossless();
   options.frames = 5;
