@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/quick_difference.h"
@@ -102,20 +103,24 @@ TEST(QuickDecoder, DecodesWhatHasContrast) {
 // mm where the frame before was observed.
 TEST(QuickDecoder, AnObservedFrameIsTheNextOnesOther) {
   const Simulated walk("walk,width=320,height=240,stripes=45");
-  constexpr std::uint64_t kBefore = 20, kAfter = 29;  // after an even number of frames and an odd one
+  constexpr std::uint64_t kFirst = 17, kBefore = 20,
+                          kAfter = 29;  // an odd number of frames later, and an even one
+  std::vector<CapturedFrame> film;
+  for (std::uint64_t n = kFirst; n <= kAfter + 1; ++n) film.push_back(walk.frame(n));
   using Places = std::map<std::pair<int, int>, float>;
   enum class Between { kEach, kNone, kLast };
   const auto places = [&](Between between, std::uint64_t last) {
     Reconstructor reconstructor = walk.reconstructor();
     Places out;
-    for (std::uint64_t n = kBefore - 3; n <= last; ++n) {
+    for (std::uint64_t n = kFirst; n <= last; ++n) {
+      const CapturedFrame& shown = film[n - kFirst];
       if (n > kBefore && n < last && between != Between::kEach) {
         if (between == Between::kLast && n == last - 1) {
-          EXPECT_TRUE(reconstructor.observe(walk.frame(n)));
+          EXPECT_TRUE(reconstructor.observe(shown));
         }
         continue;
       }
-      const auto frame = reconstructor.add(walk.frame(n));
+      const auto frame = reconstructor.add(shown);
       EXPECT_TRUE(frame);
       if (n < last) continue;
       for (const GridPoint& p : (*frame)->surface.grid) out[{p.line, p.boundary}] = p.column_px;

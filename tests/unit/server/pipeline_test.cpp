@@ -241,7 +241,7 @@ TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction)
 // A slide of now and one from before the wall jumped make few points. The paper's decoder knows nothing else
 // of the past.
 TEST_F(PipelineTest, WhereFramesAreDroppedASurfaceIsStillOfTwoInARow) {
-  constexpr std::uint64_t kJump = 16, kLeast = 400, kSurfaces = 60;
+  constexpr std::uint64_t kJump = 16, kDrops = 200, kSurfaces = 30;
   StripedScene far = scene_;
   far.depth_m = 1.6;
   const Frames far_frames(far);
@@ -252,8 +252,10 @@ TEST_F(PipelineTest, WhereFramesAreDroppedASurfaceIsStillOfTwoInARow) {
       [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
         const bool late = std::chrono::steady_clock::now() > end;
         const ServerStatus s = running->status();
-        if (late || (n >= kLeast && s.drops_reconstruct > kLeast / 2 && s.frames_published > kSurfaces))
+        if (late || (s.drops_reconstruct > kDrops && s.frames_published > kSurfaces))
           return ScriptedSource::end();
+        std::this_thread::sleep_for(
+            std::chrono::microseconds(200));  // many times faster than the machine all the same
         return std::optional(n / kJump % 2 == 0 ? frames_(n) : far_frames(n));
       },
       true);
@@ -263,7 +265,7 @@ TEST_F(PipelineTest, WhereFramesAreDroppedASurfaceIsStillOfTwoInARow) {
   const auto pipeline = make(source, {&sink_}, options);
   running = pipeline.get();
   ASSERT_TRUE(pipeline->run());
-  EXPECT_GT(pipeline->status().drops_reconstruct, kLeast / 2);
+  EXPECT_GT(pipeline->status().drops_reconstruct, kDrops);
   const auto got = sink_.frames();
   EXPECT_GT(got.size(), kSurfaces);
   for (const FrameMessage& message : got) {
