@@ -44,8 +44,7 @@ constexpr const char* kGuessed =
 struct Captured {
   CapturedFrame frame;
   std::int64_t capture_time_ns;
-  std::uint64_t ordinal;  // counts what the source gave,
-  std::uint64_t number;   // and this what it lost besides
+  std::uint64_t number;  // counts what the source gave and what it lost
 };
 struct Reconstructed {
   Frame3D frame;
@@ -239,7 +238,7 @@ class ThreadedPipeline final : public Pipeline {
       stats_.lost_in_capture(frame.lost_before);
       ++delivered;
       lost += frame.lost_before;
-      push(to_reconstruct_, Captured{std::move(frame), capture_time_ns, delivered, delivered + lost});
+      push(to_reconstruct_, Captured{std::move(frame), capture_time_ns, delivered + lost});
     }
     return {};
   }
@@ -260,7 +259,7 @@ class ThreadedPipeline final : public Pipeline {
         if (auto seen = reconstructor_.observe(item->frame); !seen) fail(seen.error());
         steps.add(item->frame.time_ns, reconstructor_.report().step);
         slides.add(*item);
-        previous = item->ordinal;
+        previous = item->number;
         ++observed_;
         item = std::move(next);
       }
@@ -287,10 +286,9 @@ class ThreadedPipeline final : public Pipeline {
                      " frames: " + steps.advice()});
         continue;
       }
-      const bool consecutive =
-          previous && item->ordinal == *previous + 1 && !starts_again && item->frame.lost_before == 0;
+      const bool consecutive = previous && item->number == *previous + 1 && !starts_again;
       if (reconstructor_.report().same_slide && consecutive) stats_.lost_in_capture(1);
-      previous = item->ordinal;
+      previous = item->number;
       if (!*result) {
         // A take that is looped would go on so for ever.
         if (!any_surface && options_.calibrated &&

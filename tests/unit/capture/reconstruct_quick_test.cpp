@@ -5,16 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/quick_difference.h"
 #include "capture/reconstruct/reconstructor.h"
-#include "capture/source/sim/renderer.h"
-#include "capture/source/sim/scene.h"
+#include "tests/support/simulated.h"
 #include "tests/support/striped_scene.h"
 
 namespace relievo {
@@ -58,38 +54,15 @@ TEST(QuickDecoder, GivesTheSameForAnyNumberOfThreads) {
   }
 }
 
-/// A simulated rig and its frames.
-struct Simulated {
-  explicit Simulated(const std::string& spec)
-      : options(*sim::parse_sim_options(spec)),
-        scene(*sim::make_scene(options.scene)),
-        rig(sim::make_rig(options, scene->view())),
-        pattern(*make_pattern(options.base, options.slides, options.first, options.stripes)),
-        renderer(options, rig, pattern, scene) {}
-
-  CapturedFrame frame(std::uint64_t n) const {
-    CapturedFrame out;
-    out.number = n;
-    out.time_ns = std::llround(static_cast<double>(n) * 1e9 / rig.frame_rate);
-    out.scan = rig.scan;
-    out.picture = renderer.render(n, false).picture;
-    return out;
-  }
-  Reconstructor reconstructor() const {
-    return *Reconstructor::create(rig, pattern, {.decoder = Decoder::kQuick, .texture = false});
-  }
-
-  const sim::SimOptions options;
-  const std::shared_ptr<const sim::Scene> scene;
-  const Rig rig;
-  const Pattern pattern;
-  const sim::Renderer renderer;
-};
+Reconstructor quick_of(const test::Simulated& simulated) {
+  return *Reconstructor::create(simulated.rig, simulated.pattern,
+                                {.decoder = Decoder::kQuick, .texture = false});
+}
 
 // What the scenes above lack: contrast, where luma is asked for the place, also beside the picture's sides.
 TEST(QuickDecoder, DecodesWhatHasContrast) {
-  const Simulated object("object,width=320,height=240,stripes=45");
-  Reconstructor reconstructor = object.reconstructor();
+  const test::Simulated object("object,width=320,height=240,stripes=45");
+  Reconstructor reconstructor = quick_of(object);
   for (std::uint64_t n = 0; n < 3; ++n) {
     const auto out = reconstructor.add(object.frame(n));
     ASSERT_TRUE(out) << out.error().message;
@@ -102,7 +75,7 @@ TEST(QuickDecoder, DecodesWhatHasContrast) {
 // Where frames are dropped: a person who walks at 1 m/s has gone 0.3 m since the other slide was seen, or 33
 // mm where the frame before was observed.
 TEST(QuickDecoder, AnObservedFrameIsTheNextOnesOther) {
-  const Simulated walk("walk,width=320,height=240,stripes=45");
+  const test::Simulated walk("walk,width=320,height=240,stripes=45");
   constexpr std::uint64_t kFirst = 17, kBefore = 20,
                           kAfter = 29;  // an odd number of frames later, and an even one
   std::vector<CapturedFrame> film;
@@ -110,7 +83,7 @@ TEST(QuickDecoder, AnObservedFrameIsTheNextOnesOther) {
   using Places = std::map<std::pair<int, int>, float>;
   enum class Between { kEach, kNone, kLast };
   const auto places = [&](Between between, std::uint64_t last) {
-    Reconstructor reconstructor = walk.reconstructor();
+    Reconstructor reconstructor = quick_of(walk);
     Places out;
     for (std::uint64_t n = kFirst; n <= last; ++n) {
       const CapturedFrame& shown = film[n - kFirst];

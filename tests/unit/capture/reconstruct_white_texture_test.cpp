@@ -7,37 +7,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <string>
 
-#include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/reconstruct/texture.h"
-#include "capture/source/sim/renderer.h"
+#include "tests/support/simulated.h"
 
 namespace relievo {
 namespace {
 
 /// A scene under stripes, and in white light without noise.
-struct Filmed {
-  explicit Filmed(const std::string& spec)
-      : options(*sim::parse_sim_options(spec)),
-        scene(*sim::make_scene(options.scene)),
-        rig(sim::make_rig(options, scene->view())),
-        pattern(*make_pattern(options.base, options.slides, options.first, options.stripes)),
-        stripes(options, rig, pattern, scene) {}
+struct Filmed : test::Simulated {
+  using Simulated::Simulated;
 
-  CapturedFrame frame(std::uint64_t index) const {
-    sim::RenderedFrame rendered = stripes.render(index, false);
-    CapturedFrame f;
-    f.number = index;
-    f.time_ns = std::llround(static_cast<double>(index) * 1e9 / rig.frame_rate);
-    f.scan = rig.scan;
-    f.picture = std::move(rendered.picture);
-    f.complement = std::move(rendered.complement);
-    return f;
-  }
   /// A white field and a black one, added.
   Image8 white(std::uint64_t index) const {
     sim::SimOptions o = options;
@@ -45,19 +28,13 @@ struct Filmed {
     o.scan = Scan::kProgressive;
     Pattern all_white = pattern;
     for (Primary& p : all_white.palette) p = 7;
-    const sim::Renderer renderer(o, sim::make_rig(o, scene->view()), all_white, scene);
-    const sim::RenderedFrame r = renderer.render(index, false);
+    const sim::Renderer in_white(o, sim::make_rig(o, scene->view()), all_white, scene);
+    const sim::RenderedFrame r = in_white.render(index, false);
     Image8 out = r.picture.clone();
     for (std::size_t i = 0; i < out.size(); ++i)
       out.data()[i] = static_cast<std::uint8_t>(std::min(255, r.picture.data()[i] + r.complement.data()[i]));
     return out;
   }
-
-  sim::SimOptions options;
-  std::shared_ptr<const sim::Scene> scene;
-  Rig rig;
-  Pattern pattern;
-  sim::Renderer stripes;
 };
 
 Image8 added(const CapturedFrame& frame) {
