@@ -80,7 +80,8 @@ Result<StillScene> render_still_scene(const std::string& spec) {
   if (!options) return options.error();
   auto scene = sim::make_scene(options->scene);
   if (!scene) return scene.error();
-  auto pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
+  auto pattern =
+      make_pattern(options->base, options->slides, options->first, options->stripes, options->path);
   if (!pattern) return pattern.error();
   options->scan = Scan::kProgressive;
   options->period = 1'000'000'000;  // frames: nothing moves

@@ -144,6 +144,24 @@ jobs_for_machine() {
 # say so by RUN_SERIAL.
 tests_for_machine() { echo $((2 * $(jobs_for_machine))); }
 
+# run_tests PRESET AT_A_TIME: ctest, whose status it returns. What failed stands thousands of lines above its summary, so the last
+# lines that each such test printed follow that once more.
+run_tests() {
+  local logs=$root/build/$1/Testing/Temporary status=0 number name
+  rm -f "$logs/LastTestsFailed.log"
+  (cd "$root" && ctest --preset "$1" -j "$2") || status=$?
+  [[ -r $logs/LastTestsFailed.log ]] || return "$status"
+  while IFS=: read -r number name; do
+    printf '\n--- %s, %s:\n' "$number" "$name"
+    awk -v name="$name" '
+      (at = index($0, " Test: ")) && substr($0, at + 7) == name { ours = 1 }
+      $0 == "<end of output>" { ours = printing = 0 }
+      printing { print }
+      ours && $0 == "Output:" { getline; printing = 1 }' "$logs/LastTest.log" | tail -n 40
+  done <"$logs/LastTestsFailed.log"
+  return "$status"
+}
+
 # build PRESET [TARGET...]: configures where needed and builds.
 build() {
   local preset=$1 dir=$root/build/$1 args=() log

@@ -57,7 +57,7 @@ Status run(const Options& options, StopSignal& stop) {
   }
   std::optional<Pattern> stripes;
   if (options.code == "stripes") {
-    auto made = make_pattern(spec->base, spec->slides, spec->first, spec->stripes);
+    auto made = make_pattern(spec->base, spec->slides, spec->first, spec->stripes, spec->path);
     if (!made) return made.error();
     if (made->slides > 2) return Error{"stripes on 1 or 2 slides calibrate: give slides=1 or slides=2"};
     stripes = *std::move(made);

@@ -14,7 +14,11 @@ CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& o) {
   for (auto* option :
        {app.add_option("--base", o.base, "Colours: 3 to 6"),
         app.add_option("--slides", o.slides, "Slides shown in turn: 1 or 2 decode; one-slide has 1"),
-        app.add_option("--first", o.first, "First stripe within the code's whole path"),
+        app.add_option("--path", o.path,
+                       "Which path through the code: clear, whose boundaries flip many channels, or paper, "
+                       "the published one; one-slide has its own")
+            ->check(CLI::IsMember({"clear", "paper"})),
+        app.add_option("--first", o.first, "First stripe within that path"),
         app.add_option("--stripes", o.stripes, "Stripes over the projector's width")}) {
     option->capture_default_str()->excludes(file);
   }
@@ -31,7 +35,8 @@ Result<Pattern> pattern_of(const PatternOptions& options) {
   const Scheme scheme = scheme_named(options.scheme).value_or(Scheme::kComplementary);
   if (scheme == Scheme::kOneSlide)
     return make_repeating_pattern(options.base, options.first, options.stripes);
-  Result<Pattern> pattern = make_pattern(options.base, options.slides, options.first, options.stripes);
+  Result<Pattern> pattern = make_pattern(options.base, options.slides, options.first, options.stripes,
+                                         code_path_named(options.path).value_or(CodePath::kClear));
   if (pattern) pattern->scheme = scheme;
   return pattern;
 }

@@ -20,11 +20,12 @@ struct PatternOptions {
   int base = 6;
   int slides = 2;
   int first = 0;
+  std::string path = "clear";
   int stripes = 90;
 };
 
-/// Adds --pattern, --base, --slides, --first, --stripes and --scheme, and returns --pattern. `options` must
-/// outlive the parsing.
+/// Adds --pattern, --base, --slides, --path, --first, --stripes and --scheme, and returns --pattern.
+/// `options` must outlive the parsing.
 CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& options);
 
 /// The pattern asked for. Fails where the file or the code does not exist.

@@ -132,7 +132,8 @@ Result<Opened> open(const std::string& spec) {
   const std::string name = "sim:" + spec;
   auto options = sim::parse_sim_options(spec);
   if (!options) return options.error().in(name);
-  auto pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
+  auto pattern =
+      make_pattern(options->base, options->slides, options->first, options->stripes, options->path);
   if (!pattern) return pattern.error().in(name);
   Opened out{*options, {}};
   out.info.name = name;

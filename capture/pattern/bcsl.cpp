@@ -5,6 +5,8 @@
 #include <cassert>
 #include <string>
 
+#include "capture/pattern/clear_path.h"
+
 namespace relievo {
 namespace {
 
@@ -83,17 +85,20 @@ int BcslGraph::neighbour_index(int from, int to) const {
   return j;
 }
 
+std::vector<int> BcslGraph::eulerian_path() const {
+  return eulerian_path([this](int vertex, int j) { return neighbour(vertex, j); });
+}
+
 // Hierholzer's algorithm with an explicit stack: walk unused arcs until stuck, then back out, which closes
 // the tour from its end. As every vertex has as many arcs in as out, the first place to be stuck is vertex 0.
-std::vector<int> BcslGraph::eulerian_path() const {
-  std::vector<int> next(static_cast<std::size_t>(vertices_), 0);  // first unused arc of each vertex
+std::vector<int> BcslGraph::eulerian_path(const std::function<int(int, int)>& nth) const {
+  std::vector<int> next(static_cast<std::size_t>(vertices_), 0);  // first untried arc of each vertex
   std::vector<int> walk{0}, path;
-  path.reserve(static_cast<std::size_t>(arcs()) + 1);
   while (!walk.empty()) {
     const int at = walk.back();
     int& j = next[static_cast<std::size_t>(at)];
     if (j < degree_) {
-      walk.push_back(neighbour(at, j++));
+      if (const int to = nth(at, j++); to >= 0) walk.push_back(to);
     } else {
       path.push_back(at);
       walk.pop_back();
@@ -109,7 +114,13 @@ std::vector<Primary> default_palette(int base) {
   return {kPrimaries.begin(), kPrimaries.begin() + base};
 }
 
-Result<Pattern> make_pattern(int base, int slides, int first_stripe, int stripes) {
+std::optional<CodePath> code_path_named(std::string_view name) {
+  if (name == "clear") return CodePath::kClear;
+  if (name == "paper") return CodePath::kPaper;
+  return std::nullopt;
+}
+
+Result<Pattern> make_pattern(int base, int slides, int first_stripe, int stripes, CodePath which) {
   const Result<BcslGraph> graph = BcslGraph::create(base, slides);
   if (!graph) return graph.error();
   std::vector<Primary> palette = default_palette(base);
@@ -125,7 +136,9 @@ Result<Pattern> make_pattern(int base, int slides, int first_stripe, int stripes
                  " do not fit a " + name_of(base, slides) + ", whose path has stripes 0 to " +
                  std::to_string(available - 1)};
   }
-  const std::vector<int> path = graph->eulerian_path();
+  const std::vector<int> path = which == CodePath::kPaper
+                                    ? graph->eulerian_path()
+                                    : clear_path(*graph, palette, first_stripe + stripes);
   const auto begin = path.begin() + first_stripe;
   return Pattern{base, slides, std::move(palette), std::vector<int>(begin, begin + stripes)};
 }

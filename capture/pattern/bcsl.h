@@ -7,7 +7,10 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "base/pattern.h"
@@ -43,8 +46,13 @@ class BcslGraph {
   /// The j with neighbour(from, j) == to, or -1 where the two share a colour on some slide. O(slides).
   int neighbour_index(int from, int to) const;
 
-  /// Every arc once: arcs() + 1 vertices, from vertex 0 back to it; always the same path.
+  /// Every arc once: arcs() + 1 vertices, from vertex 0 back to it; always the same path, the one of Table 1.
   std::vector<int> eulerian_path() const;
+
+  /// As eulerian_path(), over some arcs alone and in another order: nth(v, k) is the vertex that is tried
+  /// k-th from v, k in 0..degree()-1, or -1: that arc is left out. Each vertex must keep as many arcs in as
+  /// out; those that cannot be reached from vertex 0 are missing in the path.
+  std::vector<int> eulerian_path(const std::function<int(int, int)>& nth) const;
 
  private:
   BcslGraph(int base, int slides, int vertices, int degree)
@@ -57,9 +65,18 @@ class BcslGraph {
 /// cyan, magenta, yellow. Empty where base is over 6: no more primaries can be told from their complements.
 std::vector<Primary> default_palette(int base);
 
-/// `stripes` stripes of the Eulerian path of the (base, slides) graph from stripe `first_stripe` on, in the
-/// default palette. Fails where the graph or the palette does not exist or the path is too short.
-Result<Pattern> make_pattern(int base, int slides, int first_stripe, int stripes);
+/// Which of a graph's many Eulerian paths.
+enum class CodePath {
+  kClear,  // whose boundaries are seen best (capture/pattern/clear_path.h)
+  kPaper,  // that of Table 1
+};
+/// "clear" or "paper".
+std::optional<CodePath> code_path_named(std::string_view name);
+
+/// `stripes` stripes of such a path of the (base, slides) graph from stripe `first_stripe` on, in the default
+/// palette. Fails where the graph or the palette does not exist or the path is too short.
+Result<Pattern> make_pattern(int base, int slides, int first_stripe, int stripes,
+                             CodePath which = CodePath::kClear);
 
 /// Section 3.2, Table 1: the position of each boundary code of one pattern. 4 bytes an arc of the graph.
 class DecodingTable {

@@ -19,7 +19,7 @@ struct Simulated {
       : options(*sim::parse_sim_options(spec)),
         scene(*sim::make_scene(options.scene)),
         rig(sim::make_rig(options, scene->view())),
-        pattern(*make_pattern(options.base, options.slides, options.first, options.stripes)),
+        pattern(*make_pattern(options.base, options.slides, options.first, options.stripes, options.path)),
         renderer(options, rig, pattern, scene) {}
 
   CapturedFrame frame(std::uint64_t number) const {

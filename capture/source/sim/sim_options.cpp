@@ -58,7 +58,7 @@ std::string text(double value) {
 std::string key_names() {
   std::string out = "scan";
   for (const Key& key : kKeys) out += ", " + std::string(key.name);
-  return out + ", field_order, scheme";
+  return out + ", field_order, scheme, path";
 }
 
 Status set(SimOptions& options, const std::string& name, const std::string& value) {
@@ -78,6 +78,12 @@ Status set(SimOptions& options, const std::string& name, const std::string& valu
     const auto scheme = scheme_named(value);
     if (!scheme) return Error{"scheme=" + value + ": give " + scheme_names()};
     options.scheme = *scheme;
+    return {};
+  }
+  if (name == "path") {
+    const auto path = code_path_named(value);
+    if (!path) return Error{"path=" + value + ": give clear or paper"};
+    options.path = *path;
     return {};
   }
   for (const Key& key : kKeys) {
@@ -148,7 +154,9 @@ std::string sim_options_help() {
   std::string out =
       "scan=interlaced|progressive (interlaced)\n"
       "field_order=top|bottom (top): the field that an interlaced frame exposes first\n"
-      "scheme=complementary|white-field|white-frame|one-slide (complementary): what is projected in turn\n";
+      "scheme=complementary|white-field|white-frame|one-slide (complementary): what is projected in turn\n"
+      "path=clear|paper (clear): which path through the code, one whose boundaries flip many channels or the "
+      "published one; one-slide has its own\n";
   for (const Key& key : kKeys) {
     const double value =
         std::visit([&](auto field) { return static_cast<double>(defaults.*field); }, key.field);

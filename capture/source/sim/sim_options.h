@@ -8,6 +8,7 @@
 #include "base/pattern.h"
 #include "base/result.h"
 #include "base/rig.h"
+#include "capture/pattern/bcsl.h"
 
 namespace relievo::sim {
 
@@ -25,7 +26,8 @@ struct SimOptions {
   int projector_width = 1024, projector_height = 768;
   Scheme scheme = Scheme::kComplementary;
   int base = 6, slides = 2, stripes = 90;  // slides is 1 under the scheme one-slide
-  int first = 0;                           // first stripe within the code's whole path
+  int first = 0;                           // first stripe within the code's path
+  CodePath path = CodePath::kClear;
 
   // A projector without genlock, in fields of the camera: how far the shown slide's time has gone when frame
   // 0's first exposure begins, and how much the projector gains each second. An exposure across a slide

@@ -94,7 +94,8 @@ Result<std::unique_ptr<SimSource>> make_sim(const std::string& spec, const SimRu
   const auto make = [&] {
     return options->scheme == Scheme::kOneSlide
                ? make_repeating_pattern(options->base, options->first, options->stripes)
-               : make_pattern(options->base, options->slides, options->first, options->stripes);
+               : make_pattern(options->base, options->slides, options->first, options->stripes,
+                              options->path);
   };
   Result<Pattern> pattern = make();
   if (!pattern) return pattern.error().in(name);

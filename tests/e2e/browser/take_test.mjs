@@ -183,9 +183,8 @@ const checks = {
     await page.keyboard.press('g');
     await page.keyboard.press('ArrowLeft');
     await page.keyboard.press('+');
-    await page.waitForTimeout(300);
-    const link = await page.evaluate(() => window.relievo.link());
-    const pose = await page.evaluate(() => window.relievo.pose());
+    // Both of one moment: the eye may still be gliding.
+    const { link, pose } = await page.evaluate(() => ({ link: window.relievo.link(), pose: window.relievo.pose() }));
     await page.close();
     const other = await open(link.slice(origin.length));
     await inState(other, 'live');

@@ -7,10 +7,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
+
+#include "capture/pattern/clear_path.h"
 
 namespace relievo {
 namespace {
@@ -205,6 +209,55 @@ TEST(Bcsl, ColoursOutsideThePaletteDoNotDecode) {
     EXPECT_EQ(table->boundary_of_colours(left, right), -1) << int{other};
     EXPECT_EQ(table->boundary_of_colours(right, left), -1) << int{other};
   }
+}
+
+TEST(ClearPath, ItsBoundariesFlipAsManyChannelsAsItsLengthAllows) {
+  const auto graph = BcslGraph::create(6, 2);
+  ASSERT_TRUE(graph);
+  const std::vector<Primary> palette = default_palette(6);
+  // Of 900 codes 468 flip 4 and more: of 25 pairs of steps (2 + 2 + 1 a slide flip 1, 2 and 3 channels) 13,
+  // from 36 stripes each.
+  for (const auto& [stripes, length, flips] :
+       {std::tuple{2, 469, 4}, {469, 469, 4}, {470, 757, 3}, {758, 901, 2}, {901, 901, 2}}) {
+    const std::vector<int> path = clear_path(*graph, palette, stripes);
+    ASSERT_EQ(static_cast<int>(path.size()), length) << stripes;
+    EXPECT_EQ(path.front(), 0);
+    std::set<std::pair<int, int>> codes;
+    for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+      ASSERT_TRUE(codes.insert({path[i], path[i + 1]}).second) << "boundary " << i << " repeats";
+      int flipped = 0;
+      for (int s = 0; s < 2; ++s) {
+        const auto primary = [&](int vertex) {
+          return palette[static_cast<std::size_t>(graph->digit(vertex, s))];
+        };
+        ASSERT_NE(primary(path[i]), primary(path[i + 1])) << "boundary " << i << " keeps its colour";
+        flipped += std::popcount(static_cast<unsigned>(primary(path[i]) ^ primary(path[i + 1])));
+      }
+      EXPECT_GE(flipped, flips) << "boundary " << i;
+    }
+  }
+}
+
+TEST(ClearPath, OfAnyCodeEachBoundaryComesOnce) {
+  for (int base = 3; base <= 6; ++base) {
+    for (int slides = 1; slides <= 3; ++slides) {
+      const auto graph = BcslGraph::create(base, slides);
+      ASSERT_TRUE(graph);
+      const std::vector<int> path = clear_path(*graph, default_palette(base), graph->arcs() + 1);
+      ASSERT_EQ(static_cast<int>(path.size()), graph->arcs() + 1);
+      EXPECT_TRUE(DecodingTable::create({base, slides, default_palette(base), path}))
+          << base << "," << slides;
+    }
+  }
+}
+
+TEST(ClearPath, ThePapersOwnIsThereForTheAsking) {
+  const auto graph = BcslGraph::create(6, 2);
+  const auto pattern = make_pattern(6, 2, 40, 90, CodePath::kPaper);
+  ASSERT_TRUE(graph && pattern);
+  const std::vector<int> path = graph->eulerian_path();
+  EXPECT_EQ(pattern->sequence, std::vector<int>(path.begin() + 40, path.begin() + 130));
+  EXPECT_NE(make_pattern(6, 2, 40, 90)->sequence, pattern->sequence);
 }
 
 TEST(BcslRefusals, SchemesThatDoNotExistOrDoNotFit) {

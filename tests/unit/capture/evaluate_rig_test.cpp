@@ -107,7 +107,8 @@ TEST_P(RigCheckTest, WhatIsNotDecodedIsNotCovered) {
 }
 
 TEST_P(RigCheckTest, StripesTooFineForTheFocusDoNotFitTogether) {
-  scene.pattern = *make_pattern(6, 2, 3, 48);  // stripes of two to three pixels
+  // Stripes of two to three pixels; of boundaries that flip few channels, as the clear path has none.
+  scene.pattern = *make_pattern(6, 2, 3, 48, CodePath::kPaper);
   scene.blur_px = 10;
   const CapturedFrame frame = draw_scheme_frame(scene, 0);
   const RigCheck found = check_rig(frame, frame, {}, scene.rig, scene.pattern);

@@ -47,9 +47,10 @@ struct Filmed {
 
   Filmed(const sim::SimOptions& options, std::shared_ptr<const sim::Scene> scene)
       : rig(sim::make_rig(options, scene->view())) {
-    auto made = options.scheme == Scheme::kOneSlide
-                    ? make_repeating_pattern(options.base, options.first, options.stripes)
-                    : make_pattern(options.base, options.slides, options.first, options.stripes);
+    auto made =
+        options.scheme == Scheme::kOneSlide
+            ? make_repeating_pattern(options.base, options.first, options.stripes)
+            : make_pattern(options.base, options.slides, options.first, options.stripes, options.path);
     EXPECT_TRUE(made) << made.error().message;
     pattern = *std::move(made);
     pattern.scheme = options.scheme;

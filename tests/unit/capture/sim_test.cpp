@@ -274,7 +274,8 @@ TEST(RenderAhead, AStopLeavesTheFrameInTheMaking) {
   ASSERT_TRUE(options);
   const auto barrier = std::make_shared<const Barrier>();
   const Rig rig = sim::make_rig(*options, barrier->view());
-  auto pattern = make_pattern(options->base, options->slides, options->first, options->stripes);
+  auto pattern =
+      make_pattern(options->base, options->slides, options->first, options->stripes, options->path);
   ASSERT_TRUE(pattern);
   {
     sim::RenderAhead frames(std::make_shared<const sim::Renderer>(*options, rig, *pattern, barrier),
