@@ -73,6 +73,7 @@ TEST(SimOptions, EveryRefusalSaysWhatIsValid) {
       {"face,drop=1", "drop=1 loses every frame"},
       {"face,stripes=900", "stripes=900: give at most half"},
       {"face,stripes=500,first=600", "900"},
+      {"face,path=short", "give clear or paper"},
       {"mesh:nothing.ply", "nothing.ply is missing"},
       {"mesh:nothing.stl", "give a .ply or .obj file"},
   };
