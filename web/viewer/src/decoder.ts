@@ -2,6 +2,7 @@
 // The page's side of the decoding worker. A decoder that hangs is replaced.
 import type { Wants } from './display';
 import { take } from './early';
+import { buffersOf } from './frameMemory';
 import type { DecodedFrame, DecodeReply, DecodeRequest } from './messages';
 import { startDecoder } from './workers';
 
@@ -41,9 +42,7 @@ export class Decoder {
   /** Takes the memory of a frame that nobody looks at any more. */
   giveBack(frame: DecodedFrame): void {
     if (frame.kept === true) return;
-    const { positions, coordinates, normals, triangles, edges, quality, rims } = frame;
-    const arrays = [positions, coordinates, normals, triangles, edges, rims, quality?.sigmas, quality?.interpolated];
-    this.spares = [...new Set(arrays.flatMap((array) => (array == null || array.byteLength === 0 ? [] : [array.buffer])))];
+    this.spares = buffersOf(frame);
   }
 
   /** For good. */

@@ -2,6 +2,7 @@
 // Decodes frames off the main thread, one after the other.
 import type { DracoDecoder, Geometry } from './draco';
 import { kGeometryDraco, kGeometryDracoGrid, kGeometryGrid, kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
+import { buffersOf } from './frameMemory';
 import { GridFrames } from './grid';
 import gridWasmUrl from './grid.wasm?url';
 import { loadDraco } from './loadDraco';
@@ -16,6 +17,8 @@ const post = (reply: DecodeReply, transfer: Transferable[] = []): void => {
 };
 
 const kStills: Record<number, string> = { [kTextureJpeg]: 'image/jpeg', [kTextureWebp]: 'image/webp', [kTexturePng]: 'image/png' };
+
+const kAsItIs: ImageBitmapOptions = { colorSpaceConversion: 'none', premultiplyAlpha: 'none' };
 
 const grids = new GridFrames();
 const videos = new VideoTextures();
@@ -34,12 +37,8 @@ self.onmessage = (event: MessageEvent<DecodeRequest>) => {
   queue = queue.then(async () => {
     try {
       const frame = await decode(request);
-      const arrays = [frame.positions, frame.coordinates, frame.normals, frame.triangles, frame.edges];
-      const transfer: Transferable[] = arrays.flatMap((a) => (a === null ? [] : [a.buffer]));
-      if (frame.quality !== null) transfer.push(frame.quality.sigmas.buffer, frame.quality.interpolated.buffer);
-      if (frame.rims != null) transfer.push(frame.rims.buffer);
-      if (frame.texture !== null) transfer.push(frame.texture);
-      post(frame, transfer);
+      const pictures = [frame.texture, frame.handOn ?? null].filter((picture) => picture !== null);
+      post(frame, [...buffersOf(frame), ...pictures]);
     } catch (error) {
       post({ type: 'failed', id: request.id, message: error instanceof Error ? error.message : String(error) });
     }
@@ -76,6 +75,9 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
   const { positions, coordinates } = geometry;
   const normals =
     geometry.normals ?? (request.want.normals ? vertexNormals(positions, geometry.triangles) : null);
+  const edges = request.want.edges ? triangleEdges(geometry.triangles) : null;
+  const rims = request.want.rims && coordinates !== null ? vertexRims(coordinates, geometry.triangles, (n) => grids.spares.floats(n)) : null;
+  const texture = await picture;
   return {
     type: 'frame',
     id: request.id,
@@ -84,11 +86,12 @@ async function decode(request: DecodeRequest): Promise<DecodedFrame> {
     coordinates,
     normals,
     triangles: geometry.triangles,
-    edges: request.want.edges ? triangleEdges(geometry.triangles) : null,
+    edges,
     quality: geometry.quality,
     codedQuality: geometry.quality === null && frame.quality.length > 0 ? frame.quality.slice() : null, // for who stops here, and asks then
-    rims: request.want.rims && coordinates !== null ? vertexRims(coordinates, geometry.triangles, (n) => grids.spares.floats(n)) : null,
-    texture: await picture,
+    rims,
+    texture,
+    handOn: texture === null ? null : await createImageBitmap(texture, kAsItIs),
     notice: frame.textureCodec === kTextureH264 && !VideoTextures.possible ? noVideoHere() : null,
     extent: robustExtent(positions),
     decodeMs: performance.now() - start,
@@ -134,7 +137,7 @@ async function decodeTexture(frame: Frame): Promise<ImageBitmap | null> {
   if (type === undefined) throw new Error(`texture codec ${frame.textureCodec} is not known here`);
   // Copied into the Blob by the browser; nothing here keeps the bytes.
   const blob = new Blob([frame.texture as Uint8Array<ArrayBuffer>], { type });
-  const bitmap = await createImageBitmap(blob, { colorSpaceConversion: 'none', premultiplyAlpha: 'none' });
+  const bitmap = await createImageBitmap(blob, kAsItIs);
   const { textureWidth, textureHeight } = frame.header;
   if (bitmap.width !== textureWidth || bitmap.height !== textureHeight) {
     bitmap.close();

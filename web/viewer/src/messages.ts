@@ -30,6 +30,7 @@ export interface DecodedFrame {
   codedQuality?: Uint8Array<ArrayBuffer> | null; // what was sent and not wanted then, for decodeVertexQuality()
   colours?: Float32Array<ArrayBuffer> | null; // linear RGB a vertex, of files without a picture
   texture: ImageBitmap | null;
+  handOn?: ImageBitmap | null; // the same picture once more, for what draws: a copy would take longer than all else there
   notice: Notice | null; // while frames are like this one
   extent: Extent | null;
   decodeMs: number;

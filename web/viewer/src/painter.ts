@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the picture is drawn: by a worker, where the browser lets workers draw, else by this page.
 import type { Drawing, Drawn, Painter, PainterEvents } from './drawing';
-import type { DecodedFrame } from './messages';
 import { take } from './early';
+import { buffersOf } from './frameMemory';
+import type { DecodedFrame } from './messages';
 import type { Pixels } from './pixels';
 import type { Graphics } from './resolution';
 import type { Stage } from './stage';
 import stageUrl from 'virtual:stage-url';
 import type { StageReply, StageRequest } from './stageMessages';
+import { Spares } from './spares';
 import { startStage } from './workers';
 
 /** On this page's thread, from the worker's own file. Loaded when it is needed. */
@@ -27,6 +29,7 @@ export function makePainter(canvas: HTMLCanvasElement, graphics: Graphics, event
 class FarPainter implements Painter {
   private readonly worker = take<Worker>('stage') ?? startStage();
   private readonly asked = new Map<number, (answer: unknown) => void>();
+  private readonly spares = new Spares();
   private nextId = 1;
 
   constructor(canvas: HTMLCanvasElement, antialias: boolean, events: PainterEvents) {
@@ -34,6 +37,7 @@ class FarPainter implements Painter {
       const reply = event.data;
       if (reply.type === 'ready') events.ready();
       if (reply.type === 'took') events.took(reply.ms);
+      if (reply.type === 'spares') this.spares.add(reply.buffers);
       if (reply.type === 'contextLost') events.contextLost(reply.lost);
       if (reply.type === 'failed') events.failed(reply.why);
       if (reply.type === 'answer') {
@@ -49,9 +53,20 @@ class FarPainter implements Painter {
     this.say({ type: 'start', canvas: offscreen, antialias }, [offscreen]);
   }
 
-  show(surface: number, { positions, coordinates, normals, triangles, edges, quality, rims = null, colours = null, texture }: DecodedFrame): void {
-    const frame: Drawn = { positions, coordinates, normals, triangles, edges, quality, rims, colours, texture };
-    this.say({ type: 'show', surface, frame });
+  show(surface: number, { positions, coordinates, normals, triangles, edges, quality, rims, colours, texture, handOn }: DecodedFrame): void {
+    const copy = <T extends Float32Array | Uint32Array | Uint8Array>(array: T): T => this.spares.copy(array);
+    const frame: Drawn = {
+      positions: copy(positions),
+      coordinates: coordinates && copy(coordinates),
+      normals: normals && copy(normals),
+      triangles: copy(triangles),
+      edges: edges && copy(edges),
+      quality: quality && { sigmas: copy(quality.sigmas), interpolated: copy(quality.interpolated) },
+      rims: rims ? copy(rims) : null,
+      colours: colours ? copy(colours) : null,
+      texture: handOn ?? texture,
+    };
+    this.say({ type: 'show', surface, frame }, handOn == null ? buffersOf(frame) : [...buffersOf(frame), handOn]);
   }
   remove(surface: number): void {
     this.say({ type: 'remove', surface });

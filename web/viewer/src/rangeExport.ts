@@ -2,6 +2,7 @@
 // A range of frames as one file: a recording, or a ZIP file of surfaces. Nothing is there before it is whole.
 import { Decoder } from './decoder';
 import { kTextureJpeg, parseFrame } from './frame';
+import { closePictures } from './frameMemory';
 import type { FrameStore, Sample } from './frameStore';
 import type { DecodedFrame } from './messages';
 import type { RangeFormat } from './rangeFrames';
@@ -68,7 +69,7 @@ async function asSurfaces(order: RangeOrder, before: number[], indices: number[]
         ++damaged;
       } else {
         const content = format === 'ply' ? plyOf(frame) : await glbOf(frame, jpeg);
-        frame.texture?.close();
+        closePictures(frame);
         const name = `${String(frame.number).padStart(6, '0')}.${format}`;
         if (!zip.add(name, content)) throw new Error(text.take.tooLarge(done, kMostBytes));
       }

@@ -2,6 +2,7 @@
 // One source being watched: its frames through the decoder to the picture, and what it says of itself.
 import { utcNow } from './connection';
 import { Decoder } from './decoder';
+import { closePictures } from './frameMemory';
 import type { DecodedFrame } from './messages';
 import { Meter } from './meter';
 import type { FramePrefix, Rung, ServerMessage, StreamInfo, StreamStatus } from './protocol';
@@ -126,7 +127,7 @@ export class Session {
     const known = this.underway.get(frame.id);
     this.underway.delete(frame.id);
     if (known === undefined || known.forLater) {
-      frame.texture?.close(); // of a stream that is no longer watched, or wanted only by the decoder
+      closePictures(frame); // of a stream that is no longer watched, or wanted only by the decoder
       return;
     }
     if (this.discard()) {
@@ -151,7 +152,7 @@ export class Session {
 
   private discard(): boolean {
     const had = this.waiting !== null;
-    this.waiting?.frame.texture?.close();
+    if (this.waiting !== null) closePictures(this.waiting.frame);
     this.waiting = null;
     return had;
   }

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws on the page's canvas from a thread of its own, so that slow graphics do not hold up the page. Where the page itself
 // has to draw it imports this file for what it exports.
+import { buffersOf } from './frameMemory';
 import { Stage } from './stage';
 import type { StageReply, StageRequest } from './stageMessages';
 
 export { Stage };
 
 let stage: Stage | null = null;
-const pictures = new Map<number, ImageBitmap>(); // what is shown, by surface
+// What is shown, by surface.
+const buffers = new Map<number, ArrayBuffer[]>();
+const pictures = new Map<number, ImageBitmap>();
 
 function reply(message: StageReply, transfer: Transferable[] = []): void {
   self.postMessage(message, { transfer });
@@ -27,6 +30,9 @@ async function hear(event: MessageEvent<StageRequest>): Promise<void> {
     if (request.type === 'show') {
       const { surface, frame } = request;
       stage.show(surface, frame);
+      const before = buffers.get(surface) ?? [];
+      reply({ type: 'spares', buffers: before }, before);
+      buffers.set(surface, buffersOf(frame));
       if (frame.texture === null) return;
       pictures.get(surface)?.close();
       pictures.set(surface, frame.texture);
@@ -34,6 +40,7 @@ async function hear(event: MessageEvent<StageRequest>): Promise<void> {
       stage.remove(request.surface);
       pictures.get(request.surface)?.close();
       pictures.delete(request.surface);
+      buffers.delete(request.surface);
     } else if (request.type === 'draw') {
       stage.draw(request.drawing);
       reply({ type: 'ready' });

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A small picture of each stream: of one frame of it, by the same decoder as every other. One stream at a time.
+import { closePictures } from './frameMemory';
 import { LiveSource } from './liveSource';
 import { openRemote } from './openFile';
 import { Session } from './session';
@@ -55,7 +56,7 @@ export class Thumbnails {
     const job = this.jobs[0];
     if (frame === null || job === undefined) return;
     if (frame.texture !== null) drawThumbnail(frame.texture, job.onto);
-    frame.texture?.close();
+    closePictures(frame);
     this.next();
   }
 

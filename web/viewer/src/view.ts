@@ -410,6 +410,8 @@ export class View {
     shown.frame = frame;
     if (this.headset !== null) this.headset.show(shown.id, frame);
     else this.painter.show(shown.id, frame);
+    frame.handOn?.close(); // where it was not handed on
+    frame.handOn = null;
     if (frame.texture === null) return;
     if (shown.picture !== frame.texture) shown.picture?.close();
     shown.picture = frame.texture;
