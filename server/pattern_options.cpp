@@ -32,13 +32,9 @@ CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& o) {
 
 Result<Pattern> pattern_of(const PatternOptions& options) {
   if (!options.file.empty()) return read_pattern(options.file);
-  const Scheme scheme = scheme_named(options.scheme).value_or(Scheme::kComplementary);
-  if (scheme == Scheme::kOneSlide)
-    return make_repeating_pattern(options.base, options.first, options.stripes);
-  Result<Pattern> pattern = make_pattern(options.base, options.slides, options.first, options.stripes,
-                                         code_path_named(options.path).value_or(CodePath::kClear));
-  if (pattern) pattern->scheme = scheme;
-  return pattern;
+  return make_scheme_pattern(scheme_named(options.scheme).value_or(Scheme::kComplementary), options.base,
+                             options.slides, options.first, options.stripes,
+                             code_path_named(options.path).value_or(CodePath::kClear));
 }
 
 Status fits_projector(const Pattern& pattern, int projector_width) {

@@ -17,35 +17,17 @@ constexpr int kMostFlips = 2;
 // (docs/ACCURACY.md).
 constexpr std::mt19937::result_type kSeed = 4;
 
-/// The arcs that flip at least so many channels.
-class ClearArcs {
- public:
-  ClearArcs(const BcslGraph& graph, std::span<const Primary> palette, int least_flips)
-      : graph_(graph), palette_(palette), least_flips_(least_flips) {}
-
-  bool has(int from, int to) const {
-    int flips = 0;
-    for (int s = 0; s < graph_.slides(); ++s)
-      flips += std::popcount(static_cast<unsigned>(primary(from, s) ^ primary(to, s)));
-    return flips >= least_flips_;
+/// Channels that flip from one stripe to the other, all slides together.
+int flips(const BcslGraph& graph, std::span<const Primary> palette, int from, int to) {
+  int out = 0;
+  for (int s = 0; s < graph.slides(); ++s) {
+    const auto primary = [&](int vertex) {
+      return palette[static_cast<std::size_t>(graph.digit(vertex, s))];
+    };
+    out += std::popcount(static_cast<unsigned>(primary(from) ^ primary(to)));
   }
-
-  std::size_t count() const {
-    std::size_t arcs = 0;
-    for (int v = 0; v < graph_.vertices(); ++v)
-      for (int j = 0; j < graph_.degree(); ++j) arcs += has(v, graph_.neighbour(v, j));
-    return arcs;
-  }
-
- private:
-  Primary primary(int vertex, int slide) const {
-    return palette_[static_cast<std::size_t>(graph_.digit(vertex, slide))];
-  }
-
-  const BcslGraph& graph_;
-  std::span<const Primary> palette_;
-  int least_flips_;
-};
+  return out;
+}
 
 /// The order in which a vertex's arcs are tried: in the natural one, neighbouring boundaries would repeat one
 /// step of colours after the other, and be taken for each other.
@@ -62,16 +44,13 @@ std::vector<int> shuffled(int count) {
 std::vector<int> clear_path(const BcslGraph& graph, std::span<const Primary> palette, int stripes) {
   assert(stripes <= graph.arcs() + 1);
   const std::vector<int> order = shuffled(graph.degree());
-  for (int flips = kMostFlips * graph.slides();; --flips) {
-    const ClearArcs arcs(graph, palette, flips);
-    const std::size_t count = arcs.count();
-    if (count + 1 < static_cast<std::size_t>(stripes)) continue;
+  for (int least = kMostFlips * graph.slides();; --least) {
     // Where an arc flips so many channels the one back does, too.
     std::vector<int> path = graph.eulerian_path([&](int vertex, int k) {
       const int to = graph.neighbour(vertex, order[static_cast<std::size_t>((vertex + k) % graph.degree())]);
-      return arcs.has(vertex, to) ? to : -1;
+      return flips(graph, palette, vertex, to) >= least ? to : -1;
     });
-    if (path.size() == count + 1) return path;
+    if (path.size() >= static_cast<std::size_t>(stripes)) return path;
   }
 }
 

@@ -72,6 +72,14 @@ Result<Pattern> make_repeating_pattern(int base, int first_stripe, int stripes) 
   return Pattern{base, 1, std::move(palette), std::vector<int>(begin, begin + stripes), Scheme::kOneSlide};
 }
 
+Result<Pattern> make_scheme_pattern(Scheme scheme, int base, int slides, int first_stripe, int stripes,
+                                    CodePath path) {
+  if (scheme == Scheme::kOneSlide) return make_repeating_pattern(base, first_stripe, stripes);
+  Result<Pattern> pattern = make_pattern(base, slides, first_stripe, stripes, path);
+  if (pattern) pattern->scheme = scheme;
+  return pattern;
+}
+
 int unique_run(const Pattern& pattern) {
   for (int run = 1; run <= pattern.boundaries(); ++run) {
     std::set<std::vector<int>> seen;

@@ -91,15 +91,9 @@ Result<std::unique_ptr<SimSource>> make_sim(const std::string& spec, const SimRu
   if (!options) return options.error().in(name);
   Result<std::shared_ptr<const sim::Scene>> scene = sim::make_scene(options->scene);
   if (!scene) return scene.error().in(name);
-  const auto make = [&] {
-    return options->scheme == Scheme::kOneSlide
-               ? make_repeating_pattern(options->base, options->first, options->stripes)
-               : make_pattern(options->base, options->slides, options->first, options->stripes,
-                              options->path);
-  };
-  Result<Pattern> pattern = make();
+  Result<Pattern> pattern = make_scheme_pattern(options->scheme, options->base, options->slides,
+                                                options->first, options->stripes, options->path);
   if (!pattern) return pattern.error().in(name);
-  pattern->scheme = options->scheme;
 
   SourceInfo info;
   info.name = name;

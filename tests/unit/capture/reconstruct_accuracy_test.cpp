@@ -13,11 +13,8 @@
 #include <vector>
 
 #include "capture/evaluate/score.h"
-#include "capture/pattern/bcsl.h"
-#include "capture/pattern/repeating.h"
 #include "capture/reconstruct/reconstructor.h"
-#include "capture/source/sim/renderer.h"
-#include "capture/source/sim/scene.h"
+#include "tests/support/simulated.h"
 
 namespace relievo {
 namespace {
@@ -40,34 +37,8 @@ class MovingScene final : public sim::Scene {
   Vec3 velocity_;
 };
 
-struct Filmed {
-  Rig rig;
-  Pattern pattern;
-  std::unique_ptr<sim::Renderer> renderer;
-
-  Filmed(const sim::SimOptions& options, std::shared_ptr<const sim::Scene> scene)
-      : rig(sim::make_rig(options, scene->view())) {
-    auto made =
-        options.scheme == Scheme::kOneSlide
-            ? make_repeating_pattern(options.base, options.first, options.stripes)
-            : make_pattern(options.base, options.slides, options.first, options.stripes, options.path);
-    EXPECT_TRUE(made) << made.error().message;
-    pattern = *std::move(made);
-    pattern.scheme = options.scheme;
-    renderer = std::make_unique<sim::Renderer>(options, rig, pattern, std::move(scene));
-  }
-
-  CapturedFrame frame(std::uint64_t index, ImageF& truth) const {
-    sim::RenderedFrame rendered = renderer->render(index, true);
-    truth = std::move(rendered.truth);
-    CapturedFrame out;
-    out.number = index;
-    out.time_ns = std::llround(static_cast<double>(index) * 1e9 / rig.frame_rate);
-    out.scan = rig.scan;
-    out.picture = std::move(rendered.picture);
-    out.complement = std::move(rendered.complement);
-    return out;
-  }
+struct Filmed : test::Simulated {
+  using Simulated::Simulated;
 
   Reconstructor reconstructor() const {
     auto made = Reconstructor::create(rig, pattern, {.texture = false});
@@ -112,12 +83,6 @@ double robust_sigma(std::vector<double> values) {
   return 1.4826 * *middle;
 }
 
-sim::SimOptions parsed(const std::string& spec) {
-  auto options = sim::parse_sim_options(spec);
-  EXPECT_TRUE(options) << options.error().message;
-  return *std::move(options);
-}
-
 /// Least standard deviation of a boundary's column from one line of one frame without noise (Cramer-Rao):
 /// noise over the root of the sum of the squared slopes of all channels' differences around it.
 double cramer_rao_px(const CapturedFrame& clean, const std::array<double, 9>& m, double noise, int row,
@@ -142,19 +107,16 @@ double cramer_rao_px(const CapturedFrame& clean, const std::array<double, 9>& m,
 }
 
 TEST(Accuracy, BoundariesLieWithinTheCramerRaoBound) {
-  const std::string spec = "plane,scan=progressive,chroma=0,crosstalk=0,noise=3,stripes=90";
-  const Filmed noisy(parsed(spec), *sim::make_scene("plane"));
-  const Filmed clean(parsed("plane,scan=progressive,chroma=0,crosstalk=0,noise=0,stripes=90"),
-                     *sim::make_scene("plane"));
+  const Filmed noisy("plane,scan=progressive,chroma=0,crosstalk=0,noise=3,stripes=90");
+  const Filmed clean("plane,scan=progressive,chroma=0,crosstalk=0,noise=0,stripes=90");
   Reconstructor reconstructor = noisy.reconstructor();
   std::vector<double> normalised;
   for (std::uint64_t k = 0; k < 2; ++k) {
     ImageF truth;
-    auto out = reconstructor.add(noisy.frame(k, truth));
+    auto out = reconstructor.add(noisy.frame(k, &truth));
     ASSERT_TRUE(out) << out.error().message;
     if (!*out) continue;
-    ImageF clean_truth;
-    const CapturedFrame bare = clean.frame(k, clean_truth);
+    const CapturedFrame bare = clean.frame(k);
     for (const GridPoint& p : (*out)->surface.grid) {
       const auto at = noisy.true_column(truth, p.line, p.boundary, p.column_px);
       const int column = static_cast<int>(std::lround(p.column_px));
@@ -174,7 +136,7 @@ Score score_of(const Filmed& filmed, Decoder decoder, std::uint64_t frames = 4, 
   Scorer scorer(filmed.rig, filmed.pattern);
   for (std::uint64_t k = 0; k < frames; ++k) {
     ImageF truth;
-    auto out = made->add(filmed.frame(k, truth));
+    auto out = made->add(filmed.frame(k, &truth));
     EXPECT_TRUE(out) << out.error().message;
     if (k >= skip && out) scorer.add(truth, *out ? &(*out)->surface : nullptr);
   }
@@ -183,8 +145,7 @@ Score score_of(const Filmed& filmed, Decoder decoder, std::uint64_t frames = 4, 
 
 // Shading and texture draw zero crossings of blurred colour: most of what the paper's decoder is off.
 TEST(Accuracy, ErrorsAreFarBelowThePaperDecoders) {
-  const sim::SimOptions options = parsed("object,stripes=71,chroma=1.6");
-  const Filmed filmed(options, *sim::make_scene(options.scene));
+  const Filmed filmed("object,stripes=71,chroma=1.6");
   const Score paper = score_of(filmed, Decoder::kPaper);
   const Score ours = score_of(filmed, Decoder::kOrdered);
   std::printf("RMS %.0f um/m, the paper's decoder %.0f; completeness %.4f and %.4f\n", ours.rms_um_per_m,
@@ -198,8 +159,7 @@ TEST(Accuracy, TheClearPathsBoundariesLieBetterThanThePublishedOnes) {
   for (const std::string spec : {"face,frames=8", "walk,frames=8"}) {
     SCOPED_TRACE(spec);
     const auto score = [](const std::string& asked) {
-      const sim::SimOptions options = parsed(asked);
-      return score_of(Filmed(options, *sim::make_scene(options.scene)), Decoder::kOrdered, 6, 2);
+      return score_of(Filmed(asked), Decoder::kOrdered, 6, 2);
     };
     const Score clear = score(spec), published = score(spec + ",path=paper");
     std::printf("median %.1f um/m, completeness %.4f; under the published path %.1f, %.4f\n",
@@ -213,8 +173,7 @@ TEST(Accuracy, TheClearPathsBoundariesLieBetterThanThePublishedOnes) {
 TEST(Accuracy, TheQuickDecoderIsBetterThanThePapers) {
   for (const char* spec : {"object,stripes=71,chroma=1.6", "face,frames=8", "walk,frames=8"}) {
     SCOPED_TRACE(spec);
-    const sim::SimOptions options = parsed(spec);
-    const Filmed filmed(options, *sim::make_scene(options.scene));
+    const Filmed filmed(spec);
     const Score paper = score_of(filmed, Decoder::kPaper, 6, 2);
     const Score quick = score_of(filmed, Decoder::kQuick, 6, 2);
     std::printf("completeness %.4f, outliers %.5f, RMS %.0f um/m; the paper's decoder %.4f, %.5f, %.0f\n",
@@ -238,8 +197,7 @@ class Walking : public ::testing::TestWithParam<Walk> {};
 
 TEST_P(Walking, IsDecoded) {
   const Walk& walk = GetParam();
-  const sim::SimOptions options = parsed(walk.spec);
-  const Filmed filmed(options, *sim::make_scene(options.scene));
+  const Filmed filmed(walk.spec);
   const Score score = score_of(filmed, Decoder::kOrdered, 8, 2);
   std::printf("completeness %.4f, outliers %.5f, RMS %.0f um/m\n", score.completeness, score.outliers,
               score.rms_um_per_m);
@@ -255,13 +213,12 @@ INSTANTIATE_TEST_SUITE_P(Walks, Walking,
                          [](const auto& walk) { return std::string(walk.param.name); });
 
 TEST(Accuracy, OneSlideHasOneBoundaryAtAPlace) {
-  const sim::SimOptions options = parsed("object,scheme=one-slide");
-  const Filmed filmed(options, *sim::make_scene(options.scene));
+  const Filmed filmed("object,scheme=one-slide");
   Reconstructor reconstructor = filmed.reconstructor();
   std::size_t close = 0;
   for (std::uint64_t k = 0; k < 3; ++k) {
     ImageF truth;
-    auto out = reconstructor.add(filmed.frame(k, truth));
+    auto out = reconstructor.add(filmed.frame(k, &truth));
     ASSERT_TRUE(out) << out.error().message;
     if (!*out) continue;
     std::vector<GridPoint> points = (*out)->surface.grid;
@@ -278,14 +235,13 @@ TEST(Accuracy, OneSlideHasOneBoundaryAtAPlace) {
 class HonestSigma : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(HonestSigma, IsThatOfTheErrors) {
-  const sim::SimOptions options = parsed(GetParam());
-  const Filmed filmed(options, *sim::make_scene(options.scene));
+  const Filmed filmed(GetParam());
   Reconstructor reconstructor = filmed.reconstructor();
   const int step = filmed.rig.scan == Scan::kInterlaced ? 2 : 1;
   std::vector<double> normalised;
   for (std::uint64_t k = 0; k < 4; ++k) {
     ImageF truth;
-    auto out = reconstructor.add(filmed.frame(k, truth));
+    auto out = reconstructor.add(filmed.frame(k, &truth));
     ASSERT_TRUE(out) << out.error().message;
     if (!*out) continue;
     for (const GridPoint& p : (*out)->surface.grid) {
@@ -315,13 +271,12 @@ struct Direction {
 class Motion : public ::testing::TestWithParam<Direction> {};
 
 TEST_P(Motion, OneMetreASecondDecodes) {
-  const sim::SimOptions options = parsed("plane,stripes=80,period=80");
-  const Filmed filmed(options, std::make_shared<MovingScene>(GetParam().velocity));
+  const Filmed filmed("plane,stripes=80,period=80", std::make_shared<MovingScene>(GetParam().velocity));
   Reconstructor reconstructor = filmed.reconstructor();
   Scorer scorer(filmed.rig, filmed.pattern);
   for (std::uint64_t k = 0; k < 8; ++k) {
     ImageF truth;
-    auto out = reconstructor.add(filmed.frame(k, truth));
+    auto out = reconstructor.add(filmed.frame(k, &truth));
     ASSERT_TRUE(out) << out.error().message;
     if (k > 3) scorer.add(truth, *out ? &(*out)->surface : nullptr);
   }

@@ -37,7 +37,7 @@ self.onmessage = (event: MessageEvent<DecodeRequest>) => {
   queue = queue.then(async () => {
     try {
       const frame = await decode(request);
-      const pictures = [frame.texture, frame.handOn ?? null].filter((picture) => picture !== null);
+      const pictures = [frame.texture, frame.handOn].filter((picture) => picture != null);
       post(frame, [...buffersOf(frame), ...pictures]);
     } catch (error) {
       post({ type: 'failed', id: request.id, message: error instanceof Error ? error.message : String(error) });
