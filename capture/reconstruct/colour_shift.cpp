@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/crossing.h"
 #include "capture/reconstruct/luma_place.h"
 
 namespace relievo {
 namespace {
 
 constexpr float kRamp_px = 3.2F;  // from one stripe's colour to the next one's, of lens, pixel and projector
-constexpr int kSearch_px = 3;     // to each side of the boundary
+constexpr int kSearch_px = 3;     // to each side of the boundary, one of them for the edge's bend
 
 /// 0..1: how much of the stripe right of an end there is at a column. Smooth, so that no shift comes from
 /// where the columns' samples happen to lie.
@@ -93,13 +94,13 @@ float ColourShift::shift_px(const ShiftQuery& query, std::size_t blur) const {
     // The crossing nearest the boundary, weighed as EdgeFinder weighs it.
     float nearest = static_cast<float>(kSearch_px);
     float slope = 0;
-    for (std::size_t i = 0; i + 1 < kOut; ++i) {
+    for (std::size_t i = 1; i + 2 < kOut; ++i) {
       if (d[i] > 0 || d[i + 1] <= 0) continue;
-      const float step = d[i + 1] - d[i];
-      const float off = static_cast<float>(from + static_cast<int>(i)) - d[i] / step - query.column_px;
+      const float off =
+          static_cast<float>(from + static_cast<int>(i)) + crossing_behind(&d[i], 0) - query.column_px;
       if (std::fabs(off) >= std::fabs(nearest)) continue;
       nearest = off;
-      slope = step;
+      slope = d[i + 1] - d[i];
     }
     weight += slope * slope;
     sum += slope * slope * nearest;

@@ -12,7 +12,7 @@
 
 namespace relievo {
 namespace {
-constexpr float kAveraged = 0.3F;  // share of noise's variance that smoothing takes away
+constexpr float kAveraged = 0.6F;  // share of noise's variance that smoothing takes away
 constexpr float kLeastNoise_px = 0.01F;
 
 // Scatter over lines.

@@ -6,10 +6,14 @@
 #include <cmath>
 #include <cstring>
 
+#include "capture/reconstruct/crossing.h"
 #include "capture/reconstruct/rows.h"
 
 namespace relievo {
 namespace {
+
+/// Channels at once: red, green and blue.
+using Four = float __attribute__((vector_size(16)));
 
 constexpr float kNoiseFactor = 4;  // a rise over 3 px must exceed this many standard deviations of a value
 constexpr float kLeastRise = 2;    // grey levels, where a picture has no noise
@@ -143,11 +147,19 @@ std::uint32_t EdgeFinder::crossings_of_line(const DifferenceImage& image, int li
     const float least = image.signal_at(line, x) == Signal::kWeak ? 0 : threshold;
     std::array<float, 3> column, slope;
     std::size_t count = 0;
+    // All channels at once; what does not cross is not asked for.
+    const auto off = [&](int by) {
+      const float* d = planes + x + by;
+      return Four{d[0], d[width], d[2 * width], 1};
+    };
+    Four behind;
+    crossing_of(off(-1), off(0), off(1), off(2), behind);
     for (; flags != 0; flags &= flags - 1) {
-      const float* d = planes + std::countr_zero(flags) * width + x;
+      const int channel = std::countr_zero(flags);
+      const float* d = planes + channel * width + x;
       if (std::fabs(d[2] - d[-1]) < least) continue;
       const float step = d[1] - d[0];
-      const float here = static_cast<float>(x) - d[0] / step;
+      const float here = static_cast<float>(x) + behind[channel];
       std::size_t place = count++;
       for (; place > 0 && here < column[place - 1]; --place) {
         column[place] = column[place - 1];

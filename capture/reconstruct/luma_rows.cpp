@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "capture/reconstruct/crossing.h"
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -194,7 +196,7 @@ LumaPlace place_portable(const LumaView& view, const LumaLight& light, const Lum
       const float a = view.luma[x - view.first] - level;
       const float b = view.luma[x + 1 - view.first] - level;
       if ((a > 0) == (b > 0) || (b > a) != rising) continue;
-      const float column = static_cast<float>(x) - a / (b - a);
+      const float column = static_cast<float>(x) + crossing_behind(view.luma + (x - view.first), level);
       if (std::fabs(column - place) >= nearest) continue;
       nearest = std::fabs(column - place);
       out.column_px = column;
@@ -308,8 +310,11 @@ RELIEVO_AVX2 bool round_avx2(const LumaView& view, const LumaLight& light, const
   out.found = false;
 
   const float* around = view.luma + (centre - 4 - view.first);
-  const __m256 a = _mm256_sub_ps(_mm256_loadu_ps(around), _mm256_set1_ps(level));
-  const __m256 b = _mm256_sub_ps(_mm256_loadu_ps(around + 1), _mm256_set1_ps(level));
+  const auto beside = [&](int off) __attribute__((target("avx2"), always_inline)) {
+    return _mm256_sub_ps(_mm256_loadu_ps(around + off), _mm256_set1_ps(level));
+  };
+  const __m256 a = beside(0);
+  const __m256 b = beside(1);
   const __m256 zero = _mm256_setzero_ps();
   const __m256 crosses =
       _mm256_xor_ps(_mm256_cmp_ps(a, zero, _CMP_GT_OQ), _mm256_cmp_ps(b, zero, _CMP_GT_OQ));
@@ -318,7 +323,9 @@ RELIEVO_AVX2 bool round_avx2(const LumaView& view, const LumaLight& light, const
   const __m256 step = _mm256_sub_ps(b, a);
   const __m256 x_of = _mm256_cvtepi32_ps(
       _mm256_add_epi32(_mm256_set1_epi32(centre - 4), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)));
-  const __m256 column = _mm256_sub_ps(x_of, _mm256_div_ps(a, step));
+  __m256 behind;
+  crossing_of(beside(-1), a, b, beside(2), behind);
+  const __m256 column = _mm256_add_ps(x_of, behind);
   const __m256 off = _mm256_andnot_ps(sign, _mm256_sub_ps(column, _mm256_set1_ps(place)));
   const __m256 near = _mm256_cmp_ps(off, _mm256_set1_ps(kFarthest_px), _CMP_LT_OQ);
   auto lanes =

@@ -13,7 +13,7 @@ using namespace place_rules;
 
 namespace {
 
-constexpr float kAlways_px = 0.03F;          // standard deviation of any zero crossing, beside noise
+constexpr float kAlways_px = 0.02F;          // standard deviation of any zero crossing, beside noise
 constexpr float kLumaFrom = 0.08F;           // contrast from which on luma is asked
 constexpr float kUsualColourBias_px = 0.7F;  // where too little of a frame tells it
 constexpr std::size_t kLeastSeen = 50;

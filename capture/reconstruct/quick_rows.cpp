@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/variants.h"
+#include "capture/reconstruct/crossing.h"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -95,12 +96,15 @@ void weigh_crossing(const QuickRow& row, const Crossing& crossing, QuickPlace& o
   float sum = 0;
   unsigned bits = crossing.channels;
   for (const std::int16_t* plane : {row.red, row.green, row.blue}) {
-    const auto here = static_cast<float>(plane[crossing.x]);
-    const float step = bits & 1 ? static_cast<float>(plane[crossing.x + 1]) - here : 0;
+    const bool crosses = bits & 1;
     bits >>= 1;
-    // step^2 (-here / step), without the division.
+    if (!crosses) continue;
+    const auto at = [&](int off) { return static_cast<float>(plane[crossing.x + off]); };
+    const float step = at(1) - at(0);
+    float behind;
+    crossing_of(at(-1), at(0), at(1), at(2), behind);
     weight += step * step;
-    sum -= step * here;
+    sum += step * step * behind;
   }
   out = {sum, weight};
 }
@@ -311,21 +315,42 @@ RELIEVO_AVX2 __m256i bit(__m256i mask, std::int16_t b) {
   return count + crossings_from(x, row, width, least_rise, out + count);
 }
 
+/// Four samples next to each other from each of eight places of a plane: the first of all, and so on.
+struct EightTimesFour {
+  __m256 first, second, third, fourth;
+};
+RELIEVO_AVX2 EightTimesFour samples_at(const std::int16_t* plane, const Crossing* crossings) {
+  const auto at = [&](int i) __attribute__((target("avx2"), always_inline)) {
+    return _mm_loadl_epi64(reinterpret_cast<const __m128i*>(plane + crossings[i].x - 1));
+  };
+  const __m128i a = _mm_unpacklo_epi16(at(0), at(1));
+  const __m128i b = _mm_unpacklo_epi16(at(2), at(3));
+  const __m128i c = _mm_unpacklo_epi16(at(4), at(5));
+  const __m128i d = _mm_unpacklo_epi16(at(6), at(7));
+  const __m128i ab = _mm_unpacklo_epi32(a, b), ab_high = _mm_unpackhi_epi32(a, b);
+  const __m128i cd = _mm_unpacklo_epi32(c, d), cd_high = _mm_unpackhi_epi32(c, d);
+  const auto real = [&](__m128i v) __attribute__((target("avx2"), always_inline)) {
+    return _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(v));
+  };
+  return {real(_mm_unpacklo_epi64(ab, cd)), real(_mm_unpackhi_epi64(ab, cd)),
+          real(_mm_unpacklo_epi64(ab_high, cd_high)), real(_mm_unpackhi_epi64(ab_high, cd_high))};
+}
+
 /// As weigh_crossing(), of eight.
 RELIEVO_AVX2 void weigh_eight(const QuickRow& row, const Crossing* crossings, QuickPlace* out) {
   const __m256i both = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(crossings));
-  const __m256i x = _mm256_and_si256(both, _mm256_set1_epi32(0xffff));
   __m256 weight = _mm256_setzero_ps();
   __m256 sum = _mm256_setzero_ps();
   const auto take = [&](const std::int16_t* plane, int channel)
       __attribute__((target("avx2"), always_inline)) {
-    const __m256i pair = _mm256_i32gather_epi32(reinterpret_cast<const int*>(plane), x, 2);
-    const __m256 here = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(pair, 16), 16));
-    const __m256 next = _mm256_cvtepi32_ps(_mm256_srai_epi32(pair, 16));
-    const __m256i lanes = _mm256_srai_epi32(_mm256_slli_epi32(both, 15 - channel), 31);
-    const __m256 step = _mm256_and_ps(_mm256_sub_ps(next, here), _mm256_castsi256_ps(lanes));
-    weight = _mm256_add_ps(weight, _mm256_mul_ps(step, step));
-    sum = _mm256_sub_ps(sum, _mm256_mul_ps(step, here));
+    const EightTimesFour s = samples_at(plane, crossings);
+    __m256 behind;
+    crossing_of(s.first, s.second, s.third, s.fourth, behind);
+    const __m256 lanes = _mm256_castsi256_ps(_mm256_srai_epi32(_mm256_slli_epi32(both, 15 - channel), 31));
+    const __m256 step = _mm256_sub_ps(s.third, s.second);
+    const __m256 square = _mm256_mul_ps(step, step);
+    weight = _mm256_add_ps(weight, _mm256_and_ps(square, lanes));
+    sum = _mm256_add_ps(sum, _mm256_and_ps(_mm256_mul_ps(square, behind), lanes));
   };
   take(row.red, 0);
   take(row.green, 1);

@@ -15,14 +15,14 @@ using namespace sequence_rules;
 namespace {
 
 // As edges.cpp has them.
-constexpr float kNoiseFactor = 4;
+constexpr float kNoiseFactor = 3.5F;
 constexpr float kLeastRise = 2;
 constexpr float kMaxReach_px = 6;
 constexpr float kReachShare = 0.55F;       // of the way to the next edge
 constexpr float kSideAt = 0.85F;           // of a reach: where a side's own colour is seen best
 constexpr float kSettledGain = 2.F;        // of the edge from which a search starts
-constexpr float kLean_px = 2.5F;           // how far a boundary moves from one line to the next
-constexpr float kCompleteEvidence = 2.2F;  // gain for a boundary that a neighbouring line predicts
+constexpr float kLean_px = 3;              // how far a boundary moves from one line to the next
+constexpr float kCompleteEvidence = 1.9F;  // gain for a boundary that a neighbouring line predicts
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 /// Columns beside an edge from half its reach to a whole one away.

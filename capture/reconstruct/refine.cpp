@@ -12,7 +12,7 @@ using namespace place_rules;
 
 namespace {
 
-constexpr float kModel_px = 0.012F;  // of any place: edges are not straight between samples
+constexpr float kModel_px = 0.003F;  // of any place: an edge is not quite what its samples tell
 constexpr float kAtStep_px = 0.1F;   // and where it lies on a step of the scene
 constexpr float kPlain = 0.05F;      // contrast that is none,
 constexpr float kContrasty = 0.1F;   // and one by which the bias is measured

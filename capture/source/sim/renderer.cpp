@@ -278,8 +278,9 @@ void Renderer::trace_row(const std::vector<Placed>& shapes, const Field& field, 
     if (options_.rays > 1 && is_mixed(shapes, pixel, seen, hit)) {
       value = mixture(shapes, field, pixel);
     } else if (seen) {
-      value = shade(shapes, *seen, hit, field, pixel.middle, pixel.across);
+      value = reflected(shapes, *seen, hit, field, pixel.middle, pixel.across);
     }
+    value = camera_colour_from_projected_ * value;
     row.rgb[0][x] = value.x;
     row.rgb[1][x] = value.y;
     row.rgb[2][x] = value.z;
@@ -325,13 +326,13 @@ Vec3 Renderer::mixture(const std::vector<Placed>& shapes, const Field& field, co
                                     (static_cast<float>(k / rays) + 0.5f) * step - 0.5f);
     Hit hit;
     const Placed* seen = meet(shapes, direction, hit);
-    if (seen) sum = sum + shade(shapes, *seen, hit, field, direction, pixel.across * step);
+    if (seen) sum = sum + reflected(shapes, *seen, hit, field, direction, pixel.across * step);
   }
   return sum * (step * step);
 }
 
-Vec3 Renderer::shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit,
-                     const Field& field, Vec3 direction, Vec3 direction_step) const {
+Vec3 Renderer::reflected(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit,
+                         const Field& field, Vec3 direction, Vec3 direction_step) const {
   const Material material = seen.shape->material(direction, hit);
   const Vec3 point = direction * hit.depth;
   const Vec3 albedo = material.albedo * static_cast<float>(options_.albedo);
@@ -382,17 +383,16 @@ Vec3 Renderer::shade(const std::vector<Placed>& shapes, const Placed& seen, cons
     }
     projected = projected + shown_now * glow.share;
   }
-  const Vec3 light = camera_colour_from_projected_ * projected;
 
   const float r2 = dot(to_light, to_light), inverse_r = 1 / std::sqrt(r2);
   const float cosine = facing * inverse_r;
-  value = value + albedo * light * (exposure_ * cosine / r2);
+  value = value + albedo * projected * (exposure_ * cosine / r2);
   const float gloss = material.gloss * static_cast<float>(options_.gloss);
   if (gloss > 0) {
     const Vec3 halfway = unit(to_light * inverse_r - direction * (1 / length(direction)));
     const float h = std::max(0.0f, dot(halfway, material.normal));
     const float h4 = h * h * h * h, h16 = h4 * h4 * h4 * h4;
-    value = value + light * (exposure_ / r2 * gloss * h16 * h16);  // Blinn and Phong, exponent 32
+    value = value + projected * (exposure_ / r2 * gloss * h16 * h16);  // Blinn and Phong, exponent 32
   }
   return value;
 }

@@ -73,8 +73,9 @@ class Renderer {
   static bool is_mixed(const std::vector<Placed>& shapes, const Footprint& pixel, const Placed* seen,
                        const Hit& hit);
   Vec3 mixture(const std::vector<Placed>& shapes, const Field& field, const Footprint& pixel) const;
-  Vec3 shade(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,
-             Vec3 direction, Vec3 direction_step) const;
+  /// In the projector's channels: the surface's colour acts on the light, before the camera mixes channels.
+  Vec3 reflected(const std::vector<Placed>& shapes, const Placed& seen, const Hit& hit, const Field& field,
+                 Vec3 direction, Vec3 direction_step) const;
   void blur_chroma(Row& row) const;
   void quantise(const Row& row, std::uint64_t noise_key, std::uint8_t* out) const;
 

@@ -3,9 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <condition_variable>
+#include <cstddef>
+#include <cstdint>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -55,6 +59,37 @@ TEST(SimOptions, DefaultsAreThePapersSystem) {
 TEST(SimSource, ARayAlongTheSurfaceIsNoCrash) {
   const auto source = open("walk,width=1920,height=1080,stripes=300,rate=60,frames=16", {});
   for (int i = 0; i < 16; ++i) EXPECT_EQ(take(*source).picture.width(), 1920);
+}
+
+// The projector's primaries meet the surface before the camera mixes them, so that the colour matrix (Eq. 1)
+// gives back the projected primaries times the surface's colour, on surfaces that have one, too.
+TEST(SimSource, TheColourMatrixUndoesTheCameraOnColouredSurfaces) {
+  const auto source = open("object,scan=progressive,noise=0,chroma=0,ambient=0,frames=1", {});
+  const CapturedFrame frame = take(*source);
+  const std::array<double, 9>& m = source->info().rig.colour_matrix;
+  std::vector<double> off;
+  for (int y = 0; y < frame.picture.height(); ++y) {
+    for (int x = 0; x < frame.picture.width(); ++x) {
+      const std::uint8_t* slide = frame.picture.row(y) + 3 * x;
+      const std::uint8_t* complement = frame.complement.row(y) + 3 * x;
+      const double red = slide[0] + complement[0], blue = slide[2] + complement[2];
+      if (red < 80 || red < 1.5 * blue) continue;  // the ball alone
+      double worst = 0;
+      for (std::size_t q = 0; q < 3; ++q) {
+        double difference = 0, sum = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+          difference += m[3 * q + c] * (slide[c] - complement[c]);
+          sum += m[3 * q + c] * (slide[c] + complement[c]);
+        }
+        worst = std::max(worst, std::fabs(std::fabs(difference / sum) - 1));
+      }
+      off.push_back(worst);
+    }
+  }
+  ASSERT_GT(off.size(), 5000U);
+  // Half of the pixels and more are of one stripe alone.
+  std::nth_element(off.begin(), off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2), off.end());
+  EXPECT_LT(off[off.size() / 2], 0.03);
 }
 
 TEST(SimOptions, EveryRefusalSaysWhatIsValid) {
