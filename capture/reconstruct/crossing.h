@@ -21,14 +21,15 @@ template <class Real>
   const Real zero = s1 - s1;
   const Real one = zero + 1.F, most = zero + kMost;
   const Real step = s2 - s1;
-  const Real straight = -s1 / step;
+  const Real unit = 1.F / step;
+  const Real straight = -s1 * unit;
   // What the cubic through all four adds to the line there (Everett's form), and the cubic's slope.
   const Real before = s0 - 2.F * s1 + s2;
   const Real after = s1 - 2.F * s2 + s3;
   const Real bend = ((2.F - straight) * before + (1.F + straight) * after) * (1.F / 6);
   const Real within = straight * (straight - 1.F);
   const Real slope = step + (2.F * straight - 1.F) * bend + within * (after - before) * (1.F / 6);
-  Real share = kBlend * (kStraight - (s3 - s0) / step);
+  Real share = kBlend * (kStraight - (s3 - s0) * unit);
   share = share > zero ? share : zero;
   share = share < most ? share : most;
   const Real place = straight - share * within * bend / slope;

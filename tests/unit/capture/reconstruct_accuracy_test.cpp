@@ -204,10 +204,11 @@ TEST_P(Walking, IsDecoded) {
   EXPECT_GE(score.completeness, walk.completeness);
   EXPECT_LE(score.outliers, walk.outliers);
   EXPECT_LE(score.rms_um_per_m, walk.rms_um_per_m);
+  EXPECT_LE(score.median_um_per_m, 60);
 }
 
 INSTANTIATE_TEST_SUITE_P(Walks, Walking,
-                         ::testing::Values(Walk{"Complementary", "walk", 0.973, 0.001, 360},
+                         ::testing::Values(Walk{"Complementary", "walk", 0.973, 0.001, 350},
                                            Walk{"OneSlide", "walk,scheme=one-slide", 0.97, 0.0025, 720},
                                            Walk{"StrongAmbientLight", "walk,ambient=0.8", 0.97, 0.0015, 540}),
                          [](const auto& walk) { return std::string(walk.param.name); });
