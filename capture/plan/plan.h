@@ -78,8 +78,8 @@ struct Plan {
 
 // Measured of the default decoder (docs/RIG.md): it takes neighbouring lines together, and where there is
 // hardly any noise an error remains.
-constexpr double kSigmaOfBound = 0.45;
-constexpr double kSigmaFloor_px = 0.01;
+constexpr double kSigmaOfBound = 0.35;
+constexpr double kSigmaFloor_px = 0.003;
 
 /// The narrowest stripe, in camera pixels, that is decoded as completely as wider ones (docs/RIG.md).
 constexpr double kNarrowestStripe_px = 5;
