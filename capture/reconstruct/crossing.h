@@ -18,8 +18,6 @@ template <class Real>
   constexpr float kBlend = 4;
   constexpr float kMost = 1.75F;
 
-  const Real zero = s1 - s1;
-  const Real one = zero + 1.F, most = zero + kMost;
   const Real step = s2 - s1;
   const Real unit = 1.F / step;
   const Real straight = -s1 * unit;
@@ -30,11 +28,11 @@ template <class Real>
   const Real within = straight * (straight - 1.F);
   const Real slope = step + (2.F * straight - 1.F) * bend + within * (after - before) * (1.F / 6);
   Real share = kBlend * (kStraight - (s3 - s0) * unit);
-  share = share > zero ? share : zero;
-  share = share < most ? share : most;
+  share = share > 0.F ? share : 0.F;
+  share = share < kMost ? share : kMost;
   const Real place = straight - share * within * bend / slope;
   // What is no edge may bend so much that the cubic crosses elsewhere.
-  out = (place >= zero) & (place <= one) ? place : straight;
+  out = ((place >= 0.F) & (place <= 1.F)) ? place : straight;
 }
 
 /// The same behind s[0], of a row that crosses `level`; s[-1] to s[2] are read.

@@ -7,13 +7,11 @@
 #include <cstring>
 
 #include "capture/reconstruct/crossing.h"
+#include "capture/reconstruct/four.h"
 #include "capture/reconstruct/rows.h"
 
 namespace relievo {
 namespace {
-
-/// Channels at once: red, green and blue.
-using Four = float __attribute__((vector_size(16)));
 
 constexpr float kNoiseFactor = 4;  // a rise over 3 px must exceed this many standard deviations of a value
 constexpr float kLeastRise = 2;    // grey levels, where a picture has no noise

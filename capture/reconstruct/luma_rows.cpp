@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "capture/reconstruct/crossing.h"
+#include "capture/reconstruct/four.h"
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -87,9 +88,7 @@ RELIEVO_BODY void contrasts_body(const float* brightest, const float* darkest, i
   }
 }
 
-/// Channels at once: red, green, blue and luma.
-using Four = float __attribute__((vector_size(16)));
-
+/// Of red, green, blue and luma at once, or of any others.
 RELIEVO_BODY Four size_of(Four v) {
   return v < 0 ? -v : v;
 }

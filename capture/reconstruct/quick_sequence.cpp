@@ -14,8 +14,9 @@ using namespace sequence_rules;
 
 namespace {
 
-// As edges.cpp has them.
+// Less than the ordered decoder's, which finds weak edges in other ways, too.
 constexpr float kNoiseFactor = 3.5F;
+// As edges.cpp has them.
 constexpr float kLeastRise = 2;
 constexpr float kMaxReach_px = 6;
 constexpr float kReachShare = 0.55F;       // of the way to the next edge

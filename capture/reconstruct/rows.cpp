@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "capture/reconstruct/four.h"
+
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -121,10 +123,6 @@ RELIEVO_BODY void crossings_body(const float* __restrict planes, int width, floa
   for (int x = 2; x < width - 2; ++x)
     flags[x] = static_cast<std::uint8_t>(crosses(red, x) | crosses(green, x) << 1 | crosses(blue, x) << 2);
 }
-
-// Four numbers that are added, multiplied and compared at once wherever the processor can.
-using Four = float __attribute__((vector_size(16)));
-using FourInts = std::int32_t __attribute__((vector_size(16)));
 
 Four four_at(const float* p) {
   Four out;

@@ -8,15 +8,15 @@
 #include <numeric>
 #include <utility>
 
+#include "capture/reconstruct/four.h"
+
 namespace relievo {
 namespace {
 
 using Word = SurfacePieces::Word;
 constexpr int kWordBits = 64;
 
-// Four vertices at once.
-using Four = float __attribute__((vector_size(16)));
-using FourInts = std::int32_t __attribute__((vector_size(16)));
+// Vertices at once, as Four are.
 using TwoInts = std::int32_t __attribute__((vector_size(8)));
 
 template <typename Value, typename Vector>

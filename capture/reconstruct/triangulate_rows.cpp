@@ -5,13 +5,12 @@
 #include <cstring>
 
 #include "base/variants.h"
+#include "capture/reconstruct/four.h"
 
 namespace relievo {
 namespace {
 
-// Four boundaries at once; a processor with narrower registers takes several for the doubles.
-using Four = float __attribute__((vector_size(16)));
-using FourInts = std::int32_t __attribute__((vector_size(16)));
+// Boundaries at once; a processor with narrower registers takes several for the doubles.
 using FourDoubles = double __attribute__((vector_size(32)));
 using FourLongs = std::int64_t __attribute__((vector_size(32)));  // as a mask: 0 or -1
 

@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <random>
 
+#include "capture/reconstruct/four.h"
+
 namespace relievo {
 namespace {
 
@@ -62,7 +64,6 @@ TEST(Crossing, IsBetweenItsSamplesWhateverIsBesideThem) {
 }
 
 TEST(Crossing, ManyAtOnceAreEachAsAlone) {
-  using Four = float __attribute__((vector_size(16)));
   std::array<Four, 4> rows{};
   std::array<float, 4> alone{};
   for (std::size_t i = 0; i < 4; ++i) {
