@@ -91,15 +91,23 @@ export async function addImmersive(view: View, failed: (why: string) => void): P
   new Immersive(xr, view, failed);
 }
 
-const kRestAfterMs = 5000; // where no picture comes
+const kAskMs = 5000; // whether a picture is on its way
 const kIdleWithinMs = 2000;
 
 /** Loads what nobody has asked for yet, and keeps the page for when its server is not there; behind the first picture, or where none comes. */
 export class Rest {
   private begun = false;
 
-  constructor(private readonly measuring: Measuring | null) {
-    window.setTimeout(() => this.begin(), kRestAfterMs);
+  /** `coming`: a picture is on its way, however slow the link; it is told to begin(). */
+  constructor(
+    private readonly measuring: Measuring | null,
+    coming: () => boolean,
+  ) {
+    const asking = window.setInterval(() => {
+      if (!this.begun && coming()) return;
+      window.clearInterval(asking);
+      this.begin();
+    }, kAskMs);
   }
 
   /** There is a picture. */

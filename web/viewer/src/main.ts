@@ -110,7 +110,7 @@ class Viewer {
     this.qualityControl = new QualityControl(displayBody, (quality) => this.chooseQuality(quality));
     if (this.quality !== null) this.companions?.want(this.quality);
     this.measure = this.makeMeasure();
-    this.rest = new Rest(this.measure);
+    this.rest = new Rest(this.measure, () => this.view !== null && this.pictureComes);
     addStatistics(this.panels, {
       meter: this.session.meter,
       status: () => this.session.status,
@@ -411,6 +411,13 @@ class Viewer {
     this.measure?.readCursor();
     this.rest.begin();
     this.showDisplay();
+  }
+
+  /** So far nothing says that none will. */
+  private get pictureComes(): boolean {
+    const { info, status } = this.session;
+    if (info === null) return this.presentation?.state === 'connecting';
+    return status === null || status.state === 'running';
   }
 
   /** The stream whose camera the server has, while what is shown is of now. */
