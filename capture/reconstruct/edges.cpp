@@ -34,8 +34,10 @@ class Doubts {
                     ? nullptr
                     : image.signal.data() + static_cast<std::size_t>(line / DifferenceImage::kCellLines) *
                                                 static_cast<std::size_t>(image.cells)),
-        doubts_{kNoiseOfSign * image.noise + 0.5F, kNoiseOfSign * image.weak_noise + 0.5F,
-                kNoiseOfSign * image.noise + 0.5F} {}
+        doubts_{} {
+    for (const Signal s : {Signal::kNone, Signal::kWeak, Signal::kFading, Signal::kStrong})
+      doubts_[static_cast<std::size_t>(s)] = kNoiseOfSign * image.noise_of(s) + 0.5F;
+  }
   float at(int x) const {
     const Signal signal = signal_ == nullptr ? Signal::kStrong : signal_[x / DifferenceImage::kCellWidth];
     return doubts_[static_cast<std::size_t>(signal)];
@@ -43,7 +45,7 @@ class Doubts {
 
  private:
   const Signal* signal_;
-  std::array<float, 3> doubts_;  // by signal
+  std::array<float, 4> doubts_;  // by signal
 };
 
 SideWindows windows_beside(const Doubts& doubts, int width, const Edge& edge, float column_px) {
@@ -134,7 +136,6 @@ class EdgeFinder::Gatherer {
 std::uint32_t EdgeFinder::crossings_of_line(const DifferenceImage& image, int line, Scratch& scratch,
                                             Found* found) {
   const int width = image.width;
-  const float threshold = std::max(kLeastRise, kNoiseFactor * image.noise);
   const float weak_threshold = std::max(kLeastRise, kNoiseFactor * image.weak_noise);
   scratch.flags.resize(static_cast<std::size_t>(width + 8));
   std::fill(scratch.flags.end() - 8, scratch.flags.end(), std::uint8_t{0});  // the last ones are read at once
@@ -142,7 +143,7 @@ std::uint32_t EdgeFinder::crossings_of_line(const DifferenceImage& image, int li
   const float* planes = image.line(line);
   Gatherer gatherer(image, line, found);
   const auto take = [&](int x, unsigned flags) {
-    const float least = image.signal_at(line, x) == Signal::kWeak ? 0 : threshold;
+    const float least = std::max(weak_threshold, kNoiseFactor * image.noise_at(line, x));
     std::array<float, 3> column, slope;
     std::size_t count = 0;
     // All channels at once; what does not cross is not asked for.

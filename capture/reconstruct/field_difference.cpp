@@ -105,7 +105,8 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
     const FieldRows above = fields_at(line - 1);
     const FieldRows here = fields_at(line);
     const FieldRows below = fields_at(line + 1);
-    // A boundary that leans keeps its place, since the kernel is symmetric.
+    // A boundary that leans keeps its place, since the kernel is symmetric; where brightness changes, see
+    // capture/reconstruct/leaning.h.
     kernels.low_pass(above.difference, here.difference, below.difference, samples, across, smooth.difference);
     kernels.low_pass(above.sum, here.sum, below.sum, samples, across, smooth.sum);
     const auto at = static_cast<std::size_t>(line);

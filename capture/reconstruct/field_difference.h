@@ -18,6 +18,7 @@ namespace relievo {
 enum class Signal : std::uint8_t {
   kNone,    // nothing that stands out of the noise
   kWeak,    // so little that values are means over more pixels (capture/reconstruct/weak_signal.h)
+  kFading,  // the same, but otherwise on the next lines: means over fewer of them
   kStrong,  // enough for each pixel by itself
 };
 
@@ -29,7 +30,8 @@ struct DifferenceImage {
   std::vector<float> values;  // [line][channel][width]
   std::vector<float> white;   // [line][width]: luma of the fields' sum, what the scene shows in white light
   float noise = 0;            // standard deviation of a value, from the picture itself
-  float weak_noise = 0;       // the same where the signal is weak
+  float weak_noise = 0;       // the same where the signal is weak,
+  float fading_noise = 0;     // and where it is fading
 
   static constexpr int kCellWidth = 16;
   static constexpr int kCellLines = 8;
@@ -43,7 +45,10 @@ struct DifferenceImage {
     return signal[static_cast<std::size_t>(l / kCellLines) * static_cast<std::size_t>(cells) +
                   static_cast<std::size_t>(x / kCellWidth)];
   }
-  float noise_at(int l, int x) const { return signal_at(l, x) == Signal::kWeak ? weak_noise : noise; }
+  float noise_of(Signal s) const {
+    return s == Signal::kWeak ? weak_noise : s == Signal::kFading ? fading_noise : noise;
+  }
+  float noise_at(int l, int x) const { return noise_of(signal_at(l, x)); }
 
   const float* white_line(int l) const {
     return white.data() + static_cast<std::size_t>(l) * static_cast<std::size_t>(width);

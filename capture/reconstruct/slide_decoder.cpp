@@ -14,6 +14,7 @@
 #include "capture/reconstruct/front_edge.h"
 #include "capture/reconstruct/grow.h"
 #include "capture/reconstruct/instant.h"
+#include "capture/reconstruct/leaning.h"
 #include "capture/reconstruct/match.h"
 #include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/persistence.h"
@@ -90,6 +91,7 @@ struct SlideDecoder::State {
   Tracer tracer;
   FrontEdges front_edges;
   Refiner refiner;
+  LeanCorrection leaning;
   QuickPlacer quick_placer;
   ConsistencyCheck consistency;
   Recovery recovery;
@@ -364,6 +366,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const SharpLuma sharp(rows);
     s.refiner.refine(s.newer.difference, rows.own, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
                      &sharp);
+    s.leaning.correct(s.newer.difference, rows.between, s.pattern.boundaries(), s.result, pool, s.edges);
     const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
     const SequenceCounts& counts = s.result.counts;
     report.filters.unsupported = counts.unsupported;

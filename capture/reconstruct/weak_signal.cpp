@@ -20,12 +20,18 @@ constexpr float kStrong = 7.F;  // standard deviations of a value: a pixel shows
 
 constexpr int kReach = 3;  // pixels and lines to each side that are averaged over
 constexpr std::array<float, kReach + 1> kTaps{4.F / 16, 3.F / 16, 2.F / 16, 1.F / 16};
-// Standard deviation that the mean leaves, of a value's that the low-pass [1 2 1] has been over: (646 / 4096)
-// / 0.375.
+constexpr std::array<float, kReach + 1> kFadingTaps{2.F / 4, 1.F / 4, 0, 0};  // of lines
+// Standard deviation that the mean leaves, of a value's that the low-pass [1 2 1] has been over, whose
+// variance becomes (646 / 4096) / 0.375 either way; over fewer lines (70 / 256) / 0.375.
 constexpr float kNoiseLeft = 0.4206F;
+constexpr float kFadingNoiseLeft = 0.5541F;
 
 int first_line(int cell_row) {
   return cell_row * kLines;
+}
+
+bool averaged(Signal signal) {
+  return signal == Signal::kWeak || signal == Signal::kFading;
 }
 
 }  // namespace
@@ -64,9 +70,22 @@ void WeakSignal::measure(int cell_row, Scratch& scratch, DifferenceImage& image)
   }
 }
 
+/// Weak cells that have others above or below. There the brighter lines would hide what the others show.
+void WeakSignal::mark_fading(int rows, DifferenceImage& image) {
+  const auto at = [&](int r, int c) -> Signal& {
+    return image.signal[static_cast<std::size_t>(std::clamp(r, 0, rows - 1) * image.cells + c)];
+  };
+  for (int r = 0; r < rows; ++r)
+    for (int c = 0; c < image.cells; ++c)
+      if (at(r, c) == Signal::kWeak && !(averaged(at(r - 1, c)) && averaged(at(r + 1, c))))
+        at(r, c) = Signal::kFading;
+}
+
 void WeakSignal::average_cell(const DifferenceImage& image, int cell_row, int cell, Scratch& scratch) {
   const int first = cell * kWidth;
   const int count = std::min(kWidth, image.width - first);
+  const bool fading = image.signal_at(first_line(cell_row), first) == Signal::kFading;
+  const std::array<float, kReach + 1>& across = fading ? kFadingTaps : kTaps;
   std::array<float, kWidth + 2 * kReach> down{};
   for (int line = first_line(cell_row); line < std::min(image.lines, first_line(cell_row) + kLines); ++line) {
     for (int channel = 0; channel < 3; ++channel) {
@@ -75,9 +94,9 @@ void WeakSignal::average_cell(const DifferenceImage& image, int cell_row, int ce
       };
       for (int i = 0; i < count + 2 * kReach; ++i) {
         const int x = std::clamp(first - kReach + i, 0, image.width - 1);
-        float sum = kTaps[0] * row(line)[x];
+        float sum = across[0] * row(line)[x];
         for (int k = 1; k <= kReach; ++k)
-          sum += kTaps[static_cast<std::size_t>(k)] * (row(line - k)[x] + row(line + k)[x]);
+          sum += across[static_cast<std::size_t>(k)] * (row(line - k)[x] + row(line + k)[x]);
         down[static_cast<std::size_t>(i)] = sum;
       }
       for (int i = 0; i < count; ++i) {
@@ -95,13 +114,17 @@ void WeakSignal::average(WorkerPool& pool, DifferenceImage& image) {
   image.cells = (image.width + kWidth - 1) / kWidth;
   image.signal.resize(static_cast<std::size_t>(image.cells) * static_cast<std::size_t>(rows));
   image.weak_noise = kNoiseLeft * image.noise;
+  image.fading_noise = kFadingNoiseLeft * image.noise;
   scratch_.resize(static_cast<std::size_t>(pool.workers()));
   const auto weak = [&](int cell_row, int cell) {
-    return image.signal[static_cast<std::size_t>(cell_row * image.cells + cell)] == Signal::kWeak;
+    return averaged(image.signal[static_cast<std::size_t>(cell_row * image.cells + cell)]);
   };
   pool.for_ranges(rows, [&](int begin, int end, int worker) {
+    for (int r = begin; r < end; ++r) measure(r, scratch_[static_cast<std::size_t>(worker)], image);
+  });
+  mark_fading(rows, image);
+  pool.for_ranges(rows, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-    for (int r = begin; r < end; ++r) measure(r, scratch, image);
     scratch.averaged.reserve(3 * static_cast<std::size_t>(image.width) *
                              static_cast<std::size_t>((end - begin) * kLines));
     scratch.averaged.clear();

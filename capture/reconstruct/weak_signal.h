@@ -16,7 +16,7 @@ namespace relievo {
 class WeakSignal {
  public:
   /// Decides for each cell of `image` how strong its signal is against `image.noise`, and replaces the values
-  /// of weak cells by weighted means of those around. Sets image.signal and image.weak_noise.
+  /// of weak and fading cells by weighted means of those around. Sets image.signal and what noise is there.
   void average(WorkerPool& pool, DifferenceImage& image);
 
  private:
@@ -26,6 +26,7 @@ class WeakSignal {
     std::vector<float> averaged;  // the weak cells' values, in the order of the cells
   };
   static void measure(int cell_row, Scratch& scratch, DifferenceImage& image);
+  static void mark_fading(int rows, DifferenceImage& image);
   static void average_cell(const DifferenceImage& image, int cell_row, int cell, Scratch& scratch);
 
   std::vector<Scratch> scratch_;

@@ -81,6 +81,29 @@ TEST(WeakSignal, TellsStrongWeakAndNoneApart) {
   }
 }
 
+TEST(WeakSignal, BesideOtherLinesFewerAreAveraged) {
+  const DifferenceImage before = picture(thirty_stripes(), 0, 1, [](int l, int) {
+    return l < 16 ? 80.F : l < 48 ? 4.F : 0.F;
+  });
+  DifferenceImage image = before;
+  WorkerPool pool(1);
+  WeakSignal().average(pool, image);
+  const auto at = [&](int l) { return image.signal_at(l, 170); };
+  EXPECT_EQ(at(8), Signal::kStrong);
+  EXPECT_EQ(at(16), Signal::kFading);
+  EXPECT_EQ(at(24), Signal::kWeak);
+  EXPECT_EQ(at(32), Signal::kWeak);
+  EXPECT_EQ(at(40), Signal::kFading);
+  EXPECT_EQ(at(48), Signal::kNone);
+  // Of the bright lines above, the first dark one has a quarter of the nearest and the next one nothing.
+  const int x = static_cast<int>(place(10, 16) + kStripe_px / 2);
+  const float bright = signs(thirty_stripes().colour(11, 0))[0];
+  EXPECT_NEAR(image.line(16)[x], bright * (0.25F * 80 + 0.75F * 4), 4.F);
+  EXPECT_NEAR(image.line(17)[x], bright * 4, 4.F);
+  EXPECT_GT(image.fading_noise, image.weak_noise);
+  EXPECT_LT(image.fading_noise, image.noise);
+}
+
 TEST(WeakSignal, AveragesTheNoiseAwayAndKeepsTheStripes) {
   const Pattern pattern = thirty_stripes();
   DifferenceImage image = picture(pattern, 0, 2, [](int, int) { return 4.F; });

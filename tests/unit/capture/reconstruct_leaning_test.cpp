@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "capture/reconstruct/detection_lines.h"
+#include "capture/reconstruct/edges.h"
+#include "capture/reconstruct/field_difference.h"
+#include "capture/reconstruct/leaning.h"
+#include "capture/reconstruct/weak_signal.h"
+
+namespace relievo {
+namespace {
+
+constexpr int kWidth = 320;
+constexpr int kRows = 136;
+constexpr int kMiddle = kRows / 2;  // of a cell of DifferenceImage, too
+constexpr std::array<double, 9> kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+/// One boundary, red to its left and blue to its right, that moves by `lean_px` a row; from the first row on
+/// light becomes brighter by `rise` a row.
+struct Scene {
+  Scan scan;
+  float level, rise, lean_px;
+
+  float place(int row) const { return 100 + lean_px * static_cast<float>(row - kMiddle); }
+  int rows_a_line() const { return scan == Scan::kInterlaced ? 2 : 1; }
+
+  std::uint8_t value(int row, int x, int channel, bool complement) const {
+    const float right = 0.5F * (1 + std::erf((static_cast<float>(x) - place(row)) / (0.8F * std::sqrt(2.F))));
+    const float lit = channel == 0 ? 1 - right : channel == 2 ? right : 0;
+    const float light = std::min(230.F, level * std::exp(rise * static_cast<float>(row - kMiddle)));
+    return static_cast<std::uint8_t>(std::lround(8 + light * (complement ? 1 - lit : lit)));
+  }
+
+  CapturedFrame frame() const {
+    CapturedFrame out{.scan = scan};
+    out.picture = Image8(kWidth, kRows, 3);
+    if (scan == Scan::kProgressive) out.complement = Image8(kWidth, kRows, 3);
+    for (int y = 0; y < kRows; ++y) {
+      for (int i = 0; i < 3 * kWidth; ++i) {
+        const bool odd = scan == Scan::kInterlaced && y % 2 == 1;
+        out.picture.row(y)[i] = value(y, i / 3, i % 3, odd);
+        if (scan == Scan::kProgressive) out.complement.row(y)[i] = value(y, i / 3, i % 3, true);
+      }
+    }
+    return out;
+  }
+};
+
+struct Off {
+  double before_px, after_px;  // mean, to the right of the true place
+};
+
+/// Of the lines about the middle.
+Off off(const Scene& scene, Signal signal, float noise) {
+  const CapturedFrame frame = scene.frame();
+  const DetectionLines rows(frame);
+  WorkerPool pool(2);
+  DifferenceImage image;
+  Differencer(kIdentity).difference(rows, pool, image);
+  image.noise = std::max(image.noise, noise);
+  WeakSignal().average(pool, image);
+  EdgeImage edges;
+  EdgeFinder().find(image, pool, edges);
+  SequenceResult result;
+  for (const Edge& edge : edges.edges)
+    result.boundary.push_back(std::fabs(edge.column_px - 100) < 60 ? 3 : -1);
+  const auto mean_px = [&] {
+    double sum = 0;
+    int count = 0;
+    for (int line = image.lines / 2 - 1; line < image.lines / 2 + 3; ++line) {
+      EXPECT_EQ(image.signal_at(line, 100), signal);
+      for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+           e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e, ++count)
+        sum += edges.edges[e].column_px - scene.place(scene.rows_a_line() * line);
+    }
+    EXPECT_EQ(count, 4);
+    return sum / count;
+  };
+  const double before = mean_px();
+  LeanCorrection().correct(image, rows.between, 8, result, pool, edges);
+  return {before, mean_px()};
+}
+
+TEST(LeanCorrection, PutsBackWhatBrighterLinesDraw) {
+  struct Case {
+    const char* what;
+    Scene scene;
+    Signal signal;
+    float noise;
+    double drawn_px;  // variance of the mean over lines, in rows, times rise and lean
+    double left;      // share of it: small rises are taken for noise in part
+  };
+  constexpr Scan kInterlaced = Scan::kInterlaced;
+  constexpr Scan kProgressive = Scan::kProgressive;
+  for (const auto& [what, scene, signal, noise, drawn_px, left] : {
+           Case{"interlaced", {kInterlaced, 60, 0.15F, 0.4F}, Signal::kStrong, 0.3F, 2.5 * 0.15 * 0.4, 0.25},
+           Case{"darker below",
+                {kInterlaced, 60, -0.15F, 0.4F},
+                Signal::kStrong,
+                0.3F,
+                -2.5 * 0.15 * 0.4,
+                0.25},
+           Case{"the other way",
+                {kInterlaced, 60, 0.15F, -0.4F},
+                Signal::kStrong,
+                0.3F,
+                -2.5 * 0.15 * 0.4,
+                0.25},
+           Case{"progressive", {kProgressive, 60, 0.3F, 1.F}, Signal::kStrong, 0.3F, 0.5 * 0.3, 0.25},
+           Case{"fading", {kProgressive, 8, 0.3F, 0.5F}, Signal::kFading, 2.5F, 0.3 * 0.5, 0.25},
+           Case{"weak", {kProgressive, 6, 0.1F, 1.F}, Signal::kWeak, 1.9F, 3 * 0.1, 0.6},
+       }) {
+    SCOPED_TRACE(what);
+    const Off px = off(scene, signal, noise);
+    EXPECT_NEAR(px.before_px, drawn_px, 0.25 * std::fabs(drawn_px));
+    EXPECT_LT(std::fabs(px.after_px), left * std::fabs(drawn_px));
+  }
+}
+
+TEST(LeanCorrection, LeavesWhatIsAsBrightOrStandsUpright) {
+  for (const Scene& scene : {Scene{Scan::kInterlaced, 60, 0, 0.6F}, Scene{Scan::kInterlaced, 60, 0.08F, 0}}) {
+    const Off px = off(scene, Signal::kStrong, 0.3F);
+    EXPECT_NEAR(px.before_px, 0, 0.01);
+    EXPECT_NEAR(px.after_px, px.before_px, 0.003);
+  }
+}
+
+/// Columns of one boundary on five lines, whose edges' slopes are 10, 20, 30, 40 and 50.
+std::array<float, 5> corrected(const std::array<float, 5>& columns_px) {
+  EdgeImage edges{.lines = 5, .line_start = {0}, .edges = {}};
+  SequenceResult result;
+  for (std::size_t l = 0; l < columns_px.size(); ++l) {
+    edges.edges.push_back({.column_px = columns_px[l], .slope = 10 * static_cast<float>(l + 1)});
+    edges.line_start.push_back(static_cast<std::uint32_t>(l + 1));
+    result.boundary.push_back(0);
+  }
+  DifferenceImage image;
+  image.width = kWidth;
+  image.lines = 5;
+  WorkerPool pool(1);
+  LeanCorrection().correct(image, true, 1, result, pool, edges);
+  std::array<float, 5> out{};
+  for (std::size_t l = 0; l < out.size(); ++l) out[l] = edges.edges[l].column_px;
+  return out;
+}
+
+TEST(LeanCorrection, AStepFromLineToLineIsNoLean) {
+  // To another surface, too far away to be the same boundary's, and so near that it could be.
+  for (const float step : {8.F, 2.F}) {
+    const std::array<float, 5> columns{50, 50, 50, 50 + step, 50 + step};
+    const std::array<float, 5> out = corrected(columns);
+    for (const std::size_t l : {0, 1, 2, 3, 4})
+      EXPECT_NEAR(out[l], columns[l], 1e-5F) << step << ", line " << l;
+  }
+}
+
+TEST(LeanCorrection, AtAnEndOneNeighbourTellsIt) {
+  const auto out = corrected({50, 51, 52, 53, 54});
+  // Rises to twice the slope, of the mean of both; most of it is no noise.
+  EXPECT_NEAR(out[0], 50 - 0.625F * (2.F / 3), 0.02F);
+  EXPECT_LT(out[2], 52 - 0.15F);
+}
+
+}  // namespace
+}  // namespace relievo
