@@ -237,9 +237,22 @@ const checks = {
       await page.waitForFunction((title) => document.querySelector('#card-title')?.textContent.includes(title), name);
       assert.match(await page.textContent('#card-text'), words, name);
       await page.click('#dismiss');
-      assert.equal(await page.isVisible('#card'), false);
+      await page.waitForFunction(() => document.querySelector('#card').hidden);
       assert.equal((await look(page)).state, 'file');
     }
+  },
+
+  async 'what is said of them is put away though it moves while it is clicked'(page) {
+    await page.setInputFiles('#file', { name: 'none.mcap', mimeType: 'application/octet-stream', buffer: Buffer.from('none') });
+    await page.waitForFunction(() => document.querySelector('#card-title')?.textContent.includes('none.mcap'));
+    const { x, y, width, height } = await page.locator('#dismiss').boundingBox();
+    await page.mouse.move(x + width / 2, y + height / 2);
+    await page.mouse.down();
+    await page.evaluate(() => (document.querySelector('#card').style.marginBottom = '90px')); // as a line more below does
+    assert.ok((await page.locator('#dismiss').boundingBox()).y + height < y);
+    await page.mouse.up();
+    await page.waitForFunction(() => document.querySelector('#card').hidden);
+    await page.evaluate(() => document.querySelector('#card').removeAttribute('style'));
   },
 
   async 'nothing of them has left the device'() {

@@ -34,7 +34,9 @@ export class Ui {
 
   constructor(events: UiEvents) {
     element('retry').onclick = () => events.retry();
-    element('dismiss').onclick = () => events.dismiss();
+    const dismiss = element('dismiss');
+    dismiss.onclick = () => events.dismiss();
+    dismiss.onpointerdown = ({ pointerId }) => dismiss.setPointerCapture(pointerId); // the card may move before it is let go
     element<HTMLSelectElement>('streams').onchange = (event) => {
       events.stream((event.target as HTMLSelectElement).value);
       this.canvas.focus();
