@@ -11,7 +11,7 @@
 namespace relievo {
 namespace {
 
-constexpr std::int64_t kAway_ns = 3 * kNanosecondsPerSecond;  // without a frame
+constexpr std::int64_t kLongGap_ns = 3 * kNanosecondsPerSecond;  // without a frame
 constexpr std::size_t kReplyLimit = 16;  // answers owed to a client that sends but does not read
 
 class StreamFeed : public WsFeed {
@@ -48,6 +48,7 @@ class StreamFeed : public WsFeed {
   std::optional<Rung> told_;
   std::uint64_t seen_drops_ = 0;
   std::int64_t seen_ns_ = 0;
+  std::int64_t long_until_ns_ = -kLongGap_ns;  // the last gap that long
   int credit_ = 0;
   std::int64_t capture_time_ns_ = 0;  // of the frame that is being sent
   std::deque<std::int64_t> untaken_;  // of those for which no credit has come back
@@ -107,10 +108,13 @@ std::optional<WsOutgoing> StreamFeed::next() {
 }
 
 /// Frames that the client had no credit for, or that its connection was too slow for, are what is wrong with
-/// its quality.
+/// its quality. A page in the background, which wants none, is not judged by those: a long gap is taken for that
+/// where it followed until then. A page whose long gaps are hardly apart is slow.
 void StreamFeed::look_at(const Hub::Delivery& delivery) {
   const std::int64_t now_ns = steady_now_ns();
-  const bool was_away = now_ns - seen_ns_ > kAway_ns;  // a page in the background wants no frames
+  const bool is_long = now_ns - seen_ns_ > kLongGap_ns;
+  const bool was_away = is_long && seen_ns_ - long_until_ns_ >= kLongGap_ns;
+  if (is_long) long_until_ns_ = now_ns;
   const std::uint64_t lost = was_away ? 0 : delivery.drops - seen_drops_;
   seen_ns_ = now_ns;
   seen_drops_ = delivery.drops;

@@ -128,6 +128,33 @@ TEST_F(GatewayQuality, AClientThatCannotFollowGoesDown) {
   EXPECT_EQ(gateway->watchers("face", Rung::kFull), 1) << "the client beside it stays";
 }
 
+TEST_F(GatewayQuality, APageInTheBackgroundIsNotJudgedButOneThatIsVerySlowIs) {
+  WsClient client(port, "face");
+  ASSERT_TRUE(client.send(R"({"type":"quality","want":"auto"})"));
+  std::optional<Rung> shown;
+  const auto publish_for = [&](std::chrono::milliseconds time, bool takes) {
+    for (int i = 0; i < time / 50ms; ++i) {
+      publish_all();
+      std::this_thread::sleep_for(50ms);
+      if (!takes) continue;
+      client.credit(1);
+      const auto frame = client.next_of("frame");
+      ASSERT_TRUE(frame);
+      shown = rung_of(*frame);
+    }
+  };
+  publish_for(4s, true);
+  publish_for(3200ms, false);  // in the background
+  publish_for(2500ms, true);
+  EXPECT_EQ(shown, Rung::kFull);
+  EXPECT_EQ(gateway->watchers("face", Rung::kFull), 1);
+  EXPECT_TRUE(eventually([&] {
+    publish_for(3200ms, false);
+    publish_for(100ms, true);
+    return shown != Rung::kFull;
+  }));
+}
+
 TEST_F(GatewayQuality, WhoDecodesNoVideoGetsJpegWhereThereIsSome) {
   constexpr const char* kNoVideo = R"({"type":"quality","want":"%s","textures":["jpeg","png"]})";
   const auto wants = [&](const std::string& want) {

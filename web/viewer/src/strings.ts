@@ -182,6 +182,7 @@ export const text = {
     video: 'Video',
     videoTitle: 'Record a video of the view',
     videoStop: 'Stop video',
+    filmed: (bytes: number) => `Video: ${Math.round(bytes / 1000)} kB so far`,
     noVideo: 'This browser records no video.',
     surface: 'The surface of this frame',
     ply: "PLY: metres, the camera's frame, a colour a vertex",

@@ -79,7 +79,10 @@ export class TakePanel {
     const { view } = this.of;
     const recorder = new MediaRecorder(view.canvas.captureStream(kVideoRate), { mimeType: type });
     const parts: Blob[] = [];
-    recorder.ondataavailable = (event) => parts.push(event.data);
+    recorder.ondataavailable = ({ data }) => {
+      parts.push(data);
+      setText(this.status, say.filmed(parts.reduce((sum, { size }) => sum + size, 0)));
+    };
     recorder.onstop = () => {
       this.recorder = null;
       view.endFilm();

@@ -34,9 +34,9 @@ export class Ui {
 
   constructor(events: UiEvents) {
     element('retry').onclick = () => events.retry();
-    const dismiss = element('dismiss');
-    dismiss.onclick = () => events.dismiss();
-    dismiss.onpointerdown = ({ pointerId }) => dismiss.setPointerCapture(pointerId); // the card may move before it is let go
+    element('dismiss').onclick = () => events.dismiss();
+    // The card may move before its button is let go.
+    element('card').onpointerdown = ({ target, pointerId }) => (target as Element).closest('button')?.setPointerCapture(pointerId);
     element<HTMLSelectElement>('streams').onchange = (event) => {
       events.stream((event.target as HTMLSelectElement).value);
       this.canvas.focus();
