@@ -2,6 +2,8 @@
 #include "capture/reconstruct/leaning.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -19,8 +21,37 @@ constexpr float kOfBetween = 0.125F;  // half of the difference is a mean of two
 constexpr float kOfFading = 0.5F;     // once more
 constexpr float kOfWeak = 2.5F;       // [1 2 3 4 3 2 1] / 16 of weak_signal.h
 
+constexpr float kBrighter = 1.8F;  // times: a line beside it whose edge may be what is seen
+constexpr float kOwnShare = 0.35F;  // of that edge's height, that the line has at least of its own
+constexpr int kBeside = 3;          // pixels to each side of an edge that its height is measured over
+// Standard deviation of a height of one channel, of a low-passed difference's: its variance is that of the mean of
+// so many pixels, twice, and the low-pass [1 2 1] both ways leaves 0.375 squared of it.
+constexpr float kHeightNoise = 2.18F;
+
 bool apart(float a, float b) {
   return !(std::fabs(a - b) < kSameBoundary_px);
+}
+
+using Height = std::array<float, 3>;  // of an edge, grey levels of the difference in each channel
+
+/// On the line itself, before any low-pass. 0 where the picture ends.
+Height height(const DetectionLines& rows, int line, float column_px) {
+  Height out{};
+  const int x = static_cast<int>(std::lround(column_px));
+  if (x < kBeside || x + kBeside >= rows.own.width) return out;
+  const std::uint8_t* own = rows.own.row(line);
+  const std::uint8_t* above = rows.other_above(line);
+  const std::uint8_t* below = rows.other_below(line);
+  for (int channel = 0; channel < 3; ++channel) {
+    const auto twice = [&](int column) {
+      const int i = 3 * column + channel;
+      return 2 * own[i] - above[i] - below[i];
+    };
+    int sum = 0;
+    for (int k = 1; k <= kBeside; ++k) sum += twice(x + k) - twice(x - k);
+    out[static_cast<std::size_t>(channel)] = static_cast<float>(sum) / (2 * kBeside);
+  }
+  return out;
 }
 
 }  // namespace
@@ -55,27 +86,51 @@ float LeanCorrection::drawn_px(const Seen* here, std::ptrdiff_t stride) {
   return lean * std::clamp(rise, -kMostRise, kMostRise);
 }
 
-void LeanCorrection::correct(const DifferenceImage& image, bool between, int boundaries,
-                             const SequenceResult& result, WorkerPool& pool, EdgeImage& edges) {
+/// Whether a line beside it, mixed in by the low-pass, shows the edge and its own line does not.
+bool LeanCorrection::is_borrowed(const DetectionLines& rows, float noise, int line, const Seen* here) const {
+  for (const int step : {-1, 1}) {
+    const Seen& next = here[step * seen_.stride()];
+    if (apart(next.column_px, here->column_px) || next.slope < kBrighter * here->slope) continue;
+    const Height own = height(rows, line, here->column_px);
+    const Height beside = height(rows, line + step, next.column_px);
+    float product = 0, square = 0;
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      product += own[i] * beside[i];
+      square += beside[i] * beside[i];
+    }
+    if (product + kHeightNoise * noise * std::sqrt(square) < kOwnShare * square) return true;
+  }
+  return false;
+}
+
+std::size_t LeanCorrection::correct(const DetectionLines& rows, const DifferenceImage& image, int boundaries,
+                                    WorkerPool& pool, SequenceResult& result, EdgeImage& edges) {
   seen_.reset(boundaries, edges.lines, {});
-  const auto each_of = [&](int line, auto act) {
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
-      if (result.boundary[e] >= 0) act(edges.edges[e], seen_.line(line) + result.boundary[e]);
-  };
   const auto in_all = [&](auto act) {
     pool.for_ranges(edges.lines, [&](int begin, int end, int) {
       for (int line = begin; line < end; ++line)
-        each_of(line, [&](Edge& edge, Seen* seen) { act(line, edge, *seen); });
+        for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+             e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+          if (result.boundary[e] >= 0) act(line, e, seen_.line(line) + result.boundary[e]);
     });
   };
-  in_all([](int, const Edge& edge, Seen& seen) { seen = {edge.column_px, edge.slope}; });
-  const float strong = kOfLowPass + (between ? kOfBetween : 0);
-  in_all([&](int line, Edge& edge, const Seen& seen) {
+  in_all([&](int, std::uint32_t e, Seen* seen) {
+    *seen = {edges.edges[e].column_px, edges.edges[e].slope};
+  });
+  std::atomic<std::size_t> borrowed{0};
+  const float strong = kOfLowPass + (rows.between ? kOfBetween : 0);
+  in_all([&](int line, std::uint32_t e, const Seen* seen) {
+    Edge& edge = edges.edges[e];
+    if (is_borrowed(rows, image.noise, line, seen)) {
+      result.boundary[e] = -1;
+      ++borrowed;
+      return;
+    }
     const Signal signal = image.signal_at(line, static_cast<int>(edge.column_px));
     const float averaged = signal == Signal::kWeak ? kOfWeak : signal == Signal::kFading ? kOfFading : 0;
-    edge.column_px -= (strong + averaged) * drawn_px(&seen, seen_.stride());
+    edge.column_px -= (strong + averaged) * drawn_px(seen, seen_.stride());
   });
+  return borrowed;
 }
 
 }  // namespace relievo

@@ -366,12 +366,13 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     const SharpLuma sharp(rows);
     s.refiner.refine(s.newer.difference, rows.own, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
                      &sharp);
-    s.leaning.correct(s.newer.difference, rows.between, s.pattern.boundaries(), s.result, pool, s.edges);
+    const std::size_t borrowed =
+        s.leaning.correct(rows, s.newer.difference, s.pattern.boundaries(), pool, s.result, s.edges);
     const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
     const SequenceCounts& counts = s.result.counts;
     report.filters.unsupported = counts.unsupported;
     report.filters.completed = counts.completed;
-    report.filters.rejected = checked.rejected;
+    report.filters.rejected = borrowed + checked.rejected;
     report.filters.moved = checked.moved;
     s.recovery.recover({.shown = s.newer.difference,
                         .slide = rows.own,

@@ -255,6 +255,31 @@ const checks = {
     await page.evaluate(() => document.querySelector('#card').removeAttribute('style'));
   },
 
+  async 'of two files the one that was chosen last is shown, though the other takes longer to open'(page) {
+    await page.evaluate(() => {
+      const { arrayBuffer } = Blob.prototype;
+      const released = new Promise((resolve) => (window.releaseFiles = resolve));
+      Blob.prototype.arrayBuffer = async function () {
+        await released;
+        const bytes = await arrayBuffer.call(this);
+        window.wasReleased = true;
+        return bytes;
+      };
+      window.restoreFiles = () => (Blob.prototype.arrayBuffer = arrayBuffer);
+    });
+    await page.setInputFiles('#file', exported('ply', 5));
+    await page.setInputFiles('#file', { name: 'late.mcap', mimeType: 'application/octet-stream', buffer: Buffer.alloc(0) });
+    await page.waitForFunction(() => document.querySelector('#card-title')?.textContent.includes('late.mcap'));
+    const { file } = await look(page);
+    await page.evaluate(() => window.releaseFiles());
+    await page.waitForFunction(() => window.wasReleased);
+    await page.waitForTimeout(1000); // for what should not happen
+    assert.equal((await look(page)).file, file);
+    assert.ok(await page.isVisible('#card'));
+    await page.evaluate(() => window.restoreFiles());
+    await page.click('#dismiss');
+  },
+
   async 'nothing of them has left the device'() {
     assert.deepEqual(sent, []);
     const probe = await newPage(); // it would have been seen

@@ -25,6 +25,7 @@ constexpr std::array<double, 9> kIdentity{1, 0, 0, 0, 1, 0, 0, 0, 1};
 struct Scene {
   Scan scan;
   float level, rise, lean_px;
+  int first_lit = 0;  // row
 
   float place(int row) const { return 100 + lean_px * static_cast<float>(row - kMiddle); }
   int rows_a_line() const { return scan == Scan::kInterlaced ? 2 : 1; }
@@ -32,6 +33,7 @@ struct Scene {
   std::uint8_t value(int row, int x, int channel, bool complement) const {
     const float right = 0.5F * (1 + std::erf((static_cast<float>(x) - place(row)) / (0.8F * std::sqrt(2.F))));
     const float lit = channel == 0 ? 1 - right : channel == 2 ? right : 0;
+    if (row < first_lit) return 8;
     const float light = std::min(230.F, level * std::exp(rise * static_cast<float>(row - kMiddle)));
     return static_cast<std::uint8_t>(std::lround(8 + light * (complement ? 1 - lit : lit)));
   }
@@ -51,24 +53,41 @@ struct Scene {
   }
 };
 
+/// What of it is seen, as the ordered decoder does.
+struct Found {
+  Found(const Scene& scene, float noise) : frame(scene.frame()), rows(frame) {
+    Differencer(kIdentity).difference(rows, pool, image);
+    image.noise = std::max(image.noise, noise);
+    WeakSignal().average(pool, image);
+    EdgeFinder().find(image, pool, edges);
+    for (const Edge& edge : edges.edges)
+      result.boundary.push_back(std::fabs(edge.column_px - 100) < 60 ? 3 : -1);
+  }
+  std::size_t correct() { return LeanCorrection().correct(rows, image, 8, pool, result, edges); }
+  bool has(int line) const {
+    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+      if (result.boundary[e] >= 0) return true;
+    return false;
+  }
+
+  CapturedFrame frame;
+  DetectionLines rows;  // of frame
+  WorkerPool pool{2};
+  DifferenceImage image;
+  EdgeImage edges;
+  SequenceResult result;
+};
+
 struct Off {
   double before_px, after_px;  // mean, to the right of the true place
 };
 
 /// Of the lines about the middle.
 Off off(const Scene& scene, Signal signal, float noise) {
-  const CapturedFrame frame = scene.frame();
-  const DetectionLines rows(frame);
-  WorkerPool pool(2);
-  DifferenceImage image;
-  Differencer(kIdentity).difference(rows, pool, image);
-  image.noise = std::max(image.noise, noise);
-  WeakSignal().average(pool, image);
-  EdgeImage edges;
-  EdgeFinder().find(image, pool, edges);
-  SequenceResult result;
-  for (const Edge& edge : edges.edges)
-    result.boundary.push_back(std::fabs(edge.column_px - 100) < 60 ? 3 : -1);
+  Found found(scene, noise);
+  const DifferenceImage& image = found.image;
+  const EdgeImage& edges = found.edges;
   const auto mean_px = [&] {
     double sum = 0;
     int count = 0;
@@ -82,7 +101,7 @@ Off off(const Scene& scene, Signal signal, float noise) {
     return sum / count;
   };
   const double before = mean_px();
-  LeanCorrection().correct(image, rows.between, 8, result, pool, edges);
+  EXPECT_EQ(found.correct(), 0U);
   return {before, mean_px()};
 }
 
@@ -130,6 +149,23 @@ TEST(LeanCorrection, LeavesWhatIsAsBrightOrStandsUpright) {
   }
 }
 
+TEST(LeanCorrection, GivesUpWhatOnlyTheLineBesideItShows) {
+  for (const Scan scan : {Scan::kInterlaced, Scan::kProgressive}) {
+    const Scene scene{scan, 60, 0, 0, kMiddle};
+    const int lit = kMiddle / scene.rows_a_line();
+    Found found(scene, 0.3F);
+    EXPECT_TRUE(found.has(lit - 1)) << "the low-pass shows nothing: this tests nothing";
+    EXPECT_EQ(found.correct(), 1U);
+    EXPECT_FALSE(found.has(lit - 1));
+    for (int line = lit; line < found.image.lines; ++line) EXPECT_TRUE(found.has(line)) << "line " << line;
+  }
+}
+
+TEST(LeanCorrection, KeepsADarkLineThatShowsItsOwn) {
+  Found found({Scan::kProgressive, 60, 0.8F, 0}, 0.3F);  // each line has 0.45 of the next one's light
+  EXPECT_EQ(found.correct(), 0U);
+}
+
 /// Columns of one boundary on five lines, whose edges' slopes are 10, 20, 30, 40 and 50.
 std::array<float, 5> corrected(const std::array<float, 5>& columns_px) {
   EdgeImage edges{.lines = 5, .line_start = {0}, .edges = {}};
@@ -143,7 +179,8 @@ std::array<float, 5> corrected(const std::array<float, 5>& columns_px) {
   image.width = kWidth;
   image.lines = 5;
   WorkerPool pool(1);
-  LeanCorrection().correct(image, true, 1, result, pool, edges);
+  const CapturedFrame frame = Scene{Scan::kInterlaced, 60, 0, 0}.frame();
+  LeanCorrection().correct(DetectionLines(frame), image, 1, pool, result, edges);
   std::array<float, 5> out{};
   for (std::size_t l = 0; l < out.size(); ++l) out[l] = edges.edges[l].column_px;
   return out;

@@ -61,6 +61,7 @@ class Viewer {
   private posed = false; // the link's view is shown
 
   private problem: string | null = null;
+  private choices = 0; // of files and streams: a file that takes long to open may no longer be wanted
   private chosenByPerson = false; // the stream, by the address or the picker
   private readonly server = new ServerList();
   private wantedBesides: string[] = []; // by the address, until the list says what they are
@@ -257,6 +258,7 @@ class Viewer {
   }
 
   private choose(name: string): void {
+    ++this.choices;
     this.chosenByPerson = true;
     this.shared = null;
     for (const beside of this.companions?.names ?? []) this.companions!.remove(beside);
@@ -352,9 +354,11 @@ class Viewer {
 
   /** Whether it is shown. */
   private async showFile(name: string, open: () => Promise<Opened>, shared: Shared | null = null): Promise<boolean> {
+    const choice = ++this.choices;
     let shown = false;
     try {
       const opened = await open();
+      if (choice !== this.choices) return false;
       this.chosenByPerson = true;
       this.stream = null;
       this.file = name;
@@ -369,6 +373,7 @@ class Viewer {
       if (opened.kind === 'surface') this.show(opened.frame);
       shown = true;
     } catch (error) {
+      if (choice !== this.choices) return false;
       this.fileProblem = { name, why: error instanceof Error ? error.message : String(error), overPicture: this.session.seen };
     }
     this.refresh();
