@@ -21,11 +21,11 @@ constexpr float kOfBetween = 0.125F;  // half of the difference is a mean of two
 constexpr float kOfFading = 0.5F;     // once more
 constexpr float kOfWeak = 2.5F;       // [1 2 3 4 3 2 1] / 16 of weak_signal.h
 
-constexpr float kBrighter = 1.8F;  // times: a line beside it whose edge may be what is seen
+constexpr float kBrighter = 1.8F;   // times: a line beside it whose edge may be what is seen
 constexpr float kOwnShare = 0.35F;  // of that edge's height, that the line has at least of its own
 constexpr int kBeside = 3;          // pixels to each side of an edge that its height is measured over
-// Standard deviation of a height of one channel, of a low-passed difference's: its variance is that of the mean of
-// so many pixels, twice, and the low-pass [1 2 1] both ways leaves 0.375 squared of it.
+// Standard deviation of a height of one channel, of a low-passed difference's: its variance is that of the
+// mean of so many pixels, twice, and the low-pass [1 2 1] both ways leaves 0.375 squared of it.
 constexpr float kHeightNoise = 2.18F;
 
 bool apart(float a, float b) {
@@ -114,9 +114,7 @@ std::size_t LeanCorrection::correct(const DetectionLines& rows, const Difference
           if (result.boundary[e] >= 0) act(line, e, seen_.line(line) + result.boundary[e]);
     });
   };
-  in_all([&](int, std::uint32_t e, Seen* seen) {
-    *seen = {edges.edges[e].column_px, edges.edges[e].slope};
-  });
+  in_all([&](int, std::uint32_t e, Seen* seen) { *seen = {edges.edges[e].column_px, edges.edges[e].slope}; });
   std::atomic<std::size_t> borrowed{0};
   const float strong = kOfLowPass + (rows.between ? kOfBetween : 0);
   in_all([&](int line, std::uint32_t e, const Seen* seen) {

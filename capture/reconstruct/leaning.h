@@ -19,8 +19,8 @@ namespace relievo {
 /// Keeps its scratch memory from frame to frame. One thread.
 class LeanCorrection {
  public:
-  /// Puts the decoded edges of `image`, which was made of `rows`, back where their own line has them. Gives up
-  /// those that it does not have, whose number it returns.
+  /// Puts the decoded edges of `image`, which was made of `rows`, back where their own line has them. Gives
+  /// up those that it does not have, whose number it returns.
   std::size_t correct(const DetectionLines& rows, const DifferenceImage& image, int boundaries,
                       WorkerPool& pool, SequenceResult& result, EdgeImage& edges);
 

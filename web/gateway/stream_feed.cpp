@@ -108,8 +108,8 @@ std::optional<WsOutgoing> StreamFeed::next() {
 }
 
 /// Frames that the client had no credit for, or that its connection was too slow for, are what is wrong with
-/// its quality. A page in the background, which wants none, is not judged by those: a long gap is taken for that
-/// where it followed until then. A page whose long gaps are hardly apart is slow.
+/// its quality. A page in the background, which wants none, is not judged by those: a long gap is taken for
+/// that where it followed until then. A page whose long gaps are hardly apart is slow.
 void StreamFeed::look_at(const Hub::Delivery& delivery) {
   const std::int64_t now_ns = steady_now_ns();
   const bool is_long = now_ns - seen_ns_ > kLongGap_ns;
