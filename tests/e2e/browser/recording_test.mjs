@@ -298,6 +298,30 @@ const checks = {
     await page.waitForFunction(() => window.relievo.diagnostics().playback.following === true); // no longer the file's
   },
 
+  async 'a stream that is chosen while a recording opens stays chosen, also when it goes'() {
+    feeder.say('also other');
+    const page = await newPage();
+    let release;
+    const released = new Promise((resolve) => (release = resolve));
+    await page.route('**/recordings/*', async (route) => {
+      await released;
+      await route.fulfill({ body: 'no recording' });
+    });
+    await page.goto(`http://127.0.0.1:${feeder.port}/?recording=slow.mcap`);
+    await page.waitForFunction(() => document.querySelectorAll('#streams option').length === 2);
+    await page.selectOption('#streams', 'ball');
+    await inState(page, 'live');
+    const answered = page.waitForResponse('**/recordings/*');
+    release();
+    await answered;
+    feeder.say('gone');
+    await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');
+    await page.waitForTimeout(3000); // for what should not happen: the list comes each second or two
+    assert.equal((await look(page)).stream, 'ball');
+    await page.close();
+    feeder.say('start ball');
+  },
+
   async 'a recording of the server plays for each page by itself, once the person has a token'() {
     const tokens = join(scratch, 'tokens');
     writeFileSync(tokens, 'a-token-for-this-test\n', { mode: 0o600 });

@@ -150,7 +150,7 @@ class Viewer {
       this.wantedBesides = besides.filter((name) => name !== asked);
     } else if (recording !== null) {
       this.chosenByPerson = true;
-      void this.openServerFile(recording, this.shared).then(() => (this.chosenByPerson = this.file !== null));
+      void this.openServerFile(recording, this.shared).then(() => (this.chosenByPerson = this.file !== null || this.stream !== null));
     }
   }
 
