@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "capture/reconstruct/place_rules.h"
+
 namespace relievo {
 namespace {
 
@@ -37,7 +39,7 @@ using Height = std::array<float, 3>;  // of an edge, grey levels of the differen
 /// On the line itself, before any low-pass. 0 where the picture ends.
 Height height(const DetectionLines& rows, int line, float column_px) {
   Height out{};
-  const int x = static_cast<int>(std::lround(column_px));
+  const int x = place_rules::column_of(column_px);
   if (x < kBeside || x + kBeside >= rows.own.width) return out;
   const std::uint8_t* own = rows.own.row(line);
   const std::uint8_t* above = rows.other_above(line);

@@ -48,7 +48,7 @@ class StreamFeed : public WsFeed {
   std::optional<Rung> told_;
   std::uint64_t seen_drops_ = 0;
   std::int64_t seen_ns_ = 0;
-  std::int64_t long_until_ns_ = -kLongGap_ns;  // the last gap that long
+  std::int64_t long_until_ns_ = -kLongGap_ns;  // the end of the last gap that long
   int credit_ = 0;
   std::int64_t capture_time_ns_ = 0;  // of the frame that is being sent
   std::deque<std::int64_t> untaken_;  // of those for which no credit has come back

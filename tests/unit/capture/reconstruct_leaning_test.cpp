@@ -31,9 +31,9 @@ struct Scene {
   int rows_a_line() const { return scan == Scan::kInterlaced ? 2 : 1; }
 
   std::uint8_t value(int row, int x, int channel, bool complement) const {
+    if (row < first_lit) return 8;
     const float right = 0.5F * (1 + std::erf((static_cast<float>(x) - place(row)) / (0.8F * std::sqrt(2.F))));
     const float lit = channel == 0 ? 1 - right : channel == 2 ? right : 0;
-    if (row < first_lit) return 8;
     const float light = std::min(230.F, level * std::exp(rise * static_cast<float>(row - kMiddle)));
     return static_cast<std::uint8_t>(std::lround(8 + light * (complement ? 1 - lit : lit)));
   }
