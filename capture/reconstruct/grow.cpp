@@ -92,36 +92,56 @@ Growth::Growth(const std::array<double, 9>& colour_matrix, int boundaries, int l
 }
 
 void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edges,
-                  const std::vector<RecoveredBoundary>& recovered) {
+                  const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool) {
   cells_ = width / kCell_px + 1;
-  moving_.assign(static_cast<std::size_t>(lines_ * cells_), 0);
-  tried_.assign(static_cast<std::size_t>(lines_ * boundaries_), 0);
+  moving_.resize(static_cast<std::size_t>(lines_ * cells_));
+  tried_.resize(static_cast<std::size_t>(lines_ * boundaries_));
+  missed_px_.resize(tried_.size());
+  of_lines_.resize(static_cast<std::size_t>(pool.workers()));
+  for (OfLines& of : of_lines_) {
+    of.decoded = of.still = of.added = 0;
+    of.doubted.clear();
+    of.restored.clear();
+  }
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line)
+      fill_line(line, result, edges, of_lines_[static_cast<std::size_t>(worker)]);
+  });
+  for (const RecoveredBoundary& r : recovered) now_.line(r.line)[r.boundary] = r.column_px;
   doubted_.clear();
   std::size_t decoded = 0;
   std::size_t still = 0;
-  for (int line = 0; line < lines_; ++line) {
-    float* here = now_.line(line);
-    std::uint8_t* moving = moving_.data() + static_cast<std::size_t>(line * cells_);
-    std::fill_n(here, boundaries_, kNoColumn);
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      const float column = edges.edges[e].column_px;
-      if (result.boundary[e] >= 0) {
-        here[result.boundary[e]] = column;
-        ++decoded;
-        still += result.still[e];
-      }
-      if (result.doubted[e] >= 0) doubted_.push_back({line, e});
-      if (result.still[e] != 0) continue;
-      const int cell = static_cast<int>(column) / kCell_px;
-      const int first = std::clamp(cell - kCellsAround, 0, cells_ - 1);
-      const int last = std::clamp(cell + kCellsAround, 0, cells_ - 1);
-      std::fill(moving + first, moving + last + 1, std::uint8_t{1});
-    }
+  for (const OfLines& of : of_lines_) {
+    doubted_.insert(doubted_.end(), of.doubted.begin(), of.doubted.end());
+    decoded += of.decoded;
+    still += of.still;
   }
-  for (const RecoveredBoundary& r : recovered) now_.line(r.line)[r.boundary] = r.column_px;
   mostly_still_ = 2 * still > decoded;
   measure_pitch();
+}
+
+void Growth::fill_line(int line, const SequenceResult& result, const EdgeImage& edges, OfLines& out) {
+  float* here = now_.line(line);
+  std::uint8_t* moving = moving_.data() + static_cast<std::ptrdiff_t>(line) * cells_;
+  std::fill_n(here, boundaries_, kNoColumn);
+  std::fill_n(moving, cells_, std::uint8_t{0});
+  std::fill_n(tried_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, std::uint8_t{0});
+  std::fill_n(missed_px_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, kNoColumn);
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const float column = edges.edges[e].column_px;
+    if (result.boundary[e] >= 0) {
+      here[result.boundary[e]] = column;
+      ++out.decoded;
+      out.still += result.still[e];
+    }
+    if (result.doubted[e] >= 0) out.doubted.push_back({line, e});
+    if (result.still[e] != 0) continue;
+    const int cell = static_cast<int>(column) / kCell_px;
+    const int first = std::clamp(cell - kCellsAround, 0, cells_ - 1);
+    const int last = std::clamp(cell + kCellsAround, 0, cells_ - 1);
+    std::fill(moving + first, moving + last + 1, std::uint8_t{1});
+  }
 }
 
 void Growth::measure_pitch() {
@@ -157,9 +177,9 @@ void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage
 /// What moved away uncovers what stood behind it: an edge of the difference where both fields show it, a step
 /// of the field where that alone does.
 std::size_t Growth::restore_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                                 SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
+                                 SequenceResult& result, std::vector<RecoveredBoundary>& restored) {
   float* here = now_.line(line);
-  std::size_t restored = 0;
+  std::size_t count = 0;
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
     const float column = backdrop_.column_px(line, b);
@@ -174,11 +194,11 @@ std::size_t Growth::restore_line(const SlideFieldView& view, int line, const Edg
       continue;
     } else {
       here[b] = column;
-      recovered.push_back({line, b, column, kRestored_px, 0});
+      restored.push_back({line, b, column, kRestored_px, 0});
     }
-    ++restored;
+    ++count;
   }
-  return restored;
+  return count;
 }
 
 /// Whether an edge near a place was elsewhere two frames ago.
@@ -320,7 +340,14 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
     if (known(here[b])) continue;
     const Around places = around(line, b);
     std::optional<FoundStep> found;
-    if (places.count < 2) found = look(view, line, b, predict_beside(line, b));
+    if (places.count < 2) {
+      float& missed = missed_px_[static_cast<std::size_t>(line * boundaries_ + b)];
+      const auto beside = predict_beside(line, b);
+      if (beside && beside->column_px != missed) {
+        found = look(view, line, b, beside);
+        if (!found) missed = beside->column_px;
+      }
+    }
     if (!found && places.count > 0) found = look(view, line, b, predict_between(line, b, places));
     if (!found) continue;
     here[b] = found->column_px;
@@ -331,25 +358,25 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
 }
 
 /// What was given up for a weakness of its place, and both the field and a line beside show.
-bool Growth::confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
-                     const SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
+Growth::Confirmed Growth::confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
+                                  const SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
   const auto [line, e] = doubted;
-  if (line >= view.field.height) return false;
+  if (line >= view.field.height) return Confirmed::kNo;
   const int b = result.doubted[e];
   float& here = now_.line(line)[b];
   const float column = edges.edges[e].column_px;
-  if (result.boundary[e] >= 0 || known(here) || !moves(line, column)) return false;
+  if (result.boundary[e] >= 0 || known(here) || !moves(line, column)) return Confirmed::kNo;
   const Neighbours near = neighbours(line, column);
-  if (!near.in_order(b, column)) return false;
+  if (!near.in_order(b, column)) return Confirmed::kNo;
   const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
-  if (!found || !fits_before(view, line, b, *found, false)) return false;
+  if (!found || !fits_before(view, line, b, *found, false)) return Confirmed::kNo;
   const auto goes_on = [&](int other) {
     return std::fabs(now_.line(other)[b] - found->column_px) < kGoesOn_px;
   };
-  if (!goes_on(line - 1) && !goes_on(line + 1)) return false;
+  if (!goes_on(line - 1) && !goes_on(line + 1)) return Confirmed::kNotYet;
   here = found->column_px;
   recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
-  return true;
+  return Confirmed::kYes;
 }
 
 /// Gives up moving boundaries that the field does not show: a silhouette came over their place between the
@@ -376,20 +403,33 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
   }
 }
 
-std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, SequenceResult& result,
-                         std::vector<RecoveredBoundary>& recovered) {
-  fill(view.field.width, result, edges, recovered);
+std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, WorkerPool& pool,
+                         SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
+  fill(view.field.width, result, edges, recovered, pool);
   const int lines = std::min(lines_, view.field.height);
+  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
+    OfLines& of = of_lines_[static_cast<std::size_t>(worker)];
+    for (int line = begin; line < std::min(end, lines); ++line) {
+      // Under one slide, then under the other; all lines at first.
+      if (frame_ < 2 * kLooksEvery || line % kLooksEvery == frame_ / 2 % kLooksEvery)
+        remember_line(view, line, edges, result);
+      of.added += restore_line(view, line, edges, result, of.restored);
+      drop_line(view, line, edges, result);
+    }
+  });
   std::size_t added = 0;
-  // Under one slide, then under the other; all lines at first.
-  for (int line = 0; line < lines; ++line)
-    if (frame_ < 2 * kLooksEvery || line % kLooksEvery == frame_ / 2 % kLooksEvery)
-      remember_line(view, line, edges, result);
-  for (int line = 0; line < lines; ++line) added += restore_line(view, line, edges, result, recovered);
-  for (int line = 0; line < lines; ++line) drop_line(view, line, edges, result);
-  for (const Doubted& d : doubted_) added += confirm(view, d, edges, result, recovered);
-  for (auto d = doubted_.rbegin(); d != doubted_.rend(); ++d)
-    added += confirm(view, *d, edges, result, recovered);
+  for (const OfLines& of : of_lines_) {
+    added += of.added;
+    recovered.insert(recovered.end(), of.restored.begin(), of.restored.end());
+  }
+  // Downwards, then upwards what waits for a line below.
+  const auto confirmed = [&](const Doubted& d) {
+    const Confirmed is = confirm(view, d, edges, result, recovered);
+    added += is == Confirmed::kYes;
+    return is != Confirmed::kNotYet;
+  };
+  std::erase_if(doubted_, confirmed);
+  for (auto d = doubted_.rbegin(); d != doubted_.rend(); ++d) confirmed(*d);
   for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
   for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);
   std::swap(now_, before_);

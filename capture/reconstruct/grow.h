@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/parallel.h"
 #include "capture/reconstruct/backdrop.h"
 #include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/edges.h"
@@ -31,8 +32,8 @@ class Growth {
   /// Adds boundaries that neither `result` nor `recovered` has to either; what was added leads to more. What
   /// moved into view after the field's instant is given up first. Once a frame. Columns must be those of
   /// the field's instant. Returns how many were added.
-  std::size_t grow(const SlideFieldView& view, const EdgeImage& edges, SequenceResult& result,
-                   std::vector<RecoveredBoundary>& recovered);
+  std::size_t grow(const SlideFieldView& view, const EdgeImage& edges, WorkerPool& pool,
+                   SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
 
   /// What stands still, as far as frames told that so far.
   const Backdrop& backdrop() const { return backdrop_; }
@@ -52,13 +53,22 @@ class Growth {
     std::size_t count = 0;
     unsigned sources = 0;
   };
+  /// What was found on the lines of one range of them.
+  struct OfLines {
+    std::size_t decoded = 0, still = 0;
+    std::vector<Doubted> doubted;
+    std::vector<RecoveredBoundary> restored;
+    std::size_t added = 0;
+  };
+  enum class Confirmed { kYes, kNotYet, kNo };
   void fill(int width, const SequenceResult& result, const EdgeImage& edges,
-            const std::vector<RecoveredBoundary>& recovered);
+            const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
+  void fill_line(int line, const SequenceResult& result, const EdgeImage& edges, OfLines& out);
   void measure_pitch();
   void remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
                      const SequenceResult& result);
   std::size_t restore_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                           SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
+                           SequenceResult& result, std::vector<RecoveredBoundary>& restored);
   void drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result);
   bool moves(int line, float column_px) const;
   Neighbours neighbours(int line, float column_px);
@@ -69,8 +79,8 @@ class Growth {
   bool fits_before(const SlideFieldView& view, int line, int boundary, const FoundStep& found, bool beside);
   std::optional<FoundStep> look(const SlideFieldView& view, int line, int boundary,
                                 const std::optional<Prediction>& p);
-  bool confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
-               const SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
+  Confirmed confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
+                    const SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
   std::size_t grow_line(const SlideFieldView& view, int line, std::vector<RecoveredBoundary>& recovered);
 
   StepFinder steps_;
@@ -82,7 +92,9 @@ class Growth {
   int cells_ = 0;                     // of a line
   std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
-  std::vector<Doubted> doubted_;
+  std::vector<float> missed_px_;      // [line][boundary]: beside a boundary of its line it was not found there
+  std::vector<Doubted> doubted_;      // that may still be confirmed
+  std::vector<OfLines> of_lines_;     // [worker]
   ColumnGrid now_, before_;
 };
 

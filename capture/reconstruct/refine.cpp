@@ -145,7 +145,8 @@ ShiftQuery Refiner::shift_query(const DifferenceImage& image, int line, const Se
 /// The blur by which zero crossings would be drawn off luma's places as they are, in this frame and, ever
 /// less, those before. Where little tells it, it stays as it was.
 void Refiner::find_blur(const DifferenceImage& image, const SequenceResult& result,
-                        const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges) {
+                        const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
+                        WorkerPool& pool) {
   const auto tells = [&](std::uint32_t e) {
     const LumaSeen& luma = seen_[e];
     return result.boundary[e] >= 0 && luma.found && edges.edges[e].contrast > kContrasty &&
@@ -155,17 +156,24 @@ void Refiner::find_blur(const DifferenceImage& image, const SequenceResult& resu
   for (std::uint32_t e = 0; e < edges.edges.size(); ++e) total += tells(e);
   if (total < kLeastOfBlur) return;
   const std::uint32_t every = std::max(1U, total / kMostOfBlur);
-  for (float& cost : blur_cost_) cost *= kKeptOfCost;
+  tell_blur_.clear();
   std::uint32_t seen = 0;
-  for (int line = 0; line < edges.lines; ++line) {
+  for (int line = 0; line < edges.lines; ++line)
     for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      if (!tells(e) || seen++ % every != 0) continue;
+         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
+      if (tells(e) && seen++ % every == 0) tell_blur_.push_back({line, e, {}});
+  pool.for_ranges(static_cast<int>(tell_blur_.size()), [&](int begin, int end, int) {
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+      auto& [line, e, costs] = tell_blur_[i];
       const ShiftQuery query = shift_query(image, line, result, colours, edges, e);
       const float apart = edges.edges[e].column_px - seen_[e].column_px;
-      for (std::size_t b = 0; b < blur_cost_.size(); ++b)
-        blur_cost_[b] += std::min(kMostCost_px, std::fabs(apart - shift_.shift_px(query, b)));
+      for (std::size_t b = 0; b < costs.size(); ++b)
+        costs[b] = std::min(kMostCost_px, std::fabs(apart - shift_.shift_px(query, b)));
     }
+  });
+  for (std::size_t b = 0; b < blur_cost_.size(); ++b) {
+    blur_cost_[b] *= kKeptOfCost;
+    for (const TellsBlur& edge : tell_blur_) blur_cost_[b] += edge.costs[b];
   }
   blur_ =
       static_cast<std::size_t>(std::min_element(blur_cost_.begin(), blur_cost_.end()) - blur_cost_.begin());
@@ -287,7 +295,7 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) look_at_line(image, line, result, colours, worker, edges);
   });
-  find_blur(image, result, colours, edges);
+  find_blur(image, result, colours, edges, pool);
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line)
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];

@@ -76,7 +76,7 @@ class Refiner {
                                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
                                 std::uint32_t e);
   void find_blur(const DifferenceImage& image, const SequenceResult& result,
-                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges);
+                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges, WorkerPool& pool);
   void sample(const Edge& edge, const LumaSeen& luma, int worker);
   Drawn colour_drawn();
   static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);
@@ -84,8 +84,15 @@ class Refiner {
   LumaPlacer placer_;
   ColourShift shift_;
   std::size_t blur_ = 2;  // of chroma, of ColourShift::kBlur_px
-  // What each would leave colour off luma, in pixels, summed.
-  std::array<float, ColourShift::kBlurs> blur_cost_{};
+  // What each would leave colour off luma, in pixels: summed, and of each edge that tells.
+  using BlurCosts = std::array<float, ColourShift::kBlurs>;
+  BlurCosts blur_cost_{};
+  struct TellsBlur {
+    int line;
+    std::uint32_t edge;
+    BlurCosts costs;
+  };
+  std::vector<TellsBlur> tell_blur_;
   bool wide_stripes_ = false;         // in the last frame, so wide that two dark pixels are speckle
   float share_ = 1;                   // of the projector in the last frame's light
   const SharpLuma* sharp_ = nullptr;  // of the frame being refined

@@ -397,7 +397,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
         first_slide ? 0 : 1, s.newer.difference.noise,          &s.moving,
         s.refiner.ambient()};
     s.field_placer.place(field, s.result, pool, s.edges);
-    const std::size_t grown = s.growth.grow(field, s.edges, s.result, s.recovered);
+    const std::size_t grown = s.growth.grow(field, s.edges, pool, s.result, s.recovered);
     report.filters.recovered += grown;
     report.matched += grown;
     s.places.fill(s.pattern.boundaries(), pool, s.result, s.edges, s.recovered);

@@ -29,6 +29,7 @@ struct Frame {
   EdgeImage edges;
   SequenceResult result;
   std::vector<RecoveredBoundary> recovered;
+  WorkerPool pool{2};
 
   Frame() {
     for (std::size_t b = 0; b + 1 < stripes.size(); ++b) colours.push_back({stripes[b], stripes[b + 1]});
@@ -66,7 +67,7 @@ struct Frame {
     for (int b = 0; b < kBoundaries; ++b) result.still[at(line, b)] = 0;
   }
   std::size_t grow() {
-    return Growth(kIdentity, kBoundaries, kLines).grow({picture.view(), colours}, edges, result, recovered);
+    return Growth(kIdentity, kBoundaries, kLines).grow({picture.view(), colours}, edges, pool, result, recovered);
   }
 };
 
@@ -131,7 +132,7 @@ TEST(Growth, WhereMuchMovesTheFieldSaysWhatIsNotThere) {
     MovingPlaces moving;
     moving.find(kWidth, f.result, f.edges);
     SlideFieldView view{.field = f.picture.view(), .colours = f.colours, .moving = &moving};
-    Growth(kIdentity, kBoundaries, kLines).grow(view, f.edges, f.result, f.recovered);
+    Growth(kIdentity, kBoundaries, kLines).grow(view, f.edges, f.pool, f.result, f.recovered);
     return f.result.boundary[Frame::at(7, 3)] == 3;
   };
   EXPECT_FALSE(is_kept(true));
@@ -192,10 +193,10 @@ class AfterAnother : public ::testing::Test {
   }
   std::size_t grow() {
     for (int k = 0; k < 2; ++k)  // under both slides
-      growth_.grow({first_.picture.view(), first_.colours, nullptr, k}, first_.edges, first_.result,
-                   first_.recovered);
-    return growth_.grow({second_.picture.view(), second_.colours}, second_.edges, second_.result,
-                        second_.recovered);
+      growth_.grow({first_.picture.view(), first_.colours, nullptr, k}, first_.edges, first_.pool,
+                   first_.result, first_.recovered);
+    return growth_.grow({second_.picture.view(), second_.colours}, second_.edges, second_.pool,
+                        second_.result, second_.recovered);
   }
   void paint_second(int from, int to, Primary colour) {
     for (int line = 12; line < kLines; ++line)
@@ -251,10 +252,10 @@ TEST(Growth, BesideWhatStandsStillALineGoesOnWhereMuchMovesOnly) {
     moving.find(kWidth, as_moves, second.edges);
     Growth growth(kIdentity, kBoundaries, kLines);
     for (int k = 0; k < 2; ++k)  // under both slides
-      growth.grow({first.picture.view(), first.colours, nullptr, k}, first.edges, first.result,
+      growth.grow({first.picture.view(), first.colours, nullptr, k}, first.edges, first.pool, first.result,
                   first.recovered);
     return growth.grow({.field = second.picture.view(), .colours = second.colours, .moving = &moving},
-                       second.edges, second.result, second.recovered);
+                       second.edges, second.pool, second.result, second.recovered);
   };
   EXPECT_EQ(grown(true), static_cast<std::size_t>(kLines));
   EXPECT_EQ(grown(false), 0U);
