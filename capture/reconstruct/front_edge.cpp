@@ -54,7 +54,7 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
     // On the front's side it shows the front's colour; behind, whatever is there. Or it does so under the
     // other slide.
     const bool shows = alike(shown, own, fronts, front_side) ||
-                       (alike(other, own, fronts, 0) && alike(other, own, fronts, 1));
+                       alike(other, own, fronts, front_side);
     if (!shows) continue;
     const float off = std::fabs(at(i).column_px - before(next, front_));
     if (!(off < kGoesOn_px)) continue;

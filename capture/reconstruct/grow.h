@@ -92,9 +92,9 @@ class Growth {
   int cells_ = 0;                     // of a line
   std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
-  std::vector<float> missed_px_;      // [line][boundary]: beside a boundary of its line it was not found there
-  std::vector<Doubted> doubted_;      // that may still be confirmed
-  std::vector<OfLines> of_lines_;     // [worker]
+  std::vector<float> missed_px_;   // [line][boundary]: beside a boundary of its line it was not found there
+  std::vector<Doubted> doubted_;   // that may still be confirmed
+  std::vector<OfLines> of_lines_;  // [worker]
   ColumnGrid now_, before_;
 };
 

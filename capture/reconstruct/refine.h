@@ -76,7 +76,8 @@ class Refiner {
                                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
                                 std::uint32_t e);
   void find_blur(const DifferenceImage& image, const SequenceResult& result,
-                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges, WorkerPool& pool);
+                 const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
+                 WorkerPool& pool);
   void sample(const Edge& edge, const LumaSeen& luma, int worker);
   Drawn colour_drawn();
   static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "capture/reconstruct/luma_place.h"
@@ -26,6 +28,13 @@ constexpr float kNear_px = 1.6F;
 constexpr float kBeyond_px = 2.F;
 constexpr float kBeside_px = 1.F;
 
+// Where its colour does, which tells more.
+constexpr float kNearColour_px = 1.F;
+constexpr float kOtherColour = 0.03F;  // distance of the shares of red, green and blue
+constexpr float kBlurred_px = 2.F;     // next to a place,
+constexpr float kPlateau_px = 5.F;     // and where its surface is looked at
+constexpr int kLeastLight = 60;        // grey levels, of four samples in three channels
+
 /// Whether a place goes on from those of its surface, which are on its `side` (-1, 1).
 bool goes_on(const Place* own, int side) {
   const float next = own[side].column_px;
@@ -35,10 +44,42 @@ bool goes_on(const Place* own, int side) {
   return own->sigma_px < kSure_px && std::fabs(foretold - own->column_px) < kForetold_px;
 }
 
+/// What is seen of the scene itself on a line: under the light of both fields together.
+struct SceneLine {
+  SceneLine(const DetectionLines& rows, const DifferenceImage& image, int line)
+      : own(rows.own.row(line)),
+        above(rows.other_above(line)),
+        below(rows.other_below(line)),
+        white(image.white_line(line)),
+        width(image.width) {}
+
+  /// Shares of red, green and blue; nothing beside the picture and where there is no light.
+  std::optional<std::array<float, 3>> colour(float from_px, float to_px) const;
+
+  const std::uint8_t *own, *above, *below;
+  const float* white;
+  int width;
+};
+
+std::optional<std::array<float, 3>> SceneLine::colour(float from_px, float to_px) const {
+  const int first = static_cast<int>(std::lround(from_px));
+  const int last = static_cast<int>(std::lround(to_px));
+  if (first < 0 || last >= width || last < first) return std::nullopt;
+  std::array<int, 3> sums{};
+  for (int i = 3 * first; i < 3 * (last + 1); ++i)
+    sums[static_cast<std::size_t>(i % 3)] += 2 * own[i] + above[i] + below[i];
+  const int all = sums[0] + sums[1] + sums[2];
+  if (all < kLeastLight * (last - first + 1)) return std::nullopt;
+  std::array<float, 3> out;
+  for (std::size_t c = 0; c < 3; ++c) out[c] = static_cast<float>(sums[c]) / static_cast<float>(all);
+  return out;
+}
+
 /// Whether the scene's brightness changes most between two columns where it does so next to `column_px`.
-bool steepest_near(const float* white, int width, float from_px, float to_px, float column_px) {
+bool steepest_near(const SceneLine& scene, float from_px, float to_px, float column_px) {
   const int first = std::max(0, static_cast<int>(std::ceil(from_px)));
-  const int last = std::min(width - 2, static_cast<int>(to_px) - 1);
+  const int last = std::min(scene.width - 2, static_cast<int>(to_px) - 1);
+  const float* white = scene.white;
   float steepest = 0;
   float off_px = 0;
   for (int x = first; x <= last; ++x) {
@@ -50,8 +91,45 @@ bool steepest_near(const float* white, int width, float from_px, float to_px, fl
   return std::fabs(off_px) < kNear_px;
 }
 
+/// Where the colour of the front's last place gives way to that of the back's first one; nothing where these
+/// are nearly the same.
+std::optional<float> colour_changes(const SceneLine& scene, float front_px, float back_px) {
+  const auto front = scene.colour(front_px - kPlateau_px, front_px - kBlurred_px);
+  const auto back = scene.colour(back_px + kBlurred_px, back_px + kPlateau_px);
+  if (!front || !back) return std::nullopt;
+  std::array<float, 3> way;
+  float square = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    way[c] = (*back)[c] - (*front)[c];
+    square += way[c] * way[c];
+  }
+  if (square < kOtherColour * kOtherColour) return std::nullopt;
+  float before = 0;  // of the way
+  for (float x = std::round(front_px - kBlurred_px); x <= back_px + kBlurred_px; ++x) {
+    const auto here = scene.colour(x - 1, x + 1);
+    if (!here) return std::nullopt;
+    float gone = 0;
+    for (std::size_t c = 0; c < 3; ++c) gone += ((*here)[c] - (*front)[c]) * way[c] / square;
+    if (gone > 0.5F) return x - std::min(1.F, (gone - 0.5F) / (gone - before));
+    before = gone;
+  }
+  return std::nullopt;
+}
+
+/// Whether the scene's colour, or where that is one, its brightness changes at a place: the front's
+/// last one, or else the back's first. `sure` is that both slides look as if it were a rim; where only one
+/// does, brightness does not suffice.
+bool changes_at(const SceneLine& scene, float front_px, float back_px, bool of_front, bool sure) {
+  const float rim_px = of_front ? front_px : back_px;
+  const auto px = colour_changes(scene, front_px, back_px);
+  if (px && std::fabs(*px - rim_px) < kNearColour_px) return true;
+  if (!sure) return false;
+  return of_front ? steepest_near(scene, front_px - kBeyond_px, back_px - kBeside_px, rim_px)
+                  : steepest_near(scene, front_px + kBeside_px, back_px + kBeyond_px, rim_px);
+}
+
 /// How many of a line are taken out of `here`, which holds `count`.
-int drop_rims_of_line(const float* white, int width, const StripeColours& shown, const StripeColours& other,
+int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const StripeColours& other,
                       Place* here, int count) {
   int dropped = 0;
   int before = -1;
@@ -61,24 +139,19 @@ int drop_rims_of_line(const float* white, int width, const StripeColours& shown,
     if (left < 0 || left + 1 == b) continue;
     const auto l = static_cast<std::size_t>(left);
     const auto r = static_cast<std::size_t>(b);
-    if (shown[l][1] != shown[r][0] || other[l][1] != other[r][0]) continue;
-    const float apart = here[b].column_px - here[left].column_px;
-    if (!(apart > 0)) continue;
-    const float of_left = here[left].column_px - here[left - 1].column_px;
-    const float of_right = here[b + 1].column_px - here[b].column_px;
+    const int alike = (shown[l][1] == shown[r][0]) + (other[l][1] == other[r][0]);
+    if (alike == 0) continue;
     const float from_px = here[left].column_px;
     const float to_px = here[b].column_px;
-    if (apart < kOfFront * of_left) {
-      if (goes_on(here + b, 1) ||
-          !steepest_near(white, width, from_px + kBeside_px, to_px + kBeyond_px, to_px))
-        continue;
+    const float apart = to_px - from_px;
+    if (!(apart > 0)) continue;
+    if (apart < kOfFront * (from_px - here[left - 1].column_px)) {
+      if (goes_on(here + b, 1) || !changes_at(scene, from_px, to_px, false, alike == 2)) continue;
       here[b] = {};
       before = left;
       ++dropped;
-    } else if (apart < kOfBack * of_right) {
-      if (goes_on(here + left, -1) ||
-          !steepest_near(white, width, from_px - kBeyond_px, to_px - kBeside_px, from_px))
-        continue;
+    } else if (apart < kOfBack * (here[b + 1].column_px - to_px)) {
+      if (goes_on(here + left, -1) || !changes_at(scene, from_px, to_px, true, alike == 2)) continue;
       here[left] = {};
       ++dropped;
     }
@@ -88,15 +161,15 @@ int drop_rims_of_line(const float* white, int width, const StripeColours& shown,
 
 }  // namespace
 
-std::size_t drop_rims(const DifferenceImage& image, const StripeColours& shown, const StripeColours& other,
-                      WorkerPool& pool, PlaceGrid& places, SequenceResult& result, const EdgeImage& edges,
-                      std::vector<RecoveredBoundary>& recovered) {
+std::size_t drop_rims(const DetectionLines& rows, const DifferenceImage& image, const StripeColours& shown,
+                      const StripeColours& other, WorkerPool& pool, PlaceGrid& places, SequenceResult& result,
+                      const EdgeImage& edges, std::vector<RecoveredBoundary>& recovered) {
   std::atomic<std::size_t> total{0};
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) {
       Place* here = places.line(line);
       const int dropped =
-          drop_rims_of_line(image.white_line(line), image.width, shown, other, here, places.boundaries());
+          drop_rims_of_line(SceneLine(rows, image, line), shown, other, here, places.boundaries());
       if (dropped == 0) continue;
       total += static_cast<std::size_t>(dropped);
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];

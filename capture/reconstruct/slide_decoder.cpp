@@ -262,8 +262,8 @@ void SlideDecoder::State::look_again(const DetectionLines& rows, WorkerPool& poo
                                                      .blur_px = refiner.blur_px(),
                                                      .ambient = refiner.ambient()},
                                                     pool, result, edges, recovered);
-  const std::size_t rims = drop_rims(newer.difference, shown, sequence.shown_colours(other(order)), pool,
-                                     places, result, edges, recovered);
+  const std::size_t rims = drop_rims(rows, newer.difference, shown, sequence.shown_colours(other(order)),
+                                     pool, places, result, edges, recovered);
   report.filters.rejected += rendered.rejected + rims;
   report.filters.moved += rendered.moved;
   report.filters.recovered += rendered.restored;

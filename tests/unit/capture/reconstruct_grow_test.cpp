@@ -67,7 +67,8 @@ struct Frame {
     for (int b = 0; b < kBoundaries; ++b) result.still[at(line, b)] = 0;
   }
   std::size_t grow() {
-    return Growth(kIdentity, kBoundaries, kLines).grow({picture.view(), colours}, edges, pool, result, recovered);
+    return Growth(kIdentity, kBoundaries, kLines)
+        .grow({picture.view(), colours}, edges, pool, result, recovered);
   }
 };
 
