@@ -21,6 +21,7 @@ constexpr float kOfFront = 0.95F;
 // What is as sure as this, and where its own surface foretells it, is a boundary.
 constexpr float kSure_px = 0.06F;
 constexpr float kForetold_px = 0.2F;
+constexpr float kStray_px = 1.F;    // what is so far from there may be a rim whatever its colours are
 constexpr float kBendShare = 0.7F;  // of a bend that is taken to go on
 
 // Where the scene's brightness changes.
@@ -35,13 +36,13 @@ constexpr float kBlurred_px = 2.F;     // next to a place,
 constexpr float kPlateau_px = 5.F;     // and where its surface is looked at
 constexpr int kLeastLight = 60;        // grey levels, of four samples in three channels
 
-/// Whether a place goes on from those of its surface, which are on its `side` (-1, 1).
-bool goes_on(const Place* own, int side) {
+/// How far a place is from where those of its surface, which are on its `side` (-1, 1), foretell it; NaN
+/// where these are not two.
+float off_foretold_px(const Place* own, int side) {
   const float next = own[side].column_px;
   const float second = own[2 * side].column_px;
   const float bend = next - 2 * second + own[3 * side].column_px;
-  const float foretold = 2 * next - second + (bend == bend ? kBendShare * bend : 0);
-  return own->sigma_px < kSure_px && std::fabs(foretold - own->column_px) < kForetold_px;
+  return std::fabs(2 * next - second + (bend == bend ? kBendShare * bend : 0) - own->column_px);
 }
 
 /// What is seen of the scene itself on a line: under the light of both fields together.
@@ -116,16 +117,20 @@ std::optional<float> colour_changes(const SceneLine& scene, float front_px, floa
   return std::nullopt;
 }
 
-/// Whether the scene's colour, or where that is one, its brightness changes at a place: the front's
-/// last one, or else the back's first. `sure` is that both slides look as if it were a rim; where only one
-/// does, brightness does not suffice.
-bool changes_at(const SceneLine& scene, float front_px, float back_px, bool of_front, bool sure) {
-  const float rim_px = of_front ? front_px : back_px;
-  const auto px = colour_changes(scene, front_px, back_px);
-  if (px && std::fabs(*px - rim_px) < kNearColour_px) return true;
-  if (!sure) return false;
-  return of_front ? steepest_near(scene, front_px - kBeyond_px, back_px - kBeside_px, rim_px)
-                  : steepest_near(scene, front_px + kBeside_px, back_px + kBeyond_px, rim_px);
+/// Whether a place, the front's last one or the back's first, is a rim; the two are neighbours, and under
+/// `alike` of the two slides between them is one colour.
+bool is_rim(const SceneLine& scene, const Place& front, const Place& back, bool of_front, int alike) {
+  const Place& own = of_front ? front : back;
+  const float off = off_foretold_px(&own, of_front ? -1 : 1);
+  if (own.sigma_px < kSure_px && off < kForetold_px) return false;
+  if (alike == 0 && !(off > kStray_px)) return false;
+  const auto px = colour_changes(scene, front.column_px, back.column_px);
+  if (px && std::fabs(*px - own.column_px) < kNearColour_px) return true;
+  // Brightness tells too little where only one slide looks so.
+  if (alike < 2) return false;
+  return of_front
+             ? steepest_near(scene, front.column_px - kBeyond_px, back.column_px - kBeside_px, own.column_px)
+             : steepest_near(scene, front.column_px + kBeside_px, back.column_px + kBeyond_px, own.column_px);
 }
 
 /// How many of a line are taken out of `here`, which holds `count`.
@@ -140,18 +145,15 @@ int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const 
     const auto l = static_cast<std::size_t>(left);
     const auto r = static_cast<std::size_t>(b);
     const int alike = (shown[l][1] == shown[r][0]) + (other[l][1] == other[r][0]);
-    if (alike == 0) continue;
-    const float from_px = here[left].column_px;
-    const float to_px = here[b].column_px;
-    const float apart = to_px - from_px;
+    const float apart = here[b].column_px - here[left].column_px;
     if (!(apart > 0)) continue;
-    if (apart < kOfFront * (from_px - here[left - 1].column_px)) {
-      if (goes_on(here + b, 1) || !changes_at(scene, from_px, to_px, false, alike == 2)) continue;
+    const bool narrow = apart < kOfFront * (here[left].column_px - here[left - 1].column_px);
+    const bool has_room = !(apart < kOfBack * (here[b + 1].column_px - here[b].column_px));
+    if (narrow && is_rim(scene, here[left], here[b], false, alike)) {
       here[b] = {};
       before = left;
       ++dropped;
-    } else if (apart < kOfBack * (here[b + 1].column_px - to_px)) {
-      if (goes_on(here + left, -1) || !changes_at(scene, from_px, to_px, true, alike == 2)) continue;
+    } else if (!has_room && is_rim(scene, here[left], here[b], true, narrow ? 0 : alike)) {
       here[left] = {};
       ++dropped;
     }
