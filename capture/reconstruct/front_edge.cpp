@@ -39,10 +39,10 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
     const float bend = at(i).column_px - 2 * at(i + direction).column_px + at(i + 2 * direction).column_px;
     return straight + kBendGoesOn * bend;
   };
-  const auto alike = [](const Colours& of, int a, int b, std::size_t side) {
-    return of[static_cast<std::size_t>(a)][side] == of[static_cast<std::size_t>(b)][side];
-  };
   const std::size_t front_side = front_ < 0 ? 0 : 1;
+  const auto alike = [front_side](const Colours& of, int a, int b) {
+    return of[static_cast<std::size_t>(a)][front_side] == of[static_cast<std::size_t>(b)][front_side];
+  };
   std::size_t corrected = 0;
   for (int step = 1; step < count; ++step) {
     const int i = front_ < 0 ? step : count - 1 - step;
@@ -51,10 +51,9 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
     const int fronts = at(next).boundary - front_;
     // Further on than the front's next one.
     if ((own - fronts) * front_ >= 0) continue;
-    // On the front's side it shows the front's colour; behind, whatever is there. Or it does so under the
-    // other slide.
-    const bool shows = alike(shown, own, fronts, front_side) ||
-                       alike(other, own, fronts, front_side);
+    // On the front's side it shows the front's colour, or did so under the other slide; behind, whatever is
+    // there.
+    const bool shows = alike(shown, own, fronts) || alike(other, own, fronts);
     if (!shows) continue;
     const float off = std::fabs(at(i).column_px - before(next, front_));
     if (!(off < kGoesOn_px)) continue;

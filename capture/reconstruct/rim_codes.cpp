@@ -82,7 +82,7 @@ bool steepest_near(const SceneLine& scene, float from_px, float to_px, float col
   const int last = std::min(scene.width - 2, static_cast<int>(to_px) - 1);
   const float* white = scene.white;
   float steepest = 0;
-  float off_px = 0;
+  float off_px = kNear_px;  // nothing changes
   for (int x = first; x <= last; ++x) {
     const float step = std::fabs(white[x + 1] - white[x]) / (white[x + 1] + white[x] + kDarkSum);
     if (step <= steepest) continue;

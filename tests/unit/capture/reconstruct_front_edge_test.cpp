@@ -21,14 +21,14 @@ class FrontEdgeTest : public ::testing::Test {
   const FrontEdges::Colours& shown() const { return sequence_.shown_colours(SlideOrder::kNewerIsFirst); }
   const FrontEdges::Colours& other() const { return sequence_.shown_colours(SlideOrder::kNewerIsSecond); }
 
-  /// A boundary further on that looks like `like` on its side of it (0: the left) in the slide shown, or does
-  /// so in neither slide.
-  int lookalike(int like, std::size_t side, bool alike) const {
+  /// A boundary further on that, in one slide or the other, looks like `like` on its side of it (0: the
+  /// left).
+  int lookalike(int like, std::size_t side, bool in_shown, bool in_other) const {
     const auto l = static_cast<std::size_t>(like);
-    for (std::size_t b = l + 3; b + 3 < shown().size(); ++b) {
-      const bool in_other = other()[b] == other()[l];
-      if ((shown()[b][side] == shown()[l][side]) == alike && (alike || !in_other)) return static_cast<int>(b);
-    }
+    for (std::size_t b = l + 3; b + 3 < shown().size(); ++b)
+      if ((shown()[b][side] == shown()[l][side]) == in_shown &&
+          (other()[b][side] == other()[l][side]) == in_other)
+        return static_cast<int>(b);
     return -1;
   }
 
@@ -61,16 +61,18 @@ class FrontEdgeTest : public ::testing::Test {
 };
 
 TEST_F(FrontEdgeTest, WhatGoesOnFromTheFrontIsItsOwn) {
-  const int k = lookalike(11, 0, true);
-  ASSERT_GT(k, 0);
-  const auto got = corrected(rig_with_projector_at(0.2),
-                             {{100, 8}, {108, 9}, {116, 10}, {124, k}, {136, k + 1}, {144, k + 2}});
-  EXPECT_EQ(got, (std::vector<int>{8, 9, 10, 11, k + 1, k + 2}));
-  EXPECT_EQ(count_, 1U);
+  for (const bool in_shown : {true, false}) {
+    const int k = lookalike(11, 0, in_shown, !in_shown);
+    ASSERT_GT(k, 0);
+    const auto got = corrected(rig_with_projector_at(0.2),
+                               {{100, 8}, {108, 9}, {116, 10}, {124, k}, {136, k + 1}, {144, k + 2}});
+    EXPECT_EQ(got, (std::vector<int>{8, 9, 10, 11, k + 1, k + 2}));
+    EXPECT_EQ(count_, 1U);
+  }
 }
 
 TEST_F(FrontEdgeTest, WhatGoesOnToWhatIsBehindStays) {
-  const int k = lookalike(11, 0, true);
+  const int k = lookalike(11, 0, true, false);
   const std::vector<int> as_seen{8, 9, 10, k, k + 1, k + 2};
   const auto got = corrected(rig_with_projector_at(0.2),
                              {{100, 8}, {108, 9}, {116, 10}, {123.5F, k}, {131.5F, k + 1}, {139.5F, k + 2}});
@@ -79,7 +81,7 @@ TEST_F(FrontEdgeTest, WhatGoesOnToWhatIsBehindStays) {
 }
 
 TEST_F(FrontEdgeTest, WhatShowsAnotherColourThanTheFrontsStays) {
-  const int k = lookalike(11, 0, false);
+  const int k = lookalike(11, 0, false, false);
   ASSERT_GT(k, 0);
   const auto got = corrected(rig_with_projector_at(0.2),
                              {{100, 8}, {108, 9}, {116, 10}, {124, k}, {136, k + 1}, {144, k + 2}});
@@ -87,7 +89,7 @@ TEST_F(FrontEdgeTest, WhatShowsAnotherColourThanTheFrontsStays) {
 }
 
 TEST_F(FrontEdgeTest, WithTheProjectorOnTheOtherSideTheFrontIsOnTheRight) {
-  const int front = lookalike(11, 1, true);  // looks like 11 on its right, so 11 can be taken for it
+  const int front = lookalike(11, 1, true, false);  // looks like 11 on its right, so 11 can be taken for it
   ASSERT_GT(front, 0);
   const std::vector<Seen> line{{100, 9},         {108, 10},        {120, 11},
                                {128, front + 1}, {136, front + 2}, {144, front + 3}};
