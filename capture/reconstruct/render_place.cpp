@@ -39,6 +39,8 @@ constexpr float kRestoredUnlike = 1.8F;  // of what is usual
 constexpr float kRestoredOff_px = 0.6F;
 constexpr float kRestoredSigma_px = 0.6F;
 constexpr float kRestoredMost_px = 0.3F;
+constexpr float kLit = 0.08F;         // in a shadow nothing is projected:
+constexpr int kLitReach_px = 3;       // beside the place
 constexpr float kFromLine_px = 0.4F;  // standard deviation of a place on a line beside,
 constexpr float kLean_px = 2.F;       // as far as boundaries lean
 constexpr float kRoom_px = 2.5F;      // to the boundaries beside it
@@ -71,6 +73,26 @@ Sharp read(const DetectionLines& rows, int line, int first) {
     }
   }
   return out;
+}
+
+/// How much of the projector's light there is beside a place, on the darker side: of what its slides would
+/// differ by if all that is seen were its `gain`-fold.
+float lit(const Sharp& sharp, int first, float place_px, float gain) {
+  float least = 1;
+  for (const int side : {-1, 1}) {
+    float shown = 0;
+    float both = 1;
+    for (int away = 1; away <= kLitReach_px; ++away) {
+      const auto i = static_cast<std::size_t>(std::clamp(
+          static_cast<int>(std::lround(place_px)) + side * away - first, 0, RenderedRow::kRead - 1));
+      for (std::size_t c = 0; c < 3; ++c) {
+        shown += std::fabs(sharp.shown[c][i]);
+        both += sharp.both[c][i];
+      }
+    }
+    least = std::min(least, shown / (gain * both));
+  }
+  return least;
 }
 
 float luma_of(const std::array<RenderedRow::In, 3>& rgb, std::size_t i) {
@@ -189,7 +211,7 @@ bool RenderPlacer::look(const RenderView& view, int line, int boundary, float co
   const float right_only = unlike_(row, column_px - kNowhere_px);
   const float there = unlike_(row, column_px + best_px);
   out = {best_px, kOfCurvature / curvature, there / columns,
-         (std::min(left_only, right_only) - there) / columns};
+         (std::min(left_only, right_only) - there) / columns, lit(sharp, first, column_px + best_px, gain)};
   return true;
 }
 
@@ -229,7 +251,7 @@ bool RenderPlacer::restore(const RenderView& view, const Candidate& candidate,
   if (!(column_px - here[-1].column_px > kRoom_px && here[1].column_px - column_px > kRoom_px)) return false;
   Found found;
   if (!look(view, line, boundary, column_px, found)) return false;
-  if (found.gain < kRestoredGain || found.unlike > kRestoredUnlike * usual_ ||
+  if (found.lit < kLit || found.gain < kRestoredGain || found.unlike > kRestoredUnlike * usual_ ||
       found.sigma_px > kRestoredSigma_px || std::fabs(found.off_px) > kRestoredOff_px)
     return false;
   const Place place = weighed(column_px, sigma_px, found);

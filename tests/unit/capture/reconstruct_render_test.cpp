@@ -147,6 +147,14 @@ TEST_F(RenderTest, WhatALineBesideHasAndThePictureShowsIsTakenBack) {
   EXPECT_NEAR(recovered_[0].column_px, place_of(4), 0.1F);
 }
 
+TEST_F(RenderTest, BesideAShadowNothingIsTakenBack) {
+  boundary(3, 4) = -1;
+  for (Image8* picture : {&frame_.picture, &frame_.complement})
+    std::fill(picture->row(3) + 3 * (static_cast<int>(place_of(4)) + 1), picture->row(3) + 3 * kWidth,
+              std::uint8_t{20});
+  EXPECT_EQ(place().restored, 0U);
+}
+
 TEST_F(RenderTest, AtTheEndOfALineNothingIsTakenBack) {
   boundary(3, kBoundaries - 1) = -1;
   EXPECT_EQ(place().restored, 0U);
