@@ -117,8 +117,8 @@ std::optional<float> colour_changes(const SceneLine& scene, float front_px, floa
   return std::nullopt;
 }
 
-/// Whether a place, the front's last one or the back's first, is a rim; the two are neighbours, and under
-/// `alike` of the two slides between them is one colour.
+/// Whether a place, the front's last one or the back's first, is a rim. The two are neighbours; under `alike`
+/// of the two slides the colours tell that it may be one.
 bool is_rim(const SceneLine& scene, const Place& front, const Place& back, bool of_front, int alike) {
   const Place& own = of_front ? front : back;
   const float off = off_foretold_px(&own, of_front ? -1 : 1);
@@ -147,13 +147,14 @@ int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const 
     const int alike = (shown[l][1] == shown[r][0]) + (other[l][1] == other[r][0]);
     const float apart = here[b].column_px - here[left].column_px;
     if (!(apart > 0)) continue;
-    const bool narrow = apart < kOfFront * (here[left].column_px - here[left - 1].column_px);
-    const bool has_room = !(apart < kOfBack * (here[b + 1].column_px - here[b].column_px));
-    if (narrow && is_rim(scene, here[left], here[b], false, alike)) {
+    // Whether there is room for one more boundary between: the front's next one, the back's one before.
+    const bool front_fits = !(apart < kOfFront * (here[left].column_px - here[left - 1].column_px));
+    const bool back_fits = !(apart < kOfBack * (here[b + 1].column_px - here[b].column_px));
+    if (is_rim(scene, here[left], here[b], false, front_fits ? 0 : alike)) {
       here[b] = {};
       before = left;
       ++dropped;
-    } else if (!has_room && is_rim(scene, here[left], here[b], true, narrow ? 0 : alike)) {
+    } else if (is_rim(scene, here[left], here[b], true, front_fits && !back_fits ? alike : 0)) {
       here[left] = {};
       ++dropped;
     }

@@ -2,10 +2,11 @@
 // Ends of surfaces that look like boundaries. Where one surface ends before another and the two stripes that
 // meet there have the colours of stripes that are neighbours in the pattern, the rim itself is decoded, as
 // the front's next boundary or as the one before the back's first. It lies on neither surface. Between such
-// a boundary and the next one of the other surface there is one colour only, under both slides, or, where
-// the place of what the other one showed before was taken for the boundary's, under one. Which of the two it
-// is, and whether it is one, is told by how wide that is, and by where on it the scene's own colour changes,
-// or, where that does not, its brightness changes most.
+// a boundary and the next one of the other surface there is one colour only: under both slides, or under one,
+// since what the last frame showed there may have been another place's. Which of the two it is, and whether
+// it is one, is told by how wide that is, and by where on it the scene's own colour changes, or, where that
+// does not, its brightness changes most. What is far from where its own surface foretells it may be a rim
+// whatever its colours are.
 #pragma once
 
 #include <array>
