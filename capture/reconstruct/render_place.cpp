@@ -31,14 +31,14 @@ constexpr float kApart = 0.4F;        // of how much farther apart the two are t
 constexpr float kMost_px = 1.F;       // doubt:
 constexpr float kUnlikeShare = 0.6F;  // by how unlike it is, of what is usual; the rest is always there
 constexpr float kLeastUsual = 0.2F;   // of unlikeness
-constexpr float kLeastGain = -0.1F;   // less, and nothing is there
+constexpr float kLeastGain = -0.15F;   // less, and nothing is there
 
 // What was not found, or given up, and the picture shows all the same.
-constexpr float kRestoredGain = 0.3F;
+constexpr float kRestoredGain = 0.1F;
 constexpr float kRestoredUnlike = 1.8F;  // of what is usual
-constexpr float kRestoredOff_px = 0.6F;
-constexpr float kRestoredSigma_px = 0.6F;
-constexpr float kRestoredMost_px = 0.3F;
+constexpr float kRestoredOff_px = 0.9F;
+constexpr float kRestoredSigma_px = 0.9F;
+constexpr float kRestoredMost_px = 0.4F;
 constexpr float kLit = 0.08F;         // in a shadow nothing is projected:
 constexpr int kLitReach_px = 3;       // beside the place
 constexpr float kFromLine_px = 0.4F;  // standard deviation of a place on a line beside,
