@@ -13,6 +13,13 @@ using namespace sequence_rules;
 
 namespace {
 
+/// Of an edge that moved: what a channel of its own frame clearly contradicts (2/3) is no candidate.
+constexpr GainRules kMovingGains = [] {
+  GainRules gains = kGains;
+  gains.transition_slack = 0.65F;
+  return gains;
+}();
+
 /// Where the edge stood two frames ago, under the same slide, from where it is now: the nearest place with
 /// the same colours on both sides. `found` is false where there is none.
 struct Displacement {
@@ -100,7 +107,7 @@ int SequenceDecoder::choose_moving(const EdgeImage& edges, int line, std::uint32
   const auto places = static_cast<std::size_t>(colours.count) + 8;
   scratch.near_boundary.resize(places);
   scratch.near_gain.resize(places);
-  const int near = path_kernels().near(colours, agreement_of(edges.edges[e], beside_[e]), kGains,
+  const int near = path_kernels().near(colours, agreement_of(edges.edges[e], beside_[e]), kMovingGains,
                                        scratch.near_boundary.data(), scratch.near_gain.data());
   const float column = edges.edges[e].column_px;
   const bool moves = context.motion != nullptr && context.before_motion != nullptr;

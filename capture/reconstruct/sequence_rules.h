@@ -17,12 +17,11 @@ namespace relievo::sequence_rules {
 // Gains of the path search. Evidence of one side is a colour's agreement with three channels, -1..1; a clear
 // edge of a still scene has 2 from its own frame and 2 from the other slide's.
 inline constexpr GainRules kGains{
-    .transition_slack = 0.65F,  // of the best pair of colours: further off, as by a channel that is
-                                // clearly another (2/3), is no candidate
-    .other_floor = -0.6F,       // what the other slide's frame can take away: the scene may have moved
-    .contradiction = 0.0F,      // but where it held still, a side that disagrees
-    .contradicted = 1.5F,       // costs this much more
-    .threshold = 1.3F,          // an edge that gains less is better left out
+    .transition_slack = 0.9F,  // of the best pair of colours: further off is no candidate
+    .other_floor = -0.6F,      // what the other slide's frame can take away: the scene may have moved
+    .contradiction = 0.0F,     // but where it held still, a side that disagrees
+    .contradicted = 1.5F,      // costs this much more
+    .threshold = 1.3F,         // an edge that gains less is better left out
 };
 inline constexpr OrderRules kOrder{
     .in_order = 1.0F,     // bonus for the boundary that follows in the sequence
