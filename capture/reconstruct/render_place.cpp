@@ -34,7 +34,7 @@ constexpr float kLeastUsual = 0.2F;   // of unlikeness
 constexpr float kLeastGain = -0.15F;   // less, and nothing is there
 
 // What was not found, or given up, and the picture shows all the same.
-constexpr float kRestoredGain = 0.1F;
+constexpr float kRestoredGain = 0.2F;
 constexpr float kRestoredUnlike = 1.8F;  // of what is usual
 constexpr float kRestoredOff_px = 0.9F;
 constexpr float kRestoredSigma_px = 0.9F;
