@@ -31,7 +31,7 @@ constexpr float kApart = 0.4F;        // of how much farther apart the two are t
 constexpr float kMost_px = 1.F;       // doubt:
 constexpr float kUnlikeShare = 0.6F;  // by how unlike it is, of what is usual; the rest is always there
 constexpr float kLeastUsual = 0.2F;   // of unlikeness
-constexpr float kLeastGain = -0.15F;   // less, and nothing is there
+constexpr float kLeastGain = -0.15F;  // less, and nothing is there
 
 // What was not found, or given up, and the picture shows all the same.
 constexpr float kRestoredGain = 0.2F;
