@@ -39,8 +39,8 @@ constexpr float kRestoredUnlike = 1.8F;  // of what is usual
 constexpr float kRestoredOff_px = 0.9F;
 constexpr float kRestoredSigma_px = 0.9F;
 constexpr float kRestoredMost_px = 0.4F;
-constexpr float kLit = 0.08F;         // in a shadow nothing is projected:
-constexpr int kLitReach_px = 3;       // beside the place
+constexpr float kLit = 0.08F;         // less projected light than that, and it is in a shadow
+constexpr int kLitReach_px = 3;       // to each side, where that is looked for
 constexpr float kFromLine_px = 0.4F;  // standard deviation of a place on a line beside,
 constexpr float kLean_px = 2.F;       // as far as boundaries lean
 constexpr float kRoom_px = 2.5F;      // to the boundaries beside it
@@ -75,8 +75,8 @@ Sharp read(const DetectionLines& rows, int line, int first) {
   return out;
 }
 
-/// How much of the projector's light there is beside a place, on the darker side: of what its slides would
-/// differ by if all that is seen were its `gain`-fold.
+/// On the darker side of a place, by how much the two exposures differ, of what they would in the projector's
+/// full light; `gain` is that of ambient light.
 float lit(const Sharp& sharp, int first, float place_px, float gain) {
   float least = 1;
   for (const int side : {-1, 1}) {

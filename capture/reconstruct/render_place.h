@@ -58,7 +58,7 @@ class RenderPlacer {
     float off_px, sigma_px;
     float unlike;  // 0..3, a column: the picture there and what is shown
     float gain;    // the same, how much more without a boundary
-    float lit;     // 0..1: how much of what is seen there, on its darker side, is the projector's light
+    float lit;     // 0..1: share of the projector's light that its darker side has
   };
 
   bool look(const RenderView& view, int line, int boundary, float column_px, Found& out) const;
