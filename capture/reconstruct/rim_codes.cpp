@@ -36,6 +36,10 @@ constexpr float kBlurred_px = 2.F;     // next to a place,
 constexpr float kPlateau_px = 5.F;     // and where its surface is looked at
 constexpr int kLeastLight = 60;        // grey levels, of four samples in three channels
 
+// Light of the projector that is none, of that on the other side of a place.
+constexpr float kShadow = 0.05F;
+constexpr int kBesideShadow_px = 3;
+
 /// How far a place is from where those of its surface, which are on its `side` (-1, 1), foretell it; NaN
 /// where these are not two.
 float off_foretold_px(const Place* own, int side) {
@@ -162,6 +166,38 @@ int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const 
   return dropped;
 }
 
+/// Whether on one side of a place nothing is projected: the exposures differ by next to nothing there.
+bool in_shadow(const DifferenceImage& image, int line, float column_px) {
+  const int centre = static_cast<int>(std::lround(column_px));
+  if (centre < kBesideShadow_px || centre + kBesideShadow_px >= image.width) return false;
+  const float* of_channel = image.line(line);
+  std::array<float, 2> light{};
+  for (int c = 0; c < 3; ++c, of_channel += image.width) {
+    float left = 0;
+    float right = 0;
+    for (int away = 1; away <= kBesideShadow_px; ++away) {
+      left += of_channel[centre - away];
+      right += of_channel[centre + away];
+    }
+    light[0] += std::fabs(left);
+    light[1] += std::fabs(right);
+  }
+  return std::min(light[0], light[1]) < kShadow * std::max(light[0], light[1]);
+}
+
+/// Takes out of `here`, as drop_rims_of_line(), last boundaries of surfaces that lie in a shadow. Their
+/// surface foretells them, and the light beside the shadow, blurred, has edges under any slide.
+int drop_in_shadow(const DifferenceImage& image, int line, Place* here, int count) {
+  int dropped = 0;
+  for (int b = 0; b < count; ++b) {
+    if (!here[b].known() || (here[b - 1].known() && here[b + 1].known())) continue;
+    if (!in_shadow(image, line, here[b].column_px)) continue;
+    here[b] = {};
+    ++dropped;
+  }
+  return dropped;
+}
+
 }  // namespace
 
 std::size_t drop_rims(const DetectionLines& rows, const DifferenceImage& image, const StripeColours& shown,
@@ -171,8 +207,9 @@ std::size_t drop_rims(const DetectionLines& rows, const DifferenceImage& image, 
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) {
       Place* here = places.line(line);
-      const int dropped =
-          drop_rims_of_line(SceneLine(rows, image, line), shown, other, here, places.boundaries());
+      const SceneLine scene(rows, image, line);
+      const int dropped = drop_rims_of_line(scene, shown, other, here, places.boundaries()) +
+                          drop_in_shadow(image, line, here, places.boundaries());
       if (dropped == 0) continue;
       total += static_cast<std::size_t>(dropped);
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];

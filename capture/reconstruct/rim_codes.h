@@ -6,7 +6,7 @@
 // since what the last frame showed there may have been another place's. Which of the two it is, and whether
 // it is one, is told by how wide that is, and by where on it the scene's own colour changes, or, where that
 // does not, its brightness changes most. What is far from where its own surface foretells it may be a rim
-// whatever its colours are.
+// whatever its colours are. And a surface's last boundary is none where nothing is projected beside it.
 #pragma once
 
 #include <array>
@@ -27,9 +27,9 @@ namespace relievo {
 /// Colours to the left and right of each boundary.
 using StripeColours = std::vector<std::array<Primary, 2>>;
 
-/// Gives up boundaries of `result` (-1), and takes out of `places` and `recovered`, what may be such a rim.
-/// `shown` and `other` are the colours under the frame's slide and under the other one. `places` are those of
-/// both; `image` is what the edges were found in, of `rows`. Says how many there were.
+/// Gives up boundaries of `result` (-1), and takes out of `places` and `recovered`, what may be such a rim,
+/// or lies in a shadow. `shown` and `other` are the colours under the frame's slide and under the other one.
+/// `places` are those of both; `image` is what the edges were found in, of `rows`. Says how many there were.
 std::size_t drop_rims(const DetectionLines& rows, const DifferenceImage& image, const StripeColours& shown,
                       const StripeColours& other, WorkerPool& pool, PlaceGrid& places, SequenceResult& result,
                       const EdgeImage& edges, std::vector<RecoveredBoundary>& recovered);

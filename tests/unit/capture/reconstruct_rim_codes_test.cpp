@@ -25,6 +25,8 @@ class RimTest : public ::testing::Test {
     DifferenceImage image;
     image.width = kWidth;
     image.lines = 1;
+    for (int i = 0; i < 3 * kWidth; ++i)
+      image.values.push_back(static_cast<float>(i % kWidth) < shadow_px_ ? 50.F : 0.5F);
     CapturedFrame frame{.scan = Scan::kProgressive};
     frame.picture = Image8(kWidth, 1, 3);
     for (int x = 0; x < kWidth; ++x) {
@@ -63,6 +65,7 @@ class RimTest : public ::testing::Test {
   }
 
   static constexpr int kWidth = 200;
+  float shadow_px_ = kWidth;   // from here on
   float foretold_off_px_ = 1;  // the left surface's last place
   const SequenceDecoder sequence_{*make_pattern(6, 2, 3, 90)};
   const StripeColours& shown_ = sequence_.shown_colours(SlideOrder::kNewerIsFirst);
@@ -119,6 +122,17 @@ TEST_F(RimTest, ASliverOfTheBackTellsNothingOfTheFrontsColours) {
   foretold_off_px_ = 1.5F;
   EXPECT_EQ(dropped(100, 10, 103, k, 100, 100), 1U);
   EXPECT_EQ(result_.boundary[4], -1);
+}
+
+TEST_F(RimTest, NoLastBoundaryLiesInAShadow) {
+  const int k = meets(10, false, false);  // the last boundary is at 136
+  shadow_px_ = 138;
+  EXPECT_EQ(dropped(100, 10, 112, k, kWidth), 0U);
+  shadow_px_ = 136;
+  EXPECT_EQ(dropped(100, 10, 112, k, kWidth), 1U);
+  EXPECT_EQ(result_.boundary[8], -1);
+  shadow_px_ = 108;  // where both its sides are as dark it was found all the same
+  EXPECT_EQ(dropped(100, 10, 112, k, kWidth), 0U);
 }
 
 }  // namespace
