@@ -43,6 +43,16 @@ bool surface_goes_on_across(const std::array<float, 4>& x, float gap, const Colu
 /// The same from line to line.
 bool surface_goes_on_along(const std::array<float, 4>& x, float gap, const ColumnScale& scale);
 
+/// Share of a bend, from one difference of columns to the next, with which a surface is taken to go on.
+inline constexpr float kBendGoesOn = 0.7F;
+
+/// Where a surface goes on to beside its column x0, with x1 next to that and x2 next to x1: straight where x2
+/// is NaN.
+inline float goes_on_to(float x0, float x1, float x2) {
+  const float bend = x0 - 2 * x1 + x2;
+  return 2 * x0 - x1 + (bend == bend ? kBendGoesOn * bend : 0);
+}
+
 struct Hole {
   std::uint16_t boundary;
   std::uint16_t line;

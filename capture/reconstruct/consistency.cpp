@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/consistency_rows.h"
 #include "capture/reconstruct/smooth_columns.h"
 
@@ -31,7 +32,6 @@ constexpr float kBendAlong_px = 0.25F;     // second difference over lines
 // Standard deviations of what neighbours predict, measured on simulated scenes.
 constexpr float kPrediction_px = 0.06F;  // from three of them, in line
 constexpr float kPredictionBend = 1.4F;  // more for each pixel that the three are out of line
-constexpr float kBendShare = 0.7F;       // of a bend that is taken to go on
 constexpr float kTwoAcross_px = 1.F;     // more, from two only
 constexpr float kTwoAlong_px = 0.2F;
 constexpr float kTrusted_px = 0.15F;      // neighbours worse than this predict nothing
@@ -281,8 +281,7 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
     const float bend = a - 2 * b + c;
     const float straight = 2 * a - b;
     if (known(bend)) {
-      predictions[count++] = {straight + kBendShare * bend,
-                              kPrediction_px + kPredictionBend * std::fabs(bend)};
+      predictions[count++] = {goes_on_to(a, b, c), kPrediction_px + kPredictionBend * std::fabs(bend)};
     } else if (known(straight)) {
       predictions[count++] = {straight, kPrediction_px + one};
     } else if (known(b) && known(c)) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "capture/reconstruct/column_grid.h"
+
 namespace relievo {
 namespace {
 
@@ -11,7 +13,6 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 // Measured on simulated scenes and a rendering by others: of what these let through, nine of ten are right.
 constexpr float kGoesOn_px = 1.2F;   // off where the front's next boundary is to be
 constexpr float kMuchNearer = 0.7F;  // of how far off it is where the back's is to be
-constexpr float kBendGoesOn = 0.7F;  // share of a bend that is taken to go on
 
 }  // namespace
 
@@ -34,10 +35,8 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
       return j >= 0 && j < count && at(j).boundary == at(j - direction).boundary + direction;
     };
     if (i < 0 || i >= count || !follows(i + direction)) return kNone;
-    const float straight = 2 * at(i).column_px - at(i + direction).column_px;
-    if (!follows(i + 2 * direction)) return straight;
-    const float bend = at(i).column_px - 2 * at(i + direction).column_px + at(i + 2 * direction).column_px;
-    return straight + kBendGoesOn * bend;
+    return goes_on_to(at(i).column_px, at(i + direction).column_px,
+                      follows(i + 2 * direction) ? at(i + 2 * direction).column_px : kNone);
   };
   const std::size_t front_side = front_ < 0 ? 0 : 1;
   const auto alike = [front_side](const Colours& of, int a, int b) {

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "capture/reconstruct/column_grid.h"
+
 namespace relievo {
 namespace {
 
@@ -16,7 +18,6 @@ constexpr int kMargin = 3;
 constexpr float kAcross_px = 0.08F;      // from boundaries beside it
 constexpr float kAlong_px = 0.08F;       // from lines above or below
 constexpr float kBend = 0.5F;            // more for each pixel that the three are out of line
-constexpr float kBendShare = 0.7F;       // of a bend that is taken to go on
 constexpr float kWorst_px = 0.2F;        // beyond which it is no prediction
 constexpr float kAgree = 3.F;            // standard deviations between luma's place and the prediction
 constexpr float kLeastAgree_px = 0.25F;  // but at least
@@ -70,7 +71,7 @@ Recovery::Prediction Recovery::predict(View8 slide, int line, int boundary) cons
   const auto add = [&](float a, float b, float c, float sigma_px) {
     const float bend = a - 2 * b + c;
     if (!known(bend)) return;
-    all[count++] = {2 * a - b + kBendShare * bend, sigma_px + kBend * std::fabs(bend)};
+    all[count++] = {goes_on_to(a, b, c), sigma_px + kBend * std::fabs(bend)};
   };
   const float* here = row(line);
   add(here[boundary - 1], here[boundary - 2], here[boundary - 3], kAcross_px);

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/luma_place.h"
 
 namespace relievo {
@@ -21,8 +22,7 @@ constexpr float kOfFront = 0.95F;
 // What is as sure as this, and where its own surface foretells it, is a boundary.
 constexpr float kSure_px = 0.06F;
 constexpr float kForetold_px = 0.2F;
-constexpr float kStray_px = 1.F;    // what is so far from there may be a rim whatever its colours are
-constexpr float kBendShare = 0.7F;  // of a bend that is taken to go on
+constexpr float kStray_px = 1.F;  // what is so far from there may be a rim whatever its colours are
 
 // Where the scene's brightness changes.
 constexpr float kNear_px = 1.6F;
@@ -43,10 +43,8 @@ constexpr int kBesideShadow_px = 3;
 /// How far a place is from where those of its surface, which are on its `side` (-1, 1), foretell it; NaN
 /// where these are not two.
 float off_foretold_px(const Place* own, int side) {
-  const float next = own[side].column_px;
-  const float second = own[2 * side].column_px;
-  const float bend = next - 2 * second + own[3 * side].column_px;
-  return std::fabs(2 * next - second + (bend == bend ? kBendShare * bend : 0) - own->column_px);
+  return std::fabs(goes_on_to(own[side].column_px, own[2 * side].column_px, own[3 * side].column_px) -
+                   own->column_px);
 }
 
 /// What is seen of the scene itself on a line: under the light of both fields together.

@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/column_grid.h"
+
 namespace relievo {
 namespace {
 
 // Standard deviations of what is foretold, measured on simulated scenes.
 constexpr float kStraight_px = 0.06F;  // from three neighbours in line
 constexpr float kBend = 1.4F;          // more for each pixel that the three are out of line
-constexpr float kBendShare = 0.7F;     // of a bend that is taken to go on
 constexpr float kTwoAcross_px = 1.F;   // more, from two only
 constexpr float kTwoAlong_px = 0.2F;
 constexpr float kBetween = 0.1F;  // of the difference of the lines above and below
@@ -56,14 +57,14 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
   // From three neighbours in one direction, or two.
   const auto foretell = [&](std::ptrdiff_t step, float two_px, float times) {
     const Place &a = own[step], &b = own[2 * step], &c = own[3 * step];
-    const float straight = 2 * a.column_px - b.column_px;
     const float bend = a.column_px - 2 * b.column_px + c.column_px;
     const bool three = bend == bend;
     const float model = three ? kStraight_px + kBend * std::fabs(bend) : kStraight_px + two_px;
-    const float share = three ? kBendShare : 0;
+    const float share = three ? kBendGoesOn : 0;
     const float noise =
         square((2 + share) * a.sigma_px) + square((1 + 2 * share) * b.sigma_px) + square(share * c.sigma_px);
-    take(straight + (three ? share * bend : 0), square(times) * (square(model) + square(kOwn) * noise));
+    take(goes_on_to(a.column_px, b.column_px, c.column_px),
+         square(times) * (square(model) + square(kOwn) * noise));
   };
   foretell(-1, kTwoAcross_px, 1);
   foretell(1, kTwoAcross_px, 1);
