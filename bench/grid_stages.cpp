@@ -9,9 +9,8 @@ GridStages::GridStages(const Rig& rig, const Pattern& pattern)
     : calibration_(grid_calibration(rig, pattern)), points_(calibration_) {}
 
 Status GridStages::measure(const Surface& surface) {
-  constexpr int kStepBits = 4;
   const std::int64_t begin = steady_now_ns();
-  if (auto status = to_grid(surface, calibration_, kStepBits, false, sent_); !status) return status;
+  if (auto status = to_grid(surface, calibration_, {}, sent_); !status) return status;
   const std::int64_t gathered = steady_now_ns();
   const Bytes coded = encoder_.encode(sent_, calibration_, nullptr, {}, 1, {});
   const std::int64_t encoded = steady_now_ns();

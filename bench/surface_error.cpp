@@ -69,22 +69,34 @@ bool lies_on_sheets(const std::vector<std::optional<Place>>& places) {
   return static_cast<double>(on) >= kMostOnSheets * static_cast<double>(places.size());
 }
 
+int lines_of(const Rig& rig) {
+  const int step_px = line_step_px(rig.scan);
+  return (rig.camera.height + step_px - 1) / step_px;
+}
+
 /// The encoded vertex there: of those seen at its column of the texture the one whose boundary is
-/// nearest, since stripes may lie closer than a coarse codec's steps. kNowhere where there is none.
+/// nearest, since stripes may lie closer than a coarse codec's steps. A line may see a boundary twice: second
+/// places come `lines` further down. kNowhere where there is none.
 std::int64_t match_of(const Place& found, const Surface& encoded, const std::vector<std::int64_t>& vertex_at,
-                      const Pattern& pattern, bool on_sheets) {
+                      const Pattern& pattern, int lines, bool on_sheets) {
+  const auto off_px = [&](std::int64_t v) {
+    const double column_px = static_cast<double>(encoded.grid[static_cast<std::size_t>(v)].column_px);
+    return std::abs(column_px - found.column_px.value_or(column_px));
+  };
   const auto at = [&](std::int64_t boundary) {
-    const bool is_one = boundary >= 0 && boundary < pattern.boundaries();
-    return is_one ? vertex_at[static_cast<std::size_t>(place(found.line, boundary, pattern))] : kNowhere;
+    if (boundary < 0 || boundary >= pattern.boundaries()) return kNowhere;
+    const std::int64_t first = vertex_at[static_cast<std::size_t>(place(found.line, boundary, pattern))];
+    const std::int64_t second =
+        vertex_at[static_cast<std::size_t>(place(found.line + lines, boundary, pattern))];
+    if (first == kNowhere || second == kNowhere) return std::max(first, second);
+    return off_px(second) < off_px(first) ? second : first;
   };
   if (on_sheets || !found.column_px) return at(found.boundary);
   const std::int64_t nearest = std::clamp<std::int64_t>(found.boundary, 0, pattern.boundaries() - 1);
   for (std::int64_t off = 0; off < pattern.boundaries(); ++off) {
     for (const std::int64_t boundary : {nearest - off, nearest + off}) {
       const std::int64_t v = at(boundary);
-      if (v == kNowhere) continue;
-      const double column_px = static_cast<double>(encoded.grid[static_cast<std::size_t>(v)].column_px);
-      if (std::abs(column_px - *found.column_px) <= kSamePlace_px) return v;
+      if (v != kNowhere && off_px(v) <= kSamePlace_px) return v;
     }
   }
   return kNowhere;
@@ -99,7 +111,7 @@ Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decode
       (!decoded.texture_coordinates.empty() &&
        decoded.texture_coordinates.size() != decoded.positions.size()))
     return Error{"a surface without vertices or without a grid cannot be compared"};
-  std::vector<std::int64_t> vertex_at(static_cast<std::size_t>(place(rig.camera.height, 0, pattern)),
+  std::vector<std::int64_t> vertex_at(static_cast<std::size_t>(place(2 * rig.camera.height, 0, pattern)),
                                       kNowhere);
   for (std::size_t v = 0; v < encoded.grid.size(); ++v) {
     const std::int64_t at = place(encoded.grid[v].line, encoded.grid[v].boundary, pattern);
@@ -113,7 +125,7 @@ Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decode
   double squares = 0;
   for (std::size_t i = 0; i < decoded.positions.size(); ++i) {
     const std::int64_t match =
-        places[i] ? match_of(*places[i], encoded, vertex_at, pattern, on_sheets) : kNowhere;
+        places[i] ? match_of(*places[i], encoded, vertex_at, pattern, lines_of(rig), on_sheets) : kNowhere;
     if (match == kNowhere)
       return Error{"vertex " + std::to_string(i) + " that was decoded was never encoded"};
     const Vec3f& a = encoded.positions[static_cast<std::size_t>(match)];

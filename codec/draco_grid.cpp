@@ -287,6 +287,7 @@ Result<Bytes> encode_draco_grid(StripeGrid& grid, const GridCalibration& calibra
   head.step_bits = grid.step_bits;
   head.boundaries = grid.boundaries;
   head.lines = head.slice_lines = grid.lines;
+  head.twice = grid.twice;
   head.model = fit_model(grid, nullptr);
   head.step_mm = step_mm;
   head.calibration = calibration;
@@ -324,11 +325,11 @@ Result<GridHead> decode_draco_grid(std::span<const std::uint8_t> coded, std::uin
   if (auto status = decode_numbers(layout->places, changes_declared->vertices, places.all); !status)
     return status.error();
 
-  out.reset(head.boundaries, head.lines, head.step_bits);
+  out.reset(head.boundaries, head.lines, head.step_bits, head.twice);
   const std::vector<std::uint8_t> changes = spread_changes(places, out);
   if (changes.empty()) return kDamaged;
   const std::vector<std::uint8_t> there = find_places(changes, out);
-  if (!fill_cells(changes, there, out)) return kDamaged;
+  if (!fill_cells(changes, there, out) || joins_halves(out)) return kDamaged;
   if (out.vertices != vertices || out.triangles != triangles)
     return Error{"grid holds " + std::to_string(out.vertices) + " vertices and " +
                  std::to_string(out.triangles) + " triangles, but the frame declares " +

@@ -163,6 +163,7 @@ struct FrameEncoder::State {
   std::vector<std::uint8_t> tolerance;
   GridKey key;
   bool has_key = false;  // a grid to build on
+  bool twice = false;    // grids have room for second places
   std::unique_ptr<TextureEncoder> texture;
   TextureCodec texture_codec = TextureCodec::kNone;
   int step_bits = 4;   // of this frame's grid
@@ -207,26 +208,42 @@ struct FrameEncoder::State {
     return coded;
   }
 
+  /// Of the surfaces' own lines.
+  GridCalibration whole() const {
+    GridCalibration out = calibration;
+    out.line_step_px = line_step_px;
+    return out;
+  }
+
   /// Which lines go, and in which steps: a grid of others than before cannot build on it.
-  void choose(const EncodeOptions& options) {
+  void choose(const Surface& surface, const EncodeOptions& options) {
     const int step_px = line_step_px * (options.halve_lines ? 2 : 1);
     if (calibration.line_step_px != step_px) has_key = false;
     calibration.line_step_px = step_px;
     step_bits = options.bound_px > 0 ? step_bits_within(options.bound_px) : options.step_bits;
     if (key.grid.step_bits != step_bits) has_key = false;
+    // From the first second places on for good: room for them costs next to nothing, a key grid at each
+    // change would not.
+    twice = twice ||
+            (options.geometry != GeometryCodec::kDracoMesh && has_second_places(surface, whole().lines()));
+    if (key.grid.twice != (twice && !options.halve_lines)) has_key = false;
   }
 
   /// All its lines, as they lie in `grid` then; estimated where that is asked for.
   bool fill_grid(const Surface& surface, const EncodeOptions& options) {
-    GridCalibration whole = calibration;
-    whole.line_step_px = line_step_px;
     if (options.geometry == GeometryCodec::kDracoMesh || surface.positions.empty() ||
-        !to_grid(surface, whole, step_bits, options.quality, grid))
+        !to_grid(surface, whole(), {.step_bits = step_bits, .with_quality = options.quality, .twice = twice},
+                 grid))
       return false;
+    std::vector<std::size_t> copies = copies_of(grid);
     tolerance.clear();
     if (options.estimate) estimator.estimate(surface, grid, tolerance);
-    if (options.halve_lines) halve_lines(grid, std::array{&tolerance});
+    if (options.halve_lines) {
+      halve_lines(grid, std::array{&tolerance});
+      copies.clear();
+    }
     if (options.bound_px > 0) tolerance.assign(grid.columns.size(), 1);
+    keep_copies(copies, grid, tolerance);
     return true;
   }
 
@@ -238,7 +255,7 @@ struct FrameEncoder::State {
     estimator.forget();
     EncodeOptions mesh = options;
     mesh.geometry = GeometryCodec::kDracoMesh;
-    const bool halves = options.halve_lines && halve_lines(surface, halved);
+    const bool halves = options.halve_lines && halve_lines(surface, whole().lines(), halved);
     return encode_mesh(halves ? halved : surface, mesh);
   }
 };
@@ -269,7 +286,7 @@ Result<Bytes> FrameEncoder::encode(const Frame3D& frame, const EncodeOptions& op
   if (other_texture) s.texture = make_texture_encoder(options.texture);
   s.texture_codec = options.texture;
   const bool had_key = s.has_key;
-  s.choose(options);
+  s.choose(frame.surface, options);
   // With other lines or steps the texture begins anew too, so that whoever joins finds a whole key frame.
   const bool other_grid = had_key && !s.has_key;
   const bool want_key =

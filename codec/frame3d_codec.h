@@ -100,8 +100,9 @@ class FrameEncoder {
   ~FrameEncoder();
 
   /// As encode_frame(). A surface that does not lie on the grid of stripes and lines (the dense option's,
-  /// say) is sent as a Draco mesh, whatever the options say. `geometry_done`, where given, is called between
-  /// the surface and the texture: for who measures what each takes.
+  /// say) is sent as a Draco mesh, whatever the options say. From the first one with second places on
+  /// (GridPoint::line) all grids have room for them; that frame is a key frame. `geometry_done`, where given,
+  /// is called between the surface and the texture: for who measures what each takes.
   Result<Bytes> encode(const Frame3D& frame, const EncodeOptions& options,
                        const std::function<void()>& geometry_done = {});
 

@@ -21,7 +21,7 @@ std::int32_t floor_of(float x) {
 /// Vertices [begin, end).
 Gathered gather(const GatherVertices& job, std::size_t begin, std::size_t end) {
   const auto boundaries = static_cast<unsigned>(job.grid.boundaries);
-  const auto lines = static_cast<unsigned>(job.grid.lines);
+  const auto lines = static_cast<unsigned>(job.lines);
   const auto stride = static_cast<std::size_t>(job.grid.stride());
   std::int32_t* const columns = job.grid.columns.data() + StripeGrid::kMargin;
   for (std::size_t i = begin; i < end; ++i) {
@@ -131,7 +131,7 @@ RELIEVO_AVX2 unsigned mask_of(__m256i lanes) {
 /// Vertices that lie side by side, as many as eight of them begin with: their columns are written at once.
 [[gnu::target("avx2")]] Gathered vertices_avx2(const GatherVertices& job) {
   const auto boundaries = static_cast<std::uint32_t>(job.grid.boundaries);
-  const auto lines = static_cast<std::uint32_t>(job.grid.lines);
+  const auto lines = static_cast<std::uint32_t>(job.lines);
   const auto stride = static_cast<std::size_t>(job.grid.stride());
   std::int32_t* const columns = job.grid.columns.data() + StripeGrid::kMargin;
   const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);

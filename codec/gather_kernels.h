@@ -34,6 +34,7 @@ enum class Gathered { kAll, kOutside, kTwice };
 struct GatherVertices {
   std::span<const GridPoint> points;
   StripeGrid& grid;
+  int lines;              // of the grid, that they may lie on
   float steps, width_px;  // of a pixel; columns are below the width
   /// Of each vertex, 1: the next one lies right of it. kSpareRight longer than there are vertices.
   std::uint8_t* right;

@@ -43,6 +43,7 @@ struct GridHead {
   int step_bits = 4;
   int boundaries = 0;
   int lines = 0;
+  bool twice = false;  // as StripeGrid has it
   int slice_lines = 0;
   GridModel model;
   float step_mm = 0;            // what a step is in depth, median of the vertices; informative

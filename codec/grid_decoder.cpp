@@ -383,7 +383,7 @@ Result<GridHead> GridDecoder::decode(std::span<const std::uint8_t> coded, std::u
         "grid builds on a key frame that was not received: the next key frame shows the surface again"};
   const StripeGrid* key_grid = head.is_key ? nullptr : &key->grid;
   if (key_grid != nullptr && (key_grid->boundaries != head.boundaries || key_grid->lines != head.lines ||
-                              key_grid->step_bits != head.step_bits))
+                              key_grid->twice != head.twice || key_grid->step_bits != head.step_bits))
     return Error{"grid is of another size than its key frame"};
 
   // What the slices hold, before memory is spent on them.
@@ -411,7 +411,7 @@ Result<GridHead> GridDecoder::decode(std::span<const std::uint8_t> coded, std::u
   Tables tables;
   if (!read_tables(layout->tables, head.has_sigmas, tables)) return kDamaged;
 
-  out.reset(head.boundaries, head.lines, head.step_bits);
+  out.reset(head.boundaries, head.lines, head.step_bits, head.twice);
   if (head.has_sigmas) out.sigmas.assign(out.columns.size(), 0);
   if (head.has_interpolated) out.interpolated.assign(out.columns.size(), 0);
   scratch_.resize(slices.size());
@@ -438,6 +438,7 @@ Result<GridHead> GridDecoder::decode(std::span<const std::uint8_t> coded, std::u
     if (s > 0 && layout->slices[s].empty())
       out.triangles -= drop_cells(out, static_cast<int>(s) * head.slice_lines - 1);
   }
+  if (joins_halves(out)) return kDamaged;
   choose_diagonals(out, head.model.spacing);
   return head;
 }

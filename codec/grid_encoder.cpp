@@ -392,6 +392,7 @@ Bytes GridEncoder::encode(StripeGrid& grid, const GridCalibration& calibration, 
   head.step_bits = grid.step_bits;
   head.boundaries = grid.boundaries;
   head.lines = grid.lines;
+  head.twice = grid.twice;
   head.slice_lines = std::min(coding.slice_lines, grid.lines);
   head.model = fit_model(grid, key != nullptr ? &key->grid : nullptr);
   head.step_mm = step_mm;

@@ -48,12 +48,14 @@ void GridEstimator::measure(const Surface& measured, const StripeGrid& grid) {
 /// Each number becomes the sum over five lines and three boundaries around it.
 void GridEstimator::sum_around(const StripeGrid& grid, Plane& plane) {
   const auto stride = static_cast<std::size_t>(grid.stride());
+  const auto picture_lines = static_cast<std::size_t>(grid.picture_lines());
   const std::size_t size = plane.size();
   scratch_[0] = scratch_[size - 1] = 0;
   for (std::size_t i = 1; i + 1 < size; ++i) scratch_[i] = plane[i - 1] + plane[i] + plane[i + 1];
   for (std::size_t line = 0; line < lines_of(grid); ++line) {
-    const std::size_t first = line > kLinesAround ? line - kLinesAround : 0;
-    const std::size_t last = std::min(line + kLinesAround + 1, lines_of(grid));
+    const std::size_t top = line < picture_lines ? 0 : picture_lines;  // of these lines of the picture
+    const std::size_t first = std::max(line, top + kLinesAround) - kLinesAround;
+    const std::size_t last = std::min(line + kLinesAround + 1, top + picture_lines);
     float* to = plane.data() + line * stride;
     std::fill_n(to, stride, 0.F);
     for (std::size_t l = first; l < last; ++l)

@@ -80,7 +80,7 @@ GridModel fit_model(const StripeGrid& grid, const StripeGrid* key) {
   GridModel model;
   model.limit = static_cast<std::uint16_t>(kLimit_px * (1 << grid.step_bits));
   const std::int32_t limit = model.limit;
-  const int line_step = std::max(1, grid.lines / kSampledLines);
+  const int line_step = std::max(1, grid.picture_lines() / kSampledLines);
   model.spacing = usual_spacing(grid, line_step);
   const auto row = [&](const StripeGrid& of, int line) { return of.columns.data() + of.at(line, 0); };
   GridSlopes sums;

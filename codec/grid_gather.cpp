@@ -12,6 +12,7 @@ namespace relievo {
 namespace {
 
 constexpr float kNearest_share = 0.25F;  // of a depth, that a step may change it by
+const Error kInNoCell{"surface has a triangle that is in no cell of the grid: send it as a mesh"};
 
 /// The usual case: two triangles, one after the other, that fill a cell. 0: they do not. Without branches
 /// on the diagonal, which is hard to foresee.
@@ -66,6 +67,13 @@ float farthest_m(const GridCalibration& calibration, int step_bits) {
   return static_cast<float>(kNearest_share * calibration.camera.fx() * baseline * (1 << step_bits));
 }
 
+/// How many vertices come before the second places, which are the last ones.
+std::size_t count_firsts(const Surface& surface, int lines) {
+  std::size_t count = surface.grid.size();
+  while (count > 0 && surface.grid[count - 1].line >= lines) --count;
+  return count;
+}
+
 /// A surface on its way to a grid.
 class Gather {
  public:
@@ -75,12 +83,21 @@ class Gather {
         farthest_m_(farthest_m(calibration, out.step_bits)),
         width_px_(static_cast<float>(calibration.camera.width)),
         stride_(static_cast<std::size_t>(out.stride())),
-        right_(surface.grid.size() + kSpareRight) {}
+        lines_(static_cast<std::uint32_t>(out.picture_lines())),
+        firsts_(count_firsts(surface, out.picture_lines())),
+        right_(surface.grid.size() + kSpareRight) {
+    std::size_t count = surface.triangles.size();
+    while (count > 0 && has_second(surface.triangles[count - 1])) --count;
+    triangles_ = std::span(surface.triangles).first(count);
+  }
 
   Status vertices();
   /// Of vertices that are in the grid.
   void quality();
+  /// Those without second places.
   Status triangles();
+  /// The others, after them.
+  Status second_triangles();
   void drop_far_vertices();
 
  private:
@@ -88,25 +105,32 @@ class Gather {
   std::size_t at(std::uint32_t key) const {
     return (key >> 16) * stride_ + (key & 0xffffU) + StripeGrid::kMargin;
   }
+  bool is_far(const Triangle& t) const { return far_ && (is_far(t[0]) || is_far(t[1]) || is_far(t[2])); }
+  bool has_second(const Triangle& t) const { return t[0] >= firsts_ || t[1] >= firsts_ || t[2] >= firsts_; }
+  Status put(std::span<const GridPoint> points, std::uint8_t* right, std::uint32_t lines);
   std::size_t fill(std::size_t n);
-  Status add(const Triangle& triangle);
+  Status add(const Triangle& triangle, const std::array<std::uint32_t, 3>& keys);
+  bool copy(std::uint32_t vertex);
 
   const Surface& surface_;
   StripeGrid& out_;
   float farthest_m_, width_px_;
   std::size_t stride_;
+  std::uint32_t lines_;                  // of the picture
+  std::size_t firsts_;                   // vertices before the second places
+  std::span<const Triangle> triangles_;  // those before the ones on second places
   std::vector<std::uint8_t> right_;
   bool far_ = false;
 };
 
-Status Gather::vertices() {
-  const GatherVertices job{.points = surface_.grid,
+Status Gather::put(std::span<const GridPoint> points, std::uint8_t* right, std::uint32_t lines) {
+  const GatherVertices job{.points = points,
                            .grid = out_,
+                           .lines = static_cast<int>(lines),
                            .steps = static_cast<float>(1 << out_.step_bits),
                            .width_px = width_px_,
-                           .right = right_.data()};
-  const GatherKernels& kernels = gather_kernels();
-  switch (kernels.vertices(job)) {
+                           .right = right};
+  switch (gather_kernels().vertices(job)) {
     case Gathered::kOutside:
       return Error{"surface has a vertex outside the grid of its calibration"};
     case Gathered::kTwice:
@@ -114,8 +138,15 @@ Status Gather::vertices() {
     case Gathered::kAll:
       break;
   }
+  return {};
+}
+
+Status Gather::vertices() {
+  const std::span<const GridPoint> all = surface_.grid;
+  if (Status status = put(all.first(firsts_), right_.data(), lines_); !status) return status;
+  if (Status status = put(all.subspan(firsts_), right_.data() + firsts_, 2 * lines_); !status) return status;
   out_.vertices = static_cast<std::uint32_t>(surface_.grid.size());
-  const Reach reach = kernels.reach(surface_.positions, farthest_m_);
+  const Reach reach = gather_kernels().reach(surface_.positions, farthest_m_);
   if (reach == Reach::kNotFinite) return Error{"surface has a position that is not finite"};
   far_ = reach == Reach::kFar;
   return {};
@@ -138,8 +169,8 @@ void Gather::quality() {
 /// The cell that triangles n and n + 1 fill, and those that follow it filled: how many triangles that is. 0:
 /// they fill none.
 std::size_t Gather::fill(std::size_t n) {
-  const std::vector<Triangle>& all = surface_.triangles;
-  if (n + 1 >= all.size() || far_ || all[n + 1][1] >= surface_.grid.size()) return 0;
+  const std::span<const Triangle> all = triangles_;
+  if (n + 1 >= all.size() || far_ || all[n + 1][1] >= firsts_) return 0;
   const Triangle &first = all[n], &second = all[n + 1];
   std::uint32_t cell = 0;
   const std::uint8_t filled = filled_cell(surface_.grid.data(), first, second, cell);
@@ -149,7 +180,7 @@ std::size_t Gather::fill(std::size_t n) {
   const std::uint32_t upper = straight ? first[0] : second[1], lower = first[straight ? 1 : 0];
   std::size_t cells = 1;
   if ((right_[upper] & right_[lower]) != 0)
-    cells += gather_kernels().fill_run({.triangles = std::span(all).subspan(n + 2),
+    cells += gather_kernels().fill_run({.triangles = all.subspan(n + 2),
                                         .right = right_.data(),
                                         .upper = upper + 1,
                                         .lower = lower + 1,
@@ -158,13 +189,12 @@ std::size_t Gather::fill(std::size_t n) {
   return 2 * cells;
 }
 
-/// A triangle by itself.
-Status Gather::add(const Triangle& t) {
-  const auto key = [this](std::uint32_t v) { return place_key(surface_.grid[v]); };
+/// A triangle by itself, by the places of its corners.
+Status Gather::add(const Triangle& triangle, const std::array<std::uint32_t, 3>& keys) {
   std::uint32_t cell = 0;
-  const int corner = missing_corner(key(t[0]), key(t[1]), key(t[2]), cell);
-  if (corner < 0) return Error{"surface has a triangle that is in no cell of the grid: send it as a mesh"};
-  if (far_ && (is_far(t[0]) || is_far(t[1]) || is_far(t[2]))) return {};
+  const int corner = missing_corner(keys[0], keys[1], keys[2], cell);
+  if (corner < 0) return kInNoCell;
+  if (is_far(triangle)) return {};
   std::uint8_t& cells = out_.cells[at(cell)];
   const auto one = static_cast<std::uint8_t>(1U << corner);
   const auto both = static_cast<std::uint8_t>(cells | one);
@@ -176,17 +206,45 @@ Status Gather::add(const Triangle& t) {
 }
 
 Status Gather::triangles() {
-  const std::size_t count = surface_.grid.size();
-  for (std::size_t n = 0; n < surface_.triangles.size();) {
-    const Triangle& triangle = surface_.triangles[n];
-    if (triangle[0] >= count || triangle[1] >= count || triangle[2] >= count)
-      return Error{"surface has a triangle on a vertex that is not there"};
+  const auto key = [this](std::uint32_t v) { return place_key(surface_.grid[v]); };
+  for (std::size_t n = 0; n < triangles_.size();) {
+    const Triangle& t = triangles_[n];
+    if (has_second(t))
+      return Error{
+          "surface has a triangle on a vertex that is not there, or on a second place before others"};
     if (const std::size_t filled = fill(n); filled > 0) {
       n += filled;
       continue;
     }
-    if (Status status = add(triangle); !status) return status;
+    if (Status status = add(t, {key(t[0]), key(t[1]), key(t[2])}); !status) return status;
     ++n;
+  }
+  return {};
+}
+
+/// To the second place where that vertex has its first one, if it is not there. False: another one is.
+bool Gather::copy(std::uint32_t vertex) {
+  const std::size_t from = at(place_key(surface_.grid[vertex])), to = from + lines_ * stride_;
+  if (out_.columns[to] == out_.columns[from]) return true;
+  if (out_.columns[to] != StripeGrid::kAbsent) return false;
+  out_.columns[to] = out_.columns[from];
+  if (!out_.sigmas.empty()) out_.sigmas[to] = out_.sigmas[from];
+  if (!out_.interpolated.empty()) out_.interpolated[to] = out_.interpolated[from];
+  ++out_.vertices;
+  return true;
+}
+
+Status Gather::second_triangles() {
+  for (const Triangle& t : std::span(surface_.triangles).subspan(triangles_.size())) {
+    std::array<std::uint32_t, 3> keys{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (t[i] >= surface_.grid.size()) return Error{"surface has a triangle on a vertex that is not there"};
+      keys[i] = place_key(surface_.grid[t[i]]) + (t[i] < firsts_ ? lines_ * kBelowKey : 0);
+    }
+    if (Status status = add(t, keys); !status) return status;
+    if (is_far(t)) continue;
+    for (const std::uint32_t v : t)
+      if (v < firsts_ && !copy(v)) return kInNoCell;
   }
   return {};
 }
@@ -205,15 +263,24 @@ void Gather::drop_far_vertices() {
 
 }  // namespace
 
-Status to_grid(const Surface& surface, const GridCalibration& calibration, int step_bits, bool with_quality,
+bool has_second_places(const Surface& surface, int lines) {
+  return !surface.grid.empty() && surface.grid.back().line >= lines;
+}
+
+Status to_grid(const Surface& surface, const GridCalibration& calibration, const ToGrid& options,
                StripeGrid& out) {
   if (surface.grid.size() != surface.positions.size())
     return Error{"surface has no places on the grid of stripes and lines: send it as a mesh"};
-  out.reset(calibration.boundaries(), calibration.lines(), step_bits);
+  const int lines = calibration.lines();
+  const bool twice = options.twice || has_second_places(surface, lines);
+  if (twice && 2 * lines > kMostGridSide)
+    return Error{"surface has second places in a picture of too many lines: send it as a mesh"};
+  out.reset(calibration.boundaries(), twice ? 2 * lines : lines, options.step_bits, twice);
   Gather gather(surface, calibration, out);
   if (Status status = gather.vertices(); !status) return status;
-  if (with_quality) gather.quality();
+  if (options.with_quality) gather.quality();
   if (Status status = gather.triangles(); !status) return status;
+  if (Status status = gather.second_triangles(); !status) return status;
   gather.drop_far_vertices();
   return {};
 }

@@ -11,9 +11,9 @@
 namespace relievo {
 namespace {
 
-constexpr std::uint8_t kKey = 1, kSigmas = 2, kInterpolated = 4;
+constexpr std::uint8_t kKey = 1, kSigmas = 2, kInterpolated = 4, kTwice = 8;
 constexpr std::uint8_t kCameraDistorts = 1, kProjectorDistorts = 2;
-constexpr int kMostPlaces = 16384;  // boundaries, lines, and pixels of a picture's side
+constexpr int kMostPixels = 16384;  // of a picture's side
 constexpr int kMostStepBits = 8;
 constexpr std::int32_t kMostSpacing = 1 << 15;
 
@@ -50,7 +50,7 @@ void write_calibration(const GridCalibration& c, Bytes& out) {
 
 bool usable(const PinholeModel& m) {
   const auto finite = [](double x) { return std::isfinite(x) && std::fabs(x) < 1e6; };
-  return m.width > 0 && m.width <= kMostPlaces && m.height > 0 && m.height <= kMostPlaces &&
+  return m.width > 0 && m.width <= kMostPixels && m.height > 0 && m.height <= kMostPixels &&
          std::ranges::all_of(m.matrix, finite) && std::ranges::all_of(m.distortion, finite) && m.fx() > 1 &&
          m.fy() > 1;
 }
@@ -66,7 +66,8 @@ Status read_calibration(ByteReader& in, GridHead& head) {
   c.stripes = head.boundaries + 1;
   const auto finite = [](double x) { return std::isfinite(x) && std::fabs(x) < 1e6; };
   if (!in.ok() || flags > 3 || c.line_step_px < 1 || !usable(c.camera) || !usable(c.projector) ||
-      c.lines() != head.lines || !std::ranges::all_of(c.projector_from_camera_rotation, finite) ||
+      c.lines() * (head.twice ? 2 : 1) != head.lines ||
+      !std::ranges::all_of(c.projector_from_camera_rotation, finite) ||
       !std::ranges::all_of(c.projector_from_camera_translation, finite))
     return Error{"grid has a calibration that no rig can have"};
   return {};
@@ -75,8 +76,9 @@ Status read_calibration(ByteReader& in, GridHead& head) {
 }  // namespace
 
 void write_grid_fields(const GridHead& head, Bytes& out) {
-  append(out, static_cast<std::uint8_t>((head.is_key ? kKey : 0) | (head.has_sigmas ? kSigmas : 0) |
-                                        (head.has_interpolated ? kInterpolated : 0)));
+  append(out,
+         static_cast<std::uint8_t>((head.is_key ? kKey : 0) | (head.has_sigmas ? kSigmas : 0) |
+                                   (head.has_interpolated ? kInterpolated : 0) | (head.twice ? kTwice : 0)));
   append(out, static_cast<std::uint8_t>(head.step_bits));
   append(out, static_cast<std::uint16_t>(head.boundaries));
   append(out, static_cast<std::uint16_t>(head.lines));
@@ -104,6 +106,7 @@ Status read_grid_fields(ByteReader& in, GridHead& head) {
   head.is_key = (flags & kKey) != 0;
   head.has_sigmas = (flags & kSigmas) != 0;
   head.has_interpolated = (flags & kInterpolated) != 0;
+  head.twice = (flags & kTwice) != 0;
   head.step_bits = in.read<std::uint8_t>();
   head.boundaries = in.read<std::uint16_t>();
   head.lines = in.read<std::uint16_t>();
@@ -118,12 +121,13 @@ Status read_grid_fields(ByteReader& in, GridHead& head) {
   m.spacing = in.read<std::int32_t>();
   head.step_mm = in.read<float>();
   if (!in.ok()) return Error{"grid is cut short"};
-  if (flags > (kKey | kSigmas | kInterpolated))
+  if (flags > (kKey | kSigmas | kInterpolated | kTwice))
     return Error{"grid has flags that this version does not know: update relievo"};
   if (!fair || m.limit > GridModel::kMostLimit || m.spacing < -kMostSpacing || m.spacing > kMostSpacing)
     return Error{"grid has a prediction out of bounds"};
-  if (head.boundaries < 1 || head.boundaries > kMostPlaces || head.lines < 1 || head.lines > kMostPlaces ||
-      head.slice_lines < 1 || head.slice_lines > head.lines || head.step_bits > kMostStepBits)
+  if (head.boundaries < 1 || head.boundaries > kMostGridSide || head.lines < 1 ||
+      head.lines > kMostGridSide || (head.twice && head.lines % 2 != 0) || head.slice_lines < 1 ||
+      head.slice_lines > head.lines || head.step_bits > kMostStepBits)
     return Error{"grid has a size out of bounds"};
   if (head.is_key) {
     if (auto status = read_calibration(in, head); !status) return status;

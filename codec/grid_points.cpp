@@ -150,12 +150,13 @@ bool GridPoints::meet_curved_sheets(const std::int32_t* columns) {
 }
 
 bool GridPoints::make_line(const StripeGrid& grid, int line, Surface& out, const std::int32_t* index) {
+  const int picture_line = line % calibration_.lines();  // of second places too
   const std::int32_t* columns = grid.columns.data() + grid.at(line, 0);
   const auto places = static_cast<int>(whole_eights(grid.boundaries));
   const auto first = static_cast<std::size_t>(index[0]);
   const std::size_t count = static_cast<std::size_t>(index[grid.boundaries]) - first;
   if (count == 0) return true;
-  if (!find_rays(columns, 1.F / static_cast<float>(1 << grid.step_bits), line, count)) return false;
+  if (!find_rays(columns, 1.F / static_cast<float>(1 << grid.step_bits), picture_line, count)) return false;
   const bool has_quality = !grid.interpolated.empty() || !grid.sigmas.empty();
   const SheetRow row{columns, line_.ray_x.data(), line_.ray_y.data(),
                      has_quality ? line_.slope.data() : nullptr, line_.z.data()};
@@ -168,7 +169,7 @@ bool GridPoints::make_line(const StripeGrid& grid, int line, Surface& out, const
                      .ray_y = line_.ray_y.data(),
                      .z = line_.z.data(),
                      .per_width = 1.F / static_cast<float>(calibration_.camera.width),
-                     .v = (static_cast<float>(line * calibration_.line_step_px) + 0.5F) /
+                     .v = (static_cast<float>(picture_line * calibration_.line_step_px) + 0.5F) /
                           static_cast<float>(calibration_.camera.height),
                      .line = static_cast<std::uint16_t>(line),
                      .position = out.positions.data() + first,
@@ -204,6 +205,26 @@ void GridPoints::tell_quality(const StripeGrid& grid, int line, Surface& out, st
   }
 }
 
+/// Triangles on copies are on what those are copies of.
+void GridPoints::join_copies(Surface& out) const {
+  const auto lines = static_cast<std::uint16_t>(calibration_.lines());
+  const auto before = [](const GridPoint& a, const GridPoint& b) {
+    return a.line != b.line ? a.line < b.line : a.boundary < b.boundary;
+  };
+  const auto second = std::lower_bound(out.grid.begin(), out.grid.end(), GridPoint{0, lines}, before);
+  const auto firsts = static_cast<std::uint32_t>(second - out.grid.begin());
+  std::vector<std::uint32_t> joined;
+  for (auto at = second; at != out.grid.end(); ++at) {
+    const GridPoint place{at->boundary, static_cast<std::uint16_t>(at->line - lines)};
+    const auto first = std::lower_bound(out.grid.begin(), second, place, before);
+    const bool is_copy = first != second && !before(place, *first) && first->column_px == at->column_px;
+    joined.push_back(static_cast<std::uint32_t>((is_copy ? first : at) - out.grid.begin()));
+  }
+  for (std::size_t t = out.triangles.size(); t-- > 0 && out.triangles[t][0] >= firsts;)
+    for (std::uint32_t& v : out.triangles[t])
+      if (v >= firsts) v = joined[v - firsts];
+}
+
 Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
   const auto places = static_cast<std::size_t>(grid.stride());
   for (auto* values : {&line_.column, &line_.ray_x, &line_.ray_y, &line_.slope, &line_.z})
@@ -233,6 +254,7 @@ Status GridPoints::to_surface(const StripeGrid& grid, Surface& out) {
           {.cells = grid.cells.data() + grid.at(line - 1, 0), .above = index_[0].data(), .below = index},
           grid.boundaries - 1, triangle);
   }
+  if (grid.twice) join_copies(out);
   return {};
 }
 

@@ -22,7 +22,8 @@ class GridPoints {
   const GridCalibration& calibration() const { return calibration_; }
 
   /// Fills positions, texture coordinates, grid, triangles and, where the grid has them, standard deviations
-  /// and marks of interpolation of `out`; its memory is reused. Vertices come by line, then boundary. Fails
+  /// and marks of interpolation of `out`; its memory is reused. Vertices come by line, then boundary: second
+  /// places, whose line is the grid's, last. Triangles on copies of first places are on those. Fails
   /// where a ray meets no sheet in front of both camera and projector.
   Status to_surface(const StripeGrid& grid, Surface& out);
 
@@ -30,10 +31,12 @@ class GridPoints {
   struct Line {  // of one line, a value a boundary, rounded up to 8
     std::vector<float> column, ray_x, ray_y, slope, z;
   };
+  /// `line`: of the picture.
   bool find_rays(const std::int32_t* columns, float step_px, int line, std::size_t count);
   bool meet_curved_sheets(const std::int32_t* columns);
   /// `index`: of the vertex at each boundary, one more at the end.
   bool make_line(const StripeGrid& grid, int line, Surface& out, const std::int32_t* index);
+  void join_copies(Surface& out) const;
   void tell_quality(const StripeGrid& grid, int line, Surface& out, std::size_t first) const;
 
   GridCalibration calibration_;

@@ -23,9 +23,10 @@ struct Places {
   std::size_t at(std::size_t line, std::size_t boundary) const { return line * stride + boundary; }
 };
 
-bool find_vertices(const Surface& surface, Places& out) {
+bool find_vertices(const Surface& surface, int picture_lines, Places& out) {
   std::size_t boundaries = 0, lines = 0;
   for (const GridPoint& p : surface.grid) {
+    if (p.line >= picture_lines) continue;
     boundaries = std::max<std::size_t>(boundaries, p.boundary + 1U);
     lines = std::max<std::size_t>(lines, p.line + 1U);
   }
@@ -33,6 +34,7 @@ bool find_vertices(const Surface& surface, Places& out) {
   out.vertex.assign((lines + 2) * out.stride, kNone);
   out.triangles.assign(out.vertex.size(), 0);
   for (std::size_t i = 0; i < surface.grid.size(); ++i) {
+    if (surface.grid[i].line >= picture_lines) continue;
     std::uint32_t& place = out.vertex[out.at(surface.grid[i].line, surface.grid[i].boundary)];
     if (place != kNone) return false;  // of a dense surface, say
     place = static_cast<std::uint32_t>(i);
@@ -40,14 +42,17 @@ bool find_vertices(const Surface& surface, Places& out) {
   return true;
 }
 
-bool find_triangles(const Surface& surface, Places& out) {
+bool find_triangles(const Surface& surface, int picture_lines, Places& out) {
   for (const Triangle& triangle : surface.triangles) {
     std::size_t top = std::numeric_limits<std::size_t>::max(), left = top;
+    bool is_second = false;
     for (const std::uint32_t v : triangle) {
       if (v >= surface.grid.size()) return false;
+      is_second = is_second || surface.grid[v].line >= picture_lines;
       top = std::min<std::size_t>(top, surface.grid[v].line);
       left = std::min<std::size_t>(left, surface.grid[v].boundary);
     }
+    if (is_second) continue;
     unsigned corners = 0;
     for (const std::uint32_t v : triangle) {
       const std::size_t down = surface.grid[v].line - top;
@@ -115,15 +120,15 @@ void keep(const std::vector<T>& from, const std::vector<std::uint32_t>& kept, st
 
 }  // namespace
 
-bool halve_lines(const Surface& surface, Surface& out) {
+bool halve_lines(const Surface& surface, int lines, Surface& out) {
   clear(out);
   Places places;
-  if (surface.grid.size() != surface.positions.size() || !find_vertices(surface, places) ||
-      !find_triangles(surface, places))
+  if (surface.grid.size() != surface.positions.size() || !find_vertices(surface, lines, places) ||
+      !find_triangles(surface, lines, places))
     return false;
   std::vector<std::uint32_t> kept, now(surface.grid.size(), kNone);
   for (std::uint32_t v = 0; v < surface.grid.size(); ++v) {
-    if (surface.grid[v].line % 2 != 0) continue;
+    if (surface.grid[v].line % 2 != 0 || surface.grid[v].line >= lines) continue;
     now[v] = static_cast<std::uint32_t>(kept.size());
     kept.push_back(v);
   }
@@ -172,6 +177,8 @@ void halve_lines(StripeGrid& grid, std::span<std::vector<std::uint8_t>* const> p
       all[i] = joined(static_cast<std::uint8_t>(i >> 4), static_cast<std::uint8_t>(i & 15U));
     return all;
   }();
+  grid.lines = grid.picture_lines();  // without the second places
+  grid.twice = false;
   const auto stride = static_cast<std::size_t>(grid.stride());
   const int lines = (grid.lines + 1) / 2;
   const std::size_t size = grid.at(lines, 0);

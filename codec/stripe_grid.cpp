@@ -46,9 +46,10 @@ bool GridCalibration::operator==(const GridCalibration& other) const {
          projector_from_camera_translation == other.projector_from_camera_translation;
 }
 
-void StripeGrid::reset(int boundaries_, int lines_, int step_bits_) {
+void StripeGrid::reset(int boundaries_, int lines_, int step_bits_, bool twice_) {
   boundaries = boundaries_;
   lines = lines_;
+  twice = twice_;
   step_bits = step_bits_;
   const std::size_t size = at(lines, 0);
   columns.assign(size, kAbsent);
@@ -57,6 +58,31 @@ void StripeGrid::reset(int boundaries_, int lines_, int step_bits_) {
   interpolated.clear();
   vertices = 0;
   triangles = 0;
+}
+
+bool joins_halves(const StripeGrid& grid) {
+  if (!grid.twice) return false;
+  const auto begin = grid.cells.begin() + static_cast<std::ptrdiff_t>(grid.at(grid.picture_lines() - 1, 0));
+  return std::any_of(begin, begin + grid.boundaries, [](std::uint8_t cell) { return cell != 0; });
+}
+
+std::vector<std::size_t> copies_of(const StripeGrid& grid) {
+  std::vector<std::size_t> copies;
+  const std::size_t second = grid.at(grid.picture_lines(), 0), apart = second - grid.at(0, 0);
+  for (std::size_t i = second; i < grid.columns.size(); ++i)
+    if (grid.columns[i] != StripeGrid::kAbsent && grid.columns[i] == grid.columns[i - apart])
+      copies.push_back(i);
+  return copies;
+}
+
+void keep_copies(std::span<const std::size_t> copies, StripeGrid& grid,
+                 std::vector<std::uint8_t>& tolerance) {
+  const std::size_t apart = grid.at(grid.picture_lines(), 0) - grid.at(0, 0);
+  for (const std::size_t copy : copies) {
+    grid.columns[copy] = grid.columns[copy - apart];
+    if (!grid.sigmas.empty()) grid.sigmas[copy] = grid.sigmas[copy - apart];
+    if (!tolerance.empty()) tolerance[copy] = tolerance[copy - apart] = 0;
+  }
 }
 
 /// By the bits of the number: its octave, and which quarter of it.

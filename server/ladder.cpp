@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "base/line_step.h"
 #include "base/log.h"
 #include "base/thread_name.h"
 #include "base/time.h"
@@ -16,6 +17,12 @@ namespace {
 constexpr int kStepBits = 4;         // a sixteenth of a pixel: below the noise of what is measured
 constexpr int kTextureQuality = 70;  // of half the size
 constexpr float kBound_px = 1;
+
+/// Of surfaces: as FrameEncoder has them.
+int lines_of(const Rig& rig, int line_stride) {
+  const int step_px = line_step_px(rig.scan) * line_stride;
+  return (rig.camera.height + step_px - 1) / step_px;
+}
 
 }  // namespace
 
@@ -52,6 +59,7 @@ Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& enco
     : rig_(rig),
       pattern_(pattern),
       line_stride_(line_stride),
+      lines_(lines_of(rig, line_stride)),
       encode_(encode),
       depth_resolution_(depth_resolution),
       volume_(encode.volume) {}
@@ -115,7 +123,7 @@ void Ladder::encode(Step& step, Item& item) {
   const bool full = step.detail() == Rung::kFull;
   // A surface that lies on no grid goes whole, with the smaller texture.
   const bool whole =
-      full || (step.detail() == Rung::kReduced && !halve_lines(item.frame.surface, frame.surface));
+      full || (step.detail() == Rung::kReduced && !halve_lines(item.frame.surface, lines_, frame.surface));
   if (whole) std::swap(frame.surface, item.frame.surface);
   Image8& texture = full ? item.frame.texture : half_;
   std::swap(frame.texture, texture);

@@ -82,6 +82,7 @@ class Ladder final : public LowerRungs {
   const Rig rig_;
   const Pattern pattern_;
   const int line_stride_;
+  const int lines_;  // of the picture, that surfaces count
   const EncodeOptions encode_;
   const double depth_resolution_;
   std::vector<std::unique_ptr<Step>> steps_;

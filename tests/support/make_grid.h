@@ -3,6 +3,7 @@
 // at different depths, a step between them, holes and noise.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -52,6 +53,18 @@ inline Pattern grid_pattern(const GridScene& scene) {
   return pattern;
 }
 
+/// From the middle of the nearer surface, which ends at kNearRadius; shares of the grid's sides.
+inline float from_near_middle(float u, float v) {
+  return std::hypot(u - 0.62F, v - 0.45F);
+}
+constexpr float kNearRadius = 0.22F;
+
+/// How far the nearer surface's columns lie from those of the one behind.
+inline float near_offset_px(const GridScene& scene) {
+  const float pitch = 0.8F * static_cast<float>(scene.width) / static_cast<float>(scene.stripes);
+  return 1.4F * pitch + scene.shift_px;
+}
+
 /// Triangulated by the reconstruction's own Triangulator.
 inline Frame3D grid_frame(const GridScene& scene) {
   const Rig rig = grid_rig(scene);
@@ -75,10 +88,10 @@ inline Frame3D grid_frame(const GridScene& scene) {
       const float noise = scene.noise_px * 2 * (random.unit() - 0.5F);
       const bool hole = std::hypot(u - 0.3F, v - 0.6F) < 0.08F || random.below(400) == 0;
       if (hole || v < 0.05F + 0.05F * std::sin(9 * u) || u + 0.1F * std::sin(6 * v) > 0.93F) continue;
-      const bool is_near = std::hypot(u - 0.62F, v - 0.45F) < 0.22F;
+      const bool is_near = from_near_middle(u, v) < kNearRadius;
       float column = 0.12F * static_cast<float>(scene.width) +
                      pitch * (static_cast<float>(b) + 1.5F * std::sin(5 * u + 3 * v)) + noise;
-      if (is_near) column += 1.4F * pitch + scene.shift_px;
+      if (is_near) column += near_offset_px(scene);
       const auto position = triangulator.point(b, line, column);
       if (!position) continue;
       index[at(line, b)] = static_cast<std::int32_t>(out.positions.size());
@@ -107,6 +120,65 @@ inline Frame3D grid_frame(const GridScene& scene) {
                                  static_cast<std::uint32_t>(index[q[k]])});
       };
       if (index[q[0]] >= 0 && index[q[2]] >= 0 && near[q[0]] == near[q[2]]) {
+        triangle(0, 1, 2);
+        triangle(2, 3, 0);
+      } else {
+        triangle(1, 2, 3);
+        triangle(3, 0, 1);
+      }
+    }
+  }
+  return frame;
+}
+
+/// The same where what lies behind is seen past the rim of the nearer surface, a little way: second places,
+/// which go on from its first ones.
+inline Frame3D twice_frame(const GridScene& scene) {
+  Frame3D frame = grid_frame(scene);
+  Surface& out = frame.surface;
+  const Pattern pattern = grid_pattern(scene);
+  const int lines = scene.height / 2, boundaries = pattern.boundaries();
+  const Triangulator triangulator(grid_rig(scene), pattern, lines, 2);
+  const auto at = [&](int line, int b) { return static_cast<std::size_t>(line * boundaries + b); };
+  // Of the surface behind: its vertices, first places or second ones.
+  std::vector<std::int32_t> behind(at(lines, 0), -1);
+  const std::size_t firsts = out.grid.size();
+  for (std::size_t i = 0; i < firsts; ++i) {
+    GridPoint p = out.grid[i];
+    const int line = p.line, b = p.boundary;
+    const float middle = from_near_middle(static_cast<float>(b) / static_cast<float>(boundaries),
+                                          static_cast<float>(line) / static_cast<float>(lines));
+    if (middle >= kNearRadius) behind[at(line, b)] = static_cast<std::int32_t>(i);
+    if (middle >= kNearRadius || middle < kNearRadius - 0.05F) continue;
+    p.column_px -= near_offset_px(scene);
+    const auto position = triangulator.point(b, line, p.column_px);
+    if (!position) continue;
+    behind[at(line, b)] = static_cast<std::int32_t>(out.grid.size());
+    p.line = static_cast<std::uint16_t>(line + lines);
+    out.grid.push_back(p);
+    out.positions.push_back(*position);
+    out.texture_coordinates.push_back(
+        {(p.column_px + 0.5F) / static_cast<float>(scene.width), out.texture_coordinates[i][1]});
+    if (!scene.quality) continue;
+    out.sigmas_m.push_back(p.sigma_px * 0.002F);
+    out.interpolated.push_back(p.interpolated);
+  }
+  for (int line = 0; line + 1 < lines; ++line) {
+    for (int b = 0; b + 1 < boundaries; ++b) {
+      const std::int32_t q[4] = {behind[at(line, b)], behind[at(line + 1, b)], behind[at(line + 1, b + 1)],
+                                 behind[at(line, b + 1)]};
+      const auto triangle = [&](int i, int j, int k) {
+        if (q[i] < 0 || q[j] < 0 || q[k] < 0) return;
+        const Triangle t = {static_cast<std::uint32_t>(q[i]), static_cast<std::uint32_t>(q[j]),
+                            static_cast<std::uint32_t>(q[k])};
+        if (t[0] >= firsts || t[1] >= firsts || t[2] >= firsts) out.triangles.push_back(t);
+      };
+      const auto is_second = [&](std::int32_t v) { return v >= static_cast<std::int32_t>(firsts); };
+      if (std::count_if(q, q + 4, is_second) == 1 && std::count(q, q + 4, -1) == 0) {
+        // The first places have the triangle of the other three.
+        const int c = static_cast<int>(std::find_if(q, q + 4, is_second) - q);
+        triangle((c + 3) % 4, c, (c + 1) % 4);
+      } else if (q[0] >= 0 && q[2] >= 0) {
         triangle(0, 1, 2);
         triangle(2, 3, 0);
       } else {

@@ -129,7 +129,7 @@ TEST(DracoGrid, ToleranceMovesColumnsNoFurther) {
   const test::GridScene scene{.noise_px = 0.2F};
   const auto calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
   StripeGrid grid;
-  ASSERT_TRUE(to_grid(test::grid_frame(scene).surface, calibration, 4, false, grid).ok());
+  ASSERT_TRUE(to_grid(test::grid_frame(scene).surface, calibration, {}, grid).ok());
   const StripeGrid sent = grid;
   const auto exact = encode_draco_grid(grid, calibration, {}, 1);
   const std::vector<std::uint8_t> tolerance(grid.columns.size(), 2);
@@ -186,7 +186,7 @@ struct Section {
 Section section_of(const test::GridScene& scene) {
   const auto calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
   StripeGrid grid;
-  EXPECT_TRUE(to_grid(test::grid_frame(scene).surface, calibration, 4, true, grid).ok());
+  EXPECT_TRUE(to_grid(test::grid_frame(scene).surface, calibration, {.with_quality = true}, grid).ok());
   auto coded = encode_draco_grid(grid, calibration, {}, 1);
   EXPECT_TRUE(coded.ok());
   return {*std::move(coded), grid.vertices, grid.triangles};

@@ -59,7 +59,8 @@ Errors errors_after(int frames, float speed_px, const std::function<bool(const G
   Frame3D frame;
   for (int f = 0; f < frames; ++f) {
     frame = measured_frame(static_cast<std::uint64_t>(f) + 10, speed_px * static_cast<float>(f));
-    EXPECT_TRUE(to_grid(frame.surface, calibration, kStepBits, true, grid).ok());
+    EXPECT_TRUE(
+        to_grid(frame.surface, calibration, {.step_bits = kStepBits, .with_quality = true}, grid).ok());
     estimator.estimate(frame.surface, grid, tolerance);
   }
   const auto truth = true_columns(speed_px * static_cast<float>(frames - 1));
@@ -122,16 +123,18 @@ TEST(GridEstimator, StartsAnewOnAnotherGridAndWhenToldTo) {
   std::vector<std::uint8_t> tolerance;
   StripeGrid fresh, used;
   GridEstimator one, other;
-  ASSERT_TRUE(to_grid(frame.surface, calibration, kStepBits, true, fresh).ok());
+  ASSERT_TRUE(
+      to_grid(frame.surface, calibration, {.step_bits = kStepBits, .with_quality = true}, fresh).ok());
   one.estimate(frame.surface, fresh, tolerance);
   const test::GridScene large{.width = 800, .stripes = 60};
   ASSERT_TRUE(to_grid(test::grid_frame(large).surface,
-                      grid_calibration(test::grid_rig(large), test::grid_pattern(large)), kStepBits, true,
-                      used)
+                      grid_calibration(test::grid_rig(large), test::grid_pattern(large)),
+                      {.step_bits = kStepBits, .with_quality = true}, used)
                   .ok());
   other.estimate(test::grid_frame(large).surface, used, tolerance);
   for (int again = 0; again < 2; ++again) {
-    ASSERT_TRUE(to_grid(frame.surface, calibration, kStepBits, true, used).ok());
+    ASSERT_TRUE(
+        to_grid(frame.surface, calibration, {.step_bits = kStepBits, .with_quality = true}, used).ok());
     other.estimate(frame.surface, used, tolerance);
     EXPECT_EQ(used.columns, fresh.columns);
     other.forget();

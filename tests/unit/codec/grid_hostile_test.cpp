@@ -28,7 +28,7 @@ Sent sent(const test::GridScene& scene) {
   GridEncoder encoder;
   Sent out;
   GridKey key;
-  EXPECT_TRUE(to_grid(test::grid_frame(scene).surface, calibration, 4, true, key.grid).ok());
+  EXPECT_TRUE(to_grid(test::grid_frame(scene).surface, calibration, {.with_quality = true}, key.grid).ok());
   out.key.bytes = encoder.encode(key.grid, calibration, nullptr, {}, 1, {.slice_lines = 24});
   out.key.vertices = key.grid.vertices;
   out.key.triangles = key.grid.triangles;
@@ -36,7 +36,7 @@ Sent sent(const test::GridScene& scene) {
   StripeGrid next;
   test::GridScene moved = scene;
   moved.shift_px = 1;
-  EXPECT_TRUE(to_grid(test::grid_frame(moved).surface, calibration, 4, true, next).ok());
+  EXPECT_TRUE(to_grid(test::grid_frame(moved).surface, calibration, {.with_quality = true}, next).ok());
   out.delta.bytes = encoder.encode(next, calibration, &key, {}, 1, {.slice_lines = 24});
   out.delta.vertices = next.vertices;
   out.delta.triangles = next.triangles;

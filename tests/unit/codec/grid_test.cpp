@@ -386,9 +386,9 @@ TEST(Grid, TheOrderOfTrianglesChangesNothingAndWrongOnesAreFoundAnywhere) {
   std::vector<Triangle>& triangles = frame.surface.triangles;
   const std::vector<Triangle> in_rows = triangles;
   StripeGrid one, other;
-  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, one).ok());
+  ASSERT_TRUE(to_grid(frame.surface, calibration, {.with_quality = true}, one).ok());
   std::ranges::reverse(triangles);  // no cell follows its left neighbour
-  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, other).ok());
+  ASSERT_TRUE(to_grid(frame.surface, calibration, {.with_quality = true}, other).ok());
   EXPECT_EQ(one.cells, other.cells);
   EXPECT_EQ(one.triangles, in_rows.size());
   EXPECT_EQ(other.triangles, in_rows.size());
@@ -407,7 +407,8 @@ TEST(Grid, TheOrderOfTrianglesChangesNothingAndWrongOnesAreFoundAnywhere) {
       default:
         triangles.insert(triangles.begin() + static_cast<std::ptrdiff_t>(at), in_rows[at]);
     }
-    EXPECT_FALSE(to_grid(frame.surface, calibration, 4, true, other).ok()) << round << ' ' << at;
+    EXPECT_FALSE(to_grid(frame.surface, calibration, {.with_quality = true}, other).ok())
+        << round << ' ' << at;
   }
 }
 
@@ -417,8 +418,8 @@ TEST(Grid, SlicesAreTheSameInParallel) {
   const auto calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
   WorkerPool pool(3);
   StripeGrid one, other;
-  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, one).ok());
-  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, true, other).ok());
+  ASSERT_TRUE(to_grid(frame.surface, calibration, {.with_quality = true}, one).ok());
+  ASSERT_TRUE(to_grid(frame.surface, calibration, {.with_quality = true}, other).ok());
   GridEncoder encoder;
   const Bytes serial = encoder.encode(one, calibration, nullptr, {}, 0, {.slice_lines = 20});
   EXPECT_EQ(encoder.encode(other, calibration, nullptr, {}, 0, {.slice_lines = 20, .pool = &pool}), serial);
@@ -436,7 +437,7 @@ TEST(Grid, ALostSliceTakesNothingElseWithIt) {
   const Frame3D frame = test::grid_frame(scene);
   const auto calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
   StripeGrid whole;
-  ASSERT_TRUE(to_grid(frame.surface, calibration, 4, false, whole).ok());
+  ASSERT_TRUE(to_grid(frame.surface, calibration, {}, whole).ok());
   GridEncoder encoder;
   const Bytes bytes = encoder.encode(whole, calibration, nullptr, {}, 0, {.slice_lines = 60});
   // Cut slice 2 (of 4) out: its size becomes 0.

@@ -28,7 +28,7 @@ struct Folder {
 
 class GridVectors : public testing::TestWithParam<Folder> {};
 INSTANTIATE_TEST_SUITE_P(Codecs, GridVectors,
-                         testing::Values(Folder{"grid_v1", 8, 12}, Folder{"draco_grid_v1", 7, 14}),
+                         testing::Values(Folder{"grid_v1", 10, 16}, Folder{"draco_grid_v1", 8, 16}),
                          [](const auto& test) { return test.param.name; });
 
 std::uint32_t add(std::uint32_t hash, std::uint32_t value) {

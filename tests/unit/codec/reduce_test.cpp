@@ -17,6 +17,8 @@
 namespace relievo::test {
 namespace {
 
+constexpr int kLines = 241;  // of the pictures, at most
+
 using Place = std::pair<int, int>;  // line and boundary
 
 std::map<Place, std::uint32_t> places(const Surface& surface, int line_stride = 1) {
@@ -29,7 +31,7 @@ std::map<Place, std::uint32_t> places(const Surface& surface, int line_stride = 
 TEST(HalveLines, KeepsTheVerticesOfEverySecondLine) {
   const Frame3D frame = grid_frame({.quality = true});
   Surface half;
-  ASSERT_TRUE(halve_lines(frame.surface, half));
+  ASSERT_TRUE(halve_lines(frame.surface, kLines, half));
   const auto all = places(frame.surface);
   std::size_t even = 0;
   for (const auto& [place, v] : all) even += place.first % 2 == 0;
@@ -47,7 +49,7 @@ TEST(HalveLines, KeepsTheVerticesOfEverySecondLine) {
 TEST(HalveLines, BridgesNoHoleAndNoStep) {
   const Frame3D frame = grid_frame({});
   Surface half;
-  ASSERT_TRUE(halve_lines(frame.surface, half));
+  ASSERT_TRUE(halve_lines(frame.surface, kLines, half));
   // Which places the full surface joins by an edge along a line or from line to line.
   const auto joined = [](const Surface& s) {
     std::set<std::pair<Place, Place>> edges;
@@ -74,7 +76,7 @@ TEST(HalveLines, TravelsAsAGridAndDecodesToTheSameSurface) {
   const GridScene scene{.distorts = true, .quality = true};
   Frame3D frame = grid_frame(scene);
   Frame3D half;
-  ASSERT_TRUE(halve_lines(frame.surface, half.surface));
+  ASSERT_TRUE(halve_lines(frame.surface, kLines, half.surface));
   const EncodeOptions options{.geometry = GeometryCodec::kGrid, .step_bits = 6};
   FrameEncoder encoder(grid_rig(scene), grid_pattern(scene), 2);
   const auto bytes = encoder.encode(half, options);
@@ -102,17 +104,17 @@ TEST(HalveLines, IsNotForSurfacesOffTheGrid) {
   Surface out;
   Surface without_places = frame.surface;
   without_places.grid.clear();
-  EXPECT_FALSE(halve_lines(without_places, out));
+  EXPECT_FALSE(halve_lines(without_places, kLines, out));
   Surface twice = frame.surface;
   twice.grid[1] = twice.grid[0];
-  EXPECT_FALSE(halve_lines(twice, out));
+  EXPECT_FALSE(halve_lines(twice, kLines, out));
   Surface across = frame.surface;
   across.triangles.push_back({0, 1, static_cast<std::uint32_t>(across.positions.size() - 1)});
-  EXPECT_FALSE(halve_lines(across, out));
+  EXPECT_FALSE(halve_lines(across, kLines, out));
   Surface foreign = frame.surface;
   foreign.triangles.push_back({0, 1, static_cast<std::uint32_t>(foreign.positions.size())});
-  EXPECT_FALSE(halve_lines(foreign, out));
-  EXPECT_TRUE(halve_lines(Surface(), out));
+  EXPECT_FALSE(halve_lines(foreign, kLines, out));
+  EXPECT_TRUE(halve_lines(Surface(), kLines, out));
   EXPECT_TRUE(out.positions.empty());
 }
 
@@ -162,10 +164,10 @@ TEST(HalveLines, OfAGridIsAsOfItsSurface) {
     whole.line_step_px = 2;
     every_second.line_step_px = 4;
     Surface half;
-    ASSERT_TRUE(halve_lines(frame.surface, half));
+    ASSERT_TRUE(halve_lines(frame.surface, kLines, half));
     StripeGrid expected, grid;
-    ASSERT_TRUE(to_grid(half, every_second, 6, true, expected));
-    ASSERT_TRUE(to_grid(frame.surface, whole, 6, true, grid));
+    ASSERT_TRUE(to_grid(half, every_second, {.step_bits = 6, .with_quality = true}, expected));
+    ASSERT_TRUE(to_grid(frame.surface, whole, {.step_bits = 6, .with_quality = true}, grid));
     std::vector<std::uint8_t> plane(grid.columns.size()), none;
     for (std::size_t i = 0; i < plane.size(); ++i) plane[i] = static_cast<std::uint8_t>(grid.columns[i]);
     halve_lines(grid, std::array{&plane, &none});

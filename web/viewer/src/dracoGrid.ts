@@ -2,6 +2,7 @@
 // Geometry codec 3 of codec/FORMAT.md: the stripe grid in two Draco point clouds. The same steps as codec/draco_grid.cpp.
 import type { DracoDecoder } from './draco';
 import {
+  checkHalves,
   chooseDiagonals,
   damaged,
   emptyGrid,
@@ -165,6 +166,7 @@ export function decodeDracoGrid(
   const changed = spreadChanges(runs, changes, grid);
   const there = findPlaces(changed, grid);
   fillCells(changed, there, grid);
+  checkHalves(grid.cells, grid);
   if (grid.vertices !== vertices || grid.triangles !== triangles) {
     throw new Error('geometry is not of the size that the frame declares');
   }

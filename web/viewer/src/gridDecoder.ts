@@ -30,6 +30,7 @@ const kDirect = 48;
 export interface GridShape {
   boundaries: number;
   lines: number;
+  pictureLines: number; // half of them where second places have lines of their own, else all
   stepBits: number;
   stride: number; // places of a line with its margins; the first place is at line * stride + kMargin
   vertices: number;
@@ -46,7 +47,7 @@ export interface Grid extends GridShape {
 /** What others build on. */
 export interface KeyGrid {
   id: number;
-  grid: Pick<Grid, 'boundaries' | 'lines' | 'stepBits' | 'columns'>;
+  grid: Pick<Grid, 'boundaries' | 'lines' | 'pictureLines' | 'stepBits' | 'columns'>;
 }
 
 /** A grid whose slices are still to be decoded. */
@@ -407,8 +408,9 @@ const kTrianglesOf = Uint8Array.from({ length: 256 }, (_, cell) =>
   cell === kBoth ? 2 : (cell & 1) + ((cell >> 1) & 1) + ((cell >> 2) & 1) + ((cell >> 3) & 1),
 );
 
-export function shapeOf({ boundaries, lines, stepBits }: GridFields): GridShape {
-  return { boundaries, lines, stepBits, stride: ((boundaries + 7) >> 3) * 8 + 2 * kMargin, vertices: 0, triangles: 0 };
+export function shapeOf({ boundaries, lines, twice, stepBits }: GridFields): GridShape {
+  const stride = ((boundaries + 7) >> 3) * 8 + 2 * kMargin;
+  return { boundaries, lines, pictureLines: twice ? lines / 2 : lines, stepBits, stride, vertices: 0, triangles: 0 };
 }
 export const placesOf = ({ lines, stride }: GridShape): number => lines * stride + kMargin;
 
@@ -425,6 +427,12 @@ export function emptyGrid(fields: GridFields): Grid {
   };
 }
 
+/** Throws where there are triangles between the picture's last line and its first line again, which no grid has. */
+export function checkHalves(cells: Uint8Array, { lines, pictureLines, stride, boundaries }: GridShape): void {
+  const at = (pictureLines - 1) * stride + kMargin;
+  if (pictureLines < lines && cells.subarray(at, at + boundaries).some((cell) => cell !== 0)) throw damaged();
+}
+
 /** Takes the triangles below a line away, and says how many there were. */
 export function dropCells(cells: Uint8Array, { stride, boundaries }: GridShape, line: number): number {
   const at = line * stride + kMargin;
@@ -439,8 +447,9 @@ export function openGrid(bytes: Uint8Array, vertices: number, triangles: number,
   const head = readGridHead(bytes);
   if (!head.isKey && (key === null || key.id !== head.key)) throw new Error('geometry builds on a key frame that was not received');
   const known = head.isKey ? null : key;
-  const { boundaries, lines, stepBits } = head;
-  if (known !== null && (known.grid.boundaries !== boundaries || known.grid.lines !== lines || known.grid.stepBits !== stepBits)) {
+  const shape = shapeOf(head);
+  const alike = (['boundaries', 'lines', 'pictureLines', 'stepBits'] as const).every((size) => known === null || known.grid[size] === shape[size]);
+  if (!alike) {
     throw new Error('geometry is of another size than its key frame');
   }
   const slices = head.slices.map((slice) => (slice.length === 0 ? null : readSliceHead(slice)));
@@ -466,6 +475,7 @@ export function decodeSlices({ head, tables, slices, key }: CodedGrid): Grid {
       grid.triangles -= dropCells(grid.cells, grid, begin - 1); // on vertices that are lost
     }
   });
+  checkHalves(grid.cells, grid);
   chooseDiagonals(grid, head.spacing);
   return grid;
 }

@@ -19,6 +19,7 @@ export interface GridFields {
   stepBits: number;
   boundaries: number;
   lines: number;
+  twice: boolean; // the picture's lines, then the same ones again
   sliceLines: number;
   slopes: [number, number, number]; // of 256
   keyWeight: number;
@@ -86,29 +87,34 @@ const usable = (l: Lens): boolean =>
   l.fx > 1 &&
   l.fy > 1;
 
-function readCalibration(in_: Reader, boundaries: number, lines: number): Calibration {
+/** Rows of the picture that are lines. */
+export const linesOf = ({ camera, lineStep }: Calibration): number => Math.floor((camera.height + lineStep - 1) / lineStep);
+
+function readCalibration(in_: Reader, boundaries: number, pictureLines: number): Calibration {
   const flags = in_.u8();
   const lineStep = in_.u8();
   const camera = readLens(in_, (flags & 1) !== 0);
   const projector = readLens(in_, (flags & 2) !== 0);
   const rotation = Array.from({ length: 9 }, () => in_.f32());
   const translation = Array.from({ length: 3 }, () => in_.f32());
+  const calibration = { lineStep, camera, projector, rotation, translation, stripes: boundaries + 1 };
   const good =
     flags <= 3 &&
     lineStep >= 1 &&
     usable(camera) &&
     usable(projector) &&
-    Math.floor((camera.height + lineStep - 1) / lineStep) === lines &&
+    linesOf(calibration) === pictureLines &&
     [...rotation, ...translation].every(fair);
   if (!good) throw new Error('geometry has a calibration that no rig can have');
-  return { lineStep, camera, projector, rotation, translation, stripes: boundaries + 1 };
+  return calibration;
 }
 
 /** Throws an Error that says what is wrong; any input. `sectionBytes`: of the whole geometry. */
 export function readGridFields(in_: Reader, sectionBytes: number): GridFields {
   const flags = in_.u8();
-  if (flags > 7) throw new Error('geometry has flags that this viewer does not know');
+  if (flags > 15) throw new Error('geometry has flags that this viewer does not know');
   const isKey = (flags & 1) !== 0;
+  const twice = (flags & 8) !== 0;
   const stepBits = in_.u8();
   const [boundaries, lines, sliceLines] = [in_.u16(), in_.u16(), in_.u16()];
   const slopes: [number, number, number] = [in_.i16(), in_.i16(), in_.i16()];
@@ -123,6 +129,7 @@ export function readGridFields(in_: Reader, sectionBytes: number): GridFields {
     boundaries <= kMostPlaces &&
     lines >= 1 &&
     lines <= kMostPlaces &&
+    (!twice || lines % 2 === 0) &&
     sliceLines >= 1 &&
     sliceLines <= lines &&
     stepBits <= 8;
@@ -131,7 +138,7 @@ export function readGridFields(in_: Reader, sectionBytes: number): GridFields {
     throw new Error('geometry has a size out of bounds');
   }
   const calibrationAt = in_.at;
-  const calibration = isKey ? readCalibration(in_, boundaries, lines) : null;
+  const calibration = isKey ? readCalibration(in_, boundaries, twice ? lines / 2 : lines) : null;
   const calibrationBytes = in_.since(calibrationAt);
   const key = isKey ? 0 : in_.u32();
   return {
@@ -141,6 +148,7 @@ export function readGridFields(in_: Reader, sectionBytes: number): GridFields {
     stepBits,
     boundaries,
     lines,
+    twice,
     sliceLines,
     slopes,
     keyWeight,

@@ -2,6 +2,7 @@
 // The stripe grid decoded in WebAssembly, where the browser has its vectors of 128 bits: the same results as gridDecoder.ts
 // and gridPoints.ts in a third of the time. wasm/grid.h says what it is handed; here is where things lie in its memory.
 import {
+  checkHalves,
   chooseDiagonals,
   damaged,
   dropCells,
@@ -15,7 +16,7 @@ import {
   type KeyGrid,
 } from './gridDecoder';
 import type { GridFields, GridHead } from './gridHead';
-import { kSigmas, type GridPoints, type GridSurface } from './gridPoints';
+import { joinCopies, kSigmas, type GridPoints, type GridSurface } from './gridPoints';
 import { kScale, type Table } from './rans';
 import type { Spares } from './spares';
 
@@ -136,6 +137,7 @@ export class GridKernel {
       grid.vertices += vertices;
       grid.triangles += triangles;
     });
+    checkHalves(bytes.subarray(at.cells, at.cells + places), grid);
   }
 
   /** What was decoded, for those that build on it. */
@@ -161,7 +163,7 @@ export class GridKernel {
   /** Whether toSurface() is worth what it has to work out for these points once. */
   takesPoints(points: GridPoints): boolean {
     const { grid } = this.decoded!;
-    return points.straightRays || points.samples * grid.lines <= kMostRays * grid.vertices;
+    return points.straightRays || points.samples * grid.pictureLines <= kMostRays * grid.vertices;
   }
 
   /** As GridPoints.toSurface(), of what was decoded; into spare memory. */
@@ -193,6 +195,7 @@ export class GridKernel {
       vertex += count;
       index += indices;
     }
+    joinCopies(ints.subarray(at.columns >> 2, (at.columns >> 2) + placesOf(grid)), grid, triangles);
     return { positions, coordinates, triangles, quality };
   }
 
@@ -269,7 +272,7 @@ export class GridKernel {
     real(12, points.sheetFirst, points.sheetStep);
     whole(14, sheets(0), sheets(1), sheets(2), sheets(3), at.small, at.small + 36, at.small + 48);
     whole(kNextAt, 0, numbers(1), numbers(2), numbers(3), numbers(4), numbers(5), numbers(6), numbers(7));
-    whole(29, at.positions, at.coordinates, at.depthSigmas, at.depthMarks, at.triangles, 0);
+    whole(29, at.positions, at.coordinates, at.depthSigmas, at.depthMarks, at.triangles, 0, grid.pictureLines);
   }
 
   /** What of a calibration does not change. */

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the stripe grid to a surface: each camera ray is met with the light sheet of its boundary. codec/FORMAT.md,
 // "From the grid to a surface"; the same steps as codec/grid_points.cpp.
-import { kAbsent, kMargin, kStraight, kTurned, type Grid } from './gridDecoder';
-import type { Calibration } from './gridHead';
+import { kAbsent, kMargin, kStraight, kTurned, type Grid, type GridShape } from './gridDecoder';
+import { linesOf, type Calibration } from './gridHead';
 import { distorts, sheetAt, undistort } from './lens';
 import type { VertexQuality } from './quality';
 
@@ -36,8 +36,8 @@ export class GridPoints {
   readonly c: Float64Array;
 
   constructor(readonly calibration: Calibration) {
-    const { camera, projector, rotation, translation, stripes, lineStep } = calibration;
-    const lines = Math.floor((camera.height + lineStep - 1) / lineStep);
+    const { camera, projector, rotation, translation, stripes } = calibration;
+    const lines = linesOf(calibration);
     const boundaries = stripes - 1;
     this.raysX = new Array<Float32Array | null>(lines).fill(null);
     this.raysY = new Array<Float32Array | null>(lines).fill(null);
@@ -65,10 +65,10 @@ export class GridPoints {
     }
   }
 
-  /** Vertices come by line, then boundary. Throws where a ray meets no sheet in front of camera and projector. */
+  /** Vertices come by line, then boundary: second places last. Throws where a ray meets no sheet in front of camera and projector. */
   toSurface(grid: Grid): GridSurface {
     const { camera, lineStep } = this.calibration;
-    const { vertices, boundaries, lines, stride, columns } = grid;
+    const { vertices, boundaries, lines, pictureLines, stride, columns } = grid;
     const positions = new Float32Array(vertices * 3);
     const coordinates = new Float32Array(vertices * 2);
     const triangles = new Uint32Array(grid.triangles * 3);
@@ -90,6 +90,7 @@ export class GridPoints {
     for (let line = 0; line < lines; ++line) {
       [above, index] = [index, above];
       const at = line * stride + kMargin;
+      const pictureLine = line % pictureLines; // of second places too
       const first = next;
       let count = 0;
       for (let b = 0; b < boundaries; ++b) {
@@ -101,10 +102,10 @@ export class GridPoints {
         ++next;
       }
       if (count > 0) {
-        this.rays(line, column, count, x, y);
+        this.rays(pictureLine, column, count, x, y);
         if (this.straightSheets) this.meetStraight(place, count, x, y, z, slope);
         else this.meetCurved(place, count, x, y, z, slope);
-        const v = (line * lineStep + 0.5) / camera.height;
+        const v = (pictureLine * lineStep + 0.5) / camera.height;
         for (let i = 0; i < count; ++i) {
           const depth = z[i]!;
           const p = (first + i) * 3;
@@ -126,9 +127,11 @@ export class GridPoints {
       }
       if (line > 0) triangle = writeCells(grid, at - stride, above, index, triangles, triangle);
     }
+    joinCopies(columns, grid, triangles);
     return { positions, coordinates, triangles, quality };
   }
 
+  /** `line`: of the picture. */
   private rays(line: number, column: Float64Array, count: number, x: Float64Array, y: Float64Array): void {
     const { camera, lineStep } = this.calibration;
     const row = line * lineStep;
@@ -243,6 +246,26 @@ export class GridPoints {
     }
     this.sheets[boundary] = samples;
     return samples;
+  }
+}
+
+/** Triangles on second places that are copies of the first ones there are on those. */
+export function joinCopies(columns: Int32Array, { boundaries, lines, pictureLines, stride }: GridShape, triangles: Uint32Array): void {
+  if (pictureLines === lines) return;
+  const firstOf = new Map<number, number>(); // by how many second places are before the copy
+  let first = 0;
+  let second = 0;
+  for (let line = 0; line < pictureLines; ++line) {
+    const at = line * stride + kMargin;
+    for (let i = at; i < at + boundaries; ++i) {
+      const again = columns[i + pictureLines * stride]!;
+      if (again !== kAbsent && again === columns[i]) firstOf.set(second, first);
+      if (again !== kAbsent) ++second;
+      if (columns[i] !== kAbsent) ++first;
+    }
+  }
+  for (let t = triangles.length - 3; t >= 0 && triangles[t]! >= first; t -= 3) {
+    for (let i = t; i < t + 3; ++i) triangles[i] = firstOf.get(triangles[i]! - first) ?? triangles[i]!;
   }
 }
 

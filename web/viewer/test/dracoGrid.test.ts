@@ -47,7 +47,7 @@ describe('damaged grids in Draco', () => {
     const next = (): number => (random = (Math.imul(random, 1664525) + 1013904223) >>> 0) >>> 8;
     let refusals = 0;
     const frames = new GridFrames();
-    for (const name of ['plain.rlv', 'quality.rlv', 'lenses.rlv']) {
+    for (const name of ['plain.rlv', 'quality.rlv', 'lenses.rlv', 'twice.rlv']) {
       const whole = load(name);
       for (let i = 0; i < 200; ++i) {
         const bytes = whole.slice();

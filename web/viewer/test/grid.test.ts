@@ -76,7 +76,7 @@ describe('damaged grids', () => {
     let random = 7;
     const next = (): number => (random = (Math.imul(random, 1664525) + 1013904223) >>> 0) >>> 8;
     let refusals = 0;
-    for (const name of ['plain.rlv', 'quality.rlv', 'lenses.rlv', 'slices.rlv', 'wild.rlv']) {
+    for (const name of ['plain.rlv', 'quality.rlv', 'lenses.rlv', 'slices.rlv', 'wild.rlv', 'twice_0.rlv']) {
       const whole = load(name);
       const [frames, others] = [framesWith(null), framesWith(kernel)];
       let spare: ArrayBuffer[] = []; // of the surface before, which nobody looks at any more

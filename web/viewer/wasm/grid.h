@@ -56,6 +56,7 @@ struct Points {
   u8* marks;
   u32* triangles;
   u32 written_triangles;
+  i32 picture_lines;  // line picture_lines + l is line l of the picture again, with the second places
 };
 extern struct Points points;
 

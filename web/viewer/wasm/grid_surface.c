@@ -23,7 +23,8 @@ static void number_line(const i32* columns, u32* index) {
   points.next = next;
 }
 
-/// Columns in pixels and directions of a line's vertices; of no meaning where there is none.
+/// Columns in pixels and directions of the vertices of a line, of the picture; of no meaning where there is
+/// none.
 static void find_rays(const i32* columns, int line) {
   const float* rays = points.rays ? points.rays + (u32)line * 2 * (u32)points.ray_samples : 0;
   const float y = points.ray_y + (float)line * points.ray_y_step,
@@ -227,12 +228,13 @@ int surface_lines(int begin, int end) {
   for (int line = begin; line < end; ++line) {
     const i32* columns = job.columns + line * job.stride + kMargin;
     u32* const index = points.index[line & 1];
+    const int picture_line = line < points.picture_lines ? line : line - points.picture_lines;
     const u32 first = points.next;
     number_line(columns, index);
     if (points.next > first) {
-      find_rays(columns, line);
+      find_rays(columns, picture_line);
       if (!(points.sheets ? meet_curved(columns) : meet_straight(columns))) return 0;
-      write_vertices(columns, line);
+      write_vertices(columns, picture_line);
       if (job.sigmas || job.marks) write_quality(columns, line, first - start);
     }
     if (line > 0)
