@@ -14,7 +14,7 @@ using Vec2f = std::array<float, 2>;
 using Vec3f = std::array<float, 3>;
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise seen from the camera
 
-/// Where a vertex was measured: the stripe boundary it lies on and the camera line it was found in.
+/// The stripe boundary a vertex lies on, and the line; where that shows it again, as many lines further.
 struct GridPoint {
   std::uint16_t boundary = 0;  // of the pattern: between stripes `boundary` and `boundary` + 1
   std::uint16_t line = 0;      // detection line, top first: camera row `line * line_step_px`
@@ -29,7 +29,7 @@ struct Surface {
   std::vector<Vec3f> normals;  // unit, towards the camera
   std::vector<Vec2f>
       texture_coordinates;      // glTF: (0, 0) the texture's upper left corner, (1, 1) the lower right
-  std::vector<GridPoint> grid;  // empty where the surface did not come from stripes
+  std::vector<GridPoint> grid;  // empty where it is not from stripes; what lines show again is last
   std::vector<float> sigmas_m;  // standard deviation of the depth (along z); 0: not known
   std::vector<std::uint8_t> interpolated;  // 1: not measured, but between measured points of one surface
   std::vector<Triangle> triangles;

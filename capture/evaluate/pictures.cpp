@@ -165,13 +165,15 @@ Image8 draw_boundaries(const CapturedFrame& frame, const Surface& surface, const
     return Colour{p & 1 ? 1.F : 0.F, p & 2 ? 1.F : 0.F, p & 4 ? 1.F : 0.F};
   };
   const int step = line_step_px(frame.scan);
+  const int lines = (out.height() + step - 1) / step;
   for (const GridPoint& at : surface.grid) {
     if (at.interpolated) continue;
+    const int row = at.line % lines * step;
     const int x = static_cast<int>(std::floor(at.column_px + 0.5F));
     for (int dy = 0; dy < step; ++dy) {
       for (int side = 0; side < 2; ++side) {
-        set_pixel(out, x - 2 + side, at.line * step + dy, light(pattern.colour(at.boundary, slide)));
-        set_pixel(out, x + side, at.line * step + dy, light(pattern.colour(at.boundary + 1, slide)));
+        set_pixel(out, x - 2 + side, row + dy, light(pattern.colour(at.boundary, slide)));
+        set_pixel(out, x + side, row + dy, light(pattern.colour(at.boundary + 1, slide)));
       }
     }
   }

@@ -41,6 +41,7 @@ struct Difference {
 /// Decoded boundaries by line, from left to right.
 std::vector<std::vector<GridPoint>> by_line(const std::vector<GridPoint>& grid, int lines) {
   std::vector<std::vector<GridPoint>> out(static_cast<std::size_t>(lines));
+  // Without what a line shows a second time, which is out of its order.
   for (const GridPoint& at : grid)
     if (!at.interpolated && at.line < lines) out[at.line].push_back(at);
   for (auto& line : out)

@@ -140,7 +140,7 @@ struct Reconstructor::State {
   void forget();
   Result<const CapturedFrame*> observe(const CapturedFrame& captured);
   Frame3D blank_frame();
-  void make_surface(DecodedGrid& grid, Surface& out);
+  void make_surface(DecodedGrid& grid, const std::vector<SecondPlace>& second, Surface& out);
   void make_texture(const CapturedFrame& frame, Image8& out);
   std::optional<Frame3D> surface_between(const CapturedFrame& frame);
 };
@@ -180,7 +180,8 @@ Frame3D Reconstructor::State::blank_frame() {
   return out;
 }
 
-void Reconstructor::State::make_surface(DecodedGrid& grid, Surface& out) {
+void Reconstructor::State::make_surface(DecodedGrid& grid, const std::vector<SecondPlace>& second,
+                                        Surface& out) {
   StageClock clock;
   std::atomic<std::size_t> points{0};
   std::atomic<std::size_t> no_point{0};
@@ -193,7 +194,7 @@ void Reconstructor::State::make_surface(DecodedGrid& grid, Surface& out) {
   report.filters.no_point += no_point;
   if (options.decoder != Decoder::kPaper) depths.update(grid, points, triangulator, pool);
   report.triangulate_ms += clock.lap_ms();
-  surface_builder.build(grid, triangulator, pool, out, report.filters);
+  surface_builder.build(grid, second, triangulator, pool, out, report.filters);
   report.surface_ms += clock.lap_ms();
 }
 
@@ -220,7 +221,7 @@ std::optional<Frame3D> Reconstructor::State::surface_between(const CapturedFrame
   out.number = frame.number;
   out.time_ns = time_ns + (frame.time_ns - time_ns) / 2;
   out.between = true;
-  make_surface(decoded_between, out.surface);
+  make_surface(decoded_between, {}, out.surface);
   if (options.texture) {
     copy_picture(last_texture, out.texture);
   } else {
@@ -295,7 +296,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured)
   out.number = frame.number;
   out.time_ns = frame.time_ns;
   out.between = false;
-  s.make_surface(s.decoded, out.surface);
+  s.make_surface(s.decoded, s.decoder.second_places(), out.surface);
   clock.lap_ms();
   out.texture_time_ns = s.pairs.texture_time_ns();
   s.make_texture(frame, out.texture);

@@ -27,6 +27,7 @@
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/render_place.h"
 #include "capture/reconstruct/rim_codes.h"
+#include "capture/reconstruct/second_places.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/sharp_luma.h"
 #include "capture/reconstruct/trace.h"
@@ -106,6 +107,7 @@ struct SlideDecoder::State {
   Persistence persistence;
   Weighing weighing;
   RenderPlacer render_placer;
+  SecondPlaces second_places;
 
   Observation newer;
   Observation previous;  // the frame before
@@ -342,6 +344,7 @@ void SlideDecoder::observe(const CapturedFrame& pair, WorkerPool& pool, Reconstr
 bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report,
                           DecodedGrid& out) {
   State& s = *state_;
+  s.second_places.clear();
   if (!s.have_older && s.pattern.slides == 2) return false;
   const CapturedFrame& pair = view.pair;
   s.expected = view.expected;
@@ -410,10 +413,23 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     report.filters.moved += weighed.moved;
     // Without an earlier frame under the slide nothing tells what moves.
     // Of speckle no picture can be told.
-    if (s.have_same && !s.moving.much() && !s.consistency.speckled()) s.look_again(rows, pool, report);
+    const bool clear = s.have_same && !s.moving.much() && !s.consistency.speckled();
+    if (clear) s.look_again(rows, pool, report);
+    report.filters.duplicate = s.fill(pool, out);
+    if (clear && s.have_older) {
+      const std::size_t second =
+          s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out});
+      report.filters.recovered += second;
+      report.matched += second;
+    }
+    return true;
   }
   report.filters.duplicate = s.fill(pool, out);
   return true;
+}
+
+const std::vector<SecondPlace>& SlideDecoder::second_places() const {
+  return state_->second_places.found();
 }
 
 }  // namespace relievo

@@ -13,6 +13,7 @@
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/reconstructor.h"
+#include "capture/reconstruct/second_places.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -39,6 +40,9 @@ class SlideDecoder {
   /// and the rig's lines whose points are left as they are; false while the other slide was not seen. Sets
   /// report.matched and .filters.
   bool decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report, DecodedGrid& out);
+
+  /// What the lines of the frame that decode() was called for last show a second time. Until the next call.
+  const std::vector<SecondPlace>& second_places() const;
 
  private:
   struct State;

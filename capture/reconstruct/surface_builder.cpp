@@ -57,8 +57,9 @@ std::size_t SurfaceBuilder::fill(const ColumnScale& scale, const Triangulator& t
   return filled;
 }
 
-void SurfaceBuilder::build(DecodedGrid& grid, const Triangulator& triangulator, WorkerPool& pool,
-                           Surface& out, FilterCounts& counts) {
+void SurfaceBuilder::build(DecodedGrid& grid, const std::vector<SecondPlace>& second,
+                           const Triangulator& triangulator, WorkerPool& pool, Surface& out,
+                           FilterCounts& counts) {
   const ColumnScale scale{line_step_px_, usual_sigma_px(grid)};
   if (options_.fill_holes > 0) counts.filled += fill(scale, triangulator, grid);
   find_links(grid, scale, pool, links_);
@@ -76,7 +77,9 @@ void SurfaceBuilder::build(DecodedGrid& grid, const Triangulator& triangulator, 
                           .boundaries = pixels_.boundaries.data()},
                          scratch_, out);
   } else {
-    made = build_surface(grid, {.links = &links_, .pool = &pool, .picture = &picture}, scratch_, out);
+    const SurfaceOptions options{.links = &links_, .pool = &pool, .picture = &picture};
+    made = build_surface(grid, options, scratch_, out);
+    made.small_component += second_.add(second, grid, scale, options, triangulator, out);
   }
   counts.step += made.step;
   counts.edge_on += made.edge_on;

@@ -13,6 +13,8 @@
 #include "capture/reconstruct/dense.h"
 #include "capture/reconstruct/depth_sigma.h"
 #include "capture/reconstruct/ranked_sample.h"
+#include "capture/reconstruct/second_places.h"
+#include "capture/reconstruct/second_surface.h"
 #include "capture/reconstruct/surface.h"
 #include "capture/reconstruct/surface_builder_options.h"
 #include "capture/reconstruct/triangulate.h"
@@ -24,11 +26,11 @@ class SurfaceBuilder {
  public:
   SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options);
 
-  /// Of boundaries with their points: `grid` gains what fills holes. Fills `out` but for what it holds of
-  /// old, and adds what the filters did to `counts`. `triangulator` must be of the same rig, pattern and
-  /// lines.
-  void build(DecodedGrid& grid, const Triangulator& triangulator, WorkerPool& pool, Surface& out,
-             FilterCounts& counts);
+  /// Of boundaries with their points, and what lines show of them a second time, which is no part of a dense
+  /// surface: `grid` gains what fills holes. Fills `out` but for what it holds of old, and adds what the
+  /// filters did to `counts`. `triangulator` must be of the same rig, pattern and lines.
+  void build(DecodedGrid& grid, const std::vector<SecondPlace>& second, const Triangulator& triangulator,
+             WorkerPool& pool, Surface& out, FilterCounts& counts);
 
  private:
   float usual_sigma_px(const DecodedGrid& grid);
@@ -43,6 +45,7 @@ class SurfaceBuilder {
   DenseSampler dense_;
   DenseGrid pixels_;
   SurfaceScratch scratch_;
+  SecondSurface second_;
 };
 
 }  // namespace relievo

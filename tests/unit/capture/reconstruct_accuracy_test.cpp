@@ -233,6 +233,34 @@ TEST(Accuracy, OneSlideHasOneBoundaryAtAPlace) {
   EXPECT_EQ(close, 0U);
 }
 
+// What is behind, beside what is in front of it: .006 of what is to be seen of this scene.
+TEST(Accuracy, LinesThatShowABoundaryTwiceHaveItTwice) {
+  const Filmed filmed("object");
+  Reconstructor reconstructor = filmed.reconstructor();
+  const int lines = filmed.rig.camera.height / 2;
+  std::size_t twice = 0, near = 0;
+  Scorer scorer(filmed.rig, filmed.pattern);
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    ImageF truth;
+    auto out = reconstructor.add(filmed.frame(k, &truth));
+    ASSERT_TRUE(out) << out.error().message;
+    if (k < 2) continue;
+    ASSERT_TRUE(*out);
+    scorer.add(truth, &(*out)->surface);
+    for (const GridPoint& p : (*out)->surface.grid) {
+      if (p.line < lines) continue;
+      const auto at = filmed.true_column(truth, (p.line - lines) * 2, p.boundary, p.column_px);
+      ++twice;
+      near += at && std::fabs(p.column_px - *at) < 0.5;
+    }
+  }
+  std::printf("%zu second places, %zu of them near theirs; completeness %.4f\n", twice, near,
+              scorer.score().completeness);
+  EXPECT_GT(twice, 3 * 60U);
+  EXPECT_GT(20 * near, 19 * twice);
+  EXPECT_GT(scorer.score().completeness, 0.9915);
+}
+
 class HonestSigma : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(HonestSigma, IsThatOfTheErrors) {

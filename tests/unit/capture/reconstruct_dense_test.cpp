@@ -65,7 +65,7 @@ Built build(const std::vector<Stretch>& stretches, const SurfaceBuilderOptions& 
   Built out;
   DecodedGrid grid = blank(scene);
   place(stretches, triangulator, there, grid);
-  builder.build(grid, triangulator, pool, out.surface, out.counts);
+  builder.build(grid, {}, triangulator, pool, out.surface, out.counts);
   return out;
 }
 
@@ -159,7 +159,7 @@ TEST(Steps, NoTriangleBridgesOneBetweenTwoLines) {
   WorkerPool pool(1);
   Surface s;
   FilterCounts counts;
-  builder.build(grid, triangulator, pool, s, counts);
+  builder.build(grid, {}, triangulator, pool, s, counts);
   EXPECT_GT(s.triangles.size(), 100U);
   EXPECT_EQ(spanning(s, 0.1), 0U);
   EXPECT_GT(counts.step, 0U);
