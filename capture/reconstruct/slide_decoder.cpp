@@ -411,10 +411,10 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
         s.weighing.weigh(s.places, s.moving, s.consistency.scale(), pool, s.result, s.edges, s.recovered);
     report.filters.rejected += weighed.rejected;
     report.filters.moved += weighed.moved;
-    // Without an earlier frame under the slide nothing tells what moves.
     // Of speckle no picture can be told.
-    const bool clear = s.have_same && !s.moving.much() && !s.consistency.speckled();
-    if (clear) s.look_again(rows, pool, report);
+    const bool clear = !s.moving.much() && !s.consistency.speckled();
+    // Without an earlier frame under the slide nothing tells what moves.
+    if (clear && s.have_same) s.look_again(rows, pool, report);
     report.filters.duplicate = s.fill(pool, out);
     if (clear && s.have_older) {
       const std::size_t second =
