@@ -127,7 +127,8 @@ struct Reconstructor::State {
   SurfaceBuilder surface_builder;
 
   DecodedGrid decoded;
-  DecodedGrid decoded_between;  // white-field
+  DecodedGrid decoded_between;                             // white-field
+  std::vector<SecondPlace> second_before, second_between;  // the same
   std::optional<Frame3D> waiting;
   Image8 last_texture;  // white-field: of the frame before
   std::int64_t last_texture_time_ns = 0;
@@ -150,6 +151,7 @@ void Reconstructor::State::forget() {
   pairs.forget();
   decoder = SlideDecoder(rig, pattern, options);
   half_way = HalfWay(pattern.boundaries(), lines);
+  second_before.clear();
 }
 
 /// The frame in step of which `pair` is made; null where there is none yet.
@@ -221,7 +223,8 @@ std::optional<Frame3D> Reconstructor::State::surface_between(const CapturedFrame
   out.number = frame.number;
   out.time_ns = time_ns + (frame.time_ns - time_ns) / 2;
   out.between = true;
-  make_surface(decoded_between, {}, out.surface);
+  second_half_way(second_before, decoder.second_places(), second_between);
+  make_surface(decoded_between, second_between, out.surface);
   if (options.texture) {
     copy_picture(last_texture, out.texture);
   } else {
@@ -304,6 +307,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured)
   if (white_field) {
     copy_picture(out.texture, s.last_texture);
     s.last_texture_time_ns = out.texture_time_ns;
+    s.second_before = s.decoder.second_places();
   }
   if (!between) return std::optional<Frame3D>(std::move(out));
   s.waiting = std::move(out);

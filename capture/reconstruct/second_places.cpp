@@ -22,6 +22,11 @@ constexpr float kForetold = 0.7F;   // towards which it is put so far: the other
 constexpr float kLean_px = 4.F;     // from line to line: farther off is another surface
 constexpr float kNarrowest_px = 1.F, kWidest_px = 40.F;  // of a stripe
 constexpr int kSweeps = 2;
+constexpr float kHeldStill_px = 1.F;  // from frame to frame: farther apart are two surfaces
+
+std::tuple<int, int> place(const SecondPlace& p) {
+  return {p.line, p.boundary};
+}
 
 std::size_t primary(const SideEvidence& e) {
   return static_cast<std::size_t>((e[0] > 0 ? 1 : 0) | (e[1] > 0 ? 2 : 0) | (e[2] > 0 ? 4 : 0));
@@ -95,15 +100,15 @@ std::size_t SecondPlaces::find(const DecodedEdges& frame) {
   find_candidates(frame);
   taken_.assign(frame.edges.edges.size(), 0);
   const auto take = [&](const Candidate& c) {
-    float& place = second_.line(c.line)[c.boundary];
-    if (taken_[c.edge] != 0 || place == place) return;
+    float& second = second_.line(c.line)[c.boundary];
+    if (taken_[c.edge] != 0 || second == second) return;
     const Edge& edge = frame.edges.edges[c.edge];
     const float foretold = foretold_px(frame, c);
     if (!(foretold == foretold)) return;
     const float moved = kForetold * (foretold - edge.column_px);
-    place = edge.column_px + moved;
+    second = edge.column_px + moved;
     taken_[c.edge] = 1;
-    found_.push_back({static_cast<std::uint16_t>(c.boundary), static_cast<std::uint16_t>(c.line), place,
+    found_.push_back({static_cast<std::uint16_t>(c.boundary), static_cast<std::uint16_t>(c.line), second,
                       std::hypot(edge.sigma_px, moved)});
   };
   // Each one found confirms others.
@@ -111,8 +116,21 @@ std::size_t SecondPlaces::find(const DecodedEdges& frame) {
     for (const Candidate& c : candidates_) take(c);
     for (auto c = candidates_.rbegin(); c != candidates_.rend(); ++c) take(*c);
   }
-  std::ranges::sort(found_, {}, [](const SecondPlace& p) { return std::tuple(p.line, p.boundary); });
+  std::ranges::sort(found_, {}, place);
   return found_.size();
+}
+
+void second_half_way(const std::vector<SecondPlace>& before, const std::vector<SecondPlace>& now,
+                     std::vector<SecondPlace>& out) {
+  out.clear();
+  auto other = before.begin();
+  for (SecondPlace p : now) {
+    other = std::find_if(other, before.end(), [&](const SecondPlace& o) { return place(o) >= place(p); });
+    if (other == before.end()) break;
+    if (place(*other) != place(p) || std::fabs(other->column_px - p.column_px) > kHeldStill_px) continue;
+    p.column_px = 0.5F * (p.column_px + other->column_px);
+    out.push_back(p);
+  }
 }
 
 }  // namespace relievo

@@ -60,4 +60,8 @@ class SecondPlaces {
   std::vector<SecondPlace> found_;
 };
 
+/// What two frames in a row have at one place of the grid, half way between them.
+void second_half_way(const std::vector<SecondPlace>& before, const std::vector<SecondPlace>& now,
+                     std::vector<SecondPlace>& out);
+
 }  // namespace relievo

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "capture/pattern/bcsl.h"
@@ -127,6 +128,21 @@ TEST_F(SecondPlacesTest, BothSlidesMustShowItsColours) {
   std::ranges::transform(other_.values, other_.values.begin(), [](float v) { return -v; });
   std::swap(edge_.left, edge_.right);
   EXPECT_EQ(found(), 0U);
+}
+
+TEST(SecondHalfWay, IsBetweenWhatBothFramesHaveOfOneSurface) {
+  const std::vector<SecondPlace> before{
+      {3, 1, 20, 0.1F}, {7, 1, 60, 0.1F}, {2, 4, 10, 0.1F}, {5, 6, 40, 0.1F}};
+  const std::vector<SecondPlace> now{
+      {3, 1, 20.5F, 0.2F}, {8, 1, 70, 0.2F}, {2, 4, 60, 0.2F}, {5, 6, 40, 0.2F}};
+  std::vector<SecondPlace> out{{1, 1, 1, 1}};
+  second_half_way(before, now, out);
+  ASSERT_EQ(out.size(), 2U);
+  EXPECT_EQ(std::pair(out[0].line, out[0].boundary), (std::pair<std::uint16_t, std::uint16_t>(1, 3)));
+  EXPECT_FLOAT_EQ(out[0].column_px, 20.25F);
+  EXPECT_EQ(std::pair(out[1].line, out[1].boundary), (std::pair<std::uint16_t, std::uint16_t>(6, 5)));
+  second_half_way({}, now, out);
+  EXPECT_TRUE(out.empty());
 }
 
 /// A plane, before which another one hangs that takes some of its boundaries on some lines.
