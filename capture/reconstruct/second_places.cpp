@@ -12,8 +12,8 @@ namespace {
 
 using sequence_rules::agreement;
 
-// Measured on simulated scenes and a rendering by others. An edge's own colours and those of the other slide
-// must be clear on both sides: beside a rim they are mixed.
+// Measured on simulated scenes and a rendering by others. An edge's own colours and those of the other slide,
+// if there is one, must be clear on both sides: beside a rim they are mixed.
 constexpr float kLeastSide = 0.5F;
 constexpr float kWorst_px = 0.16F;  // standard deviation
 constexpr float kApart_px = 2.F;    // nearer its first place it is that one's own edge, blurred
@@ -53,7 +53,8 @@ void SecondPlaces::find_candidates(const DecodedEdges& frame) {
         if (!(std::fabs(first_px[b] - edge.column_px) > kApart_px)) continue;
         const auto [left, right] = colours[static_cast<std::size_t>(b)];
         const float own = std::min(agreement(left, edge.left), agreement(right, edge.right));
-        if (own > kLeastSide && frame.sequence.other_agreement(edge, line, b, frame.context) > kLeastSide)
+        if (own > kLeastSide && (frame.context.other == nullptr ||
+                                 frame.sequence.other_agreement(edge, line, b, frame.context) > kLeastSide))
           candidates_.push_back({line, b, e});
       }
     }

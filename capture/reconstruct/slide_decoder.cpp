@@ -416,7 +416,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     // Without an earlier frame under the slide nothing tells what moves.
     if (clear && s.have_same) s.look_again(rows, pool, report);
     report.filters.duplicate = s.fill(pool, out);
-    if (clear && s.have_older) {
+    if (clear) {
       const std::size_t second =
           s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out});
       report.filters.recovered += second;

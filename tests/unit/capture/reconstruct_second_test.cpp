@@ -145,6 +145,13 @@ TEST(SecondHalfWay, IsBetweenWhatBothFramesHaveOfOneSurface) {
   EXPECT_TRUE(out.empty());
 }
 
+TEST_F(SecondPlacesTest, OfOneSlideItsOwnColoursTell) {
+  context_.other = nullptr;
+  EXPECT_EQ(found(), 1U);
+  std::swap(edge_.left, edge_.right);
+  EXPECT_EQ(found(), 0U);
+}
+
 /// A plane, before which another one hangs that takes some of its boundaries on some lines.
 class SecondSurfaceTest : public ::testing::Test {
  protected:
