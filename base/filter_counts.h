@@ -41,7 +41,7 @@ inline constexpr std::array<Filter, 15> kFilters{{
     {"edge_on", "triangles not made, since they are seen edge-on", &FilterCounts::edge_on},
     {"small_component", "points left out in pieces too small to be a surface",
      &FilterCounts::small_component},
-    {"recovered", "boundaries found by their surface and luma, or by the frame before",
+    {"recovered", "boundaries found by their surface, luma or the frame before, or twice on their line",
      &FilterCounts::recovered},
     {"fronts", "last boundaries of a surface that had been taken for some of what is behind it",
      &FilterCounts::fronts},
