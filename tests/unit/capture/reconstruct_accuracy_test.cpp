@@ -276,7 +276,8 @@ TEST_P(HonestSigma, IsThatOfTheErrors) {
     if (!*out) continue;
     for (const GridPoint& p : (*out)->surface.grid) {
       ASSERT_GT(p.sigma_px, 0);
-      if (const auto at = filmed.true_column(truth, p.line * step, p.boundary, p.column_px))
+      const int row = p.line * step % truth.height();  // of second places, too
+      if (const auto at = filmed.true_column(truth, row, p.boundary, p.column_px))
         normalised.push_back((p.column_px - *at) / p.sigma_px);
     }
   }

@@ -326,7 +326,7 @@ TEST(DepthSigma, IsWhatDepthErrorsAre) {
     ASSERT_FALSE(truth.empty());
     const Surface& s = (*frame)->surface;
     for (std::size_t i = 0; i < s.positions.size(); ++i) {
-      const int row = s.grid[i].line * 2;
+      const int row = s.grid[i].line * 2 % truth.height();  // of second places, too
       const float column = s.grid[i].column_px;
       const int x = static_cast<int>(column);
       if (x < 8 || x + 9 >= truth.width()) continue;
