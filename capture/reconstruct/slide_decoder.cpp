@@ -30,6 +30,7 @@
 #include "capture/reconstruct/second_places.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/sharp_luma.h"
+#include "capture/reconstruct/smooth_across.h"
 #include "capture/reconstruct/trace.h"
 #include "capture/reconstruct/weak_signal.h"
 #include "capture/reconstruct/weigh.h"
@@ -416,6 +417,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
     // Without an earlier frame under the slide nothing tells what moves.
     if (clear && s.have_same) s.look_again(rows, pool, report);
     report.filters.duplicate = s.fill(pool, out);
+    smooth_across(pool, out);
     if (clear) {
       const std::size_t second =
           s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out});
