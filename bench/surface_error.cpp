@@ -10,6 +10,7 @@
 
 #include "base/lens.h"
 #include "base/line_step.h"
+#include "capture/reconstruct/detection_lines.h"
 
 namespace relievo::bench {
 namespace {
@@ -69,11 +70,6 @@ bool lies_on_sheets(const std::vector<std::optional<Place>>& places) {
   return static_cast<double>(on) >= kMostOnSheets * static_cast<double>(places.size());
 }
 
-int lines_of(const Rig& rig) {
-  const int step_px = line_step_px(rig.scan);
-  return (rig.camera.height + step_px - 1) / step_px;
-}
-
 /// The encoded vertex there: of those seen at its column of the texture the one whose boundary is
 /// nearest, since stripes may lie closer than a coarse codec's steps. A line may see a boundary twice: second
 /// places come `lines` further down. kNowhere where there is none.
@@ -125,7 +121,8 @@ Result<SurfaceError> surface_error(const Surface& encoded, const Surface& decode
   double squares = 0;
   for (std::size_t i = 0; i < decoded.positions.size(); ++i) {
     const std::int64_t match =
-        places[i] ? match_of(*places[i], encoded, vertex_at, pattern, lines_of(rig), on_sheets) : kNowhere;
+        places[i] ? match_of(*places[i], encoded, vertex_at, pattern, line_count(rig, 1), on_sheets)
+                  : kNowhere;
     if (match == kNowhere)
       return Error{"vertex " + std::to_string(i) + " that was decoded was never encoded"};
     const Vec3f& a = encoded.positions[static_cast<std::size_t>(match)];

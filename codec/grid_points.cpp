@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/lens.h"
+#include "codec/gather_kernels.h"
 
 namespace relievo {
 namespace {
@@ -207,17 +208,14 @@ void GridPoints::tell_quality(const StripeGrid& grid, int line, Surface& out, st
 
 /// Triangles on copies are on what those are copies of.
 void GridPoints::join_copies(Surface& out) const {
-  const auto lines = static_cast<std::uint16_t>(calibration_.lines());
-  const auto before = [](const GridPoint& a, const GridPoint& b) {
-    return a.line != b.line ? a.line < b.line : a.boundary < b.boundary;
-  };
-  const auto second = std::lower_bound(out.grid.begin(), out.grid.end(), GridPoint{0, lines}, before);
+  const std::uint32_t apart = static_cast<std::uint32_t>(calibration_.lines()) * kBelowKey;
+  const auto second = std::ranges::lower_bound(out.grid, apart, {}, place_key);
   const auto firsts = static_cast<std::uint32_t>(second - out.grid.begin());
   std::vector<std::uint32_t> joined;
   for (auto at = second; at != out.grid.end(); ++at) {
-    const GridPoint place{at->boundary, static_cast<std::uint16_t>(at->line - lines)};
-    const auto first = std::lower_bound(out.grid.begin(), second, place, before);
-    const bool is_copy = first != second && !before(place, *first) && first->column_px == at->column_px;
+    const std::uint32_t place = place_key(*at) - apart;
+    const auto first = std::ranges::lower_bound(out.grid.begin(), second, place, {}, place_key);
+    const bool is_copy = first != second && place_key(*first) == place && first->column_px == at->column_px;
     joined.push_back(static_cast<std::uint32_t>((is_copy ? first : at) - out.grid.begin()));
   }
   for (std::size_t t = out.triangles.size(); t-- > 0 && out.triangles[t][0] >= firsts;)

@@ -5,10 +5,10 @@
 #include <string>
 #include <utility>
 
-#include "base/line_step.h"
 #include "base/log.h"
 #include "base/thread_name.h"
 #include "base/time.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "codec/reduce.h"
 
 namespace relievo {
@@ -17,12 +17,6 @@ namespace {
 constexpr int kStepBits = 4;         // a sixteenth of a pixel: below the noise of what is measured
 constexpr int kTextureQuality = 70;  // of half the size
 constexpr float kBound_px = 1;
-
-/// Of surfaces: as FrameEncoder has them.
-int lines_of(const Rig& rig, int line_stride) {
-  const int step_px = line_step_px(rig.scan) * line_stride;
-  return (rig.camera.height + step_px - 1) / step_px;
-}
 
 }  // namespace
 
@@ -59,7 +53,7 @@ Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& enco
     : rig_(rig),
       pattern_(pattern),
       line_stride_(line_stride),
-      lines_(lines_of(rig, line_stride)),
+      lines_(line_count(rig, line_stride)),
       encode_(encode),
       depth_resolution_(depth_resolution),
       volume_(encode.volume) {}

@@ -357,76 +357,75 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   s.match_in_order(s.order, pool);
   if (s.paper) {
     report.matched = s.match.valid;
-  } else {
-    const DetectionLines rows(pair, s.line_stride);
-    const std::size_t traced =
-        s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
-    report.filters.traced = traced;
-    report.filters.fronts = s.front_edges.correct(s.edges, s.sequence.shown_colours(s.order),
-                                                  s.sequence.shown_colours(other(s.order)), pool, s.result);
-    std::swap(s.before_px, s.result.seen_px);
-    s.before_motion = s.newer.difference.motion;
-    s.before_ns = pair.time_ns;
-    const SharpLuma sharp(rows);
-    s.refiner.refine(s.newer.difference, rows.own, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
-                     &sharp);
-    const std::size_t borrowed =
-        s.leaning.correct(rows, s.newer.difference, s.pattern.boundaries(), pool, s.result, s.edges);
-    const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
-    const SequenceCounts& counts = s.result.counts;
-    report.filters.unsupported = counts.unsupported;
-    report.filters.completed = counts.completed;
-    report.filters.rejected = borrowed + checked.rejected;
-    report.filters.moved = checked.moved;
-    s.recovery.recover({.shown = s.newer.difference,
-                        .slide = rows.own,
-                        .shown_colours = s.sequence.shown_colours(s.order),
-                        .other = s.have_older ? &s.older.difference : nullptr,
-                        .other_colours = s.sequence.shown_colours(other(s.order))},
-                       s.refiner, s.edges, s.result, pool, s.recovered);
-    report.filters.recovered = s.recovered.size();
-    const ContinuityCounts by_before = s.continuity.check(s.recovered, pool, s.result, s.edges);
-    report.filters.rejected += by_before.rejected;
-    report.filters.recovered += by_before.carried;
-    report.filters.recovered += s.readmission.readmit(s.recovered, s.result, s.edges);
-    report.matched =
-        counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
-    // Under white-field the difference is of the slide's own instant already.
-    if (s.pattern.scheme != Scheme::kWhiteField)
-      s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
-    s.moving.find(s.newer.difference.width, s.result, s.edges);
-    const bool first_slide = s.pattern.slides == 1 || s.order == SlideOrder::kNewerIsFirst;
-    const SlideFieldView field{
-        rows.slide(),        s.sequence.shown_colours(s.order), &s.newer.difference.motion,
-        first_slide ? 0 : 1, s.newer.difference.noise,          &s.moving,
-        s.refiner.ambient()};
-    s.field_placer.place(field, s.result, pool, s.edges);
-    const std::size_t grown = s.growth.grow(field, s.edges, pool, s.result, s.recovered);
-    report.filters.recovered += grown;
-    report.matched += grown;
-    s.places.fill(s.pattern.boundaries(), pool, s.result, s.edges, s.recovered);
-    const std::size_t carried = s.persistence.carry(s.moving, pool, s.places, s.recovered);
-    report.filters.recovered += carried;
-    report.matched += carried;
-    const WeighingCounts weighed =
-        s.weighing.weigh(s.places, s.moving, s.consistency.scale(), pool, s.result, s.edges, s.recovered);
-    report.filters.rejected += weighed.rejected;
-    report.filters.moved += weighed.moved;
-    // Of speckle no picture can be told.
-    const bool clear = !s.moving.much() && !s.consistency.speckled();
-    // Without an earlier frame under the slide nothing tells what moves.
-    if (clear && s.have_same) s.look_again(rows, pool, report);
     report.filters.duplicate = s.fill(pool, out);
-    smooth_across(pool, out);
-    if (clear) {
-      const std::size_t second =
-          s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out});
-      report.filters.recovered += second;
-      report.matched += second;
-    }
     return true;
   }
+  const DetectionLines rows(pair, s.line_stride);
+  const std::size_t traced =
+      s.tracer.trace(s.newer.difference, s.sequence, s.context(s.order), pool, s.result, s.edges);
+  report.filters.traced = traced;
+  report.filters.fronts = s.front_edges.correct(s.edges, s.sequence.shown_colours(s.order),
+                                                s.sequence.shown_colours(other(s.order)), pool, s.result);
+  std::swap(s.before_px, s.result.seen_px);
+  s.before_motion = s.newer.difference.motion;
+  s.before_ns = pair.time_ns;
+  const SharpLuma sharp(rows);
+  s.refiner.refine(s.newer.difference, rows.own, s.result, s.sequence.shown_colours(s.order), pool, s.edges,
+                   &sharp);
+  const std::size_t borrowed =
+      s.leaning.correct(rows, s.newer.difference, s.pattern.boundaries(), pool, s.result, s.edges);
+  const ConsistencyCounts checked = s.consistency.check(s.pattern.boundaries(), pool, s.result, s.edges);
+  const SequenceCounts& counts = s.result.counts;
+  report.filters.unsupported = counts.unsupported;
+  report.filters.completed = counts.completed;
+  report.filters.rejected = borrowed + checked.rejected;
+  report.filters.moved = checked.moved;
+  s.recovery.recover({.shown = s.newer.difference,
+                      .slide = rows.own,
+                      .shown_colours = s.sequence.shown_colours(s.order),
+                      .other = s.have_older ? &s.older.difference : nullptr,
+                      .other_colours = s.sequence.shown_colours(other(s.order))},
+                     s.refiner, s.edges, s.result, pool, s.recovered);
+  report.filters.recovered = s.recovered.size();
+  const ContinuityCounts by_before = s.continuity.check(s.recovered, pool, s.result, s.edges);
+  report.filters.rejected += by_before.rejected;
+  report.filters.recovered += by_before.carried;
+  report.filters.recovered += s.readmission.readmit(s.recovered, s.result, s.edges);
+  report.matched =
+      counts.in_order - counts.unsupported + counts.completed + traced + report.filters.recovered;
+  // Under white-field the difference is of the slide's own instant already.
+  if (s.pattern.scheme != Scheme::kWhiteField)
+    s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
+  s.moving.find(s.newer.difference.width, s.result, s.edges);
+  const bool first_slide = s.pattern.slides == 1 || s.order == SlideOrder::kNewerIsFirst;
+  const SlideFieldView field{
+      rows.slide(),        s.sequence.shown_colours(s.order), &s.newer.difference.motion,
+      first_slide ? 0 : 1, s.newer.difference.noise,          &s.moving,
+      s.refiner.ambient()};
+  s.field_placer.place(field, s.result, pool, s.edges);
+  const std::size_t grown = s.growth.grow(field, s.edges, pool, s.result, s.recovered);
+  report.filters.recovered += grown;
+  report.matched += grown;
+  s.places.fill(s.pattern.boundaries(), pool, s.result, s.edges, s.recovered);
+  const std::size_t carried = s.persistence.carry(s.moving, pool, s.places, s.recovered);
+  report.filters.recovered += carried;
+  report.matched += carried;
+  const WeighingCounts weighed =
+      s.weighing.weigh(s.places, s.moving, s.consistency.scale(), pool, s.result, s.edges, s.recovered);
+  report.filters.rejected += weighed.rejected;
+  report.filters.moved += weighed.moved;
+  // Of speckle no picture can be told.
+  const bool clear = !s.moving.much() && !s.consistency.speckled();
+  // Without an earlier frame under the slide nothing tells what moves.
+  if (clear && s.have_same) s.look_again(rows, pool, report);
   report.filters.duplicate = s.fill(pool, out);
+  smooth_across(pool, out);
+  if (clear) {
+    const std::size_t second =
+        s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out});
+    report.filters.recovered += second;
+    report.matched += second;
+  }
   return true;
 }
 

@@ -65,6 +65,18 @@ inline float near_offset_px(const GridScene& scene) {
   return 1.4F * pitch + scene.shift_px;
 }
 
+/// triangle(i, j, k) of a cell's two, on the diagonal from corner 0 to 2 or else from 1 to 3.
+template <typename Add>
+void split_cell(bool straight, const Add& triangle) {
+  if (straight) {
+    triangle(0, 1, 2);
+    triangle(2, 3, 0);
+  } else {
+    triangle(1, 2, 3);
+    triangle(3, 0, 1);
+  }
+}
+
 /// Triangulated by the reconstruction's own Triangulator.
 inline Frame3D grid_frame(const GridScene& scene) {
   const Rig rig = grid_rig(scene);
@@ -119,13 +131,7 @@ inline Frame3D grid_frame(const GridScene& scene) {
                                  static_cast<std::uint32_t>(index[q[j]]),
                                  static_cast<std::uint32_t>(index[q[k]])});
       };
-      if (index[q[0]] >= 0 && index[q[2]] >= 0 && near[q[0]] == near[q[2]]) {
-        triangle(0, 1, 2);
-        triangle(2, 3, 0);
-      } else {
-        triangle(1, 2, 3);
-        triangle(3, 0, 1);
-      }
+      split_cell(index[q[0]] >= 0 && index[q[2]] >= 0 && near[q[0]] == near[q[2]], triangle);
     }
   }
   return frame;
@@ -178,12 +184,8 @@ inline Frame3D twice_frame(const GridScene& scene) {
         // The first places have the triangle of the other three.
         const int c = static_cast<int>(std::find_if(q, q + 4, is_second) - q);
         triangle((c + 3) % 4, c, (c + 1) % 4);
-      } else if (q[0] >= 0 && q[2] >= 0) {
-        triangle(0, 1, 2);
-        triangle(2, 3, 0);
       } else {
-        triangle(1, 2, 3);
-        triangle(3, 0, 1);
+        split_cell(q[0] >= 0 && q[2] >= 0, triangle);
       }
     }
   }

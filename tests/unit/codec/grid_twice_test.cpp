@@ -297,15 +297,26 @@ void set_lines(Bytes& bytes, int lines) {
 constexpr std::uint8_t kTwice = 8;
 const GridScene kSmall{.width = 320, .height = 144, .stripes = 27, .distorts = true, .quality = true};
 
-TEST(HostileGridTwice, FlagLinesAndKeyMustAgree) {
-  const auto calibration = grid_calibration(test::grid_rig(kSmall), test::grid_pattern(kSmall));
+/// A key grid and a delta grid that builds on it, both with second places.
+class HostileGridTwice : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Surface surface = test::twice_frame(kSmall).surface;
+    ASSERT_TRUE(to_grid(surface, calibration, {.with_quality = true}, key.grid));
+    good = coded(key.grid, calibration, nullptr);
+    key.id = grid_id(good.bytes);
+    ASSERT_TRUE(to_grid(surface, calibration, {.with_quality = true}, next));
+    delta = coded(next, calibration, &key);
+  }
+
+  const GridCalibration calibration = grid_calibration(test::grid_rig(kSmall), test::grid_pattern(kSmall));
   GridKey key;
-  ASSERT_TRUE(to_grid(test::twice_frame(kSmall).surface, calibration, {.with_quality = true}, key.grid));
-  const Coded good = coded(key.grid, calibration, nullptr);
-  key.id = grid_id(good.bytes);
-  StripeGrid next, out;
-  ASSERT_TRUE(to_grid(test::twice_frame(kSmall).surface, calibration, {.with_quality = true}, next));
-  const Coded delta = coded(next, calibration, &key);
+  StripeGrid next;  // what `delta` is of
+  Coded good, delta;
+};
+
+TEST_F(HostileGridTwice, FlagLinesAndKeyMustAgree) {
+  StripeGrid out;
   EXPECT_EQ(good.bytes[0] & kTwice, kTwice);
   GridDecoder decoder;
   const auto decodes = [&](const Coded& frame, const auto& change) {
@@ -331,14 +342,11 @@ TEST(HostileGridTwice, FlagLinesAndKeyMustAgree) {
   const Coded other = coded(once, calibration, nullptr);
   ASSERT_TRUE(decodes(other, [](Bytes&) {}));
   EXPECT_FALSE(decodes(other, unflag)) << "the flag without the lines";
-  const Coded of_other_size = coded(once, calibration, nullptr);
-  GridKey small{.id = grid_id(of_other_size.bytes), .grid = once};
-  Bytes bytes = delta.bytes;
-  EXPECT_FALSE(decoder.decode(bytes, delta.vertices, delta.triangles, &small, out).ok());
+  const GridKey of_other_size{.id = grid_id(other.bytes), .grid = once};
+  EXPECT_FALSE(decoder.decode(delta.bytes, delta.vertices, delta.triangles, &of_other_size, out).ok());
 }
 
-TEST(HostileGridTwice, TrianglesFromTheLastLineToTheFirstOneAreRefused) {
-  const auto calibration = grid_calibration(test::grid_rig(kSmall), test::grid_pattern(kSmall));
+TEST_F(HostileGridTwice, TrianglesFromTheLastLineToTheFirstOneAreRefused) {
   for (const bool joins : {false, true}) {
     StripeGrid grid;
     ASSERT_TRUE(to_grid(test::grid_frame(kSmall).surface, calibration, {.twice = true}, grid));
@@ -355,15 +363,7 @@ TEST(HostileGridTwice, TrianglesFromTheLastLineToTheFirstOneAreRefused) {
   }
 }
 
-TEST(HostileGridTwice, MutatedBytesGiveAnErrorOrAGrid) {
-  const auto calibration = grid_calibration(test::grid_rig(kSmall), test::grid_pattern(kSmall));
-  GridKey key;
-  ASSERT_TRUE(to_grid(test::twice_frame(kSmall).surface, calibration, {.with_quality = true}, key.grid));
-  const Coded good = coded(key.grid, calibration, nullptr);
-  key.id = grid_id(good.bytes);
-  StripeGrid next;
-  ASSERT_TRUE(to_grid(test::twice_frame(kSmall).surface, calibration, {.with_quality = true}, next));
-  const Coded delta = coded(next, calibration, &key);
+TEST_F(HostileGridTwice, MutatedBytesGiveAnErrorOrAGrid) {
   test::Random random(12);
   GridDecoder decoder;
   int decoded = 0;
