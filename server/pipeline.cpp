@@ -14,6 +14,7 @@
 #include "base/log.h"
 #include "base/thread_name.h"
 #include "base/time.h"
+#include "codec/frame_layout.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
 #include "server/texture_look.h"
@@ -52,6 +53,8 @@ struct Reconstructed {
 };
 struct Encoded {
   FrameMessage message;
+  std::uint64_t number;   // counts encoded frames,
+  std::uint64_t key;      // that of the last one that decodes alone
   std::int64_t begin_ns;  // of its encoding
   double place;           // RateControl::place()
 };
@@ -81,6 +84,26 @@ class SlidesSeen {
     std::int64_t time_ns;
   };
   std::optional<Seen> last_, other_;
+};
+
+/// Whether encoded frames, in order, decode where some of them were dropped.
+class Decodable {
+ public:
+  bool add(const Encoded& item) {
+    is_whole_ = is_whole_ && item.number == next_;
+    next_ = item.number + 1;
+    const BuildsOn on = what_it_builds_on(*item.message.data);
+    if (on == BuildsOn::kNothing) {
+      key_ = item.key;
+      is_whole_ = true;
+    }
+    return on == BuildsOn::kFrameBefore ? is_whole_ : item.key == key_;
+  }
+
+ private:
+  std::uint64_t next_ = 0;
+  std::uint64_t key_ = 0;  // the last one that came
+  bool is_whole_ = true;   // since then
 };
 
 class ThreadedPipeline final : public Pipeline {
@@ -130,7 +153,7 @@ class ThreadedPipeline final : public Pipeline {
     s.stream = options_.stream;
     s.drops_reconstruct = to_reconstruct_.drops() + observed_;
     s.drops_encode = to_encode_.drops();
-    s.drops_publish = to_publish_.drops();
+    s.drops_publish = to_publish_.drops() + undecodable_;
     if (options_.rungs != nullptr) s.rungs = options_.rungs->status();
     std::lock_guard lock(mutex_);
     s.state = state_;
@@ -327,6 +350,7 @@ class ThreadedPipeline final : public Pipeline {
     std::int64_t look_ns = steady_now_ns();  // when the texture's error is measured next
     std::optional<RateControl> rate;
     if (options_.rate.any()) rate.emplace(options_.rate, source_.info().rig.frame_rate, options_.encode);
+    std::uint64_t encoded = 0, key = 0;
     while (auto item = to_encode_.pop()) {
       const std::int64_t begin = steady_now_ns();
       if (begin - key_ns >= kWishedKeyInterval_ns && key_wanted_.exchange(false))
@@ -349,7 +373,10 @@ class ThreadedPipeline final : public Pipeline {
       if (const std::string notice = encoder_.take_notice(); !notice.empty()) log_warning(notice);
       stats_.encoded_parts(milliseconds(geometry_ns - begin), milliseconds(steady_now_ns() - geometry_ns));
       const bool is_key = is_key_frame(*bytes);
-      if (is_key) key_ns = begin;
+      if (is_key) {
+        key_ns = begin;
+        key = encoded;
+      }
       if (rate) {
         rate->add(bytes->size(), is_key, encode.key_interval);
         stats_.rate_level(static_cast<std::uint32_t>(rate->level()));
@@ -361,7 +388,7 @@ class ThreadedPipeline final : public Pipeline {
       message.data = std::make_shared<const Bytes>(*std::move(bytes));
       const auto data = message.data;
       const std::uint64_t dropped = to_publish_.drops();
-      push(to_publish_, Encoded{std::move(message), begin, place});
+      push(to_publish_, Encoded{std::move(message), encoded++, key, begin, place});
       if (to_publish_.drops() > dropped) encoder_.request_key_frame();  // later frames may build on that one
       if (options_.rate.texture_db > 0 && is_key && begin >= look_ns) {
         look_ns = begin + kLookInterval_ns;
@@ -377,10 +404,14 @@ class ThreadedPipeline final : public Pipeline {
   void publish_stage() {
     name_this_thread("publish");
     std::uint64_t sequence = 0;
+    Decodable decodable;
     std::int64_t status_due_ns = steady_now_ns();
     while (!to_publish_.finished()) {
       const std::int64_t wait_ns = std::max<std::int64_t>(0, status_due_ns - steady_now_ns());
-      if (auto encoded = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns))) {
+      auto encoded = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns));
+      if (encoded && !decodable.add(*encoded)) {
+        ++undecodable_;  // readers would see no gap
+      } else if (encoded) {
         FrameMessage& message = encoded->message;
         message.sequence = sequence++;
         message.publish_time_ns = utc_now_ns();
@@ -445,7 +476,8 @@ class ThreadedPipeline final : public Pipeline {
   FrameEncoder encoder_;
   WorkingVolume volume_;
   std::atomic<bool> key_wanted_{false};
-  std::atomic<std::uint64_t> observed_{0};  // frames that gave no surface so that the next one's is of now
+  std::atomic<std::uint64_t> observed_{0};     // frames that gave no surface so that the next one's is of now
+  std::atomic<std::uint64_t> undecodable_{0};  // frames that build on one dropped before publishing
   BoundedQueue<Captured> to_reconstruct_{kQueueFrames};
   BoundedQueue<Reconstructed> to_encode_{kQueueFrames};
   BoundedQueue<Encoded> to_publish_{kQueueFrames};

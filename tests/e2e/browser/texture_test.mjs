@@ -148,9 +148,11 @@ try {
     return here.coloured > 5000 && Math.abs(here.coloured / there.coloured - 1) < 0.15;
   });
   console.log(`coloured pixels: ${there.coloured} of H.264, ${here.coloured} of JPEG`);
-  for (const page of [video, hidden]) {
-    assert.ok(await page.isHidden('#notice'));
-    assert.equal((await look(page)).errors, 0, (await look(page)).lastError);
+  for (const [name, page] of Object.entries({ video, hidden })) {
+    assert.ok(await page.isHidden('#notice'), name);
+    const { errors, lastError } = await look(page);
+    const drops = async () => (await (await fetch(`${server.address}/metrics`)).text()).match(/^relievo_stream_drops_total.*/gm);
+    assert.equal(errors, 0, errors > 0 ? `${name}: ${lastError}; ${await drops()}` : '');
   }
   console.log('ok: JPEG where WebCodecs are missing');
 } finally {

@@ -207,6 +207,54 @@ TEST_F(PipelineTest, ASlowSinkCostsTheOldestFramesBeforePublishing) {
   EXPECT_EQ(s.drops_capture, 0U);
 }
 
+// Readers see no gap where a frame was dropped before it had a number: what they get must decode.
+TEST_F(PipelineTest, WhatBuildsOnADroppedFrameIsDroppedToo) {
+  Gate entered;
+  Gate release;
+  sink_.on_frame = [&](const FrameMessage& f) -> Status {
+    if (f.number == 1) {
+      entered.open();
+      release.wait();
+    }
+    return {};
+  };
+  Pipeline* running = nullptr;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        if (n == 2) {
+          EXPECT_TRUE(entered.wait());
+        }
+        if (n > 2 && n < 6) {
+          EXPECT_TRUE(eventually(at_rest)) << n;
+        }
+        if (n == 6) {  // frame 5 was encoded before anybody knew that it throws out frame 2
+          EXPECT_TRUE(eventually([&] { return running->status().drops_publish > 0; }));
+          release.open();
+          EXPECT_TRUE(eventually([&] { return running->stages().waiting_publish == 0; }));
+        }
+        if (n == 9) return ScriptedSource::end();
+        return std::optional(frames_(n));
+      },
+      true);
+  PipelineOptions options;
+  options.encode.key_interval = 100;
+  options.encode.texture = TextureCodec::kH264;
+  const auto pipeline = make(source, {&sink_}, options);
+  running = pipeline.get();
+  ASSERT_TRUE(pipeline->run());
+  const auto got = sink_.frames();
+  EXPECT_EQ(numbers(got), (std::vector<std::uint64_t>{1, 6, 7, 8}));
+  expect_no_gaps(got);
+  EXPECT_EQ(pipeline->status().drops_publish, 4U);
+  FrameDecoder decoder;
+  Frame3D frame;
+  for (const FrameMessage& message : got) {
+    const Status decoded = decoder.decode(*message.data, frame);
+    EXPECT_TRUE(decoded) << message.number << ": " << decoded.error().message;
+  }
+}
+
 TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction) {
   constexpr std::uint64_t kLeast = 400;
   Pipeline* running = nullptr;
