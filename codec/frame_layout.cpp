@@ -7,6 +7,7 @@
 #include <string>
 
 #include "codec/byte_io.h"
+#include "codec/grid_coder.h"
 #include "codec/texture_codec.h"
 
 namespace relievo {
@@ -175,6 +176,14 @@ BuildsOn what_it_builds_on(std::span<const std::uint8_t> bytes) {
   const auto texture = layout->sections.texture;
   const bool is_chained = !texture.empty() && !texture_is_key(layout->header.texture, texture);
   return is_chained ? BuildsOn::kFrameBefore : BuildsOn::kKeyFrame;
+}
+
+bool grid_builds_on(std::span<const std::uint8_t> bytes, std::span<const std::uint8_t> key) {
+  const auto layout = read_frame_layout(bytes);
+  const auto key_layout = read_frame_layout(key);
+  if (!layout || !key_layout || layout->header.geometry != GeometryCodec::kGrid) return false;
+  const auto head = read_grid_head(layout->sections.geometry);
+  return head && !head->is_key && head->key == grid_id(key_layout->sections.geometry);
 }
 
 Bytes write_frame(const FrameHeader& header, const FrameSections& sections) {

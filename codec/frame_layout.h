@@ -31,6 +31,8 @@ Result<FrameLayout> read_frame_layout(std::span<const std::uint8_t> bytes);
 enum class BuildsOn : std::uint8_t { kNothing, kKeyFrame, kFrameBefore };
 /// Any input; nothing for what is no frame.
 BuildsOn what_it_builds_on(std::span<const std::uint8_t> bytes);
+/// Whether a frame's grid builds on that of the key frame `key`. Any input.
+bool grid_builds_on(std::span<const std::uint8_t> bytes, std::span<const std::uint8_t> key);
 
 /// Fails where one of the counts is above its limit.
 Status check_limits(const DecodeLimits& limits, std::uint64_t vertices, std::uint64_t triangles,
