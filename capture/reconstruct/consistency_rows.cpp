@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/consistency_rows.h"
 
-#include <cmath>
-
 #include "base/variants.h"
 #include "capture/reconstruct/eight.h"
 
@@ -62,13 +60,6 @@ RELIEVO_INLINE void neighbourhoods_body(const ColumnRows& rows, const float* noi
                            (bent_along & Neighbourhood::kBentAlong) | (squeezed & Neighbourhood::kSqueezed);
     store(bits, out + b);
   }
-}
-
-RELIEVO_INLINE void take_root(Eight& v) {
-  float values[8];
-  store(v, values);
-  for (float& value : values) value = std::sqrt(value);  // at once, since errno is left alone in this file
-  load(values, v);
 }
 
 RELIEVO_INLINE void average_body(const float* measured_px, const float* smooth_px, const float* noise_px,

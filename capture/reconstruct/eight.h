@@ -4,6 +4,7 @@
 // depends on the set.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -20,6 +21,13 @@ RELIEVO_INLINE void load(const float* from, Eight& to) {
 }
 RELIEVO_INLINE void store(const Eight& from, float* to) {
   std::memcpy(to, &from, sizeof from);
+}
+/// At once only in files that leave errno alone (CMakeLists.txt).
+RELIEVO_INLINE void take_root(Eight& v) {
+  float values[8];
+  store(v, values);
+  for (float& value : values) value = std::sqrt(value);
+  load(values, v);
 }
 /// Numbers from 0 to 255. Compilers convert them one by one.
 RELIEVO_INLINE void store(const EightInts& from, std::uint8_t* to) {

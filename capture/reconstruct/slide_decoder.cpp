@@ -245,6 +245,7 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
   const std::size_t carried = persistence.carry(moving, pool, places, recovered);
   const WeighingCounts weighed =
       weighing.weigh(places, moving, kQuickTolerance * consistency.scale(), pool, out);
+  smooth_across(pool, out);
   report.filters.unsupported = quick_counts.unsupported;
   report.filters.completed = quick_counts.completed;
   report.filters.rejected = checked.rejected + by_before.rejected + weighed.rejected;

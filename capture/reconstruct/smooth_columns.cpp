@@ -13,6 +13,12 @@ namespace {
 constexpr float kStraightFit = 1.4F;
 constexpr float kBentFit = 3.F;
 
+// Across boundaries. Farther off the cubic than both is the surface itself.
+constexpr float kMost_px = 0.1F;
+constexpr float kSigmas = 4;
+// Standard deviations say more than errors are, the more so the smoother what they are of is.
+constexpr float kSaid = 0.95F;
+
 /// `worst` becomes |off| where that is greater; a NaN that is there first stays.
 RELIEVO_INLINE void take(const Eight& off, Eight& worst) {
   const Eight size = off < 0 ? -off : off;
@@ -74,14 +80,59 @@ RELIEVO_INLINE void smooth_body(const std::array<const float*, 7>& rows, const f
   }
 }
 
+/// A row's numbers at one place and at the two on either side of it.
+struct Five {
+  Eight far_before, before, own, after, far_after;
+};
+RELIEVO_INLINE void load_five(const float* row, Five& to) {
+  load(row - 2, to.far_before);
+  load(row - 1, to.before);
+  load(row, to.own);
+  load(row + 1, to.after);
+  load(row + 2, to.far_after);
+}
+
+RELIEVO_INLINE void across_body(float* column_px, float* sigma_px, int count) {
+  constexpr float kNear = 4.F / 6, kFar = -1.F / 6;  // weights of the cubic through the four beside a place
+  Five column, sigma, next_column, next_sigma;
+  load_five(column_px, next_column);
+  load_five(sigma_px, next_sigma);
+  for (int b = 0; b < count; b += 8) {
+    column = next_column;
+    sigma = next_sigma;
+    // All as it was measured, before this is written.
+    load_five(column_px + b + 8, next_column);
+    load_five(sigma_px + b + 8, next_sigma);
+    const Eight off =
+        column.own - kNear * (column.before + column.after) - kFar * (column.far_before + column.far_after);
+    const Eight own = sigma.own * sigma.own;
+    const Eight variance =
+        kNear * kNear * (sigma.before * sigma.before + sigma.after * sigma.after) +
+        kFar * kFar * (sigma.far_before * sigma.far_before + sigma.far_after * sigma.far_after);
+    const Eight both = own + variance;
+    const EightInts foretold = (off < kMost_px) & (off > -kMost_px) & (off * off < kSigmas * kSigmas * both);
+    const Eight share = own / both;
+    Eight smoothed = share * variance;
+    take_root(smoothed);
+    store(foretold ? column.own - share * off : column.own, column_px + b);
+    store(foretold ? kSaid * smoothed : sigma.own, sigma_px + b);
+  }
+}
+
 void smooth_portable(const std::array<const float*, 7>& rows, const float* noises, int count, float usual_px,
                      float* out) {
   smooth_body(rows, noises, count, usual_px, out);
+}
+void across_portable(float* column_px, float* sigma_px, int count) {
+  across_body(column_px, sigma_px, count);
 }
 #if defined(__x86_64__)
 [[gnu::target("avx2")]] void smooth_avx2(const std::array<const float*, 7>& rows, const float* noises,
                                          int count, float usual_px, float* out) {
   smooth_body(rows, noises, count, usual_px, out);
+}
+[[gnu::target("avx2")]] void across_avx2(float* column_px, float* sigma_px, int count) {
+  across_body(column_px, sigma_px, count);
 }
 #endif
 
@@ -89,9 +140,9 @@ void smooth_portable(const std::array<const float*, 7>& rows, const float* noise
 
 const std::vector<Smoother>& smoothers() {
   static const std::vector<Smoother> all = [] {
-    std::vector<Smoother> out{{"portable", smooth_portable}};
+    std::vector<Smoother> out{{"portable", smooth_portable, across_portable}};
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) out.push_back({"avx2", smooth_avx2});
+    if (__builtin_cpu_supports("avx2")) out.push_back({"avx2", smooth_avx2, across_avx2});
 #endif
     return out;
   }();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Noise averaged along a boundary: its columns on a line and on the three above and below. As rows.h: a
-// portable reference, and others with the same results for what a processor can do beyond it.
+// Noise averaged along a boundary: its columns on a line and on the three above and below; and across
+// boundaries. As rows.h: a portable reference, and others with the same results for what a processor can do
+// beyond it.
 #pragma once
 
 #include <array>
@@ -18,6 +19,10 @@ struct Smoother {
   /// long as `count` rounded up to a multiple of eight.
   void (*smooth)(const std::array<const float*, 7>& rows, const float* noises, int count, float usual_px,
                  float* out);
+
+  /// As smooth_across.h, of a line: one a boundary, `count` rounded up to a multiple of eight of them, and
+  /// read from two places before the first to ten behind that.
+  void (*across)(float* column_px, float* sigma_px, int count);
 };
 
 /// Those that run on this machine, the reference first and the best last.

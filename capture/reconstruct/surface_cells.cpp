@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/surface_cells.h"
 
-#include <cmath>
-
 #include "base/variants.h"
 #include "capture/reconstruct/eight.h"
 
@@ -180,7 +178,7 @@ RELIEVO_INLINE void unit_body(int count, const NormalRow& row) {
     const Eight square = x * x + y * y + z * z;
     const EightInts none = square <= 0;
     Eight length = none ? one : square;
-    for (int i = 0; i < 8; ++i) length[i] = std::sqrt(length[i]);
+    take_root(length);
     const Eight per_length = one / length;
     store(x * per_length, row.axis(0) + b);
     store(y * per_length, row.axis(1) + b);

@@ -97,6 +97,34 @@ TEST_P(Smoothers, EqualTheReferenceToTheLastBit) {
   }
 }
 
+TEST_P(Smoothers, AcrossBoundariesEqualTheReferenceToTheLastBit) {
+  constexpr std::size_t kFirst = 8, kBeyond = 24;
+  std::mt19937 random(10);
+  std::normal_distribution<float> normal(0, 1);
+  std::bernoulli_distribution missing(0.05), unknown(0.05), rough(0.1);
+  for (const int count : {1, 7, 8, 9, 16, 89}) {
+    for (int round = 0; round < 40; ++round) {
+      const std::size_t size = kFirst + static_cast<std::size_t>(count) + kBeyond;
+      std::vector<float> columns(size, kNone), sigmas(size, 0.F);
+      for (std::size_t i = kFirst; i < size - kBeyond; ++i) {
+        if (!missing(random))
+          columns[i] = 6 * static_cast<float>(i) + (rough(random) ? 0.5F : 0.02F) * normal(random);
+        sigmas[i] = unknown(random) ? 0 : 0.03F * std::fabs(normal(random));
+      }
+      auto expected_columns = columns, expected_sigmas = sigmas;
+      const auto before = columns;
+      smoother().across(columns.data() + kFirst, sigmas.data() + kFirst, count);
+      smoothers().front().across(expected_columns.data() + kFirst, expected_sigmas.data() + kFirst, count);
+      for (std::size_t i = 0; i < size; ++i) {
+        const bool both_none = std::isnan(columns[i]) && std::isnan(expected_columns[i]);
+        ASSERT_TRUE(columns[i] == expected_columns[i] || both_none) << i;
+        ASSERT_EQ(sigmas[i], expected_sigmas[i]) << i;
+        ASSERT_EQ(std::isnan(columns[i]), std::isnan(before[i])) << i;
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(, Smoothers, testing::Range(std::size_t{0}, smoothers().size()),
                          [](const auto& test) { return std::string(smoothers()[test.param].name); });
 
