@@ -174,6 +174,7 @@ const checks = {
   async 'a file dropped on the page is opened: an exported PLY'(page) {
     const index = 5;
     await seek(page, index);
+    await still(page); // of the range that was repeated a frame may still be on its way
     await onFrame(page, numbers[index]);
     const before = await page.evaluate(() => window.relievo.extent());
     const bytes = readFileSync(exported('ply', index)).toString('base64');
