@@ -6,10 +6,10 @@
 
 namespace relievo {
 
-/// Rows of the camera from one detection line to the next; of a progressive camera one row in `stride` is a
-/// line.
+/// Rows of the camera from one detection line to the next, where one row in `stride` of a progressive picture
+/// or of a field is a line.
 inline int line_step_px(Scan scan, int stride = 1) {
-  return scan == Scan::kInterlaced ? 2 : stride;
+  return (scan == Scan::kInterlaced ? 2 : 1) * stride;
 }
 
 }  // namespace relievo

@@ -17,7 +17,7 @@ namespace relievo {
 void add_decoder_option(CLI::App& app, Decoder& decoder);
 
 inline constexpr const char* kHalfLinesHelp =
-    "Of a progressive camera reconstruct every second row alone, in little more than half the time";
+    "Reconstruct every second line alone, in little more than half the time";
 /// --half-lines, which makes `line_stride` 2. It must outlive the parsing.
 void add_half_lines_option(CLI::App& app, int& line_stride);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rows of a frame that are detection lines. Line l is row 2 l of an interlaced picture, whichever field
-// was first, and row l * stride of a progressive one.
+// The rows of a frame that are detection lines. Line l is row 2 l * stride of an interlaced picture,
+// whichever field was first, and row l * stride of a progressive one.
 #pragma once
 
 #include <algorithm>
@@ -25,13 +25,15 @@ struct DetectionLines {
   bool shows_slide = true;  // `own` does, and `other` the complement; or the other way round
 
   DetectionLines(const CapturedFrame& frame, int stride = 1)
-      : own(frame.picture.view()), other(frame.complement.view()) {
+      : own(frame.picture.view()), other(frame.complement.view()), step_(stride) {
     if (frame.scan == Scan::kInterlaced) {
       other = own.field(1);
       own = own.field(0);
       between = true;
       shows_slide = frame.field_order == FieldOrder::kTop;
-    } else if (stride == 2) {
+    }
+    all_other_ = other;
+    if (stride == 2) {
       own = own.field(0);
       other = other.field(0);
     }
@@ -43,9 +45,16 @@ struct DetectionLines {
   int sign() const { return shows_slide ? 1 : -1; }
   /// The other exposure's rows whose mean lies on line l. It must have one.
   const std::uint8_t* other_above(int l) const {
-    return other.row(std::clamp(between ? l - 1 : l, 0, other.height - 1));
+    const int row = step_ * l;
+    return all_other_.row(std::clamp(between ? row - 1 : row, 0, all_other_.height - 1));
   }
-  const std::uint8_t* other_below(int l) const { return other.row(std::min(l, other.height - 1)); }
+  const std::uint8_t* other_below(int l) const {
+    return all_other_.row(std::min(step_ * l, all_other_.height - 1));
+  }
+
+ private:
+  View8 all_other_;  // also those of its rows that are beside no line
+  int step_;
 };
 
 }  // namespace relievo

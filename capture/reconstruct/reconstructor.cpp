@@ -50,13 +50,8 @@ Status check_fits(const CapturedFrame& frame, const Rig& rig) {
   return {};
 }
 
-Status check_lines(const Rig& rig, int stride) {
+Status check_lines(int stride) {
   if (stride != 1 && stride != 2) return Error{"line_stride is 1 or 2, not " + std::to_string(stride)};
-  if (stride == 2 && rig.scan == Scan::kInterlaced) {
-    return Error{
-        "half_lines leaves out every second row of a progressive camera; a field of this interlaced one has "
-        "no others: do without it"};
-  }
   return {};
 }
 
@@ -246,7 +241,7 @@ Result<Reconstructor> Reconstructor::create(const Rig& rig, const Pattern& patte
                  " slides; two frames in a row decode one or two: use a pattern with slides: 2"};
   }
   if (pattern.stripes() < 2) return Error{"the pattern has no boundary: it needs two stripes or more"};
-  if (auto status = check_lines(rig, options.line_stride); !status) return status.error();
+  if (auto status = check_lines(options.line_stride); !status) return status.error();
   if (pattern.scheme == Scheme::kOneSlide && options.decoder == Decoder::kPaper) {
     return Error{
         "the paper's decoder reads each code by itself, and those of scheme one-slide repeat: use the "

@@ -56,8 +56,11 @@ TEST_F(PipelineTest, LosslessEqualsTheSerialLoopByteForByte) {
   }
 }
 
-TEST(HalfLines, ReachReadersWhereTheirRowsAre) {
-  const StripedScene scene = striped_scene(Scan::kProgressive);
+class HalfLines : public testing::TestWithParam<Scan> {};
+
+TEST_P(HalfLines, ReachReadersWhereTheirRowsAre) {
+  const StripedScene scene = striped_scene(GetParam());
+  const int step_px = GetParam() == Scan::kInterlaced ? 4 : 2;
   const Frames frames(scene);
   ScriptedSource source(scene, count_to(frames, 4));
   CollectingSink sink;
@@ -71,15 +74,18 @@ TEST(HalfLines, ReachReadersWhereTheirRowsAre) {
     const auto frame = decoder.decode(*message.data);
     ASSERT_TRUE(frame) << frame.error().message;
     const Surface& surface = frame->surface;
-    EXPECT_GT(surface.grid.size(), 60U * 12);
+    EXPECT_GT(static_cast<int>(surface.grid.size()), 120 / step_px * 12);
     for (std::size_t v = 0; v < surface.grid.size(); ++v) {
       const Vec3f& p = surface.positions[v];
-      ASSERT_LT(surface.grid[v].line, 60);
-      EXPECT_NEAR(scene.rig.camera.fy() * p[1] / p[2] + scene.rig.camera.cy(), 2 * surface.grid[v].line,
+      ASSERT_LT(surface.grid[v].line, 120 / step_px);
+      EXPECT_NEAR(scene.rig.camera.fy() * p[1] / p[2] + scene.rig.camera.cy(), step_px * surface.grid[v].line,
                   0.01);
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(, HalfLines, testing::Values(Scan::kInterlaced, Scan::kProgressive),
+                         [](const auto& test) { return std::string(to_string(test.param)); });
 
 /// Vertices in triangles, which are those that a mesh carries.
 std::size_t in_triangles(const Surface& surface) {
