@@ -46,21 +46,29 @@ struct Options {
   DomainOptions domain{.domain = 1 + static_cast<int>(getpid() % 200), .interface = ""};
   int threads = 1;
   int line_stride = 1;
-  Decoder decoder = ReconstructOptions{}.decoder;
+  std::string decoder{decoder_name(ReconstructOptions{}.decoder)};  // as `serve` has it
   std::string geometry = "grid", texture = "jpeg";
   bool json = false;
 };
 
-ReconstructOptions reconstruct_options(const Options& options) {
-  return {.decoder = options.decoder, .threads = options.threads, .line_stride = options.line_stride};
-}
-
 /// As `serve` makes of them.
-EncodeOptions coded_as(const Options& options) {
+StreamConfig served_as(const Options& options) {
   StreamConfig config;
+  set_decoder(options.decoder, config);
+  config.half_lines = options.line_stride > 1;
   config.geometry = options.geometry;
   config.texture = texture_codec_named(options.texture).value_or(config.texture);
-  return encode_options(config);
+  return config;
+}
+
+/// What frames are decoded with, first.
+ReconstructOptions reconstruct_options(const Options& options) {
+  return {
+      .decoder = served_as(options).decoder, .threads = options.threads, .line_stride = options.line_stride};
+}
+
+EncodeOptions coded_as(const Options& options) {
+  return encode_options(served_as(options));
 }
 
 /// The reference: the same frames through the same stages on one thread, nothing waiting for anything. No
@@ -196,6 +204,7 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
   pipeline_options.frames =
       options.frames > 0 ? options.frames : static_cast<std::uint64_t>(std::ceil(options.seconds * rate));
   pipeline_options.reconstruct = reconstruct_options(options);
+  pipeline_options.auto_pace = served_as(options).auto_pace;
   pipeline_options.encode = coded_as(options);
   auto pipeline = Pipeline::create(*source, {&noting, dds.get(), web.get()}, pipeline_options);
   if (!pipeline) return pipeline.error();
@@ -287,7 +296,7 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
                    {"clients", count(options.clients)},
                    {"web_clients", count(options.web_clients)},
                    {"threads", count(options.threads)},
-                   {"decoder", std::string(decoder_name(options.decoder))},
+                   {"decoder", options.decoder},
                    {"line_stride", count(options.line_stride)},
                    {"geometry", options.geometry},
                    {"texture", options.texture},
@@ -338,6 +347,7 @@ Report report_of(const Options& options, const FrameLoop& frames, const Serial& 
 }
 
 Status run(const Options& options, StopSignal& stop) {
+  if (const Status fits = check_lines(served_as(options)); !fits) return fits;
   const auto loop = FrameLoop::load(options.source, kDistinctFrames, stop);
   if (!loop) return loop.error();
   if (!*loop) return {};
@@ -377,7 +387,9 @@ Command chain_suite() {
                            "Network interface, by name or address (default: the first that reaches others)")
                 ->type_name("NAME");
             add_threads_option(app, options->threads);
-            add_decoder_option(app, options->decoder);
+            app.add_option("--decoder", options->decoder, "ordered, quick, auto or paper, as `serve` has it")
+                ->check(CLI::IsMember({"ordered", "quick", "auto", "paper"}))
+                ->capture_default_str();
             add_half_lines_option(app, options->line_stride);
             add_codec_options(app, options->geometry, options->texture);
             add_json_option(app, options->json);

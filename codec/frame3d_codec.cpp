@@ -154,7 +154,8 @@ Result<Bytes> encode_frame(const Frame3D& frame, const EncodeOptions& options) {
 
 struct FrameEncoder::State {
   GridCalibration calibration;  // of the lines that go
-  int line_step_px = 1;         // of the surfaces' lines
+  int rig_step_px = 1;          // of the rig's lines,
+  int line_step_px = 1;         // and of the surfaces'
   double rate_hz = 0;           // of the camera
   Surface halved;               // of a mesh
   GridEncoder encoder;
@@ -263,13 +264,18 @@ struct FrameEncoder::State {
 FrameEncoder::FrameEncoder(const Rig& rig, const Pattern& pattern, int line_stride)
     : state_(std::make_unique<State>()) {
   state_->calibration = grid_calibration(rig, pattern);
-  state_->calibration.line_step_px *= line_stride;
-  state_->line_step_px = state_->calibration.line_step_px;
+  state_->rig_step_px = state_->calibration.line_step_px;
   state_->rate_hz = rig.frame_rate;
+  set_line_stride(line_stride);
 }
 FrameEncoder::FrameEncoder(FrameEncoder&&) noexcept = default;
 FrameEncoder& FrameEncoder::operator=(FrameEncoder&&) noexcept = default;
 FrameEncoder::~FrameEncoder() = default;
+
+void FrameEncoder::set_line_stride(int stride) {
+  const int step_px = state_->rig_step_px * stride;
+  if (std::exchange(state_->line_step_px, step_px) != step_px) state_->estimator.forget();
+}
 
 void FrameEncoder::request_key_frame() {
   state_->key_asked = true;

@@ -92,12 +92,14 @@ bool is_key_frame(std::span<const std::uint8_t> bytes);
 /// where said.
 class FrameEncoder {
  public:
-  /// `line_stride`: surfaces have every so many of the rig's detection lines, and count those
-  /// (codec/reduce.h).
   FrameEncoder(const Rig& rig, const Pattern& pattern, int line_stride = 1);
   FrameEncoder(FrameEncoder&&) noexcept;
   FrameEncoder& operator=(FrameEncoder&&) noexcept;
   ~FrameEncoder();
+
+  /// Surfaces from now on have every so many of the rig's detection lines, and count those (codec/reduce.h).
+  /// Where it changes the next frame is a key frame.
+  void set_line_stride(int stride);
 
   /// As encode_frame(). A surface that does not lie on the grid of stripes and lines (the dense option's,
   /// say) is sent as a Draco mesh, whatever the options say. From the first one with second places on

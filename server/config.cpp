@@ -50,6 +50,21 @@ std::vector<StreamConfig> ServeConfig::all_streams() const {
   return streams.empty() ? std::vector<StreamConfig>{*this} : streams;
 }
 
+bool set_decoder(std::string_view name, StreamConfig& config) {
+  const bool is_auto = name == "auto";
+  const auto decoder = is_auto ? Decoder::kOrdered : decoder_named(name);
+  if (!decoder) return false;
+  config.decoder = *decoder;
+  config.auto_pace = is_auto;
+  return true;
+}
+
+Status check_lines(const StreamConfig& config) {
+  if (config.auto_pace && config.half_lines)
+    return Error{"decoder auto leaves out lines where it has to: leave out half_lines, or name a decoder"};
+  return {};
+}
+
 Result<double> parse_pre_roll_s(const std::string& text) {
   if (text == "0" || text == "0s") return 0.0;
   const auto seconds = parse_duration_s(text);
@@ -97,6 +112,7 @@ Status check_stream(const StreamConfig& stream) {
   if (const Status usable = check_texture_codec(stream.texture, stream.texture_encoder); !usable)
     return usable;
   if (const auto source = with_scheme(stream.source, stream.scheme); !source) return source.error();
+  if (const Status fits = check_lines(stream); !fits) return fits;
   if (stream.rate.texture_db > 0 && stream.texture == TextureCodec::kPng)
     return Error{"psnr is kept of textures that lose something: leave it out with png"};
   return check_rig(stream.source, stream.camera);

@@ -39,6 +39,7 @@ struct StreamConfig {
   bool fast = false;
   int threads = 1;
   Decoder decoder = ReconstructOptions{}.decoder;
+  bool auto_pace = false;  // decoder "auto": as PipelineOptions has it
   bool half_lines = false;
   SurfaceBuilderOptions surface;
   TextureCodec texture = TextureCodec::kJpeg;
@@ -57,6 +58,11 @@ struct StreamConfig {
 
   bool operator==(const StreamConfig&) const = default;
 };
+
+/// `name`: as --decoder has it. False where nothing is called so.
+bool set_decoder(std::string_view name, StreamConfig& config);
+/// Whether decoder and half_lines go together.
+Status check_lines(const StreamConfig& config);
 
 /// The projector that pages may drive (/rig); docs/RIG.md.
 struct ProjectorConfig {

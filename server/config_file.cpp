@@ -63,13 +63,12 @@ class Reader {
       out.push_back(*value);
     }
   }
-  void decoder(std::string_view key, Decoder& out) {
+  void decoder(std::string_view key, StreamConfig& out) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
     const auto value = node->value_exact<std::string>();
-    const auto named = decoder_named(value.value_or(""));
-    if (!named) return refuse(*node, key, "must be \"ordered\", \"quick\" or \"paper\"");
-    out = *named;
+    if (!set_decoder(value.value_or(""), out))
+      refuse(*node, key, "must be \"ordered\", \"quick\", \"auto\" or \"paper\"");
   }
   void scheme(std::string_view key, std::string& out) {
     const toml::node* node = take(key);
@@ -309,7 +308,7 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.flag("loop", config.loop);
   reader.flag("fast", config.fast);
   reader.integer("threads", 1, 64, config.threads);
-  reader.decoder("decoder", config.decoder);
+  reader.decoder("decoder", config);
   reader.flag("half_lines", config.half_lines);
   reader.flag("dense", config.surface.dense);
   reader.integer("fill_holes", 0, kMostFilled, config.surface.fill_holes);

@@ -48,12 +48,9 @@ struct Ladder::Step {
   bool takes() const { return output.readers() > 0 && (!output.due || output.due()); }
 };
 
-Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution,
-               int line_stride)
+Ladder::Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution)
     : rig_(rig),
       pattern_(pattern),
-      line_stride_(line_stride),
-      lines_(line_count(rig, line_stride)),
       encode_(encode),
       depth_resolution_(depth_resolution),
       volume_(encode.volume) {}
@@ -64,20 +61,19 @@ Ladder::~Ladder() {
 
 void Ladder::add(Output output) {
   const Rung rung = output.rung;
-  steps_.emplace_back(new Step{
-      .output = std::move(output),
-      .options = rung_options(encode_, rung),
-      .encoder = FrameEncoder(rig_, pattern_, line_stride_ * (detail_of(rung) == Rung::kReduced ? 2 : 1))});
+  steps_.emplace_back(new Step{.output = std::move(output),
+                               .options = rung_options(encode_, rung),
+                               .encoder = FrameEncoder(rig_, pattern_)});
 }
 
 bool Ladder::wanted() {
   return std::any_of(steps_.begin(), steps_.end(), [](const auto& step) { return step->takes(); });
 }
 
-void Ladder::take(Frame3D frame, std::int64_t capture_time_ns) {
+void Ladder::take(Frame3D frame, std::int64_t capture_time_ns, int line_stride) {
   if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
   const std::uint64_t before = queue_.drops();
-  queue_.push_drop_oldest(Item(std::move(frame), capture_time_ns, &give_back_));
+  queue_.push_drop_oldest(Item(std::move(frame), capture_time_ns, line_stride, &give_back_));
   if (queue_.drops() == before) return;
   for (const auto& step : steps_)
     if (step->takes_all()) ++step->drops;
@@ -116,8 +112,10 @@ void Ladder::encode(Step& step, Item& item) {
   frame.time_ns = item.frame.time_ns;
   const bool full = step.detail() == Rung::kFull;
   // A surface that lies on no grid goes whole, with the smaller texture.
-  const bool whole =
-      full || (step.detail() == Rung::kReduced && !halve_lines(item.frame.surface, lines_, frame.surface));
+  const bool halves = step.detail() == Rung::kReduced;
+  const int lines = line_count(rig_, item.line_stride);
+  const bool whole = full || (halves && !halve_lines(item.frame.surface, lines, frame.surface));
+  step.encoder.set_line_stride(item.line_stride * (halves ? 2 : 1));
   if (whole) std::swap(frame.surface, item.frame.surface);
   Image8& texture = full ? item.frame.texture : half_;
   std::swap(frame.texture, texture);

@@ -30,10 +30,8 @@ EncodeOptions rung_options(const EncodeOptions& full, Rung rung);
 
 class Ladder final : public LowerRungs {
  public:
-  /// `encode` and `depth_resolution`: the stream's own, see PipelineOptions. `line_stride`: as
-  /// FrameEncoder has it.
-  Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution,
-         int line_stride = 1);
+  /// `encode` and `depth_resolution`: the stream's own, see PipelineOptions.
+  Ladder(const Rig& rig, const Pattern& pattern, const EncodeOptions& encode, double depth_resolution);
   Ladder(const Ladder&) = delete;
   Ladder& operator=(const Ladder&) = delete;
   ~Ladder() override;
@@ -53,7 +51,7 @@ class Ladder final : public LowerRungs {
 
   bool wanted() override;
   /// A frame that comes before the one before is done takes its place, which is counted.
-  void take(Frame3D frame, std::int64_t capture_time_ns) override;
+  void take(Frame3D frame, std::int64_t capture_time_ns, int line_stride) override;
   void give_back_to(std::function<void(Frame3D&&)> give_back) override { give_back_ = std::move(give_back); }
   void end() override;
   std::vector<RungStatus> status() const override;
@@ -62,11 +60,12 @@ class Ladder final : public LowerRungs {
   struct Step;
   /// Given back where it ends: encoded, dropped by the queue, or left in it.
   struct Item {
-    Item(Frame3D frame_, std::int64_t time_ns, const std::function<void(Frame3D&&)>* give_back_)
-        : frame(std::move(frame_)), capture_time_ns(time_ns), give_back(give_back_) {}
+    Item(Frame3D frame_, std::int64_t time_ns, int stride, const std::function<void(Frame3D&&)>* give_back_)
+        : frame(std::move(frame_)), capture_time_ns(time_ns), line_stride(stride), give_back(give_back_) {}
     Item(Item&& other) noexcept
         : frame(std::move(other.frame)),
           capture_time_ns(other.capture_time_ns),
+          line_stride(other.line_stride),
           give_back(std::exchange(other.give_back, nullptr)) {}
     Item& operator=(Item&&) = delete;
     ~Item() {
@@ -74,6 +73,7 @@ class Ladder final : public LowerRungs {
     }
     Frame3D frame;
     std::int64_t capture_time_ns;
+    int line_stride;
     const std::function<void(Frame3D&&)>* give_back;  // null: nobody
   };
   void run();
@@ -81,8 +81,6 @@ class Ladder final : public LowerRungs {
 
   const Rig rig_;
   const Pattern pattern_;
-  const int line_stride_;
-  const int lines_;  // of the picture, that surfaces count
   const EncodeOptions encode_;
   const double depth_resolution_;
   std::vector<std::unique_ptr<Step>> steps_;

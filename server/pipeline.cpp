@@ -15,6 +15,7 @@
 #include "base/thread_name.h"
 #include "base/time.h"
 #include "codec/frame_layout.h"
+#include "server/pace.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
 #include "server/texture_look.h"
@@ -50,6 +51,7 @@ struct Captured {
 struct Reconstructed {
   Frame3D frame;
   std::int64_t capture_time_ns;
+  int line_stride;
 };
 struct Encoded {
   FrameMessage message;
@@ -114,12 +116,13 @@ class ThreadedPipeline final : public Pipeline {
         sinks_(std::move(sinks)),
         options_(options),
         reconstructor_(std::move(reconstructor)),
-        encoder_(source.info().rig, source.info().pattern, options.reconstruct.line_stride),
+        pace_{options.reconstruct.decoder, options.reconstruct.line_stride},
+        encoder_(source.info().rig, source.info().pattern),
         volume_(options.encode.volume) {}
 
   Status run() override {
     if (options_.rungs != nullptr)
-      options_.rungs->give_back_to([this](Frame3D&& used) { reconstructor_.recycle(std::move(used)); });
+      options_.rungs->give_back_to([this](Frame3D&& used) { recycle(std::move(used)); });
     std::thread reconstruct([this] { reconstruct_stage(); });
     std::thread encode([this] { encode_stage(); });
     std::thread publish([this] { publish_stage(); });
@@ -168,7 +171,11 @@ class ThreadedPipeline final : public Pipeline {
 
   StageTimes stages() const override {
     StageTimes times = stats_.stages();
-    times.decoder = decoder_name(options_.reconstruct.decoder);
+    {
+      std::lock_guard lock(mutex_);
+      times.decoder = decoder_name(pace_.decoder);
+      times.line_stride = pace_.line_stride;
+    }
     times.waiting_reconstruct = to_reconstruct_.size();
     times.waiting_encode = to_encode_.size();
     times.waiting_publish = to_publish_.size();
@@ -326,9 +333,43 @@ class ThreadedPipeline final : public Pipeline {
         stats_.reconstructed(ms, reconstructor_.report().filters);
         if (!made->between) offer(item->frame, &made->surface, steps);
         const std::int64_t later_ns = made->time_ns - item->frame.time_ns;  // below 0: of a field before
-        push(to_encode_, Reconstructed{*std::move(made), item->capture_time_ns + later_ns});
+        push(to_encode_,
+             Reconstructed{*std::move(made), item->capture_time_ns + later_ns, pace_.line_stride});
       }
+      keep_pace(item->frame, ms);
     }
+  }
+
+  /// After a frame that was reconstructed in `ms`.
+  void keep_pace(const CapturedFrame& frame, double ms) {
+    const std::uint64_t dropped = to_reconstruct_.drops() + observed_;
+    pace_control_.add(steady_now_ns(), ms, dropped - std::exchange(dropped_, dropped));
+    if (!options_.auto_pace) return say_behind();
+    const Pace pace = pace_control_.now();
+    if (pace == pace_) return;
+    ReconstructOptions options = options_.reconstruct;
+    options.decoder = pace.decoder;
+    options.line_stride = pace.line_stride;
+    auto made = Reconstructor::create(source_.info().rig, source_.info().pattern, options);
+    const Status seen = made ? made->observe(frame) : Status(made.error());
+    if (!seen) return fail(seen.error());
+    log_info("decoding: " + to_string(pace) + ", which suits the camera's rate and this machine");
+    std::lock_guard lock(mutex_);
+    std::swap(reconstructor_, *made);
+    pace_ = pace;
+  }
+
+  /// Logged once, where frames are dropped for more than a moment.
+  void say_behind() {
+    if (!pace_control_.at_least() || std::exchange(said_behind_, true)) return;
+    log_warning("this machine is too slow for all of the camera's frames with " + to_string(pace_) +
+                ": serve with --decoder auto or more --threads");
+  }
+
+  /// Of any thread.
+  void recycle(Frame3D&& used) {
+    std::lock_guard lock(mutex_);
+    reconstructor_.recycle(std::move(used));
   }
 
   /// To somebody who looks at single frames: a copy, where one was asked for.
@@ -355,6 +396,7 @@ class ThreadedPipeline final : public Pipeline {
       const std::int64_t begin = steady_now_ns();
       if (begin - key_ns >= kWishedKeyInterval_ns && key_wanted_.exchange(false))
         encoder_.request_key_frame();
+      encoder_.set_line_stride(item->line_stride);
       EncodeOptions encode = options_.encode;
       encode.volume = volume_.fit(item->frame.surface.positions);
       if (const int bits = volume_.bits(options_.depth_resolution); bits > 0) encode.position_bits = bits;
@@ -395,9 +437,9 @@ class ThreadedPipeline final : public Pipeline {
         if (const auto db = texture_db(*data, item->frame.texture)) rate->looked(*db, place);
       }
       if (options_.rungs != nullptr && options_.rungs->wanted())
-        options_.rungs->take(std::move(item->frame), item->capture_time_ns);
+        options_.rungs->take(std::move(item->frame), item->capture_time_ns, item->line_stride);
       else
-        reconstructor_.recycle(std::move(item->frame));
+        recycle(std::move(item->frame));
     }
   }
 
@@ -472,7 +514,11 @@ class ThreadedPipeline final : public Pipeline {
   FieldSource& source_;
   std::vector<FrameSink*> sinks_;
   const PipelineOptions options_;
-  Reconstructor reconstructor_;
+  Reconstructor reconstructor_;  // changes with the pace, under the mutex, as pace_
+  Pace pace_;
+  PaceControl pace_control_;
+  std::uint64_t dropped_ = 0;  // when pace_control_ was told last
+  bool said_behind_ = false;
   FrameEncoder encoder_;
   WorkingVolume volume_;
   std::atomic<bool> key_wanted_{false};

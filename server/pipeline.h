@@ -38,7 +38,8 @@ class LowerRungs {
   virtual ~LowerRungs() = default;
   /// Whether take() is to be called. This and take() are called on the encoding thread and return at once.
   virtual bool wanted() = 0;
-  virtual void take(Frame3D frame, std::int64_t capture_time_ns) = 0;
+  /// `line_stride`: of the frame's surface, as ReconstructOptions has it.
+  virtual void take(Frame3D frame, std::int64_t capture_time_ns, int line_stride) = 0;
   /// Called with each frame that was taken when it is done with, on any thread, until end() has returned; so
   /// that the next ones are made in its memory. Before the first take().
   virtual void give_back_to(std::function<void(Frame3D&&)> give_back) = 0;
@@ -54,6 +55,9 @@ struct PipelineOptions {
   bool lossless = false;  // full queues wait instead of dropping the oldest: for tests and offline work
   std::optional<std::uint64_t> frames;  // end after this many camera frames
   ReconstructOptions reconstruct;
+  // Decoder and lines are chosen while it runs, so that all of the camera's frames are reconstructed
+  // (pace.h).
+  bool auto_pace = false;
   EncodeOptions encode;  // volume.size_m 0: fitted to the first frame, grown when a frame leaves it
   // Step of coded positions, of the distance to the nearest part of the scene; overrides position_bits.
   double depth_resolution = 1e-4;

@@ -48,7 +48,7 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   set(flags.record, config.record);
   set(flags.threads, config.threads);
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
-  if (flags.decoder) config.decoder = decoder_named(*flags.decoder).value_or(config.decoder);
+  if (flags.decoder) set_decoder(*flags.decoder, config);
   if (flags.texture) config.texture = texture_codec_named(*flags.texture).value_or(config.texture);
   if (flags.texture_encoder)
     config.texture_encoder = video_encoder_named(*flags.texture_encoder).value_or(config.texture_encoder);
@@ -176,11 +176,13 @@ Command serve_command() {
                         "With --projector: its mode, for a rig that the page /rig is to calibrate from "
                         "nothing; afterwards rig.yaml says it");
         app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
-        app.add_option(
-               "--decoder", f->decoder,
-               "ordered (default: the most exact), quick (for a camera that ordered cannot keep up with) or "
-               "paper (as published)")
-            ->check(CLI::IsMember({"ordered", "quick", "paper"}))
+        app.add_option("--decoder", f->decoder,
+                       "ordered (default: the most exact), quick (for a camera that ordered cannot keep up "
+                       "with), auto "
+                       "(as exact as all of the camera's frames can be on this machine: ordered, quick, or "
+                       "quick with "
+                       "every second line) or paper (as published)")
+            ->check(CLI::IsMember({"ordered", "quick", "auto", "paper"}))
             ->type_name("NAME");
         app.add_flag("--half-lines", f->half_lines, kHalfLinesHelp);
         app.add_flag("--dense", f->dense,

@@ -121,6 +121,7 @@ PipelineOptions pipeline_options(const StreamConfig& config, const std::string& 
   options.reconstruct.threads = config.threads;
   options.reconstruct.decoder = config.decoder;
   options.reconstruct.line_stride = config.half_lines ? 2 : 1;
+  options.auto_pace = config.auto_pace;
   options.reconstruct.surface = config.surface;
   options.encode = encode_options(config);
   options.rate = config.rate;
@@ -245,7 +246,7 @@ Status RunningStream::announce(const std::string& uri) {
 Status RunningStream::raise_ladder(const PipelineOptions& options) {
   if (config_.ladder.empty()) return {};
   ladder_ = std::make_unique<Ladder>(source_->info().rig, source_->info().pattern, options.encode,
-                                     options.depth_resolution, options.reconstruct.line_stride);
+                                     options.depth_resolution);
   for (const Rung rung : rungs_of(config_)) {
     auto made = RungPublisher::create(domain_options(around_.config), name_, rung,
                                       [ladder = ladder_.get()] { ladder->request_key_frame(); });

@@ -108,6 +108,11 @@ void write_stages(Exposition& out, const std::vector<StreamSnapshot>& streams) {
                      std::string(to_string(s.info.pattern.scheme)) + "\",decoder=\"" +
                      std::string(s.stages->decoder) + "\"}",
                  1);
+  each("relievo_stream_line_stride", "gauge",
+       "Every so many of the camera's detection lines are reconstructed.",
+       [&](const std::string& stream, const StageTimes& times) {
+         out.sample("{" + stream + "}", static_cast<double>(times.line_stride));
+       });
   each("relievo_stage_seconds", "histogram",
        "What each stage takes for a frame, without waiting for it; decode: at the clients over DDS.",
        [&](const std::string& stream, const StageTimes& times) {

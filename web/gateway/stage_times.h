@@ -15,7 +15,8 @@ namespace relievo {
 
 /// Since the start. Times of a frame in each stage, without what it waited before it.
 struct StageTimes {
-  std::string_view decoder;  // as `--decoder` has it
+  std::string_view decoder;  // as `--decoder` has it; of `auto` the one that decodes now,
+  int line_stride = 1;       // every so many detection lines
   Histogram reconstruct, encode_geometry, encode_texture, publish;
   // Frames that wait now, before each stage.
   std::size_t waiting_reconstruct = 0, waiting_encode = 0, waiting_publish = 0;

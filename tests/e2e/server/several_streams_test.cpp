@@ -203,6 +203,7 @@ TEST_F(SeveralStreams, MetricsSayWhatEachStageTakes) {
     EXPECT_EQ(
         value("relievo_stream_info{stream=\"" + stream + "\",scheme=\"complementary\",decoder=\"ordered\"}"),
         1);
+    EXPECT_EQ(value("relievo_stream_line_stride{stream=\"" + stream + "\"}"), 1);
     EXPECT_GE(value("relievo_stage_waiting{stream=\"" + stream + "\",stage=\"encode\"}"), 0);
     EXPECT_EQ(value("relievo_stream_sent_again_bytes_total{stream=\"" + stream + "\"}"), 0);
   }

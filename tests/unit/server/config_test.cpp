@@ -87,6 +87,23 @@ TEST(Config, TheLadderIsAListOfLowerQualities) {
   EXPECT_FALSE(parse_ladder("reduced,reduced-jpeg")) << "those come by themselves";
 }
 
+TEST(Config, ADecoderOrHowItIsChosen) {
+  const Read chosen = read("decoder = \"auto\"\n");
+  ASSERT_TRUE(chosen.status) << chosen.status.error().message;
+  EXPECT_TRUE(chosen.config.auto_pace);
+  EXPECT_EQ(chosen.config.decoder, Decoder::kOrdered);
+  ServeConfig config = chosen.config;
+  EXPECT_TRUE(check_config(config));
+  config.half_lines = true;
+  const Status both = check_config(config);
+  ASSERT_FALSE(both);
+  EXPECT_NE(both.error().message.find("half_lines"), std::string::npos) << both.error().message;
+  EXPECT_TRUE(set_decoder("quick", config));  // as a flag behind the file
+  EXPECT_FALSE(config.auto_pace);
+  EXPECT_EQ(config.decoder, Decoder::kQuick);
+  EXPECT_FALSE(set_decoder("best", config));
+}
+
 TEST(Config, EverySetting) {
   const Read r = read(R"(# a comment
 source = "take:shared/bunny"
@@ -351,7 +368,8 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"fast_number", "fast = 0", "fast must be true or false"},
         Wrong{"scheme_unknown", "scheme = \"striped\"",
               "scheme must be complementary, white-field, white-frame or one-slide in quotes"},
-        Wrong{"decoder_unknown", "decoder = \"best\"", "decoder must be \"ordered\", \"quick\" or \"paper\""},
+        Wrong{"decoder_unknown", "decoder = \"best\"",
+              "decoder must be \"ordered\", \"quick\", \"auto\" or \"paper\""},
         Wrong{"threads_none", "threads = 0", "threads must be a whole number from 1 to 64"},
         Wrong{"threads_many", "threads = 65", "threads must be a whole number from 1 to 64"},
         Wrong{"encoder", "texture_encoder = \"quicksync\"",

@@ -58,7 +58,7 @@ TEST_F(LadderTest, NothingIsMadeWhereNobodyReads) {
   EXPECT_FALSE(ladder_.wanted());
   texture_readers_ = 2;
   EXPECT_TRUE(ladder_.wanted());
-  ladder_.take(frame_with_picture(), 5);
+  ladder_.take(frame_with_picture(), 5, 1);
   ASSERT_TRUE(eventually([&] { return texture_.frames().size() == 1; }));
   ladder_.end();
   EXPECT_TRUE(reduced_.frames().empty());
@@ -76,7 +76,7 @@ TEST_F(LadderTest, RungsAreSmallerFramesOfTheSameMoment) {
   FrameEncoder encoder(grid_rig({}), grid_pattern({}));
   const auto full = encoder.encode(frame_with_picture(), encode_);
   ASSERT_TRUE(full);
-  ladder_.take(frame_with_picture(42), 5);
+  ladder_.take(frame_with_picture(42), 5, 1);
   ASSERT_TRUE(eventually([&] { return texture_.frames().size() == 1; }));
   const FrameMessage reduced = reduced_.frames().at(0), texture = texture_.frames().at(0);
   EXPECT_EQ(reduced.rung, Rung::kReduced);
@@ -104,7 +104,7 @@ TEST_F(LadderTest, JpegRungsAreTheSameInJpegWhateverTheStreamsTexturesAre) {
   ladder.add(output(Rung::kReducedJpeg, readers, reduced));
   ladder.add(output(Rung::kTextureJpeg, readers, texture));
   const std::size_t vertices = grid_frame({}).surface.positions.size();
-  ladder.take(frame_with_picture(42), 5);
+  ladder.take(frame_with_picture(42), 5, 1);
   ASSERT_TRUE(eventually([&] { return texture.frames().size() == 1; }));
   const auto header = [](CollectingSink& sink) {
     const auto read = read_frame_header(*sink.frames().at(0).data);
@@ -131,7 +131,7 @@ TEST_F(LadderTest, ASurfaceOffTheGridGoesWhole) {
   Frame3D frame = frame_with_picture();
   frame.surface.grid.clear();
   const std::size_t vertices = frame.surface.positions.size();
-  ladder_.take(std::move(frame), 5);
+  ladder_.take(std::move(frame), 5, 1);
   ASSERT_TRUE(eventually([&] { return reduced_.frames().size() == 1; }));
   const auto header = read_frame_header(*reduced_.frames()[0].data);
   ASSERT_TRUE(header);
@@ -144,9 +144,9 @@ TEST_F(LadderTest, ASlowRungDropsAndKeepsNobodyWaiting) {
   reduced_readers_ = 1;
   Gate entered, go_on;
   hold(entered, go_on);
-  ladder_.take(frame_with_picture(1), 1);
+  ladder_.take(frame_with_picture(1), 1, 1);
   ASSERT_TRUE(entered.wait());
-  for (std::uint64_t n = 2; n <= 6; ++n) ladder_.take(frame_with_picture(n), 1);  // would hang here
+  for (std::uint64_t n = 2; n <= 6; ++n) ladder_.take(frame_with_picture(n), 1, 1);  // would hang here
   EXPECT_EQ(ladder_.status()[0].drops, 4U);
   EXPECT_EQ(ladder_.status()[1].drops, 0U) << "nobody reads it";
   go_on.open();
@@ -162,7 +162,7 @@ TEST_F(LadderTest, WhoJoinsGetsAKeyFrame) {
   reduced_readers_ = 1;
   const auto next = [&] {
     const std::size_t count = reduced_.frames().size();
-    ladder.take(frame_with_picture(), 1);
+    ladder.take(frame_with_picture(), 1, 1);
     EXPECT_TRUE(eventually([&] { return reduced_.frames().size() > count; }));
     return is_key_frame(*reduced_.frames().back().data);
   };
@@ -177,9 +177,9 @@ TEST_F(LadderTest, EndsAtOnceWithFramesWaiting) {
   reduced_readers_ = 1;
   Gate entered, go_on;
   hold(entered, go_on);
-  ladder_.take(frame_with_picture(1), 1);
+  ladder_.take(frame_with_picture(1), 1, 1);
   ASSERT_TRUE(entered.wait());
-  ladder_.take(frame_with_picture(2), 1);
+  ladder_.take(frame_with_picture(2), 1, 1);
   std::thread ending([&] { ladder_.end(); });
   go_on.open();
   ending.join();
@@ -201,7 +201,7 @@ TEST_F(LadderTest, EveryFrameComesBackInItsMemory) {
     Frame3D frame = frame_with_picture(n);
     if (n == 5) frame.surface.grid.clear();  // goes whole
     taken.push_back(frame.texture.data());
-    ladder_.take(std::move(frame), 1);
+    ladder_.take(std::move(frame), 1, 1);
     if (n == 1) {
       ASSERT_TRUE(entered.wait());
     }
@@ -230,7 +230,7 @@ TEST(RungOptions, AreNeverFinerThanTheStreams) {
 class CountingRungs final : public LowerRungs {
  public:
   bool wanted() override { return true; }
-  void take(Frame3D frame, std::int64_t) override {
+  void take(Frame3D frame, std::int64_t, int) override {
     ++frames;
     memory.insert(frame.texture.data());
     if (kept_) give_back_(std::move(*kept_));
