@@ -23,7 +23,8 @@ std::string to_string(const Pace& pace);
 /// One thread. Pure: the same times give the same paces.
 class PaceControl {
  public:
-  PaceControl();
+  /// `lines`: the camera's detection lines, of which enough are to be left to see what is there.
+  explicit PaceControl(int lines);
 
   /// A frame was reconstructed at now() in `ms`, after so many others were dropped for want of time.
   /// `now_ns`: monotonic.
@@ -35,6 +36,7 @@ class PaceControl {
 
  private:
   QualityChoice choice_;
+  Rung least_ = Rung::kFull;
 };
 
 }  // namespace relievo

@@ -14,6 +14,7 @@
 #include "base/log.h"
 #include "base/thread_name.h"
 #include "base/time.h"
+#include "capture/reconstruct/detection_lines.h"
 #include "codec/frame_layout.h"
 #include "server/pace.h"
 #include "server/stats.h"
@@ -117,6 +118,7 @@ class ThreadedPipeline final : public Pipeline {
         options_(options),
         reconstructor_(std::move(reconstructor)),
         pace_{options.reconstruct.decoder, options.reconstruct.line_stride},
+        pace_control_(line_count(source.info().rig, 1)),
         encoder_(source.info().rig, source.info().pattern),
         volume_(options.encode.volume) {}
 

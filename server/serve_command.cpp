@@ -178,10 +178,8 @@ Command serve_command() {
         app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
         app.add_option("--decoder", f->decoder,
                        "ordered (default: the most exact), quick (for a camera that ordered cannot keep up "
-                       "with), auto "
-                       "(as exact as all of the camera's frames can be on this machine: ordered, quick, or "
-                       "quick with "
-                       "every second line) or paper (as published)")
+                       "with), auto (as exact as all of the camera's frames can be on this machine: ordered, "
+                       "quick, or quick with fewer lines) or paper (as published)")
             ->check(CLI::IsMember({"ordered", "quick", "auto", "paper"}))
             ->type_name("NAME");
         app.add_flag("--half-lines", f->half_lines, kHalfLinesHelp);

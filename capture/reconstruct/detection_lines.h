@@ -12,7 +12,7 @@
 
 namespace relievo {
 
-/// `stride` is 1 or 2, as ReconstructOptions::line_stride.
+/// `stride` is 1, 2 or 4, as ReconstructOptions::line_stride.
 inline int line_count(const Rig& rig, int stride) {
   const int step = line_step_px(rig.scan, stride);
   return (rig.camera.height + step - 1) / step;
@@ -20,8 +20,8 @@ inline int line_count(const Rig& rig, int stride) {
 
 /// Refers to the frame it was made of.
 struct DetectionLines {
-  View8 own, other;         // the exposure on the lines, and the other one
-  bool between = false;     // the other's rows lie half a line below: on a line lies the mean of two
+  View8 own, other;  // the exposure on the lines, and the other one
+  float below = 0;   // so many lines below lie the other's rows, and as many above: a line's mean of two
   bool shows_slide = true;  // `own` does, and `other` the complement; or the other way round
 
   DetectionLines(const CapturedFrame& frame, int stride = 1)
@@ -29,11 +29,11 @@ struct DetectionLines {
     if (frame.scan == Scan::kInterlaced) {
       other = own.field(1);
       own = own.field(0);
-      between = true;
+      below = 0.5F / static_cast<float>(stride);
       shows_slide = frame.field_order == FieldOrder::kTop;
     }
     all_other_ = other;
-    if (stride == 2) {
+    for (int left = stride; left > 1; left /= 2) {
       own = own.field(0);
       other = other.field(0);
     }
@@ -46,7 +46,7 @@ struct DetectionLines {
   /// The other exposure's rows whose mean lies on line l. It must have one.
   const std::uint8_t* other_above(int l) const {
     const int row = step_ * l;
-    return all_other_.row(std::clamp(between ? row - 1 : row, 0, all_other_.height - 1));
+    return all_other_.row(std::clamp(below > 0 ? row - 1 : row, 0, all_other_.height - 1));
   }
   const std::uint8_t* other_below(int l) const {
     return all_other_.row(std::min(step_ * l, all_other_.height - 1));

@@ -18,10 +18,9 @@ constexpr float kStraight_px = 0.5F;      // between its moves from above and to
 constexpr float kNoise = 0.1F;            // of a rise: less is mostly noise
 constexpr float kMostRise = 1.F;          // a line: at a rim, beyond which there is nothing
 // Variance, in lines, of what a place is a mean over.
-constexpr float kOfLowPass = 0.5F;    // [1 2 1] / 4
-constexpr float kOfBetween = 0.125F;  // half of the difference is a mean of two rows, half a line off each
-constexpr float kOfFading = 0.5F;     // once more
-constexpr float kOfWeak = 2.5F;       // [1 2 3 4 3 2 1] / 16 of weak_signal.h
+constexpr float kOfLowPass = 0.5F;  // [1 2 1] / 4
+constexpr float kOfFading = 0.5F;   // once more
+constexpr float kOfWeak = 2.5F;     // [1 2 3 4 3 2 1] / 16 of weak_signal.h
 
 constexpr float kBrighter = 1.8F;   // times: a line beside it whose edge may be what is seen
 constexpr float kOwnShare = 0.35F;  // of that edge's height, that the line has at least of its own
@@ -118,7 +117,8 @@ std::size_t LeanCorrection::correct(const DetectionLines& rows, const Difference
   };
   in_all([&](int, std::uint32_t e, Seen* seen) { *seen = {edges.edges[e].column_px, edges.edges[e].slope}; });
   std::atomic<std::size_t> borrowed{0};
-  const float strong = kOfLowPass + (rows.between ? kOfBetween : 0);
+  // Half of the difference is the other exposure: the mean of two rows.
+  const float strong = kOfLowPass + 0.5F * rows.below * rows.below;
   in_all([&](int line, std::uint32_t e, const Seen* seen) {
     Edge& edge = edges.edges[e];
     if (is_borrowed(rows, image.noise, line, seen)) {

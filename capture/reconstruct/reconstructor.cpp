@@ -51,7 +51,8 @@ Status check_fits(const CapturedFrame& frame, const Rig& rig) {
 }
 
 Status check_lines(int stride) {
-  if (stride != 1 && stride != 2) return Error{"line_stride is 1 or 2, not " + std::to_string(stride)};
+  if (stride != 1 && stride != 2 && stride != 4)
+    return Error{"line_stride is 1, 2 or 4, not " + std::to_string(stride)};
   return {};
 }
 

@@ -33,7 +33,7 @@ struct ReconstructOptions {
   Decoder decoder = Decoder::kOrdered;
   int threads = 1;  // 1 is the serial reference; more give the same result
   bool texture = true;
-  int line_stride = 1;  // 2: every second detection line alone, for half the time
+  int line_stride = 1;  // 2: every second detection line alone, for half the time; 4: every fourth
   SurfaceBuilderOptions surface;
 };
 

@@ -17,12 +17,13 @@ namespace {
 
 using namespace test;
 
-constexpr Pace kOrdered{Decoder::kOrdered, 1}, kQuick{Decoder::kQuick, 1}, kHalf{Decoder::kQuick, 2};
+constexpr Pace kOrdered{Decoder::kOrdered, 1}, kQuick{Decoder::kQuick, 1}, kHalf{Decoder::kQuick, 2},
+    kQuarter{Decoder::kQuick, 4};
 
 /// A camera in front of a machine that reconstructs as `serve` does: three frames wait, the oldest goes.
 class Machine {
  public:
-  explicit Machine(double frame_ms) : frame_ms_(frame_ms) {}
+  explicit Machine(double frame_ms, int lines = 540) : control(lines), frame_ms_(frame_ms) {}
 
   /// For so long, with what a frame takes at each pace. Returns how often the pace changed.
   int run(double seconds, double ordered_ms, double quick_ms, double half_ms) {
@@ -33,7 +34,10 @@ class Machine {
         take_in();
       }
       const Pace pace = control.now();
-      const double ms = pace == kOrdered ? ordered_ms : pace == kQuick ? quick_ms : half_ms;
+      const double ms = pace == kOrdered ? ordered_ms
+                        : pace == kQuick ? quick_ms
+                        : pace == kHalf  ? half_ms
+                                         : half_ms / 2;
       --waiting_;
       now_ms_ += ms;
       const std::uint64_t now_dropped = take_in();
@@ -72,13 +76,24 @@ TEST(PaceControl, StaysAsExactAsItCan) {
 }
 
 TEST(PaceControl, GoesAsFarDownAsItMustAndStays) {
-  for (const auto& [frame_ms, pace] : {std::pair{33.4, kQuick}, std::pair{16.7, kHalf}}) {
+  for (const auto& [frame_ms, pace] :
+       {std::pair{33.4, kQuick}, std::pair{16.7, kHalf}, std::pair{8.4, kQuarter}}) {
     Machine machine(frame_ms);
-    machine.run(9, 86, 23, 12);
+    machine.run(12, 86, 23, 12);
     EXPECT_EQ(machine.control.now(), pace) << to_string(machine.control.now());
     EXPECT_GT(std::exchange(machine.dropped, 0), 0U);
     EXPECT_EQ(machine.run(300, 86, 23, 12), 0) << "tries what it knows to take too long";
     EXPECT_EQ(machine.dropped, 0U);
+  }
+}
+
+TEST(PaceControl, LeavesEnoughLines) {
+  for (const auto& [lines, pace] :
+       {std::pair{1080, kQuarter}, std::pair{240, kHalf}, std::pair{144, kQuick}}) {
+    Machine machine(1, lines);
+    machine.run(30, 86, 23, 12);
+    EXPECT_EQ(machine.control.now(), pace) << to_string(machine.control.now());
+    EXPECT_TRUE(machine.control.at_least());
   }
 }
 
@@ -108,7 +123,11 @@ TEST(PaceControl, WhatFailsIsTriedLessAndLessOften) {
 }
 
 TEST_F(PipelineTest, AtAnotherPaceTheStreamGoesOn) {
-  // A camera that is four times too fast for every decoder, until half of the lines come.
+  // A camera that is too fast for any decoder, until half of the lines come.
+  StripedScene tall = scene_;
+  tall.rig.camera.height = 480;
+  tall.rig.camera.matrix[5] = 239.5;
+  const Frames frames(tall);
   FrameDecoder decoder;
   std::map<int, int> frames_of;  // by lines
   bool all_decode = true;
@@ -119,19 +138,19 @@ TEST_F(PipelineTest, AtAnotherPaceTheStreamGoesOn) {
     if (!frame) return {};
     int last = 0;
     for (const GridPoint& point : frame->surface.grid) last = std::max<int>(last, point.line);
-    const int lines = last >= 30 ? 60 : 30;
+    const int lines = last >= 120 ? 240 : 120;
     ++frames_of[lines];
-    halved = lines == 30;
+    halved = lines == 120;
     return {};
   };
   Pipeline* running = nullptr;
   const auto end = std::chrono::steady_clock::now() + kPatience;
   ScriptedSource source(
-      scene_,
+      tall,
       [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
         const bool late = std::chrono::steady_clock::now() > end;
         if (late || (halved && running->status().frames_published > 20)) return ScriptedSource::end();
-        return std::optional(frames_(n));
+        return std::optional(frames(n));
       },
       true);
   PipelineOptions options;
@@ -143,8 +162,8 @@ TEST_F(PipelineTest, AtAnotherPaceTheStreamGoesOn) {
   running = pipeline.get();
   ASSERT_TRUE(pipeline->run());
   EXPECT_TRUE(all_decode);
-  EXPECT_GT(frames_of[60], 0);
-  EXPECT_GT(frames_of[30], 0);
+  EXPECT_GT(frames_of[240], 0);
+  EXPECT_GT(frames_of[120], 0);
   EXPECT_EQ(pipeline->stages().decoder, "quick");
 }
 
