@@ -15,7 +15,7 @@
 #include "base/thread_name.h"
 #include "base/time.h"
 #include "capture/reconstruct/detection_lines.h"
-#include "codec/frame_layout.h"
+#include "codec/decodable_frames.h"
 #include "server/pace.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
@@ -56,8 +56,7 @@ struct Reconstructed {
 };
 struct Encoded {
   FrameMessage message;
-  std::uint64_t number;   // counts encoded frames,
-  std::uint64_t key;      // that of the last one that decodes alone
+  std::uint64_t number;   // counts encoded frames
   std::int64_t begin_ns;  // of its encoding
   double place;           // RateControl::place()
 };
@@ -87,26 +86,6 @@ class SlidesSeen {
     std::int64_t time_ns;
   };
   std::optional<Seen> last_, other_;
-};
-
-/// Whether encoded frames, in order, decode where some of them were dropped.
-class Decodable {
- public:
-  bool add(const Encoded& item) {
-    is_whole_ = is_whole_ && item.number == next_;
-    next_ = item.number + 1;
-    const BuildsOn on = what_it_builds_on(*item.message.data);
-    if (on == BuildsOn::kNothing) {
-      key_ = item.key;
-      is_whole_ = true;
-    }
-    return on == BuildsOn::kFrameBefore ? is_whole_ : item.key == key_;
-  }
-
- private:
-  std::uint64_t next_ = 0;
-  std::uint64_t key_ = 0;  // the last one that came
-  bool is_whole_ = true;   // since then
 };
 
 class ThreadedPipeline final : public Pipeline {
@@ -393,7 +372,7 @@ class ThreadedPipeline final : public Pipeline {
     std::int64_t look_ns = steady_now_ns();  // when the texture's error is measured next
     std::optional<RateControl> rate;
     if (options_.rate.any()) rate.emplace(options_.rate, source_.info().rig.frame_rate, options_.encode);
-    std::uint64_t encoded = 0, key = 0;
+    std::uint64_t encoded = 0;
     while (auto item = to_encode_.pop()) {
       const std::int64_t begin = steady_now_ns();
       if (begin - key_ns >= kWishedKeyInterval_ns && key_wanted_.exchange(false))
@@ -417,10 +396,7 @@ class ThreadedPipeline final : public Pipeline {
       if (const std::string notice = encoder_.take_notice(); !notice.empty()) log_warning(notice);
       stats_.encoded_parts(milliseconds(geometry_ns - begin), milliseconds(steady_now_ns() - geometry_ns));
       const bool is_key = is_key_frame(*bytes);
-      if (is_key) {
-        key_ns = begin;
-        key = encoded;
-      }
+      if (is_key) key_ns = begin;
       if (rate) {
         rate->add(bytes->size(), is_key, encode.key_interval);
         stats_.rate_level(static_cast<std::uint32_t>(rate->level()));
@@ -432,7 +408,7 @@ class ThreadedPipeline final : public Pipeline {
       message.data = std::make_shared<const Bytes>(*std::move(bytes));
       const auto data = message.data;
       const std::uint64_t dropped = to_publish_.drops();
-      push(to_publish_, Encoded{std::move(message), encoded++, key, begin, place});
+      push(to_publish_, Encoded{std::move(message), encoded++, begin, place});
       if (to_publish_.drops() > dropped) encoder_.request_key_frame();  // later frames may build on that one
       if (options_.rate.texture_db > 0 && is_key && begin >= look_ns) {
         look_ns = begin + kLookInterval_ns;
@@ -448,12 +424,12 @@ class ThreadedPipeline final : public Pipeline {
   void publish_stage() {
     name_this_thread("publish");
     std::uint64_t sequence = 0;
-    Decodable decodable;
+    DecodableFrames decodable;
     std::int64_t status_due_ns = steady_now_ns();
     while (!to_publish_.finished()) {
       const std::int64_t wait_ns = std::max<std::int64_t>(0, status_due_ns - steady_now_ns());
       auto encoded = to_publish_.pop_for(std::chrono::nanoseconds(wait_ns));
-      if (encoded && !decodable.add(*encoded)) {
+      if (encoded && !decodable.add(encoded->number, encoded->message.data)) {
         ++undecodable_;  // readers would see no gap
       } else if (encoded) {
         FrameMessage& message = encoded->message;

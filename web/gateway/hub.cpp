@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/time.h"
+#include "codec/decodable_frames.h"
 #include "codec/frame_layout.h"
 #include "web/gateway/protocol.h"
 
@@ -42,28 +43,6 @@ struct Hub::Watcher {
   bool told_waiting = false;
 };
 
-/// What comes of one rung, and what of it was lost on its way.
-class Arrivals {
- public:
-  /// The next one; false where it builds on a lost one and so is of no use to anybody.
-  bool add(const FrameMessage& frame) {
-    const BuildsOn on = builds_on(frame);
-    lost_ = lost_ || (last_ && frame.sequence != *last_ + 1);
-    last_ = frame.sequence;
-    if (on == BuildsOn::kNothing) {
-      key_ = frame.data;
-      lost_ = false;
-    }
-    if (!lost_) return true;
-    return on == BuildsOn::kKeyFrame && key_ && grid_builds_on(*frame.data, *key_);
-  }
-
- private:
-  std::optional<std::uint64_t> last_;  // sequence number
-  std::shared_ptr<const Bytes> key_;   // the last one that builds on nothing
-  bool lost_ = false;                  // something, since then
-};
-
 struct Hub::Entry {
   StreamSnapshot facts;
   bool live = false;  // announced and not withdrawn
@@ -72,7 +51,7 @@ struct Hub::Entry {
   // So that a late joiner sees a stalled stream's last picture: the last frame, and where that builds on
   // others the last one that does not.
   std::optional<FrameMessage> latest, latest_key;
-  std::array<Arrivals, kRungs.size()> arrivals;  // of each rung
+  std::array<DecodableFrames, kRungs.size()> decodable;  // of each rung
   std::optional<std::int64_t> key_asked_ns;
   std::vector<std::shared_ptr<Watcher>> watchers;
 
@@ -146,7 +125,8 @@ void Hub::publish(const std::string& stream, const FrameMessage& frame) {
   if (it == streams_.end() || !it->second->live || !frame.data) return;
   Entry& entry = *it->second;
   const bool is_key = builds_on(frame) == BuildsOn::kNothing;
-  const bool is_broken = !entry.arrivals[static_cast<std::size_t>(frame.rung)].add(frame);
+  const bool is_broken =
+      !entry.decodable[static_cast<std::size_t>(frame.rung)].add(frame.sequence, frame.data);
   if (frame.rung == Rung::kFull) {
     ++entry.facts.published;
     entry.facts.published_after.add(seconds(frame.publish_time_ns - frame.capture_time_ns));
@@ -237,7 +217,7 @@ void Hub::withdraw(const std::string& stream) {
   entry.facts.status.reset();
   entry.facts.recording = {};
   entry.facts.clock_offset_ns.reset();
-  entry.arrivals = {};
+  entry.decodable = {};
   entry.status_version = entry.recording_version = 0;
   entry.recording_text.reset();
   for (const auto& watcher : entry.watchers) {

@@ -50,6 +50,17 @@ class PipelineTest : public ::testing::Test {
   const StripedScene scene_ = striped_scene();
   const Frames frames_{scene_};
   CollectingSink sink_;
+
+  /// The sink opens `entered` with frame 1, and is done with it when `release` is open.
+  void hold_frame_1(Gate& entered, Gate& release) {
+    sink_.on_frame = [&](const FrameMessage& frame) -> Status {
+      if (frame.number == 1) {
+        entered.open();
+        release.wait();
+      }
+      return {};
+    };
+  }
 };
 
 }  // namespace relievo::test

@@ -168,15 +168,8 @@ TEST_F(PipelineTest, SomethingFarAwayDoesNotCoarsenWhatIsNear) {
 
 TEST_F(PipelineTest, ASlowSinkCostsTheOldestFramesBeforePublishing) {
   // Frame 1 waits in the sink and three more in the queue; each further one must throw the oldest out.
-  Gate entered;
-  Gate release;
-  sink_.on_frame = [&](const FrameMessage& f) -> Status {
-    if (f.number == 1) {
-      entered.open();
-      release.wait();
-    }
-    return {};
-  };
+  Gate entered, release;
+  hold_frame_1(entered, release);
   Pipeline* running = nullptr;
   ScriptedSource source(
       scene_,
@@ -215,15 +208,8 @@ TEST_F(PipelineTest, ASlowSinkCostsTheOldestFramesBeforePublishing) {
 
 // Readers see no gap where a frame was dropped before it had a number: what they get must decode.
 TEST_F(PipelineTest, WhatBuildsOnADroppedFrameIsDroppedToo) {
-  Gate entered;
-  Gate release;
-  sink_.on_frame = [&](const FrameMessage& f) -> Status {
-    if (f.number == 1) {
-      entered.open();
-      release.wait();
-    }
-    return {};
-  };
+  Gate entered, release;
+  hold_frame_1(entered, release);
   Pipeline* running = nullptr;
   ScriptedSource source(
       scene_,
