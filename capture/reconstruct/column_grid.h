@@ -5,7 +5,9 @@
 // a surface their differences change little from one to the next, at a depth step one of them stands out.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -51,6 +53,30 @@ inline constexpr float kBendGoesOn = 0.7F;
 inline float goes_on_to(float x0, float x1, float x2) {
   const float bend = x0 - 2 * x1 + x2;
   return 2 * x0 - x1 + (bend == bend ? kBendGoesOn * bend : 0);
+}
+
+struct Foretold {
+  float column_px;
+  float unsure_px;  // more than where the surface goes on
+};
+
+/// The same of columns known to a standard deviation each, beside the end of a surface. It ends there because
+/// it turns away, sooner than a bend tells: of simulated faces and spheres, the last column is .3 to .5 px
+/// short of what three before it foretell wherever these draw nearer to each other at all.
+inline Foretold ends_on(const std::array<float, 3>& x, const std::array<float, 3>& sigma_px) {
+  constexpr float kShort_px = 0.4F;
+  constexpr float kUnsure_px = 0.3F;
+  constexpr float kUnsureWider_px = 0.7F;  // where they draw apart
+  constexpr float kNoise = 2;              // standard deviations of a bend that is none,
+  constexpr float kBent_px = 0.1F;         // and so much more one that is
+  const float bend = x[0] - 2 * x[1] + x[2];
+  const float noise =
+      std::sqrt(sigma_px[0] * sigma_px[0] + 4 * sigma_px[1] * sigma_px[1] + sigma_px[2] * sigma_px[2]);
+  const float bent = std::clamp((std::fabs(bend) - kNoise * noise) / kBent_px, 0.F, 1.F);
+  const float outwards = x[0] > x[1] ? 1.F : -1.F;
+  const float column = goes_on_to(x[0], x[1], x[2]);
+  if (bend * outwards > 0) return {column, kUnsureWider_px * bent};
+  return {column - outwards * kShort_px * bent, kUnsure_px * bent};
 }
 
 struct Hole {

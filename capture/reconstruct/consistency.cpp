@@ -277,23 +277,36 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
   std::array<Estimate, 4> predictions{};
   std::size_t count = 0;
   // From three, or two, neighbours in one direction.
-  const auto predict = [&](float a, float b, float c, float one) {
+  const auto predict = [&](float a, float b, float c, const Foretold& three, float two_px) {
     const float bend = a - 2 * b + c;
     const float straight = 2 * a - b;
     if (known(bend)) {
-      predictions[count++] = {goes_on_to(a, b, c), kPrediction_px + kPredictionBend * std::fabs(bend)};
+      predictions[count++] = {three.column_px,
+                              kPrediction_px + kPredictionBend * std::fabs(bend) + three.unsure_px};
     } else if (known(straight)) {
-      predictions[count++] = {straight, kPrediction_px + one};
+      predictions[count++] = {straight, kPrediction_px + two_px};
     } else if (known(b) && known(c)) {
-      predictions[count++] = {3 * b - 2 * c, kPrediction_px + 2 * one};
+      predictions[count++] = {3 * b - 2 * c, kPrediction_px + 2 * two_px};
     }
   };
   const float* here = row(trusted_, line);
-  predict(here[boundary - 1], here[boundary - 2], here[boundary - 3], kTwoAcross_px);
-  predict(here[boundary + 1], here[boundary + 2], here[boundary + 3], kTwoAcross_px);
-  const auto at = [&](int l) { return row(trusted_, line + l)[boundary]; };
-  if (!above_differs) predict(at(-1), at(-2), at(-3), kTwoAlong_px);
-  if (!below_differs) predict(at(1), at(2), at(3), kTwoAlong_px);
+  const float* measured = row(measured_, line);
+  const float* noise = row(noise_, line);
+  const auto across = [&](int side, bool ends) {
+    const std::array<float, 3> x{here[boundary + side], here[boundary + 2 * side], here[boundary + 3 * side]};
+    const Foretold three =
+        ends ? ends_on(x, {noise[boundary + side], noise[boundary + 2 * side], noise[boundary + 3 * side]})
+             : Foretold{goes_on_to(x[0], x[1], x[2]), 0};
+    predict(x[0], x[1], x[2], three, kTwoAcross_px);
+  };
+  across(-1, !hangs_together(measured, boundary + 1));
+  across(1, !hangs_together(measured, boundary));
+  const auto along = [&](int way) {
+    const auto x = [&](int i) { return row(trusted_, line + way * i)[boundary]; };
+    predict(x(1), x(2), x(3), {goes_on_to(x(1), x(2), x(3)), 0}, kTwoAlong_px);
+  };
+  if (!above_differs) along(-1);
+  if (!below_differs) along(1);
   float own_variance = sigma_px * sigma_px + kOwn_px * kOwn_px;
   if (state & (Around::kOpenAlong | Around::kBentAlong)) own_variance += kDoubtAlong_px * kDoubtAlong_px;
   if (state & (Around::kOpenAcross | Around::kBentAcross)) own_variance += kDoubtAcross_px * kDoubtAcross_px;

@@ -23,6 +23,30 @@ std::int32_t& SequenceDecoder::cell(int line, int boundary) {
                static_cast<std::size_t>(boundary)];
 }
 
+/// Gives up boundaries that follow on neither side and show nothing but the stripes in which the surfaces
+/// beside them end: what was decoded is where these meet, and the boundary may be elsewhere on the line.
+void SequenceDecoder::give_up_meetings(const EdgeImage& edges, int line, const SequenceContext& context,
+                                       SequenceResult& out) const {
+  const auto meet = [](const SlideColours& slide, int left, int own, int right) {
+    const auto of = [&](int boundary) { return slide.colours[static_cast<std::size_t>(boundary)]; };
+    return of(left)[1] == of(own)[0] && of(own)[1] == of(right)[0];
+  };
+  int left = -1;
+  std::int16_t* own = nullptr;
+  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
+       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const int right = out.boundary[e];
+    if (right < 0) continue;
+    if (left >= 0 && *own != left + 1 && right != *own + 1 && meet(shown_slide(context), left, *own, right) &&
+        meet(other_slide(context), left, *own, right)) {
+      *own = -1;
+    } else if (own != nullptr) {
+      left = *own;
+    }
+    own = &out.boundary[e];
+  }
+}
+
 /// Puts a line's edges on the grid. Of several that are one boundary the clearest stays.
 void SequenceDecoder::place_on_grid(const EdgeImage& edges, int line, SequenceResult& out) {
   std::fill_n(&cell(line, 0), boundaries_, -1);
@@ -56,11 +80,15 @@ bool SequenceDecoder::goes_on(const EdgeImage& edges, int line, std::uint32_t e,
 /// A boundary stays where a neighbour on the grid agrees with it: above, below, left or right. That is asked
 /// from the first line to the last, and along each, so that of what is above and to the left only what is
 /// left of it counts. Most edges stay or go whatever becomes of those; the others wait for them.
-void SequenceDecoder::check(const EdgeImage& edges, WorkerPool& pool, SequenceResult& out) {
+void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& context, WorkerPool& pool,
+                            SequenceResult& out) {
   grid_.resize(static_cast<std::size_t>(edges.lines) * static_cast<std::size_t>(boundaries_));
   verdict_.resize(edges.edges.size());
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
-    for (int line = begin; line < end; ++line) place_on_grid(edges, line, out);
+    for (int line = begin; line < end; ++line) {
+      if (context.other != nullptr) give_up_meetings(edges, line, context, out);
+      place_on_grid(edges, line, out);
+    }
   });
   const auto follows = [&](std::uint32_t first, std::uint32_t last, std::uint32_t e) {
     return e > first && e < last && out.boundary[e - 1] >= 0 && out.boundary[e] == out.boundary[e - 1] + 1;

@@ -14,8 +14,7 @@ namespace {
 
 constexpr float kModel_px = 0.003F;  // of any place: an edge is not quite what its samples tell
 constexpr float kAtStep_px = 0.1F;   // and where it lies on a step of the scene
-constexpr float kPlain = 0.05F;      // contrast that is none,
-constexpr float kContrasty = 0.1F;   // and one by which the bias is measured
+constexpr float kContrasty = 0.1F;   // contrast by which the blur is told
 constexpr float kSteep = 0.15F;      // slope of the luma ratio that places a boundary well, a pixel
 constexpr float kWideStripe_px = 12.F;
 constexpr float kShifting = 0.04F;    // contrast from which on zero crossings are put back
@@ -97,7 +96,7 @@ Refiner::Place Refiner::find(const DifferenceImage& image, int line, float colum
   const float sigma = placer_.sigma_px(image, line, luma);
   const float level =
       kLevelShare * contrast_around(image, line, centre, kLumaContrast_px, wide_stripes_) / luma.slope;
-  return {luma.column_px, std::sqrt(sigma * sigma + level * level), true, true};
+  return {luma.column_px, std::hypot(sigma, level, scatter_.luma_px()), true, true};
 }
 
 /// What is around an edge, into it and `out`; `luma` is where luma has it.
@@ -179,19 +178,6 @@ void Refiner::find_blur(const DifferenceImage& image, const SequenceResult& resu
       static_cast<std::size_t>(std::min_element(blur_cost_.begin(), blur_cost_.end()) - blur_cost_.begin());
 }
 
-/// What tells how far colour is still off luma goes to the worker's samples.
-void Refiner::sample(const Edge& edge, const LumaSeen& luma, int worker) {
-  if (!luma.found) return;
-  const float apart = luma.column_px - edge.column_px;
-  const float excess = apart * apart - luma.sigma_px * luma.sigma_px - edge.sigma_px * edge.sigma_px;
-  if (edge.contrast < kPlain) {
-    always_.of(worker).push_back(excess);
-  } else if (edge.contrast > kContrasty && luma.steep) {
-    by_contrast_.of(worker).push_back((excess - luma.level_px * luma.level_px) /
-                                      (edge.contrast * edge.contrast));
-  }
-}
-
 /// As LumaPlacer::places(), by luma without a low-pass along the line.
 void Refiner::place_sharply(int line, const LumaLine& light, int width, const LumaQuery& query,
                             LumaPlace& out) const {
@@ -246,19 +232,19 @@ void Refiner::look_at_line(const DifferenceImage& image, int line, const Sequenc
   }
 }
 
-void Refiner::refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge) {
+void Refiner::refine_edge(const LumaSeen& luma, const ColourAndLumaErrors& errors, Edge& edge) {
+  const auto squared = [](float v) { return v * v; };
   const float own = edge.column_px;
-  const float colour_noise = edge.sigma_px * edge.sigma_px + drawn.always_px * drawn.always_px;
-  const float colour_bias = drawn.by_contrast_px * edge.contrast;
-  const float w_colour = 1 / (colour_noise + colour_bias * colour_bias);
+  const float colour_noise = squared(edge.sigma_px) + squared(errors.colour.px);
+  const float w_colour = 1 / (colour_noise + squared(errors.colour.by_contrast_px * edge.contrast));
   float w_luma = 0;
   float noise = colour_noise;
   float pure_weight = 1 / colour_noise;
   if (luma.found) {
-    const float variance = luma.sigma_px * luma.sigma_px;
+    const float variance = squared(luma.sigma_px) + squared(errors.luma.px);
     pure_weight += 1 / variance;
     noise += variance;
-    w_luma = 1 / (variance + luma.level_px * luma.level_px);
+    w_luma = 1 / (variance + squared(luma.level_px) + squared(errors.luma.by_contrast_px * edge.contrast));
     edge.column_px = (w_luma * luma.column_px + w_colour * own) / (w_luma + w_colour);
   }
   // Where the two disagree by more than they should, neither is as good as it looks.
@@ -267,14 +253,8 @@ void Refiner::refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge) 
           ? kApartShare * std::max(0.F, std::fabs(luma.column_px - own) - kApartNoise * std::sqrt(noise))
           : kNoLuma_px + kNoLumaContrast_px * edge.contrast;
   const float model = edge.at_step ? kAtStep_px : kModel_px;
-  edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + apart * apart + model * model);
+  edge.sigma_px = std::sqrt(1 / (w_luma + w_colour) + squared(apart) + squared(model));
   edge.noise_px = 1 / std::sqrt(pure_weight);
-}
-
-/// How far blurred chroma draws colour's place from luma's, in the frame at hand.
-Refiner::Drawn Refiner::colour_drawn() {
-  return {std::sqrt(std::max(0.F, always_.median(0)) * kVarianceOfMedian),
-          drawn_by_contrast_px(by_contrast_.median(0))};
 }
 
 void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceResult& result,
@@ -290,11 +270,14 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
   wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   seen_.resize(edges.edges.size());
   scratch_.resize(static_cast<std::size_t>(pool.workers()));
-  always_.reset(pool.workers());
-  by_contrast_.reset(pool.workers());
+  scatter_.begin(pool.workers());
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
-    for (int line = begin; line < end; ++line) look_at_line(image, line, result, colours, worker, edges);
+    for (int line = begin; line < end; ++line) {
+      look_at_line(image, line, result, colours, worker, edges);
+      scatter_.line(edges, result, seen_, line, worker);
+    }
   });
+  scatter_.settle_plain();
   find_blur(image, result, colours, edges, pool);
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line)
@@ -304,17 +287,18 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
         Edge& edge = edges.edges[e];
         if (edge.contrast > kShifting && result.still[e] != 0)
           edge.column_px -= shift_.shift_px(shift_query(image, line, result, colours, edges, e), blur_);
-        sample(edge, seen_[e], worker);
+        scatter_.apart(edge, seen_[e], result.still[e] != 0, worker);
       }
   });
-  const Drawn drawn = colour_drawn();
+  const ColourAndLumaErrors still = scatter_.of_still();
+  const ColourAndLumaErrors moving = scatter_.of_moving();
   pool.for_shares(edges.line_start, [&](int begin_line, int end_line, int) {
     for (int line = begin_line; line < end_line; ++line)
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
         if (result.boundary[e] >= 0) {
           Edge& edge = edges.edges[e];
-          refine_edge(seen_[e], drawn, edge);
+          refine_edge(seen_[e], result.still[e] != 0 ? still : moving, edge);
           if (edge.contrast > kStepContrast) {
             edge.above_differs = line > 0 && !same_surface(slide, line, line - 1, edge.column_px);
             edge.below_differs =

@@ -12,7 +12,7 @@
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/luma_place.h"
-#include "capture/reconstruct/ranked_sample.h"
+#include "capture/reconstruct/place_scatter.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/sharp_luma.h"
 
@@ -50,16 +50,6 @@ class Refiner {
   Place find(const DifferenceImage& image, int line, float column_px, const Sides& sides) const;
 
  private:
-  /// Where luma has the boundary of an edge, and what noise and contrast make of it.
-  struct LumaSeen {
-    float column_px, sigma_px, level_px;
-    bool steep;  // luma places it well
-    bool found;
-  };
-  /// Standard deviations of what blurred chroma does to zero crossings.
-  struct Drawn {
-    float always_px, by_contrast_px;
-  };
   struct Scratch {
     LumaLine light;                    // of one line
     std::vector<LumaQuery> queries;    // of its edges that luma may place,
@@ -78,9 +68,7 @@ class Refiner {
   void find_blur(const DifferenceImage& image, const SequenceResult& result,
                  const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
                  WorkerPool& pool);
-  void sample(const Edge& edge, const LumaSeen& luma, int worker);
-  Drawn colour_drawn();
-  static void refine_edge(const LumaSeen& luma, const Drawn& drawn, Edge& edge);
+  static void refine_edge(const LumaSeen& luma, const ColourAndLumaErrors& errors, Edge& edge);
 
   LumaPlacer placer_;
   ColourShift shift_;
@@ -99,7 +87,7 @@ class Refiner {
   const SharpLuma* sharp_ = nullptr;  // of the frame being refined
   std::vector<Scratch> scratch_;      // one a worker
   std::vector<LumaSeen> seen_;        // one an edge
-  RankedSample always_, by_contrast_;
+  PlaceScatter scatter_;
 };
 
 }  // namespace relievo

@@ -300,9 +300,6 @@ RenderCounts RenderPlacer::place(const RenderView& view, WorkerPool& pool, Seque
   }
   for (float& weight : blur_) weight /= all;
 
-  const auto asks = [&](int line, float column_px, float sigma_px) {
-    return sigma_px > kUnsure_px && view.moving.around(line, column_px) == 0;
-  };
   counts_.assign(static_cast<std::size_t>(pool.workers()), {});
   unlikes_.reset(pool.workers());
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
@@ -311,7 +308,7 @@ RenderCounts RenderPlacer::place(const RenderView& view, WorkerPool& pool, Seque
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
         Edge& edge = edges.edges[e];
-        if (result.boundary[e] < 0 || !asks(line, edge.column_px, edge.sigma_px)) continue;
+        if (result.boundary[e] < 0 || edge.sigma_px <= kUnsure_px) continue;
         if (settle(view, line, result.boundary[e], worker, edge.column_px, edge.sigma_px)) {
           ++counts.moved;
         } else {
@@ -327,7 +324,7 @@ RenderCounts RenderPlacer::place(const RenderView& view, WorkerPool& pool, Seque
     total.rejected += c.rejected;
   }
   total.rejected += std::erase_if(recovered, [&](RecoveredBoundary& r) {
-    if (!asks(r.line, r.column_px, r.sigma_px)) return false;
+    if (r.sigma_px <= kUnsure_px) return false;
     ++total.moved;
     return !settle(view, r.line, r.boundary, 0, r.column_px, r.sigma_px);
   });

@@ -46,10 +46,10 @@ class RenderPlacer {
   /// `colour_matrix` must have an inverse: pictures are as the camera gives them.
   explicit RenderPlacer(const std::array<double, 9>& colour_matrix);
 
-  /// Where things hold still: moves unsure places of `edges` and `recovered` and updates their standard
-  /// deviations; gives up boundaries of `result` (-1), and takes them out of `recovered`, that the picture
-  /// does not show; and adds boundaries to `recovered` that were given up, or that a line beside has, and
-  /// that it does show.
+  /// Moves unsure places of `edges` and `recovered` and updates their standard deviations; gives up
+  /// boundaries of `result` (-1), and takes them out of `recovered`, that the picture does not show; and,
+  /// where things hold still, adds boundaries to `recovered` that were given up, or that a line beside has,
+  /// and that it does show. Not for frames in which much moves: their two fields show different surfaces.
   RenderCounts place(const RenderView& view, WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
                      std::vector<RecoveredBoundary>& recovered);
 

@@ -268,7 +268,7 @@ void SequenceDecoder::decode(const EdgeImage& edges, const SequenceContext& cont
     out.score += s.score;
     out.counts.in_order += s.in_order;
   }
-  check(edges, pool, out);
+  check(edges, context, pool, out);
   complete(edges, context, out);
 }
 

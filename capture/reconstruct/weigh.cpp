@@ -55,7 +55,9 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
     ++count;
   };
   // From three neighbours in one direction, or two.
-  const auto foretell = [&](std::ptrdiff_t step, float two_px, float times) {
+  const auto foretell = [&](std::ptrdiff_t step, bool across) {
+    const float two_px = across ? kTwoAcross_px : kTwoAlong_px;
+    const float times = across ? 1 : kAlong;
     const Place &a = own[step], &b = own[2 * step], &c = own[3 * step];
     const float bend = a.column_px - 2 * b.column_px + c.column_px;
     const bool three = bend == bend;
@@ -63,13 +65,15 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
     const float share = three ? kBendGoesOn : 0;
     const float noise =
         square((2 + share) * a.sigma_px) + square((1 + 2 * share) * b.sigma_px) + square(share * c.sigma_px);
-    take(goes_on_to(a.column_px, b.column_px, c.column_px),
-         square(times) * (square(model) + square(kOwn) * noise));
+    Foretold there{goes_on_to(a.column_px, b.column_px, c.column_px), 0};
+    if (across && three && !own[-step].known())
+      there = ends_on({a.column_px, b.column_px, c.column_px}, {a.sigma_px, b.sigma_px, c.sigma_px});
+    take(there.column_px, square(times) * (square(model + there.unsure_px) + square(kOwn) * noise));
   };
-  foretell(-1, kTwoAcross_px, 1);
-  foretell(1, kTwoAcross_px, 1);
-  foretell(-stride, kTwoAlong_px, kAlong);
-  foretell(stride, kTwoAlong_px, kAlong);
+  foretell(-1, true);
+  foretell(1, true);
+  foretell(-stride, false);
+  foretell(stride, false);
   const Place &above = own[-stride], &below = own[stride];
   const float apart = below.column_px - above.column_px;
   take(0.5F * (above.column_px + below.column_px),

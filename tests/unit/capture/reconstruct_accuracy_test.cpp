@@ -154,6 +154,26 @@ TEST(Accuracy, ErrorsAreFarBelowThePaperDecoders) {
   EXPECT_GT(ours.completeness, paper.completeness);
 }
 
+// Luma never reaches the levels that its places are told by: they are off by a tenth of a pixel and more.
+TEST(Accuracy, StripesAboutAsNarrowAsTheirBlurAreNotDrawnByLuma) {
+  const Filmed filmed("object,stripes=120,defocus=2.6,chroma=0.5");
+  const Score paper = score_of(filmed, Decoder::kPaper);
+  const Score ours = score_of(filmed, Decoder::kOrdered);
+  std::printf("median %.0f, RMS %.0f um/m, the paper's decoder %.0f, %.0f\n", ours.median_um_per_m,
+              ours.rms_um_per_m, paper.median_um_per_m, paper.rms_um_per_m);
+  EXPECT_LT(ours.median_um_per_m, 0.6 * paper.median_um_per_m);
+  EXPECT_LT(ours.rms_um_per_m, 0.8 * paper.rms_um_per_m);
+}
+
+// Half of a cheek's rim shows, before the wall behind it, the code of a boundary that is elsewhere on the
+// line.
+TEST(Accuracy, WhereTwoSurfacesMeetThereIsNoThird) {
+  const Filmed filmed("face,first=356,seed=1549,stripes=72,noise=1.8,chroma=0.9,defocus=1.7");
+  const Score ours = score_of(filmed, Decoder::kOrdered, 4, 2);
+  EXPECT_LT(ours.outliers, 0.0006);
+  EXPECT_GT(ours.completeness, 0.989);
+}
+
 // Each channel that flips says once more where a boundary is: 2.2 of them a slide instead of 1.7.
 TEST(Accuracy, TheClearPathsBoundariesLieBetterThanThePublishedOnes) {
   for (const std::string spec : {"face,frames=8", "walk,frames=8"}) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/persistence.h"
 #include "tests/unit/capture/decoded_frame.h"
 
@@ -87,6 +88,23 @@ TEST(Weighing, BesideAnotherSurfaceNothingPullsAPlaceThere) {
   f.weigh();
   for (int line = 4; line + 4 < kLines; ++line)
     EXPECT_NEAR(f.edge(line, 5).column_px, Frame::place(line, 5), 0.01) << line;
+}
+
+TEST(Weighing, WhereASurfaceEndsItTurnsAwaySoonerThanItsBendTells) {
+  // Spacings of 8, 7.8 and 7.6 px are followed by one of 7.46 - 0.4.
+  const Foretold turning = ends_on({123.4F, 115.8F, 108.F}, {0.02F, 0.02F, 0.02F});
+  EXPECT_NEAR(turning.column_px, 123.4F + 7.46F - 0.4F, 1e-3F);
+  EXPECT_NEAR(turning.unsure_px, 0.3F, 1e-6F);
+  // The other way round, the same.
+  const Foretold left = ends_on({-123.4F, -115.8F, -108.F}, {0.02F, 0.02F, 0.02F});
+  EXPECT_NEAR(left.column_px, -turning.column_px, 1e-3F);
+  // What noise explains is no bend, and what draws apart is anybody's guess.
+  const Foretold noisy = ends_on({123.4F, 115.8F, 108.F}, {0.06F, 0.06F, 0.06F});
+  EXPECT_NEAR(noisy.column_px, 123.4F + 7.46F, 1e-3F);
+  EXPECT_EQ(noisy.unsure_px, 0);
+  const Foretold apart = ends_on({123.8F, 115.8F, 108.F}, {0.02F, 0.02F, 0.02F});
+  EXPECT_NEAR(apart.column_px, 123.8F + 8.14F, 1e-3F);
+  EXPECT_NEAR(apart.unsure_px, 0.7F, 1e-6F);
 }
 
 TEST(Weighing, WhatStaysUnsureIsGivenUp) {
