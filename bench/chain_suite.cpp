@@ -388,7 +388,7 @@ Command chain_suite() {
                 ->type_name("NAME");
             add_threads_option(app, options->threads);
             app.add_option("--decoder", options->decoder, "ordered, quick, auto or paper, as `serve` has it")
-                ->check(CLI::IsMember({"ordered", "quick", "auto", "paper"}))
+                ->check(CLI::IsMember(kServedDecoders))
                 ->capture_default_str();
             add_half_lines_option(app, options->line_stride);
             add_codec_options(app, options->geometry, options->texture);

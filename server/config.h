@@ -59,6 +59,9 @@ struct StreamConfig {
   bool operator==(const StreamConfig&) const = default;
 };
 
+/// What set_decoder() takes.
+inline const std::vector<std::string> kServedDecoders{"ordered", "quick", "auto", "paper"};
+
 /// `name`: as --decoder has it. False where nothing is called so.
 bool set_decoder(std::string_view name, StreamConfig& config);
 /// Whether decoder and half_lines go together.

@@ -17,6 +17,7 @@
 #include "capture/reconstruct/detection_lines.h"
 #include "codec/decodable_frames.h"
 #include "server/pace.h"
+#include "server/slides_seen.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
 #include "server/texture_look.h"
@@ -36,10 +37,6 @@ constexpr std::int64_t kLookInterval_ns = kNanosecondsPerSecond;  // between pic
 constexpr std::uint64_t kFramesForASurface = 30;                  // far more than any schedule needs
 constexpr std::uint64_t kMixedForASurface =
     300;  // frames under two slides each: ten seconds of a drifting rig
-
-// Of a person who walks at 1 m/s the quick decoder finds 0.99 with the other slide from 33 ms ago and 0.94,
-// less and less, from 0.1 s on. At 60 Hz one frame may be dropped.
-constexpr std::int64_t kOldestOther_ns = 60'000'000;
 
 constexpr const char* kGuessed =
     "The rig is not calibrated: its shapes are guesses until it is, on the page /rig.";
@@ -62,30 +59,6 @@ struct Encoded {
 };
 struct Taken {
   double ms, place;
-};
-
-/// The last frames under either slide, where slides alternate.
-class SlidesSeen {
- public:
-  /// Whether frames were dropped since the other slide was seen that `next` would be decoded with, and that
-  /// was too long ago or never.
-  bool other_is_old(const Captured& next) const {
-    if (!last_) return false;
-    const std::uint64_t since = next.number - last_->number;
-    const std::optional<Seen>& other = since % 2 == 1 ? last_ : other_;
-    return since > 1 && (!other || next.frame.time_ns - other->time_ns > kOldestOther_ns);
-  }
-  void add(const Captured& item) {
-    if (last_ && (item.number - last_->number) % 2 == 1) other_ = last_;
-    last_ = Seen{item.number, item.frame.time_ns};
-  }
-
- private:
-  struct Seen {
-    std::uint64_t number;
-    std::int64_t time_ns;
-  };
-  std::optional<Seen> last_, other_;
 };
 
 class ThreadedPipeline final : public Pipeline {
@@ -262,19 +235,21 @@ class ThreadedPipeline final : public Pipeline {
     StepWatch steps(source_.info().rig.frame_rate);
     SlidesSeen slides;
     const bool dropping = !options_.lossless && source_.info().pattern.scheme == Scheme::kComplementary;
-    const auto not_alone = [&](const Captured& item) { return dropping && slides.other_is_old(item); };
+    const auto not_alone = [&](const Captured& item) {
+      return dropping && slides.other_is_old(item.number, item.frame.time_ns);
+    };
     for (;;) {
       auto [item, next] = to_reconstruct_.pop_with_next_if(not_alone);
       if (!item) break;
       if (next) {
         if (auto seen = reconstructor_.observe(item->frame); !seen) fail(seen.error());
         steps.add(item->frame.time_ns, reconstructor_.report().step);
-        slides.add(*item);
+        slides.add(item->number, item->frame.time_ns);
         previous = item->number;
         ++observed_;
         item = std::move(next);
       }
-      slides.add(*item);
+      slides.add(item->number, item->frame.time_ns);
       const std::int64_t begin = steady_now_ns();
       auto result = reconstructor_.add(item->frame);
       if (!result) {

@@ -180,7 +180,7 @@ Command serve_command() {
                        "ordered (default: the most exact), quick (for a camera that ordered cannot keep up "
                        "with), auto (as exact as all of the camera's frames can be on this machine: ordered, "
                        "quick, or quick with fewer lines) or paper (as published)")
-            ->check(CLI::IsMember({"ordered", "quick", "auto", "paper"}))
+            ->check(CLI::IsMember(kServedDecoders))
             ->type_name("NAME");
         app.add_flag("--half-lines", f->half_lines, kHalfLinesHelp);
         app.add_flag("--dense", f->dense,
