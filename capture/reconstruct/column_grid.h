@@ -60,6 +60,10 @@ struct Foretold {
   float unsure_px;  // more than where the surface goes on
 };
 
+inline Foretold foretold(const std::array<float, 3>& x) {
+  return {goes_on_to(x[0], x[1], x[2]), 0};
+}
+
 /// The same of columns known to a standard deviation each, beside the end of a surface. It ends there because
 /// it turns away, sooner than a bend tells: of simulated faces and spheres, the last column is .3 to .5 px
 /// short of what three before it foretell wherever these draw nearer to each other at all.

@@ -277,7 +277,8 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
   std::array<Estimate, 4> predictions{};
   std::size_t count = 0;
   // From three, or two, neighbours in one direction.
-  const auto predict = [&](float a, float b, float c, const Foretold& three, float two_px) {
+  const auto predict = [&](const std::array<float, 3>& x, const Foretold& three, float two_px) {
+    const auto [a, b, c] = x;
     const float bend = a - 2 * b + c;
     const float straight = 2 * a - b;
     if (known(bend)) {
@@ -294,16 +295,16 @@ std::optional<ConsistencyCheck::Estimate> ConsistencyCheck::settle(int line, int
   const float* noise = row(noise_, line);
   const auto across = [&](int side, bool ends) {
     const std::array<float, 3> x{here[boundary + side], here[boundary + 2 * side], here[boundary + 3 * side]};
-    const Foretold three =
-        ends ? ends_on(x, {noise[boundary + side], noise[boundary + 2 * side], noise[boundary + 3 * side]})
-             : Foretold{goes_on_to(x[0], x[1], x[2]), 0};
-    predict(x[0], x[1], x[2], three, kTwoAcross_px);
+    const std::array<float, 3> noise_px{noise[boundary + side], noise[boundary + 2 * side],
+                                        noise[boundary + 3 * side]};
+    predict(x, ends ? ends_on(x, noise_px) : foretold(x), kTwoAcross_px);
   };
   across(-1, !hangs_together(measured, boundary + 1));
   across(1, !hangs_together(measured, boundary));
   const auto along = [&](int way) {
-    const auto x = [&](int i) { return row(trusted_, line + way * i)[boundary]; };
-    predict(x(1), x(2), x(3), {goes_on_to(x(1), x(2), x(3)), 0}, kTwoAlong_px);
+    const auto at = [&](int i) { return row(trusted_, line + way * i)[boundary]; };
+    const std::array<float, 3> x{at(1), at(2), at(3)};
+    predict(x, foretold(x), kTwoAlong_px);
   };
   if (!above_differs) along(-1);
   if (!below_differs) along(1);

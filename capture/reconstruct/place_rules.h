@@ -29,8 +29,13 @@ inline constexpr float kNoLuma_px = 0.1F;          // where luma shows no step, 
 inline constexpr float kNoLumaContrast_px = 0.6F;  // times contrast more
 inline constexpr float kLeastRise = 0.12F;         // of luma, between the sides of a boundary that luma shows
 inline constexpr float kLeastSlope = 0.2F;         // of that, a pixel
+inline constexpr float kContrasty = 0.1F;          // contrast by which blur and errors are measured
 inline constexpr float kStepContrast = 0.12F;      // a step of the scene that is one
 inline constexpr float kStepNear_px = 1.2F;
+
+inline float squared(float v) {
+  return v * v;
+}
 
 /// Of a column that is not negative; a call of std::lround takes ten times as long.
 inline int column_of(float column_px) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/place_rules.h"
 
 namespace relievo {
@@ -12,17 +13,11 @@ using namespace place_rules;
 
 namespace {
 
-constexpr float kPlain = 0.05F;         // contrast that is none,
-constexpr float kContrasty = 0.1F;      // and one by which errors are measured
 constexpr float kCubic = 34.F / 36;     // variance of a cubic through four places, of one's
 constexpr int kEvery = 3;               // lines that are asked about cubics
 constexpr std::size_t kLeastSeen = 40;  // places with contrast that tell colour from luma
 constexpr float kMostLuma_px = 4;
 constexpr std::size_t kFewMove = 4;  // times as many with contrast hold still
-
-float squared(float v) {
-  return v * v;
-}
 
 /// Luma's part of the variance of both, of which luma's is so much more than colour's.
 float part_of_luma(float both, float more) {
@@ -52,7 +47,7 @@ void PlaceScatter::line(const EdgeImage& edges, const SequenceResult& result,
     const LumaSeen& luma = seen[e];
     const bool contrasty = edge.contrast > kContrasty && luma.steep && result.still[e] != 0;
     const int b = result.boundary[e];
-    if (b < 0 || !luma.found || (edge.contrast > kPlain && !contrasty)) continue;
+    if (b < 0 || !luma.found || (edge.contrast > BoundaryRow::kPlainContrast && !contrasty)) continue;
     if (result.boundary[e - 2] != b - 2 || result.boundary[e - 1] != b - 1 ||
         result.boundary[e + 1] != b + 1 || result.boundary[e + 2] != b + 2)
       continue;
@@ -96,6 +91,12 @@ void PlaceScatter::apart(const Edge& edge, const LumaSeen& luma, bool still, int
       .push_back((squared(luma.column_px - edge.column_px) - known) / squared(edge.contrast));
 }
 
+PlaceScatter::Errors PlaceScatter::errors() {
+  const ColourAndLumaErrors still = of_still();
+  if (apart_moving_.size() * kFewMove < contrasty_.apart.size()) return {still, still};
+  return {still, {{colour_px_, drawn_by_contrast_px(apart_moving_.median(0))}, {luma_px_, 0}}};
+}
+
 ColourAndLumaErrors PlaceScatter::of_still() {
   const float both = std::max(0.F, contrasty_.apart.median(0));
   const float of_luma = contrasty_.luma.size() < kLeastSeen
@@ -103,11 +104,6 @@ ColourAndLumaErrors PlaceScatter::of_still() {
                             : part_of_luma(both, contrasty_.luma.median(0) - contrasty_.colour.median(0));
   return {{colour_px_, drawn_by_contrast_px(both - of_luma)},
           {luma_px_, std::min(kMostLuma_px, std::sqrt(of_luma * kVarianceOfMedian))}};
-}
-
-ColourAndLumaErrors PlaceScatter::of_moving() {
-  if (apart_moving_.size() * kFewMove < contrasty_.apart.size()) return of_still();
-  return {{colour_px_, drawn_by_contrast_px(apart_moving_.median(0))}, {luma_px_, 0}};
 }
 
 }  // namespace relievo

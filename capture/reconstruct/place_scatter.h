@@ -47,12 +47,17 @@ class PlaceScatter {
   /// What an edge tells that has contrast around it. `still`: nothing moved there.
   void apart(const Edge& edge, const LumaSeen& luma, bool still, int worker);
 
-  ColourAndLumaErrors of_still();
-  /// Where things move both fields show other surfaces, and what colour and luma have in common is unknown:
-  /// all is taken for colour's. Where few move it is as of_still().
-  ColourAndLumaErrors of_moving();
+  struct Errors {
+    ColourAndLumaErrors still;
+    /// Where things move both fields show other surfaces, and what colour and luma have in common is
+    /// unknown: all is taken for colour's. Where few move it is as where nothing does.
+    ColourAndLumaErrors moving;
+  };
+  Errors errors();
 
  private:
+  ColourAndLumaErrors of_still();
+
   struct Squares {              // of distances
     RankedSample apart;         // luma from colour,
     RankedSample colour, luma;  // and either from the cubics

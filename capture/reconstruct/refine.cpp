@@ -14,7 +14,6 @@ namespace {
 
 constexpr float kModel_px = 0.003F;  // of any place: an edge is not quite what its samples tell
 constexpr float kAtStep_px = 0.1F;   // and where it lies on a step of the scene
-constexpr float kContrasty = 0.1F;   // contrast by which the blur is told
 constexpr float kSteep = 0.15F;      // slope of the luma ratio that places a boundary well, a pixel
 constexpr float kWideStripe_px = 12.F;
 constexpr float kShifting = 0.04F;    // contrast from which on zero crossings are put back
@@ -233,7 +232,6 @@ void Refiner::look_at_line(const DifferenceImage& image, int line, const Sequenc
 }
 
 void Refiner::refine_edge(const LumaSeen& luma, const ColourAndLumaErrors& errors, Edge& edge) {
-  const auto squared = [](float v) { return v * v; };
   const float own = edge.column_px;
   const float colour_noise = squared(edge.sigma_px) + squared(errors.colour.px);
   const float w_colour = 1 / (colour_noise + squared(errors.colour.by_contrast_px * edge.contrast));
@@ -290,15 +288,14 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
         scatter_.apart(edge, seen_[e], result.still[e] != 0, worker);
       }
   });
-  const ColourAndLumaErrors still = scatter_.of_still();
-  const ColourAndLumaErrors moving = scatter_.of_moving();
+  const PlaceScatter::Errors errors = scatter_.errors();
   pool.for_shares(edges.line_start, [&](int begin_line, int end_line, int) {
     for (int line = begin_line; line < end_line; ++line)
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
         if (result.boundary[e] >= 0) {
           Edge& edge = edges.edges[e];
-          refine_edge(seen_[e], result.still[e] != 0 ? still : moving, edge);
+          refine_edge(seen_[e], result.still[e] != 0 ? errors.still : errors.moving, edge);
           if (edge.contrast > kStepContrast) {
             edge.above_differs = line > 0 && !same_surface(slide, line, line - 1, edge.column_px);
             edge.below_differs =

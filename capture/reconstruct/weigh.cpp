@@ -65,9 +65,10 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
     const float share = three ? kBendGoesOn : 0;
     const float noise =
         square((2 + share) * a.sigma_px) + square((1 + 2 * share) * b.sigma_px) + square(share * c.sigma_px);
-    Foretold there{goes_on_to(a.column_px, b.column_px, c.column_px), 0};
-    if (across && three && !own[-step].known())
-      there = ends_on({a.column_px, b.column_px, c.column_px}, {a.sigma_px, b.sigma_px, c.sigma_px});
+    const std::array<float, 3> x{a.column_px, b.column_px, c.column_px};
+    const Foretold there = across && three && !own[-step].known()
+                               ? ends_on(x, {a.sigma_px, b.sigma_px, c.sigma_px})
+                               : foretold(x);
     take(there.column_px, square(times) * (square(model + there.unsure_px) + square(kOwn) * noise));
   };
   foretell(-1, true);

@@ -143,24 +143,33 @@ Score score_of(const Filmed& filmed, Decoder decoder, std::uint64_t frames = 4, 
   return scorer.score();
 }
 
+struct Compared {
+  Score ours, paper;
+};
+/// A decoder's scores, as score_of(), beside those of the paper's; both are printed.
+Compared compared(const char* spec, Decoder decoder, std::uint64_t frames = 4, std::uint64_t skip = 1) {
+  const Filmed filmed(spec);
+  const Compared out{score_of(filmed, decoder, frames, skip),
+                     score_of(filmed, Decoder::kPaper, frames, skip)};
+  const auto print = [](const char* name, const Score& s) {
+    std::printf("%s: completeness %.4f, outliers %.5f, median %.0f, RMS %.0f um/m\n", name, s.completeness,
+                s.outliers, s.median_um_per_m, s.rms_um_per_m);
+  };
+  print(spec, out.ours);
+  print("the paper's decoder", out.paper);
+  return out;
+}
+
 // Shading and texture draw zero crossings of blurred colour: most of what the paper's decoder is off.
 TEST(Accuracy, ErrorsAreFarBelowThePaperDecoders) {
-  const Filmed filmed("object,stripes=71,chroma=1.6");
-  const Score paper = score_of(filmed, Decoder::kPaper);
-  const Score ours = score_of(filmed, Decoder::kOrdered);
-  std::printf("RMS %.0f um/m, the paper's decoder %.0f; completeness %.4f and %.4f\n", ours.rms_um_per_m,
-              paper.rms_um_per_m, ours.completeness, paper.completeness);
+  const auto [ours, paper] = compared("object,stripes=71,chroma=1.6", Decoder::kOrdered);
   EXPECT_LT(ours.rms_um_per_m, 0.6 * paper.rms_um_per_m);
   EXPECT_GT(ours.completeness, paper.completeness);
 }
 
 // Luma never reaches the levels that its places are told by: they are off by a tenth of a pixel and more.
 TEST(Accuracy, StripesAboutAsNarrowAsTheirBlurAreNotDrawnByLuma) {
-  const Filmed filmed("object,stripes=120,defocus=2.6,chroma=0.5");
-  const Score paper = score_of(filmed, Decoder::kPaper);
-  const Score ours = score_of(filmed, Decoder::kOrdered);
-  std::printf("median %.0f, RMS %.0f um/m, the paper's decoder %.0f, %.0f\n", ours.median_um_per_m,
-              ours.rms_um_per_m, paper.median_um_per_m, paper.rms_um_per_m);
+  const auto [ours, paper] = compared("object,stripes=120,defocus=2.6,chroma=0.5", Decoder::kOrdered);
   EXPECT_LT(ours.median_um_per_m, 0.6 * paper.median_um_per_m);
   EXPECT_LT(ours.rms_um_per_m, 0.8 * paper.rms_um_per_m);
 }
@@ -193,12 +202,7 @@ TEST(Accuracy, TheClearPathsBoundariesLieBetterThanThePublishedOnes) {
 TEST(Accuracy, TheQuickDecoderIsBetterThanThePapers) {
   for (const char* spec : {"object,stripes=71,chroma=1.6", "face,frames=8", "walk,frames=8"}) {
     SCOPED_TRACE(spec);
-    const Filmed filmed(spec);
-    const Score paper = score_of(filmed, Decoder::kPaper, 6, 2);
-    const Score quick = score_of(filmed, Decoder::kQuick, 6, 2);
-    std::printf("completeness %.4f, outliers %.5f, RMS %.0f um/m; the paper's decoder %.4f, %.5f, %.0f\n",
-                quick.completeness, quick.outliers, quick.rms_um_per_m, paper.completeness, paper.outliers,
-                paper.rms_um_per_m);
+    const auto [quick, paper] = compared(spec, Decoder::kQuick, 6, 2);
     EXPECT_GT(quick.completeness, paper.completeness);
     EXPECT_LT(quick.outliers, paper.outliers);
     EXPECT_LT(quick.rms_um_per_m, paper.rms_um_per_m);

@@ -44,7 +44,8 @@ ColourAndLumaErrors measured(const Off& off, bool of_moving = false) {
   for (int line = 0; line < kLines; ++line) scatter.line(frame.edges, frame.result, seen, line, 0);
   scatter.settle_plain();
   for (std::size_t e = 0; e < seen.size(); ++e) scatter.apart(frame.edges.edges[e], seen[e], off.still, 0);
-  return of_moving ? scatter.of_moving() : scatter.of_still();
+  const PlaceScatter::Errors errors = scatter.errors();
+  return of_moving ? errors.moving : errors.still;
 }
 
 TEST(PlaceScatter, WhereNothingIsOffThereIsNoiseAlone) {
