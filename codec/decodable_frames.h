@@ -15,13 +15,13 @@ namespace relievo {
 class DecodableFrames {
  public:
   /// The next frame that came; a number that is not one more than the last one's tells of a loss. False where
-  /// it builds on a lost one. Any bytes; the last key frame's are kept.
+  /// it builds on a lost one, or on one before the first that came. Any bytes; the last key frame's are kept.
   bool add(std::uint64_t number, const std::shared_ptr<const Bytes>& frame);
 
  private:
   std::optional<std::uint64_t> last_;  // number
   std::shared_ptr<const Bytes> key_;   // the last one that builds on nothing
-  bool lost_ = false;                  // something, since then
+  bool lost_ = true;                   // something, since then
 };
 
 }  // namespace relievo

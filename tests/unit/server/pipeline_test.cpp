@@ -247,6 +247,39 @@ TEST_F(PipelineTest, WhatBuildsOnADroppedFrameIsDroppedToo) {
   }
 }
 
+TEST_F(PipelineTest, AStreamBeginsWithAFrameThatDecodes) {
+  // The publisher begins late: the stream's first frames, its key frame among them, are gone by then.
+  Gate release;
+  sink_.on_status = [&](const ServerStatus&) -> Status {
+    release.wait();
+    return {};
+  };
+  Pipeline* running = nullptr;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        EXPECT_TRUE(eventually(at_rest)) << n;
+        if (running->status().drops_publish > 0) release.open();
+        if (n == 12) return ScriptedSource::end();
+        return std::optional(frames_(n));
+      },
+      true);
+  PipelineOptions options;
+  options.encode.key_interval = 100;
+  options.encode.texture = TextureCodec::kH264;
+  const auto pipeline = make(source, {&sink_}, options);
+  running = pipeline.get();
+  ASSERT_TRUE(pipeline->run());
+  const auto got = sink_.frames();
+  ASSERT_GT(got.size(), 3U);
+  expect_no_gaps(got);
+  FrameDecoder decoder;
+  for (const FrameMessage& message : got) {
+    const auto decoded = decoder.decode(*message.data);
+    EXPECT_TRUE(decoded.ok()) << message.number << ": " << decoded.error().message;
+  }
+}
+
 TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction) {
   constexpr std::uint64_t kLeast = 400;
   Pipeline* running = nullptr;
