@@ -7,7 +7,7 @@ namespace relievo {
 
 bool DecodableFrames::add(std::uint64_t number, const std::shared_ptr<const Bytes>& frame) {
   const BuildsOn on = what_it_builds_on(*frame);
-  lost_ = lost_ || (last_ && number != *last_ + 1);
+  lost_ = lost_ || number != last_ + 1;
   last_ = number;
   if (on == BuildsOn::kNothing) {
     key_ = frame;

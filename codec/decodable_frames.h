@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 
 #include "base/stream.h"
 
@@ -19,9 +18,9 @@ class DecodableFrames {
   bool add(std::uint64_t number, const std::shared_ptr<const Bytes>& frame);
 
  private:
-  std::optional<std::uint64_t> last_;  // number
-  std::shared_ptr<const Bytes> key_;   // the last one that builds on nothing
-  bool lost_ = true;                   // something, since then
+  std::uint64_t last_ = 0;            // number
+  std::shared_ptr<const Bytes> key_;  // the last one that builds on nothing
+  bool lost_ = true;                  // something, since then; before the first all is
 };
 
 }  // namespace relievo

@@ -5,8 +5,12 @@
 #include <cmath>
 
 #include "capture/reconstruct/column_grid.h"
+#include "capture/reconstruct/place_rules.h"
 
 namespace relievo {
+
+using place_rules::squared;
+
 namespace {
 
 // Standard deviations of what is foretold, measured on simulated scenes.
@@ -27,23 +31,19 @@ constexpr float kMost_px = 0.85F;   // standard deviation, after weighing, times
 constexpr float kMostMoving_px = 0.55F;  // and where so many boundaries around were elsewhere: there it is
 constexpr int kMoves = 4;                // the silhouette's, and errors are several times as large
 
-float square(float x) {
-  return x * x;
-}
-
 }  // namespace
 
 /// A place's own column and all that is foretold of it and agrees, by their variances. Nothing where it is to
 /// be given up.
 std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, float most_px) const {
-  const float own_variance = square(kOwn * own->sigma_px) + square(kOwnLeast_px);
+  const float own_variance = squared(kOwn * own->sigma_px) + squared(kOwnLeast_px);
   float weights = 1 / own_variance;
   float sum = weights * own->column_px;
   float off = 0;
   int count = 0;
   bool against = false;
   const auto take = [&](float column_px, float variance) {
-    const float apart = square(column_px - own->column_px);
+    const float apart = squared(column_px - own->column_px);
     const float expected = variance + own_variance;
     if (!(apart < kAgree * kAgree * expected)) {
       against = against || (apart == apart && variance < kStrong_px * kStrong_px);
@@ -63,13 +63,13 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
     const bool three = bend == bend;
     const float model = three ? kStraight_px + kBend * std::fabs(bend) : kStraight_px + two_px;
     const float share = three ? kBendGoesOn : 0;
-    const float noise =
-        square((2 + share) * a.sigma_px) + square((1 + 2 * share) * b.sigma_px) + square(share * c.sigma_px);
+    const float noise = squared((2 + share) * a.sigma_px) + squared((1 + 2 * share) * b.sigma_px) +
+                        squared(share * c.sigma_px);
     const std::array<float, 3> x{a.column_px, b.column_px, c.column_px};
     const Foretold there = across && three && !own[-step].known()
                                ? ends_on(x, {a.sigma_px, b.sigma_px, c.sigma_px})
                                : foretold(x);
-    take(there.column_px, square(times) * (square(model + there.unsure_px) + square(kOwn) * noise));
+    take(there.column_px, squared(times) * (squared(model + there.unsure_px) + squared(kOwn) * noise));
   };
   foretell(-1, true);
   foretell(1, true);
@@ -78,8 +78,8 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
   const Place &above = own[-stride], &below = own[stride];
   const float apart = below.column_px - above.column_px;
   take(0.5F * (above.column_px + below.column_px),
-       square(kAlong) * (square(kStraight_px + kBetween * std::fabs(apart)) +
-                         square(kOwn / 2) * (square(above.sigma_px) + square(below.sigma_px))));
+       squared(kAlong) * (squared(kStraight_px + kBetween * std::fabs(apart)) +
+                          squared(kOwn / 2) * (squared(above.sigma_px) + squared(below.sigma_px))));
   if (count == 0 && against) return std::nullopt;
   // Where the surface ends its end is its own.
   float column_px = sum / weights;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/frame3d_codec.h"
 #include "server/pipeline.h"
 #include "tests/unit/server/fakes.h"
 
@@ -43,6 +44,23 @@ inline std::vector<std::uint64_t> range(std::uint64_t first, std::uint64_t end) 
 
 inline void expect_no_gaps(const std::vector<FrameMessage>& frames) {
   for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i].sequence, i);
+}
+
+/// A key frame is followed by frames that build on each other.
+inline PipelineOptions keys_are_rare() {
+  PipelineOptions options;
+  options.encode.key_interval = 100;
+  options.encode.texture = TextureCodec::kH264;
+  return options;
+}
+
+/// Each by what came before it.
+inline void expect_all_decode(const std::vector<FrameMessage>& frames) {
+  FrameDecoder decoder;
+  for (const FrameMessage& message : frames) {
+    const auto decoded = decoder.decode(*message.data);
+    EXPECT_TRUE(decoded.ok()) << message.number << ": " << decoded.error().message;
+  }
 }
 
 class PipelineTest : public ::testing::Test {

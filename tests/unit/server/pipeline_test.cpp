@@ -229,22 +229,14 @@ TEST_F(PipelineTest, WhatBuildsOnADroppedFrameIsDroppedToo) {
         return std::optional(frames_(n));
       },
       true);
-  PipelineOptions options;
-  options.encode.key_interval = 100;
-  options.encode.texture = TextureCodec::kH264;
-  const auto pipeline = make(source, {&sink_}, options);
+  const auto pipeline = make(source, {&sink_}, keys_are_rare());
   running = pipeline.get();
   ASSERT_TRUE(pipeline->run());
   const auto got = sink_.frames();
   EXPECT_EQ(numbers(got), (std::vector<std::uint64_t>{1, 6, 7, 8}));
   expect_no_gaps(got);
   EXPECT_EQ(pipeline->status().drops_publish, 4U);
-  FrameDecoder decoder;
-  Frame3D frame;
-  for (const FrameMessage& message : got) {
-    const Status decoded = decoder.decode(*message.data, frame);
-    EXPECT_TRUE(decoded) << message.number << ": " << decoded.error().message;
-  }
+  expect_all_decode(got);
 }
 
 TEST_F(PipelineTest, AStreamBeginsWithAFrameThatDecodes) {
@@ -264,20 +256,13 @@ TEST_F(PipelineTest, AStreamBeginsWithAFrameThatDecodes) {
         return std::optional(frames_(n));
       },
       true);
-  PipelineOptions options;
-  options.encode.key_interval = 100;
-  options.encode.texture = TextureCodec::kH264;
-  const auto pipeline = make(source, {&sink_}, options);
+  const auto pipeline = make(source, {&sink_}, keys_are_rare());
   running = pipeline.get();
   ASSERT_TRUE(pipeline->run());
   const auto got = sink_.frames();
   ASSERT_GT(got.size(), 3U);
   expect_no_gaps(got);
-  FrameDecoder decoder;
-  for (const FrameMessage& message : got) {
-    const auto decoded = decoder.decode(*message.data);
-    EXPECT_TRUE(decoded.ok()) << message.number << ": " << decoded.error().message;
-  }
+  expect_all_decode(got);
 }
 
 TEST_F(PipelineTest, ACameraFasterThanTheMachineCostsFramesBeforeReconstruction) {
