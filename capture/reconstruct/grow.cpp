@@ -36,6 +36,7 @@ constexpr float kAlike = 0.2F;      // the same, where the step is seen, too
 constexpr float kSameEdge_px = 0.3F;
 constexpr float kRoom_px = 2.F;       // no other edge so near to what comes back
 constexpr float kRestored_px = 0.1F;  // its standard deviation
+constexpr int kStandsLines = 4;       // so far around what comes back it is asked what stands
 constexpr int kLooksEvery = 8;        // lines: it takes time, and what stands still stays
 
 // Standard deviations, measured on simulated scenes.
@@ -97,6 +98,7 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   moving_.resize(static_cast<std::size_t>(lines_ * cells_));
   tried_.resize(static_cast<std::size_t>(lines_ * boundaries_));
   missed_px_.resize(tried_.size());
+  uncovered_.resize(tried_.size());
   of_lines_.resize(static_cast<std::size_t>(pool.workers()));
   for (OfLines& of : of_lines_) {
     of.decoded = of.still = of.added = 0;
@@ -174,17 +176,45 @@ void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage
   }
 }
 
-/// What moved away uncovers what stood behind it: an edge of the difference where both fields show it, a step
-/// of the field where that alone does.
-std::size_t Growth::restore_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                                 SequenceResult& result, std::vector<RecoveredBoundary>& restored) {
+/// Whether more boundaries around a place are where they were last seen to stand than a little beside it: a
+/// surface that turns looks the same for a while, and is not where it was.
+bool Growth::stands_around(int line, int boundary, float column_px) const {
+  int stood = 0;
+  int moved = 0;
+  for (int l = std::max(0, line - kStandsLines); l <= std::min(lines_ - 1, line + kStandsLines); ++l) {
+    const float* now = now_.line(l);
+    for (int b = std::max(0, boundary - 1); b <= std::min(boundaries_ - 1, boundary + 1); ++b) {
+      const float was = backdrop_.column_px(l, b);
+      const float since = std::fabs(now[b] - was);
+      if (!(std::fabs(was - column_px) < kElsewhere * pitch_px_ && since < kElsewhere * pitch_px_)) continue;
+      ++(since < kStood_px ? stood : moved);
+    }
+  }
+  return stood >= moved;
+}
+
+/// Of a line, which boundaries are missing and look as they did where they stood: what moved away uncovers
+/// what stood behind it.
+void Growth::find_uncovered(const SlideFieldView& view, int line) {
+  const float* here = now_.line(line);
+  std::uint8_t* uncovered = uncovered_.data() + static_cast<std::ptrdiff_t>(line) * boundaries_;
+  for (int b = 0; b < boundaries_; ++b) {
+    const float column = backdrop_.column_px(line, b);
+    uncovered[b] = !known(here[b]) && known(column) && moves(line, column) &&
+                   backdrop_.difference(view, line, b, column).value_or(1) < kSameLook &&
+                   stands_around(line, b, column);
+  }
+}
+
+/// Puts them back: on an edge of the difference where both fields show it, else where it stood.
+std::size_t Growth::restore_line(int line, const EdgeImage& edges, SequenceResult& result,
+                                 std::vector<RecoveredBoundary>& restored) {
   float* here = now_.line(line);
+  const std::uint8_t* uncovered = uncovered_.data() + static_cast<std::ptrdiff_t>(line) * boundaries_;
   std::size_t count = 0;
   for (int b = 0; b < boundaries_; ++b) {
-    if (known(here[b])) continue;
+    if (uncovered[b] == 0) continue;
     const float column = backdrop_.column_px(line, b);
-    if (!known(column) || !moves(line, column)) continue;
-    if (!(backdrop_.difference(view, line, b, column).value_or(1) < kSameLook)) continue;
     const std::optional<std::uint32_t> near = edge_near(edges, line, column);
     if (near && std::fabs(edges.edges[*near].column_px - column) < kSameEdge_px) {
       if (result.boundary[*near] >= 0) here[result.boundary[*near]] = kNoColumn;
@@ -407,13 +437,16 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Wor
                          SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
   fill(view.field.width, result, edges, recovered, pool);
   const int lines = std::min(lines_, view.field.height);
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+    for (int line = begin; line < std::min(end, lines); ++line) find_uncovered(view, line);
+  });
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     OfLines& of = of_lines_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < std::min(end, lines); ++line) {
       // Under one slide, then under the other; all lines at first.
       if (frame_ < 2 * kLooksEvery || line % kLooksEvery == frame_ / 2 % kLooksEvery)
         remember_line(view, line, edges, result);
-      of.added += restore_line(view, line, edges, result, of.restored);
+      of.added += restore_line(line, edges, result, of.restored);
       drop_line(view, line, edges, result);
     }
   });

@@ -67,8 +67,10 @@ class Growth {
   void measure_pitch();
   void remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
                      const SequenceResult& result);
-  std::size_t restore_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                           SequenceResult& result, std::vector<RecoveredBoundary>& restored);
+  bool stands_around(int line, int boundary, float column_px) const;
+  void find_uncovered(const SlideFieldView& view, int line);
+  std::size_t restore_line(int line, const EdgeImage& edges, SequenceResult& result,
+                           std::vector<RecoveredBoundary>& restored);
   void drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result);
   bool moves(int line, float column_px) const;
   Neighbours neighbours(int line, float column_px);
@@ -92,9 +94,10 @@ class Growth {
   int cells_ = 0;                     // of a line
   std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
-  std::vector<float> missed_px_;   // [line][boundary]: beside a boundary of its line it was not found there
-  std::vector<Doubted> doubted_;   // that may still be confirmed
-  std::vector<OfLines> of_lines_;  // [worker]
+  std::vector<float> missed_px_;  // [line][boundary]: beside a boundary of its line it was not found there
+  std::vector<std::uint8_t> uncovered_;  // [line][boundary]: find_uncovered()
+  std::vector<Doubted> doubted_;         // that may still be confirmed
+  std::vector<OfLines> of_lines_;        // [worker]
   ColumnGrid now_, before_;
 };
 

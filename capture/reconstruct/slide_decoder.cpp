@@ -40,6 +40,8 @@ namespace {
 
 // Of what the ordered decoder lets be unsure: less was asked about the quick one's boundaries before.
 constexpr float kQuickTolerance = 0.8F;
+// And of what the picture was looked at for: that has confirmed it.
+constexpr float kShownTolerance = 1.5F;
 
 SlideOrder other(SlideOrder order) {
   return order == SlideOrder::kNewerIsFirst ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst;
@@ -268,8 +270,12 @@ void SlideDecoder::State::look_again(const DetectionLines& rows, WorkerPool& poo
                                                     pool, result, edges, recovered);
   const std::size_t rims = drop_rims(rows, newer.difference, shown, sequence.shown_colours(other(order)),
                                      pool, places, result, edges, recovered);
-  report.filters.rejected += rendered.rejected + rims;
-  report.filters.moved += rendered.moved;
+  // Weighed anew among places that are better now.
+  places.fill(pattern.boundaries(), pool, result, edges, recovered);
+  const WeighingCounts weighed =
+      weighing.weigh(places, moving, kShownTolerance * consistency.scale(), pool, result, edges, recovered);
+  report.filters.rejected += rendered.rejected + rims + weighed.rejected;
+  report.filters.moved += rendered.moved + weighed.moved;
   report.filters.recovered += rendered.restored;
   report.matched += rendered.restored;
 }
