@@ -10,6 +10,7 @@
 #include "base/time.h"
 #include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/detection_lines.h"
+#include "capture/reconstruct/exposure_order.h"
 #include "capture/reconstruct/field_pairs.h"
 #include "capture/reconstruct/half_way.h"
 #include "capture/reconstruct/slide_decoder.h"
@@ -105,6 +106,7 @@ struct Reconstructor::State {
         surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface) {
     decoded.reset(p.boundaries(), lines);
     if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), lines);
+    if (p.slides == 1) exposure_order.emplace(r, p, o);
     spare.reserve(kSpareFrames);
   }
 
@@ -113,6 +115,7 @@ struct Reconstructor::State {
   ReconstructOptions options;
   WorkerPool pool;
   StepKeeper steps;
+  std::optional<ExposureOrder> exposure_order;  // of a single slide
   FieldPairs pairs;
   SlideDecoder decoder;
   int lines;  // of a frame
@@ -287,6 +290,12 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured)
   const bool complete = s.decoder.decode({*s.pair, s.depths.columns()}, s.pool, s.report, s.decoded);
   s.report.match_ms = clock.lap_ms();
   if (!complete) return std::optional<Frame3D>();
+  if (s.exposure_order && s.exposure_order->exchanged(*s.pair, s.report, s.pool)) {
+    s.steps.exchange(captured);
+    s.forget();
+    s.report.step.restarted = true;
+    return std::optional<Frame3D>();
+  }
 
   const bool white_field = s.pattern.scheme == Scheme::kWhiteField;
   std::optional<Frame3D> between;

@@ -94,7 +94,7 @@ std::optional<float> StepKeeper::estimate() const {
 
 const CapturedFrame* StepKeeper::read(const CapturedFrame& frame) {
   report_ = {};
-  if (!active_) return &frame;
+  if (!active_) return late_ ? regroup_and_keep(frame) : &frame;
   sample(frame);
   const bool follows = before_time_ns_ && frame.time_ns - *before_time_ns_ > frame_ns_ / 2 &&
                        frame.time_ns - *before_time_ns_ < frame_ns_ * 3 / 2;
@@ -125,7 +125,15 @@ const CapturedFrame* StepKeeper::read(const CapturedFrame& frame) {
   settled_ = report_.phase.has_value();
   report_.restarted = late != late_;
   late_ = late;
-  if (!late_) return &frame;
+  return late_ ? regroup_and_keep(frame) : &frame;
+}
+
+void StepKeeper::exchange(const CapturedFrame& frame) {
+  late_ = !late_;
+  keep_second(frame);
+}
+
+const CapturedFrame* StepKeeper::regroup_and_keep(const CapturedFrame& frame) {
   const CapturedFrame* out = regroup(frame);
   keep_second(frame);
   return out;

@@ -31,9 +31,13 @@ class StepKeeper {
 
   /// The frame whose first exposure is under a slide: `frame` itself, one made of the last frame's second and
   /// this one's first exposure (valid until the next call), or null: exposures are mixed, or what would be
-  /// needed was lost. Schemes other than complementary and white-field, and single slides, are taken as they
-  /// are. The frame's size must be the rig's.
+  /// needed was lost. Schemes other than complementary and white-field, and single slides until exchange(),
+  /// are taken as they are. The frame's size must be the rig's.
   const CapturedFrame* read(const CapturedFrame& frame);
+
+  /// Of single slides, in which pictures do not tell: with the frame after `frame`, which was read last, it
+  /// is the other exposure that shows the slide.
+  void exchange(const CapturedFrame& frame);
 
   const StepReport& report() const { return report_; }
 
@@ -44,6 +48,7 @@ class StepKeeper {
   std::optional<float> estimate() const;
   void keep_second(const CapturedFrame& frame);
   const CapturedFrame* regroup(const CapturedFrame& frame);
+  const CapturedFrame* regroup_and_keep(const CapturedFrame& frame);
 
   bool active_;
   float reference_;  // angle of a phase of 0

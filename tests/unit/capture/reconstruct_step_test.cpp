@@ -145,11 +145,11 @@ struct Surfaces {
 };
 
 /// Of the plane scene, which stands still.
-Surfaces reconstruct(const std::string& more) {
+Surfaces reconstruct(const std::string& more, Decoder decoder = Decoder::kOrdered) {
   auto source = make_sim("plane" + more + kSmall, {.threads = 1});
   EXPECT_TRUE(source) << source.error().message;
-  auto reconstructor =
-      Reconstructor::create((*source)->info().rig, (*source)->info().pattern, {.texture = true});
+  auto reconstructor = Reconstructor::create((*source)->info().rig, (*source)->info().pattern,
+                                             {.decoder = decoder, .texture = true});
   EXPECT_TRUE(reconstructor);
   Surfaces out;
   const double length = std::sqrt(0.2 * 0.2 + 0.1 * 0.1 + 1);
@@ -219,6 +219,33 @@ TEST(StepKeeping, LostFramesAreNotRegroupedAcross) {
   EXPECT_EQ(s.mixed, 0U);
   EXPECT_GT(s.count, 3U);
   EXPECT_LT(static_cast<double>(s.wrong), 0.01 * static_cast<double>(s.vertices));
+}
+
+TEST(ExposureOrder, ASingleSlideShownSecondIsFoundAndRegrouped) {
+  for (const Decoder decoder : {Decoder::kOrdered, Decoder::kQuick}) {
+    for (const std::string more : {"", ",scan=progressive", ",field_order=bottom"}) {
+      const std::string spec = ",frames=8,scheme=one-slide" + more;
+      const Surfaces in_step = reconstruct(spec, decoder);
+      const Surfaces off = reconstruct(spec + ",phase=1", decoder);
+      EXPECT_EQ(in_step.regrouped, 0U) << more;
+      EXPECT_EQ(in_step.count, 8U) << more;
+      EXPECT_EQ(off.regrouped, 7U) << more;  // the first tells
+      EXPECT_EQ(off.count, 7U) << more;
+      EXPECT_GT(static_cast<double>(off.vertices) / 7, 0.97 * static_cast<double>(in_step.vertices) / 8)
+          << more;
+      for (const Surfaces& s : {in_step, off})
+        EXPECT_LT(static_cast<double>(s.wrong), 0.005 * static_cast<double>(s.vertices)) << more;
+    }
+  }
+}
+
+TEST(ExposureOrder, ADriftAcrossASlideChangeIsFoundWithinAFewFrames) {
+  // At 15 and 45 of 60 frames both exposures are alike; it takes some contrast again to tell.
+  const Surfaces s = reconstruct(",frames=60,drift=1,scheme=one-slide");
+  EXPECT_GT(s.regrouped, 20U);
+  EXPECT_LT(s.regrouped, 40U);
+  EXPECT_GT(s.count, 50U);
+  EXPECT_LT(static_cast<double>(s.wrong), 0.15 * static_cast<double>(s.vertices));
 }
 
 }  // namespace
