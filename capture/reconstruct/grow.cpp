@@ -47,6 +47,8 @@ constexpr float kDoubted_px = 1.F;    // and of a place that was given up
 
 constexpr float kGoesOn_px = 2.F;  // from one line to the next a boundary leans less
 
+constexpr float kDropped_px = 0.6F;  // from where it was given up, and it is the same
+
 // What tells where a boundary is.
 constexpr unsigned kAbove = 1, kBelow = 2, kLeft = 4, kRight = 8;
 
@@ -99,6 +101,7 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   tried_.resize(static_cast<std::size_t>(lines_ * boundaries_));
   missed_px_.resize(tried_.size());
   uncovered_.resize(tried_.size());
+  dropped_.resize(tried_.size());
   of_lines_.resize(static_cast<std::size_t>(pool.workers()));
   for (OfLines& of : of_lines_) {
     of.decoded = of.still = of.added = 0;
@@ -128,6 +131,7 @@ void Growth::fill_line(int line, const SequenceResult& result, const EdgeImage& 
   std::fill_n(here, boundaries_, kNoColumn);
   std::fill_n(moving, cells_, std::uint8_t{0});
   std::fill_n(tried_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, std::uint8_t{0});
+  std::fill_n(dropped_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, -1);
   std::fill_n(missed_px_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, kNoColumn);
   for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
        e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
@@ -362,8 +366,8 @@ std::optional<FoundStep> Growth::look(const SlideFieldView& view, int line, int 
   return found && fits_before(view, line, boundary, *found, p->beside) ? found : std::nullopt;
 }
 
-std::size_t Growth::grow_line(const SlideFieldView& view, int line,
-                              std::vector<RecoveredBoundary>& recovered) {
+std::size_t Growth::grow_line(const SlideFieldView& view, int line, const EdgeImage& edges,
+                              SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
   float* here = now_.line(line);
   std::size_t added = 0;
   for (int b = 0; b < boundaries_; ++b) {
@@ -380,9 +384,10 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line,
     }
     if (!found && places.count > 0) found = look(view, line, b, predict_between(line, b, places));
     if (!found) continue;
+    ++added;
+    if (take_back(line, b, found->column_px, edges, result)) continue;
     here[b] = found->column_px;
     recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
-    ++added;
   }
   return added;
 }
@@ -430,7 +435,21 @@ void Growth::drop_line(const SlideFieldView& view, int line, const EdgeImage& ed
       continue;
     result.boundary[e] = -1;
     here[b] = kNoColumn;
+    dropped_[static_cast<std::size_t>(line * boundaries_ + b)] = static_cast<std::int32_t>(e);
   }
+}
+
+/// Where growth found what it had given up itself, and nearly there, the place that was measured is the
+/// better one.
+bool Growth::take_back(int line, int boundary, float found_px, const EdgeImage& edges,
+                       SequenceResult& result) {
+  const std::int32_t e = dropped_[static_cast<std::size_t>(line * boundaries_ + boundary)];
+  if (e < 0) return false;
+  const float column = edges.edges[static_cast<std::size_t>(e)].column_px;
+  if (!(std::fabs(column - found_px) < kDropped_px)) return false;
+  result.boundary[static_cast<std::size_t>(e)] = static_cast<std::int16_t>(boundary);
+  now_.line(line)[boundary] = column;
+  return true;
 }
 
 std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, WorkerPool& pool,
@@ -463,8 +482,8 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Wor
   };
   std::erase_if(doubted_, confirmed);
   for (auto d = doubted_.rbegin(); d != doubted_.rend(); ++d) confirmed(*d);
-  for (int line = 0; line < lines; ++line) added += grow_line(view, line, recovered);
-  for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, recovered);
+  for (int line = 0; line < lines; ++line) added += grow_line(view, line, edges, result, recovered);
+  for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, edges, result, recovered);
   std::swap(now_, before_);
   ++frame_;
   return added;

@@ -83,7 +83,9 @@ class Growth {
                                 const std::optional<Prediction>& p);
   Confirmed confirm(const SlideFieldView& view, const Doubted& doubted, const EdgeImage& edges,
                     const SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
-  std::size_t grow_line(const SlideFieldView& view, int line, std::vector<RecoveredBoundary>& recovered);
+  bool take_back(int line, int boundary, float found_px, const EdgeImage& edges, SequenceResult& result);
+  std::size_t grow_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result,
+                        std::vector<RecoveredBoundary>& recovered);
 
   StepFinder steps_;
   Backdrop backdrop_;
@@ -95,6 +97,7 @@ class Growth {
   std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
   std::vector<float> missed_px_;  // [line][boundary]: beside a boundary of its line it was not found there
+  std::vector<std::int32_t> dropped_;    // [line][boundary]: the edge whose boundary was given up, or -1
   std::vector<std::uint8_t> uncovered_;  // [line][boundary]: find_uncovered()
   std::vector<Doubted> doubted_;         // that may still be confirmed
   std::vector<OfLines> of_lines_;        // [worker]
