@@ -70,6 +70,7 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
 /// Of a frame under `slide`.
 struct Truths {
   int slide;
+  bool decodable;
   const ImageF& before;  // the frame's before, empty where it is not known
   const ImageF& now;
 };
@@ -102,8 +103,8 @@ Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, 
     }
     completed = reconstructor.next();
   }
-  if (!completed) return {};
-  return judges.judge(frame, truths.slide, at(truths.now, 0), &*completed);
+  if (!completed && !truths.decodable) return {};
+  return judges.judge(frame, truths.slide, at(truths.now, 0), completed ? &*completed : nullptr);
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -162,8 +163,8 @@ Status run(const Options& options, StopSignal& stop) {
     filters += reconstructor->report().filters;
     Status judged;
     if (info.pattern.scheme == Scheme::kWhiteField) {
-      judged = judge_both(frame, *std::move(*result), *reconstructor,
-                          {exposure.slide, previous_truth, *truth}, judges);
+      judged = judge_both(frame, std::move(*result), *reconstructor,
+                          {exposure.slide, decodable, previous_truth, *truth}, judges);
     } else if (decodable) {
       judged = judges.judge(frame, exposure.slide, *truth, *result ? &**result : nullptr);
     }

@@ -176,6 +176,11 @@ Status run(const Options& options, StopSignal& stop) {
   }
   if (totals.reconstructed == 0 && !stop.stopped()) {
     if (steps.status().mixed > 0) return Error{"no frame could be reconstructed: " + steps.advice()};
+    if (totals.frames > 1 && totals.same_slide + 1 >= totals.frames) {
+      return Error{
+          "no frame could be reconstructed: all look as if under one slide; do the slides change, and are "
+          "pictures over-exposed?"};
+    }
     return Error{
         "no frame could be reconstructed: the take needs two readable frames under different slides"};
   }

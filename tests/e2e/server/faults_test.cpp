@@ -140,6 +140,21 @@ TEST_F(ServerFault, NoTruthToScoreAgainst) {
   expect_one_error(run(server({"evaluate", take_.string()})), "truth");
 }
 
+TEST_F(ServerFault, ATakeOfWhichNothingDecodes) {
+  // So bright that slides and white look the same: neither scored nor crashed.
+  const std::string bright = (folder_.path() / "bright").string();
+  ASSERT_EQ(run(server({"simulate", "--scene", "plane,width=192,height=144,stripes=30,ambient=0.8,exposure=3",
+                        "--scheme", "white-field", "--frames", "6", "--out", bright}))
+                .status,
+            0);
+  for (const std::string decoder : {"ordered", "quick"}) {
+    expect_one_error(run(server({"evaluate", bright, "--decoder", decoder})), "could be scored");
+    const Finished done = run(server({"reconstruct", bright, "--out", out_.string(), "--decoder", decoder}));
+    EXPECT_EQ(done.status, 1);
+    EXPECT_NE(done.err.find("over-exposed"), std::string::npos) << done.err;
+  }
+}
+
 TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   std::ofstream(out_) << "mine\n";
   expect_one_error(run(server({"reconstruct", take_.string(), "--out", out_.string()})), out_.string());
