@@ -70,7 +70,7 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
 /// Of a frame under `slide`.
 struct Truths {
   int slide;
-  bool decodable;
+  bool decodable;        // it should give a surface
   const ImageF& before;  // the frame's before, empty where it is not known
   const ImageF& now;
 };

@@ -36,4 +36,8 @@ inline int first_row(FieldOrder order, int half) {
   return order == FieldOrder::kTop ? half : 1 - half;
 }
 
+inline FieldOrder other(FieldOrder order) {
+  return order == FieldOrder::kTop ? FieldOrder::kBottom : FieldOrder::kTop;
+}
+
 }  // namespace relievo

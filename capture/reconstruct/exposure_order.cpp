@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "capture/pattern/schedule.h"
 #include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/slide_decoder.h"
 
@@ -25,7 +26,7 @@ std::size_t given_up(const ReconstructReport& report) {
 CapturedFrame turned(const CapturedFrame& pair) {
   CapturedFrame out = pair.clone();
   if (pair.scan == Scan::kInterlaced) {
-    out.field_order = pair.field_order == FieldOrder::kTop ? FieldOrder::kBottom : FieldOrder::kTop;
+    out.field_order = other(pair.field_order);
   } else {
     std::swap(out.picture, out.complement);
   }
@@ -34,12 +35,13 @@ CapturedFrame turned(const CapturedFrame& pair) {
 
 }  // namespace
 
+ExposureOrder::ExposureOrder(const Rig& rig, const Pattern& pattern, int line_stride)
+    : rig_(rig), pattern_(pattern), options_{.decoder = Decoder::kQuick, .line_stride = line_stride} {}
+
 std::size_t ExposureOrder::given_up_of(const CapturedFrame& pair, WorkerPool& pool) const {
-  ReconstructOptions options = options_;
-  options.decoder = Decoder::kQuick;  // tells as clearly
-  SlideDecoder decoder(rig_, pattern_, options);
+  SlideDecoder decoder(rig_, pattern_, options_);
   DecodedGrid grid;
-  grid.reset(pattern_.boundaries(), line_count(rig_, options.line_stride));
+  grid.reset(pattern_.boundaries(), line_count(rig_, options_.line_stride));
   ReconstructReport report;
   decoder.observe(pair, pool, report);
   decoder.decode({pair, nullptr}, pool, report, grid);

@@ -17,9 +17,8 @@ namespace relievo {
 /// One stream's. One thread.
 class ExposureOrder {
  public:
-  /// `pattern` must have one slide.
-  ExposureOrder(const Rig& rig, const Pattern& pattern, const ReconstructOptions& options)
-      : rig_(rig), pattern_(pattern), options_(options) {}
+  /// `pattern` must have one slide; `line_stride` as ReconstructOptions has it.
+  ExposureOrder(const Rig& rig, const Pattern& pattern, int line_stride);
 
   /// Whether `pair`, of which `report` is, decodes clearly better with its exposures the other way round.
   /// Tries both ways where that is not known yet, and now and then where much is given up.
@@ -32,7 +31,7 @@ class ExposureOrder {
 
   Rig rig_;
   Pattern pattern_;
-  ReconstructOptions options_;
+  ReconstructOptions options_;  // of the quick decoder, which tells as clearly as the other
   bool known_ = false;
   int pause_ = kSoon;
   int wait_ = 0;  // doubtful frames until it is asked again

@@ -106,7 +106,7 @@ struct Reconstructor::State {
         surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface) {
     decoded.reset(p.boundaries(), lines);
     if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), lines);
-    if (p.slides == 1) exposure_order.emplace(r, p, o);
+    if (p.slides == 1) exposure_order.emplace(r, p, o.line_stride);
     spare.reserve(kSpareFrames);
   }
 

@@ -271,7 +271,6 @@ void SlideDecoder::State::look_again(const DetectionLines& rows, WorkerPool& poo
   const std::size_t rims = drop_rims(rows, newer.difference, shown, sequence.shown_colours(other(order)),
                                      pool, places, result, edges, recovered);
   // Weighed anew among places that are better now.
-  places.fill(pattern.boundaries(), pool, result, edges, recovered);
   const WeighingCounts weighed =
       weighing.weigh(places, moving, kShownTolerance * consistency.scale(), pool, result, edges, recovered);
   report.filters.rejected += rendered.rejected + rims + weighed.rejected;

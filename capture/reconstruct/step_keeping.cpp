@@ -156,7 +156,7 @@ const CapturedFrame* StepKeeper::regroup(const CapturedFrame& frame) {
     copy_picture(frame.picture, made_.complement);
   } else {
     copy_picture(second_, made_.picture);
-    made_.field_order = frame.field_order == FieldOrder::kTop ? FieldOrder::kBottom : FieldOrder::kTop;
+    made_.field_order = other(frame.field_order);
     for (int y = first_row(frame.field_order, 0); y < made_.picture.height(); y += 2)
       std::copy_n(frame.picture.row(y), made_.picture.stride(), made_.picture.row(y));
   }

@@ -142,6 +142,9 @@ struct Surfaces {
   std::size_t wrong = 0;  // more than 5 mm off the plane
   std::size_t mixed = 0;
   std::size_t regrouped = 0;
+
+  double vertices_each() const { return static_cast<double>(vertices) / static_cast<double>(count); }
+  double wrong_share() const { return static_cast<double>(wrong) / static_cast<double>(vertices); }
 };
 
 /// Of the plane scene, which stands still.
@@ -188,13 +191,9 @@ TEST(StepKeeping, FramesAFieldOffGiveTheSameSurface) {
     EXPECT_EQ(off.regrouped, 6U) << more;
     EXPECT_EQ(other.regrouped, 6U) << more;
     ASSERT_GT(off.count, 0U) << more;
-    const auto each = [](const Surfaces& s) {
-      return static_cast<double>(s.vertices) / static_cast<double>(s.count);
-    };
-    EXPECT_GT(each(off), 0.97 * each(in_step)) << more;
-    EXPECT_GT(each(other), 0.97 * each(in_step)) << more;
-    for (const Surfaces& s : {in_step, off, other})
-      EXPECT_LT(static_cast<double>(s.wrong), 0.005 * static_cast<double>(s.vertices)) << more;
+    EXPECT_GT(off.vertices_each(), 0.97 * in_step.vertices_each()) << more;
+    EXPECT_GT(other.vertices_each(), 0.97 * in_step.vertices_each()) << more;
+    for (const Surfaces& s : {in_step, off, other}) EXPECT_LT(s.wrong_share(), 0.005) << more;
   }
 }
 
@@ -211,14 +210,14 @@ TEST(StepKeeping, ADriftingRigGivesSurfacesInBetweenAndNoWrongOnes) {
   EXPECT_GT(s.mixed, 20U);
   EXPECT_GT(s.count, 12U);
   EXPECT_GT(s.regrouped, 8U);
-  EXPECT_LT(static_cast<double>(s.wrong), 0.01 * static_cast<double>(s.vertices));
+  EXPECT_LT(s.wrong_share(), 0.01);
 }
 
 TEST(StepKeeping, LostFramesAreNotRegroupedAcross) {
   const Surfaces s = reconstruct(",frames=12,phase=1,drop=4");
   EXPECT_EQ(s.mixed, 0U);
   EXPECT_GT(s.count, 3U);
-  EXPECT_LT(static_cast<double>(s.wrong), 0.01 * static_cast<double>(s.vertices));
+  EXPECT_LT(s.wrong_share(), 0.01);
 }
 
 TEST(ExposureOrder, ASingleSlideShownSecondIsFoundAndRegrouped) {
@@ -231,10 +230,8 @@ TEST(ExposureOrder, ASingleSlideShownSecondIsFoundAndRegrouped) {
       EXPECT_EQ(in_step.count, 8U) << more;
       EXPECT_EQ(off.regrouped, 7U) << more;  // the first tells
       EXPECT_EQ(off.count, 7U) << more;
-      EXPECT_GT(static_cast<double>(off.vertices) / 7, 0.97 * static_cast<double>(in_step.vertices) / 8)
-          << more;
-      for (const Surfaces& s : {in_step, off})
-        EXPECT_LT(static_cast<double>(s.wrong), 0.005 * static_cast<double>(s.vertices)) << more;
+      EXPECT_GT(off.vertices_each(), 0.97 * in_step.vertices_each()) << more;
+      for (const Surfaces& s : {in_step, off}) EXPECT_LT(s.wrong_share(), 0.005) << more;
     }
   }
 }
@@ -245,7 +242,7 @@ TEST(ExposureOrder, ADriftAcrossASlideChangeIsFoundWithinAFewFrames) {
   EXPECT_GT(s.regrouped, 20U);
   EXPECT_LT(s.regrouped, 40U);
   EXPECT_GT(s.count, 50U);
-  EXPECT_LT(static_cast<double>(s.wrong), 0.15 * static_cast<double>(s.vertices));
+  EXPECT_LT(s.wrong_share(), 0.15);
 }
 
 }  // namespace
