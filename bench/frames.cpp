@@ -9,6 +9,7 @@
 #include "capture/source/npy.h"
 #include "capture/source/sim/sim_source.h"
 #include "capture/source/take_files.h"
+#include "capture/upright.h"
 #include "cli/progress.h"
 
 namespace relievo::bench {
@@ -73,6 +74,10 @@ Result<std::optional<FrameLoop>> FrameLoop::load(const std::string& uri, int cou
   const auto* sim = options.truth ? dynamic_cast<const SimSource*>(source->get()) : nullptr;
   FrameLoop loop;
   loop.info_ = (*source)->info();
+  auto seen = upright(loop.info_.rig, loop.info_.pattern);
+  if (!seen) return seen.error();
+  loop.info_.rig = seen->rig;
+  loop.info_.pattern = std::move(seen->pattern);
   Progress progress("load", "frames", static_cast<std::uint64_t>(count));
   while (loop.frames_.size() < static_cast<std::size_t>(count)) {
     if (stop.stopped()) return std::optional<FrameLoop>{};

@@ -8,12 +8,14 @@
 #include <numbers>
 #include <optional>
 
+#include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/compare_rigs.h"
 #include "capture/calibrate/geometry.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
 #include "capture/rig_file.h"
+#include "capture/upright.h"
 #include "cli/size_option.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
@@ -159,6 +161,7 @@ Status run(const Options& options, StopSignal& stop) {
   rig.colour_matrix = before.colour_matrix.value_or(std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
   rig = with_geometry(rig, *geometry);
   if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
+  if (const auto seen = upright(rig, {}); !seen) log_warning(seen.error().message);
   if (!options.pictures.empty()) {
     if (const Status made = make_folder(options.pictures); !made) return made;
     const Status drawn = write_png(fs::path(options.pictures) / "residuals.png", draw_residuals(*geometry));

@@ -122,9 +122,9 @@ Status run(const Options& options, StopSignal& stop) {
                                               .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
 
-  Judges judges{Scorer(info.rig, info.pattern)};
+  Judges judges{Scorer(reconstructor->rig(), reconstructor->pattern())};
   if (!options.pictures.empty()) {
-    auto made = EvaluationPictures::create(options.pictures, info.rig, info.pattern);
+    auto made = EvaluationPictures::create(options.pictures, reconstructor->rig(), reconstructor->pattern());
     if (!made) return made.error();
     judges.pictures = *std::move(made);
   }

@@ -71,7 +71,7 @@ class ThreadedPipeline final : public Pipeline {
         reconstructor_(std::move(reconstructor)),
         pace_{options.reconstruct.decoder, options.reconstruct.line_stride},
         pace_control_(line_count(source.info().rig, 1)),
-        encoder_(source.info().rig, source.info().pattern),
+        encoder_(reconstructor_.rig(), reconstructor_.pattern()),
         volume_(options.encode.volume) {}
 
   Status run() override {

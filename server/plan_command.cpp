@@ -10,6 +10,7 @@
 
 #include "capture/plan/plan.h"
 #include "capture/rig_file.h"
+#include "capture/upright.h"
 #include "cli/checks.h"
 #include "cli/size_option.h"
 #include "server/commands.h"
@@ -40,7 +41,13 @@ struct Options {
 };
 
 Result<Rig> rig_of(const Options& o) {
-  if (!o.rig.empty()) return read_rig(o.rig);
+  if (!o.rig.empty()) {
+    auto rig = read_rig(o.rig);
+    if (!rig) return rig.error();
+    auto seen = upright(*rig, {});
+    if (!seen) return seen.error().in(o.rig);
+    return std::move(seen->rig);
+  }
   RigSketch sketch;
   sketch.scan = o.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive;
   sketch.frame_rate = o.frame_rate;

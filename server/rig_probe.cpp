@@ -36,8 +36,10 @@ Image8 draw(std::string_view name, const TappedFrame& frame, const RigCheck& che
 
 }  // namespace
 
-RigProbe::RigProbe(std::string stream, const Rig& rig, const Pattern& pattern)
-    : stream_(std::move(stream)), rig_(rig), pattern_(pattern), thread_([this] { work(); }) {}
+RigProbe::RigProbe(std::string stream, const Rig& rig, const Pattern& pattern, UprightRig seen)
+    : stream_(std::move(stream)), rig_(rig), pattern_(pattern), seen_(std::move(seen)), thread_([this] {
+        work();
+      }) {}
 
 RigProbe::~RigProbe() {
   {
@@ -96,14 +98,15 @@ std::shared_ptr<const RigView> RigProbe::make(const TappedFrame& frame,
                                               const std::vector<std::string>& pictures) const {
   RigCheck check;
   if (frame.decoded) {
-    check = check_rig(frame.captured, *frame.decoded, frame.grid, rig_, pattern_);
+    check = check_rig(frame.captured, *frame.decoded, frame.grid, seen_.rig, seen_.pattern);
   } else {
     check.exposure = check_exposure(frame.captured);
   }
   auto out = std::make_shared<RigView>();
   for (const std::string& name : pictures) {
     Bytes jpeg;
-    const Status drawn = append_jpeg(draw(name, frame, check, rig_, pattern_).view(), kQuality, jpeg);
+    const Status drawn =
+        append_jpeg(draw(name, frame, check, seen_.rig, seen_.pattern).view(), kQuality, jpeg);
     if (drawn) {
       out->pictures.emplace(name, std::move(jpeg));
     } else {

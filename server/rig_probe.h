@@ -16,6 +16,7 @@
 
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/upright.h"
 #include "server/frame_tap.h"
 #include "web/gateway/rig_control.h"
 
@@ -23,7 +24,8 @@ namespace relievo {
 
 class RigProbe final : public FrameTap {
  public:
-  RigProbe(std::string stream, const Rig& rig, const Pattern& pattern);
+  /// What the projector shows, and how frames are decoded: upright() of that.
+  RigProbe(std::string stream, const Rig& rig, const Pattern& pattern, UprightRig seen);
   RigProbe(const RigProbe&) = delete;
   RigProbe& operator=(const RigProbe&) = delete;
   ~RigProbe() override;
@@ -46,6 +48,7 @@ class RigProbe final : public FrameTap {
   const std::string stream_;
   const Rig rig_;
   const Pattern pattern_;
+  const UprightRig seen_;
   std::atomic<bool> wanted_{false};
   int without_surface_ = 0;  // frames since one was wanted; of the pipeline's thread
 

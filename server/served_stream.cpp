@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/time.h"
 #include "capture/source/field_source.h"
+#include "capture/upright.h"
 #include "idl/recorder.h"
 #include "idl/stream_recorder.h"
 #include "server/ladder.h"
@@ -171,6 +172,7 @@ class RunningStream final : public ServedStream {
   const Surroundings around_;
   const std::string name_, label_;
   std::unique_ptr<FieldSource> source_;
+  UprightRig seen_;  // by the source: what frames are of
   std::unique_ptr<Publisher> publisher_;
   Recording recording_;
   std::optional<OnRequest> on_request_;
@@ -187,6 +189,9 @@ Status RunningStream::open() {
   auto opened = open_stream_source(config_, around_.config.projector);
   if (!opened) return opened.error();
   source_ = std::move(opened->source);
+  auto seen = upright(source_->info().rig, source_->info().pattern);
+  if (!seen) return seen.error();
+  seen_ = *std::move(seen);
   if (const Status announced = announce(opened->uri); !announced) return announced;
   std::vector<FrameSink*> sinks;
   for (const auto& sink : sinks_) sinks.push_back(sink.get());
@@ -194,7 +199,7 @@ Status RunningStream::open() {
   options.calibrated = opened->calibrated;
   if (around_.rigs != nullptr) {
     const SourceInfo& info = source_->info();
-    probe_ = std::make_unique<RigProbe>(name_, info.rig, info.pattern);
+    probe_ = std::make_unique<RigProbe>(name_, info.rig, info.pattern, seen_);
     options.tap = probe_.get();
   }
   if (const Status raised = raise_ladder(options); !raised) return raised;
@@ -218,8 +223,8 @@ Status RunningStream::announce(const std::string& uri) {
   info.stream = name_;
   info.source = uri;
   info.started_ns = utc_now_ns();
-  info.rig = source_->info().rig;
-  info.pattern = source_->info().pattern;
+  info.rig = seen_.rig;
+  info.pattern = seen_.pattern;
   auto publisher = Publisher::create(domain_options(around_.config), info,
                                      [wishes = &around_.wishes, name = name_] { wishes->wish(name); });
   if (!publisher) return publisher.error();
@@ -245,8 +250,7 @@ Status RunningStream::announce(const std::string& uri) {
 
 Status RunningStream::raise_ladder(const PipelineOptions& options) {
   if (config_.ladder.empty()) return {};
-  ladder_ = std::make_unique<Ladder>(source_->info().rig, source_->info().pattern, options.encode,
-                                     options.depth_resolution);
+  ladder_ = std::make_unique<Ladder>(seen_.rig, seen_.pattern, options.encode, options.depth_resolution);
   for (const Rung rung : rungs_of(config_)) {
     auto made = RungPublisher::create(domain_options(around_.config), name_, rung,
                                       [ladder = ladder_.get()] { ladder->request_key_frame(); });

@@ -147,7 +147,7 @@ class Calibration {
       const bool settled = std::fabs(noise / priors.noise_px - 1) < 0.02;
       priors.noise_px = noise;
       priors.loss_px = kLossSigmas * noise;
-      if (!changed && (settled || round >= 50)) return finish(*fit);
+      if (!changed && (settled || round >= 50)) return fitting(finish(*fit));
       if (Status enough = check_count(); !enough) return enough.error();
     }
   }
@@ -323,6 +323,15 @@ class Calibration {
     g.square_error_m = all.length_rms_m;
     g.scale_error = all.scale_error;
     return std::move(out_);
+  }
+
+  Result<Geometry> fitting(Geometry geometry) const {
+    if (geometry.stereo_rms <= options_.most_rms_px) return geometry;
+    char rms[32];
+    std::snprintf(rms, sizeof rms, "%.1f", geometry.stereo_rms);
+    return Error{std::string("no rig fits the views: the best leaves a stereo RMS of ") + rms +
+                 " px; are the projector's size and the pattern those that were projected, unmirrored, and "
+                 "did nothing but the board move?"};
   }
 
   PinholeModel camera_size_, projector_size_;

@@ -25,6 +25,7 @@ struct GeometryOptions {
   double bad_corner = 5;
   double bad_corner_px = 1;
   std::size_t min_views = 3;
+  double most_rms_px = 5;  // stereo RMS of a rig that can be used
 };
 
 /// Pixels, but for the plane. An RMS is over distances in the picture, as cv::stereoCalibrate reports it.
@@ -61,8 +62,8 @@ struct Geometry {
   std::vector<CornerResidual> residuals;  // of used corners
 };
 
-/// Sizes are pixels of the two devices. Fails where fewer than `min_views` views can be used or they do not
-/// determine the rig; the error says which views and why.
+/// Sizes are pixels of the two devices. Fails where fewer than `min_views` views can be used, or they do not
+/// determine the rig or fit none; the error says which views and why.
 Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, const PinholeModel& camera_size,
                                     const PinholeModel& projector_size, const GeometryOptions& options);
 

@@ -2,13 +2,16 @@
 #include "capture/calibrate/stripe_decode.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/refine.h"
 #include "capture/reconstruct/sequence.h"
+#include "capture/upright.h"
 
 namespace relievo {
 namespace {
@@ -39,7 +42,7 @@ class AxisDecoder {
       : pattern_(pattern),
         differencer_(colour_matrix),
         refiner_(colour_matrix),
-        sequence_(pattern),
+        sequences_{SequenceDecoder(pattern), SequenceDecoder(reversed(pattern))},
         pool_(pool) {}
 
   void add(Image8 lit, Image8 complement) {
@@ -53,21 +56,23 @@ class AxisDecoder {
   }
 
   std::vector<Found> decode() {
+    // Whether the projector is the other way up, and in which order its slides were taken: what explains the
+    // pictures best.
     std::vector<Found> out;
-    if (images_.size() == 1) {
-      take(0, SlideOrder::kNewerIsFirst, run(0, nullptr, SlideOrder::kNewerIsFirst), out);
-      return out;
+    std::vector<SequenceResult> best;
+    bool backwards = false;
+    for (const bool swapped : {false, true}) {
+      if (swapped && images_.size() == 1) break;
+      for (const bool backward : {false, true}) {
+        std::vector<SequenceResult> results = run(swapped, backward);
+        if (!best.empty() && score(results) <= score(best)) continue;
+        best = std::move(results);
+        swapped_ = swapped;
+        backwards = backward;
+      }
     }
-    // The order that explains the pictures better is the one in which they were taken.
-    const auto both = [&](SlideOrder order, SlideOrder turned_order) {
-      return std::array{run(0, &images_[1], order), run(1, &images_[0], turned_order)};
-    };
-    auto best = both(SlideOrder::kNewerIsFirst, SlideOrder::kNewerIsSecond);
-    auto other = both(SlideOrder::kNewerIsSecond, SlideOrder::kNewerIsFirst);
-    swapped_ = best[0].score + best[1].score < other[0].score + other[1].score;
-    if (swapped_) std::swap(best, other);
-    take(0, swapped_ ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst, best[0], out);
-    take(1, swapped_ ? SlideOrder::kNewerIsFirst : SlideOrder::kNewerIsSecond, best[1], out);
+    for (std::size_t frame = 0; frame < images_.size(); ++frame)
+      take(frame, order_of(frame, swapped_), backwards, best[frame], out);
     return out;
   }
 
@@ -75,21 +80,36 @@ class AxisDecoder {
   bool swapped() const { return swapped_; }
 
  private:
-  SequenceResult run(std::size_t frame, const DifferenceImage* other, SlideOrder order) {
-    SequenceResult out;
-    sequence_.decode(edges_[frame], {.order = order, .other = other}, pool_, out);
+  static SlideOrder order_of(std::size_t frame, bool swapped) {
+    return (frame == 0) != swapped ? SlideOrder::kNewerIsFirst : SlideOrder::kNewerIsSecond;
+  }
+  static double score(const std::vector<SequenceResult>& results) {
+    return std::accumulate(results.begin(), results.end(), 0.,
+                           [](double sum, const SequenceResult& r) { return sum + r.score; });
+  }
+
+  std::vector<SequenceResult> run(bool swapped, bool backwards) {
+    std::vector<SequenceResult> out(images_.size());
+    for (std::size_t frame = 0; frame < images_.size(); ++frame) {
+      const DifferenceImage* const other = images_.size() > 1 ? &images_[1 - frame] : nullptr;
+      sequences_[backwards].decode(edges_[frame], {.order = order_of(frame, swapped), .other = other}, pool_,
+                                   out[frame]);
+    }
     return out;
   }
 
-  void take(std::size_t frame, SlideOrder order, const SequenceResult& result, std::vector<Found>& out) {
+  void take(std::size_t frame, SlideOrder order, bool backwards, const SequenceResult& result,
+            std::vector<Found>& out) {
     EdgeImage& edges = edges_[frame];
-    refiner_.refine(images_[frame], lit_[frame].view(), result, sequence_.shown_colours(order), pool_, edges);
+    refiner_.refine(images_[frame], lit_[frame].view(), result, sequences_[backwards].shown_colours(order),
+                    pool_, edges);
     for (int line = 0; line < edges.lines; ++line) {
       const auto l = static_cast<std::size_t>(line);
       for (std::uint32_t e = edges.line_start[l]; e < edges.line_start[l + 1]; ++e) {
         const Edge& edge = edges.edges[e];
         if (result.boundary[e] < 0 || edge.at_step || edge.sigma_px > kMaxSigma_px) continue;
-        out.push_back({edge.column_px, line, result.boundary[e]});
+        const int boundary = result.boundary[e];
+        out.push_back({edge.column_px, line, backwards ? pattern_.boundaries() - 1 - boundary : boundary});
       }
     }
   }
@@ -98,7 +118,7 @@ class AxisDecoder {
   Differencer differencer_;
   EdgeFinder edge_finder_;
   Refiner refiner_;
-  SequenceDecoder sequence_;
+  std::array<SequenceDecoder, 2> sequences_;  // of the pattern, and of it from right to left
   WorkerPool& pool_;
   std::vector<Image8> lit_;
   std::vector<DifferenceImage> images_;  // of them and their complements

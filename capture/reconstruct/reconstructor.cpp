@@ -18,6 +18,7 @@
 #include "capture/reconstruct/texture.h"
 #include "capture/reconstruct/triangulate.h"
 #include "capture/reconstruct/white_texture.h"
+#include "capture/upright.h"
 
 namespace relievo {
 namespace {
@@ -251,12 +252,22 @@ Result<Reconstructor> Reconstructor::create(const Rig& rig, const Pattern& patte
         "the paper's decoder reads each code by itself, and those of scheme one-slide repeat: use the "
         "decoder ordered or quick"};
   }
-  return Reconstructor(std::make_unique<State>(rig, pattern, options));
+  const auto seen = upright(rig, pattern);
+  if (!seen) return seen.error();
+  return Reconstructor(std::make_unique<State>(seen->rig, seen->pattern, options));
 }
 
 void Reconstructor::recycle(Frame3D&& used) {
   std::lock_guard lock(state_->spare_mutex);
   if (state_->spare.size() < kSpareFrames) state_->spare.push_back(std::move(used));
+}
+
+const Rig& Reconstructor::rig() const {
+  return state_->rig;
+}
+
+const Pattern& Reconstructor::pattern() const {
+  return state_->pattern;
 }
 
 const ReconstructReport& Reconstructor::report() const {

@@ -51,7 +51,8 @@ struct ReconstructReport {
 /// One stream's decoder: holds the frame before. One thread at a time.
 class Reconstructor {
  public:
-  /// Fails where rig and pattern do not fit (see read_pattern for what a valid pattern is).
+  /// Of a projector that is turned either way up. Fails where rig and pattern do not fit (see read_pattern
+  /// for what a valid pattern is, and upright()).
   static Result<Reconstructor> create(const Rig& rig, const Pattern& pattern,
                                       const ReconstructOptions& options);
   Reconstructor(Reconstructor&&) noexcept;
@@ -75,6 +76,10 @@ class Reconstructor {
   /// What else the last add() completed, in order of time: under white-field the surface of the frame itself,
   /// add() having given the one half way from the frame before. Nothing when there is no more.
   std::optional<Frame3D> next();
+
+  /// What GridPoints refer to: upright() of what create() was given. As long as this decoder.
+  const Rig& rig() const;
+  const Pattern& pattern() const;
 
   /// Textures made so far: fewer than surfaces under white-frame, half as many under white-field.
   std::uint64_t textures() const;

@@ -125,11 +125,14 @@ Rig make_rig(const SimOptions& o, const SceneView& view) {
   const double k = o.distortion;
   rig.camera.distortion = {-0.22 * k, 0.12 * k, 0.0008 * k, -0.0012 * k, -0.02 * k};
   rig.projector.distortion = {-0.05 * k, 0.08 * k, -0.0010 * k, 0.0006 * k, 0.01 * k};
-  // The projector stands to the right and turns in until both axes cross at the working distance.
-  const double angle = std::atan2(view.baseline_m, view.distance_m), c = std::cos(angle), s = std::sin(angle);
-  rig.projector_from_camera_rotation = {c, 0, s, 0, 1, 0, -s, 0, c};
-  const double lift = 0.075 * view.baseline_m;
-  rig.projector_from_camera_translation = {-c * view.baseline_m, -lift, s * view.baseline_m};
+  // The projector stands to the side, a little higher, and turns in until both axes cross at the working
+  // distance; then it turns about its own.
+  const double baseline_m = o.baseline * view.baseline_m;
+  const double angle = std::atan2(baseline_m, view.distance_m), c = std::cos(angle), s = std::sin(angle);
+  const double roll = o.roll * std::numbers::pi / 180, rc = std::cos(roll), rs = std::sin(roll);
+  rig.projector_from_camera_rotation = {rc * c, -rs, rc * s, rs * c, rc, rs * s, -s, 0, c};
+  const double right = -c * baseline_m, down = -0.075 * std::fabs(baseline_m);
+  rig.projector_from_camera_translation = {rc * right - rs * down, rs * right + rc * down, s * baseline_m};
   // A camera's usual crosstalk; each row adds up to one, so that white stays white.
   const std::array<double, 9> seen = {0.86, 0.11, 0.03, 0.13, 0.78, 0.09, 0.03, 0.15, 0.82};
   std::array<double, 9> mixed{};

@@ -44,9 +44,13 @@ constexpr Key kKeys[] = {
     {"rays", &SimOptions::rays, 1, 8,
      "rays of a pixel each way where shapes meet, 1: one through its middle alone"},
     {"distortion", &SimOptions::distortion, 0, 2, "times a cheap lens's distortion"},
+    {"baseline", &SimOptions::baseline, -4, 4,
+     "times the scene's own; below 0: the projector stands to the camera's left"},
+    {"roll", &SimOptions::roll, -180, 180, "degrees by which the projector is turned about its axis"},
     {"seed", &SimOptions::seed, 0, 4294967295.0, "of the noise"},
 };
 
+constexpr double kLeastBaseline = 0.01;
 constexpr int kWhiteFramePeriod = 84;  // of cycles of 2, 3, 4, 6 or 7 frames
 
 std::string text(double value) {
@@ -130,6 +134,9 @@ Result<SimOptions> parse_sim_options(const std::string& spec) {
       return Error{"slides=" + std::to_string(options.slides) + ": scheme=one-slide has one"};
     options.slides = 1;
   }
+  if (std::fabs(options.baseline) < kLeastBaseline)
+    return Error{"baseline=" + text(options.baseline) + ": depth needs one, of " + text(kLeastBaseline) +
+                 " at least to either side"};
   const bool white_frame = options.scheme == Scheme::kWhiteFrame;
   const int cycle = options.slides + (white_frame ? 1 : 0);
   if (white_frame && !period_given) options.period = kWhiteFramePeriod / cycle * cycle;

@@ -46,6 +46,8 @@ struct SimOptions {
   double exposure = 1.0;   // times the exposure that puts white at working distance to 230
   int rays = 1;  // of a pixel, each way, where shapes and their faces meet; 1: one through its middle alone
   double distortion = 0.0;  // times the lens distortion of a cheap camera and projector
+  double baseline = 1.0;    // times the scene's own; below 0: the projector stands to the camera's left
+  double roll = 0.0;        // degrees by which the projector is turned about its axis
   std::uint32_t seed = 1;
 };
 

@@ -182,6 +182,14 @@ TEST(Geometry, TooFewViewsSayWhy) {
             "2 (only 3 of 63 corners could be decoded)");
 }
 
+TEST(Geometry, ViewsThatNoRigFitsAreRefused) {
+  const Rig rig = truth();
+  const auto geometry = calibrate(rig, ideal_views(rig, 6, 8));
+  ASSERT_FALSE(geometry.ok());
+  EXPECT_NE(geometry.error().message.find("no rig fits the views"), std::string::npos)
+      << geometry.error().message;
+}
+
 TEST(Geometry, FewFlatViewsStayInsideReason) {
   const Rig rig = truth();
   auto views = ideal_views(rig, 3, 0.2);

@@ -16,6 +16,7 @@
 #include "capture/calibrate/stripe_stack.h"
 #include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/triangulate.h"
+#include "tests/support/hung_up.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/calibrate/true_rig.h"
 
@@ -161,6 +162,17 @@ TEST(Stripes, ViewsGiveTheRigBack) {
   ASSERT_TRUE(off.ok()) << off.error().message;
   EXPECT_LT(off->camera_centre_px, 5);
   EXPECT_LT(off->projector_centre_px, 6);
+  EXPECT_LT(off->depth_rms_m, 0.001);
+}
+
+TEST(Stripes, AProjectorMayHangFromTheCeiling) {
+  const Rig rig = test::hung_up(coloured_truth());
+  const Geometry geometry = calibrated(rig, false, rig.colour_matrix);
+  EXPECT_EQ(geometry.views, 6u);
+  EXPECT_LT(geometry.stereo_rms, 0.09);
+  const auto off = compare_rigs(rig_of(geometry), rig, 1.0);
+  ASSERT_TRUE(off.ok()) << off.error().message;
+  EXPECT_LT(off->rotation_rad, 0.01);
   EXPECT_LT(off->depth_rms_m, 0.001);
 }
 

@@ -4,6 +4,8 @@
 #include <set>
 
 #include "base/time.h"
+#include "capture/upright.h"
+#include "tests/support/hung_up.h"
 #include "tests/unit/server/pipeline_fixture.h"
 
 namespace relievo {
@@ -92,6 +94,18 @@ std::size_t in_triangles(const Surface& surface) {
   std::set<std::uint32_t> used;
   for (const Triangle& triangle : surface.triangles) used.insert(triangle.begin(), triangle.end());
   return used.size();
+}
+
+TEST_F(PipelineTest, AProjectorUpsideDownGivesTheSameStream) {
+  StripedScene over = scene_;  // whose pictures are the same
+  over.rig = hung_up(scene_.rig);
+  over.pattern = reversed(scene_.pattern);
+  ScriptedSource upright(scene_, count_to(frames_, 4)), hung(over, count_to(frames_, 4));
+  CollectingSink as_ever, turned;
+  ASSERT_TRUE(make(upright, {&as_ever}, fast_and_lossless())->run());
+  ASSERT_TRUE(make(hung, {&turned}, fast_and_lossless())->run());
+  ASSERT_EQ(turned.frames().size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(*turned.frames()[i].data, *as_ever.frames()[i].data);
 }
 
 TEST_F(PipelineTest, TheVolumeGrowsSoThatNoVertexIsLost) {

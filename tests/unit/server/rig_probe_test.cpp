@@ -56,7 +56,7 @@ TEST_F(RigProbeTest, NobodyAskedNothingIsCopied) {
 }
 
 TEST_F(RigProbeTest, ALookIsOfTheNextFrameWithASurface) {
-  RigProbe probe("test", scene_.rig, scene_.pattern);
+  RigProbe probe("test", scene_.rig, scene_.pattern, {scene_.rig, scene_.pattern});
   EXPECT_EQ(probe.look({"camera", "order"}), nullptr) << "asks, and there is none yet";
   run(probe, count_to(frames_, 6));
   ASSERT_TRUE(eventually([&] { return probe.look({}) != nullptr; }));
@@ -73,7 +73,7 @@ TEST_F(RigProbeTest, ALookIsOfTheNextFrameWithASurface) {
 }
 
 TEST_F(RigProbeTest, ACameraThatGivesNoSurfaceIsLookedAtToo) {
-  RigProbe probe("test", scene_.rig, scene_.pattern);
+  RigProbe probe("test", scene_.rig, scene_.pattern, {scene_.rig, scene_.pattern});
   EXPECT_EQ(probe.look({}), nullptr);
   run(probe, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
     if (n >= 20) return ScriptedSource::end();
