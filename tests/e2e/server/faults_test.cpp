@@ -72,6 +72,18 @@ TEST_F(ServerFault, ARigWithoutAKey) {
   }
 }
 
+TEST_F(ServerFault, ARigThatGivesNoDepth) {
+  StripedScene scene = striped_scene();
+  scene.rig.projector_from_camera_rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1};  // on its side
+  ASSERT_TRUE(write_striped_take(scene, take_, 2));
+  const std::string rig = (take_ / "rig.yaml").string();
+  for (const auto& command :
+       {serve(source_, {}), server({"reconstruct", take_.string(), "--out", out_.string()}),
+        server({"plan", "--rig", rig, "--distance", "1"})})
+    expect_one_error(run(command), "turn the camera or the projector by 90 degrees");
+  EXPECT_FALSE(fs::exists(out_));
+}
+
 TEST_F(ServerFault, APatternThatRepeatsACode) {
   StripedScene scene = striped_scene();
   scene.pattern.sequence = {0, 7, 14, 0, 7};

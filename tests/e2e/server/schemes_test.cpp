@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "capture/rig_file.h"
+#include "capture/upright.h"
 #include "server_process.h"
 
 namespace relievo::test {
@@ -65,10 +69,12 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Case{"complementary", "", "complementary", 8, 8, 9, 150},
                       Case{"complementary_bottom", ",field_order=bottom", "complementary", 8, 8, 9, 150},
                       Case{"complementary_progressive", ",scan=progressive", "complementary", 8, 8, 9, 150},
+                      Case{"complementary_upside_down", ",roll=180", "complementary", 8, 8, 9, 150},
                       Case{"white_field", "", "white-field", 15, 15, 9, 200},
                       Case{"white_field_bottom", ",field_order=bottom", "white-field", 15, 15, 9, 200},
                       Case{"white_frame", "", "white-frame", 5, 5, 3, 150},
                       Case{"white_frame_progressive", ",scan=progressive", "white-frame", 5, 5, 3, 150},
+                      Case{"white_frame_upside_down", ",roll=-179", "white-frame", 5, 5, 3, 150},
                       Case{"one_slide", "", "one-slide", 8, 9, 9, 150},
                       Case{"one_slide_bottom", ",field_order=bottom", "one-slide", 8, 9, 9, 150}),
     [](const auto& p) { return p.param.name; });
@@ -80,6 +86,27 @@ TEST(SchemeOption, StreamsBothSurfacesOfAWhiteFieldFrame) {
   EXPECT_EQ(done.status, 0) << done.err;
   // The first frame gives none and the second its own: 1 + 4 x 2.
   EXPECT_NE(done.err.find("6 frames captured, 9 published"), std::string::npos) << done.err;
+}
+
+TEST(Stream, OfAnUpsideDownProjectorHasTheRigAndThePatternThatItsSurfacesAreOf) {
+  const TempFolder folder;
+  const std::string scene = "plane,width=96,height=64,stripes=20,period=4,frames=4,roll=180";
+  const fs::path take = folder / "take", file = folder / "stream.mcap";
+  ASSERT_EQ(run(server({"simulate", "--scene", scene, "--out", take.string()}), kPatience).status, 0);
+  ASSERT_EQ(
+      run(serve("sim:" + scene, {"--fast", "--frames", "4", "--record", file.string()}), kPatience).status,
+      0);
+  const auto rig = read_rig(take / "rig.yaml");
+  const auto pattern = read_pattern(take / "pattern.yaml");
+  ASSERT_TRUE(rig) << rig.error().message;
+  ASSERT_TRUE(pattern) << pattern.error().message;
+  const auto seen = upright(*rig, *pattern);
+  ASSERT_TRUE(seen) << seen.error().message;
+  std::ifstream recorded(file, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(recorded), {});
+  EXPECT_NE(bytes.find(to_yaml(seen->pattern)), std::string::npos);
+  EXPECT_NE(bytes.find(to_yaml(seen->rig)), std::string::npos);
+  EXPECT_EQ(bytes.find(to_yaml(*pattern)), std::string::npos);
 }
 
 TEST(SchemeOption, ASchemeOfASourceThatSaysItsOwnIsRefused) {
