@@ -24,7 +24,8 @@ FrontEdges::FrontEdges(const Rig& rig) {
   front_ = projector_x >= 0 ? -1 : 1;
 }
 
-/// In place, from the front's side on, so that a boundary goes on from one that was just corrected.
+/// In place, from the front's side on. What follows on one that was just corrected is the back's: behind a
+/// sliver there is no more of the front.
 std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& shown,
                                      const Colours& other) const {
   const int count = static_cast<int>(line.size());
@@ -43,9 +44,11 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
     return of[static_cast<std::size_t>(a)][front_side] == of[static_cast<std::size_t>(b)][front_side];
   };
   std::size_t corrected = 0;
+  int last_corrected = -1;
   for (int step = 1; step < count; ++step) {
     const int i = front_ < 0 ? step : count - 1 - step;
     const int next = i + front_;  // towards the front
+    if (next == last_corrected) continue;
     const int own = at(i).boundary;
     const int fronts = at(next).boundary - front_;
     // Further on than the front's next one.
@@ -61,6 +64,7 @@ std::size_t FrontEdges::correct_line(std::vector<Decoded>& line, const Colours& 
     const float off_back = has_behind ? std::fabs(at(i).column_px - before(behind, -front_)) : kNone;
     if (off > kMuchNearer * off_back) continue;
     at(i).boundary = fronts;
+    last_corrected = i;
     ++corrected;
   }
   return corrected;

@@ -2,6 +2,7 @@
 // SequenceDecoder's second half: lines against those above and below them.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "capture/reconstruct/sequence.h"
 
@@ -23,22 +24,28 @@ std::int32_t& SequenceDecoder::cell(int line, int boundary) {
                static_cast<std::size_t>(boundary)];
 }
 
-/// Gives up boundaries that follow on neither side and show nothing but the stripes in which the surfaces
-/// beside them end: what was decoded is where these meet, and the boundary may be elsewhere on the line.
+/// Whether a boundary follows on neither of those beside it on its line and shows nothing but the stripes in
+/// which their surfaces end: what was decoded is where these meet, and the boundary may be elsewhere on the
+/// line.
+bool SequenceDecoder::is_meeting(const SequenceContext& context, int left, int own, int right) const {
+  if (own == left + 1 || right == own + 1) return false;
+  for (const SlideColours* slide : {&shown_slide(context), &other_slide(context)}) {
+    const auto of = [&](int boundary) { return slide->colours[static_cast<std::size_t>(boundary)]; };
+    if (of(left)[1] != of(own)[0] || of(own)[1] != of(right)[0]) return false;
+  }
+  return true;
+}
+
+/// Gives up boundaries that are meetings.
 void SequenceDecoder::give_up_meetings(const EdgeImage& edges, int line, const SequenceContext& context,
                                        SequenceResult& out) const {
-  const auto meet = [](const SlideColours& slide, int left, int own, int right) {
-    const auto of = [&](int boundary) { return slide.colours[static_cast<std::size_t>(boundary)]; };
-    return of(left)[1] == of(own)[0] && of(own)[1] == of(right)[0];
-  };
   int left = -1;
   std::int16_t* own = nullptr;
   for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
        e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
     const int right = out.boundary[e];
     if (right < 0) continue;
-    if (left >= 0 && *own != left + 1 && right != *own + 1 && meet(shown_slide(context), left, *own, right) &&
-        meet(other_slide(context), left, *own, right)) {
+    if (left >= 0 && is_meeting(context, left, *own, right)) {
       *own = -1;
     } else if (own != nullptr) {
       left = *own;
@@ -47,18 +54,35 @@ void SequenceDecoder::give_up_meetings(const EdgeImage& edges, int line, const S
   }
 }
 
-/// Puts a line's edges on the grid. Of several that are one boundary the clearest stays.
-void SequenceDecoder::place_on_grid(const EdgeImage& edges, int line, SequenceResult& out) {
+/// Puts a line's edges on the grid. Of several that are one boundary the clearest stays; but where one lies
+/// between its neighbours in the sequence, and shows its colours better, one that has neither is a rim.
+void SequenceDecoder::place_on_grid(const EdgeImage& edges, int line, const SequenceContext& context,
+                                    SequenceResult& out) {
   std::fill_n(&cell(line, 0), boundaries_, -1);
-  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+  const std::uint32_t first = edges.line_start[static_cast<std::size_t>(line)];
+  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  const auto neighbours = [&](std::uint32_t e) {
+    const int own = out.boundary[e];
+    return (e > first && out.boundary[e - 1] == own - 1 ? 1 : 0) +
+           (e + 1 < end && out.boundary[e + 1] == own + 1 ? 1 : 0);
+  };
+  const auto better = [&](std::uint32_t e, std::uint32_t than) {
+    const Edge &a = edges.edges[e], &b = edges.edges[than];
+    const int more = neighbours(e) - neighbours(than);
+    const int boundary = out.boundary[e];
+    if (std::abs(more) == 2 &&
+        (more > 0) == (gain(a, beside_[e], context, boundary) > gain(b, beside_[than], context, boundary)))
+      return more > 0;
+    return a.slope > b.slope;
+  };
+  for (std::uint32_t e = first; e < end; ++e) {
     if (out.boundary[e] < 0) continue;
     std::int32_t& slot = cell(line, out.boundary[e]);
-    if (slot < 0 || edges.edges[e].slope > edges.edges[static_cast<std::size_t>(slot)].slope) {
+    if (slot >= 0 && !better(e, static_cast<std::uint32_t>(slot))) {
+      out.boundary[e] = -1;
+    } else {
       if (slot >= 0) out.boundary[static_cast<std::size_t>(slot)] = -1;
       slot = static_cast<std::int32_t>(e);
-    } else {
-      out.boundary[e] = -1;
     }
   }
 }
@@ -87,7 +111,7 @@ void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& conte
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) {
       if (context.other != nullptr) give_up_meetings(edges, line, context, out);
-      place_on_grid(edges, line, out);
+      place_on_grid(edges, line, context, out);
     }
   });
   const auto follows = [&](std::uint32_t first, std::uint32_t last, std::uint32_t e) {
@@ -147,6 +171,20 @@ void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& conte
   }
 }
 
+/// Whether it would be a meeting if edge `e` were that boundary.
+bool SequenceDecoder::would_meet(const EdgeImage& edges, int line, std::uint32_t e,
+                                 const SequenceContext& context, int boundary,
+                                 const SequenceResult& result) const {
+  std::uint32_t left = e;
+  std::uint32_t right = e + 1;
+  const std::uint32_t first = edges.line_start[static_cast<std::size_t>(line)];
+  const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  while (left > first && result.boundary[left - 1] < 0) --left;
+  while (right < end && result.boundary[right] < 0) ++right;
+  return left > first && right < end &&
+         is_meeting(context, result.boundary[left - 1], boundary, result.boundary[right]);
+}
+
 /// What a line did not decode, its neighbours predict.
 void SequenceDecoder::complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out) {
   const auto predict = [&](const Open& o, int from) {
@@ -170,6 +208,7 @@ void SequenceDecoder::complete(const EdgeImage& edges, const SequenceContext& co
       best = b;
     }
     if (best < 0) return;
+    if (context.other != nullptr && would_meet(edges, o.line, o.edge, context, best, out)) return;
     out.boundary[o.edge] = static_cast<std::int16_t>(best);
     cell(o.line, best) = static_cast<std::int32_t>(o.edge);
     ++out.counts.completed;

@@ -135,9 +135,12 @@ class SequenceDecoder {
   float expected_gain(int line, float column_px, float was_px, const SequenceContext& context,
                       int boundary) const;
   std::int32_t& cell(int line, int boundary);
+  bool is_meeting(const SequenceContext& context, int left, int own, int right) const;
+  bool would_meet(const EdgeImage& edges, int line, std::uint32_t e, const SequenceContext& context,
+                  int boundary, const SequenceResult& result) const;
   void give_up_meetings(const EdgeImage& edges, int line, const SequenceContext& context,
                         SequenceResult& out) const;
-  void place_on_grid(const EdgeImage& edges, int line, SequenceResult& out);
+  void place_on_grid(const EdgeImage& edges, int line, const SequenceContext& context, SequenceResult& out);
   bool goes_on(const EdgeImage& edges, int line, std::uint32_t e, int boundary, int direction, bool left);
   void check(const EdgeImage& edges, const SequenceContext& context, WorkerPool& pool, SequenceResult& out);
   void complete(const EdgeImage& edges, const SequenceContext& context, SequenceResult& out);

@@ -183,6 +183,17 @@ TEST(Accuracy, WhereTwoSurfacesMeetThereIsNoThird) {
   EXPECT_GT(ours.completeness, 0.989);
 }
 
+// A cube's rim has the code of one of the cube's own boundaries, and is the steeper of the two; or, on those
+// lines where a boundary beside it is missing and on all that follow, of one that is nowhere.
+TEST(Accuracy, ARimBeforeAWallIsNoBoundary) {
+  for (const char* spec : {"object,first=285,seed=5,baseline=-1",
+                           "object,first=369,seed=6489,stripes=100,noise=0.95,baseline=-1.1,roll=-179.8"}) {
+    const Score ours = score_of(Filmed(spec), Decoder::kOrdered, 6, 2);
+    EXPECT_LT(ours.outliers, 0.0007) << spec;
+    EXPECT_GT(ours.completeness, 0.99) << spec;
+  }
+}
+
 // Each channel that flips says once more where a boundary is: 2.2 of them a slide instead of 1.7.
 TEST(Accuracy, TheClearPathsBoundariesLieBetterThanThePublishedOnes) {
   for (const std::string spec : {"face,frames=8", "walk,frames=8"}) {

@@ -71,6 +71,16 @@ TEST_F(FrontEdgeTest, WhatGoesOnFromTheFrontIsItsOwn) {
   }
 }
 
+TEST_F(FrontEdgeTest, BehindASliverThereIsNoMoreOfTheFront) {
+  const int k = lookalike(11, 0, true, false);
+  const int next = lookalike(12, 0, true, false);
+  ASSERT_GT(k, 0);
+  ASSERT_GT(next, 0);
+  const auto got =
+      corrected(rig_with_projector_at(0.2), {{100, 8}, {108, 9}, {116, 10}, {124, k}, {132.5F, next}});
+  EXPECT_EQ(got, (std::vector<int>{8, 9, 10, 11, next}));
+}
+
 TEST_F(FrontEdgeTest, WhatGoesOnToWhatIsBehindStays) {
   const int k = lookalike(11, 0, true, false);
   const std::vector<int> as_seen{8, 9, 10, k, k + 1, k + 2};
