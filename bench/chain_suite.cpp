@@ -63,8 +63,9 @@ StreamConfig served_as(const Options& options) {
 
 /// What frames are decoded with, first.
 ReconstructOptions reconstruct_options(const Options& options) {
-  return {
-      .decoder = served_as(options).decoder, .threads = options.threads, .line_stride = options.line_stride};
+  return {.decoder = served_decoder(served_as(options)).decoder,
+          .threads = options.threads,
+          .line_stride = options.line_stride};
 }
 
 EncodeOptions coded_as(const Options& options) {
@@ -204,7 +205,7 @@ Result<Outcome> run_chain(const FrameLoop& frames, const Options& options, StopS
   pipeline_options.frames =
       options.frames > 0 ? options.frames : static_cast<std::uint64_t>(std::ceil(options.seconds * rate));
   pipeline_options.reconstruct = reconstruct_options(options);
-  pipeline_options.auto_pace = served_as(options).auto_pace;
+  pipeline_options.auto_pace = served_decoder(served_as(options)).auto_pace;
   pipeline_options.encode = coded_as(options);
   auto pipeline = Pipeline::create(*source, {&noting, dds.get(), web.get()}, pipeline_options);
   if (!pipeline) return pipeline.error();

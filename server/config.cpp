@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <thread>
 #include <vector>
 
 #include "base/stream.h"
@@ -50,17 +51,24 @@ std::vector<StreamConfig> ServeConfig::all_streams() const {
   return streams.empty() ? std::vector<StreamConfig>{*this} : streams;
 }
 
+int usual_threads() {
+  return static_cast<int>(std::clamp(std::thread::hardware_concurrency() / 2, 1U, 4U));
+}
+
 bool set_decoder(std::string_view name, StreamConfig& config) {
   const bool is_auto = name == "auto";
   const auto decoder = is_auto ? Decoder::kOrdered : decoder_named(name);
   if (!decoder) return false;
-  config.decoder = *decoder;
-  config.auto_pace = is_auto;
+  config.decoder = {*decoder, is_auto};
   return true;
 }
 
+ServedDecoder served_decoder(const StreamConfig& config) {
+  return config.decoder.value_or(ServedDecoder{.auto_pace = !config.fast && !config.half_lines});
+}
+
 Status check_lines(const StreamConfig& config) {
-  if (config.auto_pace && config.half_lines)
+  if (served_decoder(config).auto_pace && config.half_lines)
     return Error{"decoder auto leaves out lines where it has to: leave out half_lines, or name a decoder"};
   return {};
 }

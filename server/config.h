@@ -27,6 +27,18 @@ inline constexpr std::int64_t kLeastBitRate = 100'000, kMostBitRate = 1'000'000'
 inline constexpr double kLeastDeadline_ms = 0.5, kMostDeadline_ms = 1000;  // of --deadline
 inline constexpr double kLeastTexture_db = 20, kMostTexture_db = 60;       // of --psnr
 
+/// Threads that reconstruct where nothing is said: half of the cores, 1 to 4, so that as many are left to code and
+/// send.
+int usual_threads();
+
+/// How frames are decoded; `auto_pace`: `decoder` at first, then as PipelineOptions has it.
+struct ServedDecoder {
+  Decoder decoder = ReconstructOptions{}.decoder;
+  bool auto_pace = false;
+
+  bool operator==(const ServedDecoder&) const = default;
+};
+
 /// One stream that is served, and from what.
 struct StreamConfig {
   std::string source = "sim:face";
@@ -37,9 +49,8 @@ struct StreamConfig {
   std::optional<std::uint64_t> frames;
   bool loop = false;
   bool fast = false;
-  int threads = 1;
-  Decoder decoder = ReconstructOptions{}.decoder;
-  bool auto_pace = false;  // decoder "auto": as PipelineOptions has it
+  int threads = usual_threads();
+  std::optional<ServedDecoder> decoder;  // see served_decoder()
   bool half_lines = false;
   SurfaceBuilderOptions surface;
   TextureCodec texture = TextureCodec::kJpeg;
@@ -64,6 +75,9 @@ inline const std::vector<std::string> kServedDecoders{"ordered", "quick", "auto"
 
 /// `name`: as --decoder has it. False where nothing is called so.
 bool set_decoder(std::string_view name, StreamConfig& config);
+/// What is said, or else auto where the camera sets the pace. Ordered where every frame is decoded however
+/// long that takes, and where lines are left out by hand.
+ServedDecoder served_decoder(const StreamConfig& config);
 /// Whether decoder and half_lines go together.
 Status check_lines(const StreamConfig& config);
 

@@ -176,10 +176,11 @@ Command serve_command() {
                         "With --projector: its mode, for a rig that the page /rig is to calibrate from "
                         "nothing; afterwards rig.yaml says it");
         app.add_option("--frames", f->frames, "End after this many camera frames")->check(whole_number(1));
-        app.add_option("--decoder", f->decoder,
-                       "ordered (default: the most exact), quick (for a camera that ordered cannot keep up "
-                       "with), auto (as exact as all of the camera's frames can be on this machine: ordered, "
-                       "quick, or quick with fewer lines) or paper (as published)")
+        app.add_option(
+               "--decoder", f->decoder,
+               "ordered (the most exact; default with --fast or --half-lines), quick (for a camera that "
+               "ordered cannot keep up with), auto (default: as exact as all of the camera's frames can "
+               "be on this machine: ordered, quick, or quick with fewer lines) or paper (as published)")
             ->check(CLI::IsMember(kServedDecoders))
             ->type_name("NAME");
         app.add_flag("--half-lines", f->half_lines, kHalfLinesHelp);
@@ -189,7 +190,7 @@ Command serve_command() {
                        "Bridge so many missing boundaries or lines of one surface (default 0: none)")
             ->check(CLI::Range(0, kMostFilled))
             ->type_name("N");
-        app.add_option("--threads", f->threads, "Threads that reconstruct (default 1)")
+        app.add_option("--threads", f->threads, "Threads that reconstruct (default: half of the cores, 1 to 4)")
             ->check(CLI::Range(1, 64));
         app.add_option("--texture", f->texture,
                        "How the texture is sent: jpeg (default: any receiver), webp (smaller, slower), png "

@@ -120,9 +120,10 @@ PipelineOptions pipeline_options(const StreamConfig& config, const std::string& 
   options.lossless = config.fast;
   options.frames = config.frames;
   options.reconstruct.threads = config.threads;
-  options.reconstruct.decoder = config.decoder;
+  const ServedDecoder decoder = served_decoder(config);
+  options.reconstruct.decoder = decoder.decoder;
   options.reconstruct.line_stride = config.half_lines ? 2 : 1;
-  options.auto_pace = config.auto_pace;
+  options.auto_pace = decoder.auto_pace;
   options.reconstruct.surface = config.surface;
   options.encode = encode_options(config);
   options.rate = config.rate;

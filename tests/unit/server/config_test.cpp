@@ -90,8 +90,8 @@ TEST(Config, TheLadderIsAListOfLowerQualities) {
 TEST(Config, ADecoderOrHowItIsChosen) {
   const Read chosen = read("decoder = \"auto\"\n");
   ASSERT_TRUE(chosen.status) << chosen.status.error().message;
-  EXPECT_TRUE(chosen.config.auto_pace);
-  EXPECT_EQ(chosen.config.decoder, Decoder::kOrdered);
+  EXPECT_TRUE(served_decoder(chosen.config).auto_pace);
+  EXPECT_EQ(served_decoder(chosen.config).decoder, Decoder::kOrdered);
   ServeConfig config = chosen.config;
   EXPECT_TRUE(check_config(config));
   config.half_lines = true;
@@ -99,8 +99,8 @@ TEST(Config, ADecoderOrHowItIsChosen) {
   ASSERT_FALSE(both);
   EXPECT_NE(both.error().message.find("half_lines"), std::string::npos) << both.error().message;
   EXPECT_TRUE(set_decoder("quick", config));  // as a flag behind the file
-  EXPECT_FALSE(config.auto_pace);
-  EXPECT_EQ(config.decoder, Decoder::kQuick);
+  EXPECT_FALSE(served_decoder(config).auto_pace);
+  EXPECT_EQ(served_decoder(config).decoder, Decoder::kQuick);
   EXPECT_FALSE(set_decoder("best", config));
 }
 
@@ -143,7 +143,7 @@ fill_holes = 3
   EXPECT_TRUE(r.config.loop);
   EXPECT_TRUE(r.config.fast);
   EXPECT_EQ(r.config.threads, 3);
-  EXPECT_EQ(r.config.decoder, Decoder::kQuick);
+  EXPECT_EQ(served_decoder(r.config).decoder, Decoder::kQuick);
   EXPECT_EQ(r.config.texture, TextureCodec::kWebp);
   EXPECT_EQ(r.config.texture_quality, 91);
   EXPECT_EQ(r.config.texture_encoder, VideoEncoderKind::kX264);
@@ -158,6 +158,18 @@ fill_holes = 3
   EXPECT_TRUE(r.config.half_lines);
   EXPECT_TRUE(r.config.surface.dense);
   EXPECT_EQ(r.config.surface.fill_holes, 3);
+}
+
+TEST(Config, ADecoderThatIsNotSaidIsChosenWhereTheCameraSetsThePace) {
+  StreamConfig config;
+  EXPECT_EQ(served_decoder(config), (ServedDecoder{Decoder::kOrdered, true}));
+  config.half_lines = true;
+  EXPECT_EQ(served_decoder(config), (ServedDecoder{Decoder::kOrdered, false}));
+  EXPECT_TRUE(check_lines(config));
+  config = {.fast = true};
+  EXPECT_EQ(served_decoder(config), (ServedDecoder{Decoder::kOrdered, false}));
+  ASSERT_TRUE(set_decoder("auto", config));
+  EXPECT_TRUE(served_decoder(config).auto_pace);
 }
 
 TEST(Config, ARecordingsTable) {
