@@ -56,18 +56,19 @@ struct SceneLine {
         white(image.white_line(line)),
         width(image.width) {}
 
-  /// Shares of red, green and blue; nothing beside the picture and where there is no light.
-  std::optional<std::array<float, 3>> colour(float from_px, float to_px) const;
+  /// Shares of red, green and blue between two columns, in either order; nothing beside the picture and where
+  /// there is no light.
+  std::optional<std::array<float, 3>> colour(float one_px, float other_px) const;
 
   const std::uint8_t *own, *above, *below;
   const float* white;
   int width;
 };
 
-std::optional<std::array<float, 3>> SceneLine::colour(float from_px, float to_px) const {
-  const int first = static_cast<int>(std::lround(from_px));
-  const int last = static_cast<int>(std::lround(to_px));
-  if (first < 0 || last >= width || last < first) return std::nullopt;
+std::optional<std::array<float, 3>> SceneLine::colour(float one_px, float other_px) const {
+  const int first = static_cast<int>(std::lround(std::min(one_px, other_px)));
+  const int last = static_cast<int>(std::lround(std::max(one_px, other_px)));
+  if (first < 0 || last >= width) return std::nullopt;
   std::array<int, 3> sums{};
   for (int i = 3 * first; i < 3 * (last + 1); ++i)
     sums[static_cast<std::size_t>(i % 3)] += 2 * own[i] + above[i] + below[i];
@@ -78,10 +79,11 @@ std::optional<std::array<float, 3>> SceneLine::colour(float from_px, float to_px
   return out;
 }
 
-/// Whether the scene's brightness changes most between two columns where it does so next to `column_px`.
-bool steepest_near(const SceneLine& scene, float from_px, float to_px, float column_px) {
-  const int first = std::max(0, static_cast<int>(std::ceil(from_px)));
-  const int last = std::min(scene.width - 2, static_cast<int>(to_px) - 1);
+/// Whether the scene's brightness changes most between two columns, in either order, where it does so next to
+/// `column_px`.
+bool steepest_near(const SceneLine& scene, float one_px, float other_px, float column_px) {
+  const int first = std::max(0, static_cast<int>(std::ceil(std::min(one_px, other_px))));
+  const int last = std::min(scene.width - 2, static_cast<int>(std::max(one_px, other_px)) - 1);
   const float* white = scene.white;
   float steepest = 0;
   float off_px = kNear_px;  // nothing changes
@@ -95,49 +97,58 @@ bool steepest_near(const SceneLine& scene, float from_px, float to_px, float col
 }
 
 /// Where the colour of the front's last place gives way to that of the back's first one; nothing where these
-/// are nearly the same.
-std::optional<float> colour_changes(const SceneLine& scene, float front_px, float back_px) {
-  const auto front = scene.colour(front_px - kPlateau_px, front_px - kBlurred_px);
-  const auto back = scene.colour(back_px + kBlurred_px, back_px + kPlateau_px);
+/// are nearly the same. `way`: from the front to the back, 1 to the right, -1 to the left.
+std::optional<float> colour_changes(const SceneLine& scene, float front_px, float back_px, float way) {
+  const auto front = scene.colour(front_px - way * kPlateau_px, front_px - way * kBlurred_px);
+  const auto back = scene.colour(back_px + way * kBlurred_px, back_px + way * kPlateau_px);
   if (!front || !back) return std::nullopt;
-  std::array<float, 3> way;
+  std::array<float, 3> change;
   float square = 0;
   for (std::size_t c = 0; c < 3; ++c) {
-    way[c] = (*back)[c] - (*front)[c];
-    square += way[c] * way[c];
+    change[c] = (*back)[c] - (*front)[c];
+    square += change[c] * change[c];
   }
   if (square < kOtherColour * kOtherColour) return std::nullopt;
-  float before = 0;  // of the way
-  for (float x = std::round(front_px - kBlurred_px); x <= back_px + kBlurred_px; ++x) {
+  float before = 0;  // of the change
+  for (float x = std::round(front_px - way * kBlurred_px); way * (back_px - x) >= -kBlurred_px; x += way) {
     const auto here = scene.colour(x - 1, x + 1);
     if (!here) return std::nullopt;
     float gone = 0;
-    for (std::size_t c = 0; c < 3; ++c) gone += ((*here)[c] - (*front)[c]) * way[c] / square;
-    if (gone > 0.5F) return x - std::min(1.F, (gone - 0.5F) / (gone - before));
+    for (std::size_t c = 0; c < 3; ++c) gone += ((*here)[c] - (*front)[c]) * change[c] / square;
+    if (gone > 0.5F) return x - way * std::min(1.F, (gone - 0.5F) / (gone - before));
     before = gone;
   }
   return std::nullopt;
 }
 
-/// Whether a place, the front's last one or the back's first, is a rim. The two are neighbours; under `alike`
-/// of the two slides the colours tell that it may be one.
-bool is_rim(const SceneLine& scene, const Place& front, const Place& back, bool of_front, int alike) {
-  const Place& own = of_front ? front : back;
-  const float off = off_foretold_px(&own, of_front ? -1 : 1);
+/// Two places that are neighbours on a line where a surface ends before another.
+struct Step {
+  const Place *front, *back;
+  int way;  // from the one to the other, 1 to the right, -1 to the left
+};
+
+/// Whether one of the two is a rim: the front's last one or the back's first. Under `alike` of the two slides
+/// the colours tell that it may be one.
+bool is_rim(const SceneLine& scene, const Step& step, bool of_front, int alike) {
+  const Place& own = of_front ? *step.front : *step.back;
+  const auto way = static_cast<float>(step.way);
+  const float front_px = step.front->column_px;
+  const float back_px = step.back->column_px;
+  const float off = off_foretold_px(&own, of_front ? -step.way : step.way);
   if (own.sigma_px < kSure_px && off < kForetold_px) return false;
   if (alike == 0 && !(off > kStray_px)) return false;
-  const auto px = colour_changes(scene, front.column_px, back.column_px);
+  const auto px = colour_changes(scene, front_px, back_px, way);
   if (px && std::fabs(*px - own.column_px) < kNearColour_px) return true;
   // Brightness tells too little where only one slide looks so.
   if (alike < 2) return false;
   return of_front
-             ? steepest_near(scene, front.column_px - kBeyond_px, back.column_px - kBeside_px, own.column_px)
-             : steepest_near(scene, front.column_px + kBeside_px, back.column_px + kBeyond_px, own.column_px);
+             ? steepest_near(scene, front_px - way * kBeyond_px, back_px - way * kBeside_px, own.column_px)
+             : steepest_near(scene, front_px + way * kBeside_px, back_px + way * kBeyond_px, own.column_px);
 }
 
-/// How many of a line are taken out of `here`, which holds `count`.
+/// How many of a line are taken out of `here`, which holds `count`. `front`: front_side().
 int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const StripeColours& other,
-                      Place* here, int count) {
+                      int front, Place* here, int count) {
   int dropped = 0;
   int before = -1;
   for (int b = 0; b < count; ++b) {
@@ -149,17 +160,25 @@ int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const 
     const int alike = (shown[l][1] == shown[r][0]) + (other[l][1] == other[r][0]);
     const float apart = here[b].column_px - here[left].column_px;
     if (!(apart > 0)) continue;
+    const int of_front = front < 0 ? left : b;
+    const int of_back = front < 0 ? b : left;
+    const Step step{here + of_front, here + of_back, -front};
     // Whether there is room for one more boundary between: the front's next one, the back's one before.
-    const bool front_fits = !(apart < kOfFront * (here[left].column_px - here[left - 1].column_px));
-    const bool back_fits = !(apart < kOfBack * (here[b + 1].column_px - here[b].column_px));
-    if (is_rim(scene, here[left], here[b], false, front_fits ? 0 : alike)) {
-      here[b] = {};
-      before = left;
-      ++dropped;
-    } else if (is_rim(scene, here[left], here[b], true, front_fits && !back_fits ? alike : 0)) {
-      here[left] = {};
-      ++dropped;
+    const auto stripe_px = [&](const Place* own, int side) {
+      return static_cast<float>(side) * (own[side].column_px - own->column_px);
+    };
+    const bool front_fits = !(apart < kOfFront * stripe_px(step.front, front));
+    const bool back_fits = !(apart < kOfBack * stripe_px(step.back, -front));
+    int gone = -1;
+    if (is_rim(scene, step, false, front_fits ? 0 : alike)) {
+      gone = of_back;
+    } else if (is_rim(scene, step, true, front_fits && !back_fits ? alike : 0)) {
+      gone = of_front;
     }
+    if (gone < 0) continue;
+    here[gone] = {};
+    if (gone == b) before = left;
+    ++dropped;
   }
   return dropped;
 }
@@ -199,14 +218,15 @@ int drop_in_shadow(const DifferenceImage& image, int line, Place* here, int coun
 }  // namespace
 
 std::size_t drop_rims(const DetectionLines& rows, const DifferenceImage& image, const StripeColours& shown,
-                      const StripeColours& other, WorkerPool& pool, PlaceGrid& places, SequenceResult& result,
-                      const EdgeImage& edges, std::vector<RecoveredBoundary>& recovered) {
+                      const StripeColours& other, int front, WorkerPool& pool, PlaceGrid& places,
+                      SequenceResult& result, const EdgeImage& edges,
+                      std::vector<RecoveredBoundary>& recovered) {
   std::atomic<std::size_t> total{0};
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line) {
       Place* here = places.line(line);
       const SceneLine scene(rows, image, line);
-      const int dropped = drop_rims_of_line(scene, shown, other, here, places.boundaries()) +
+      const int dropped = drop_rims_of_line(scene, shown, other, front, here, places.boundaries()) +
                           drop_in_shadow(image, line, here, places.boundaries());
       if (dropped == 0) continue;
       total += static_cast<std::size_t>(dropped);

@@ -53,7 +53,8 @@ class RimTest : public ::testing::Test {
     edges.line_start = {0, static_cast<std::uint32_t>(edges.edges.size())};
     PlaceGrid places;
     places.fill(static_cast<int>(shown_.size()), pool_, result_, edges, recovered_);
-    return drop_rims(DetectionLines(frame), image, shown_, other_, pool_, places, result_, edges, recovered_);
+    return drop_rims(DetectionLines(frame), image, shown_, other_, front_, pool_, places, result_, edges,
+                     recovered_);
   }
   /// A later boundary whose left stripe looks like the right one of `boundary`, in one slide or the other.
   int meets(int boundary, bool in_shown, bool in_other) const {
@@ -65,6 +66,7 @@ class RimTest : public ::testing::Test {
   }
 
   static constexpr int kWidth = 200;
+  int front_ = -1;             // the left surface
   float shadow_px_ = kWidth;   // from here on
   float foretold_off_px_ = 1;  // the left surface's last place
   const SequenceDecoder sequence_{*make_pattern(6, 2, 3, 90)};
@@ -82,6 +84,19 @@ TEST_F(RimTest, ARimBetweenStripesThatArePartOfThePatternIsDropped) {
   EXPECT_EQ(result_.boundary[4], -1);
   EXPECT_EQ(dropped(100, 10, 106, k, 106), 1U);  // the left surface's next one would be to its right
   EXPECT_EQ(result_.boundary[5], -1);
+}
+
+TEST_F(RimTest, WithTheProjectorOnTheOtherSideTheRightSurfaceIsInFront) {
+  const int k = meets(10, true, true);
+  ASSERT_GT(k, 0);
+  EXPECT_EQ(dropped(100, 10, 108.8F, k, 108.8F), 0U);
+  EXPECT_EQ(dropped(100, 10, 106, k, 100), 0U);
+  front_ = 1;
+  EXPECT_EQ(dropped(100, 10, 108.8F, k, 108.8F), 1U);  // the left one's next one would be to its right
+  EXPECT_EQ(result_.boundary[5], -1);
+  EXPECT_EQ(dropped(100, 10, 106, k, 100), 1U);  // the right one's would be to its left
+  EXPECT_EQ(result_.boundary[4], -1);
+  EXPECT_EQ(dropped(100, 10, 108.8F, k, 100), 0U);
 }
 
 TEST_F(RimTest, WhereThereIsRoomForTheNextBoundaryItIsNone) {
