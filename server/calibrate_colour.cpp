@@ -104,6 +104,16 @@ void warn_of_weak_colours(const ColourCalibration& c) {
   }
 }
 
+void warn_of_a_curve(const ColourCalibration& c) {
+  if (c.camera_gamma == 1) return;
+  char gamma[16];
+  std::snprintf(gamma, sizeof gamma, "%.1f", c.camera_gamma);
+  log_warning("light does not add up in these captures: the camera's response is curved, as by a gamma of " +
+              std::string(gamma) +
+              ", which costs depth precision and leaves stripes in textures; switch the camera's gamma off "
+              "(100 of v4l2's control) and take all captures again");
+}
+
 Status run(const Options& options, StopSignal& stop) {
   RigPart before;
   if (!options.update.empty()) {
@@ -140,6 +150,7 @@ Status run(const Options& options, StopSignal& stop) {
     print(*calibration, out);
   }
   warn_of_weak_colours(*calibration);
+  warn_of_a_curve(*calibration);
   return {};
 }
 

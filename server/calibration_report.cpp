@@ -38,6 +38,7 @@ std::string colour_report(const ColourCalibration& c) {
       {"colour_matrix", c.matrix},
       {"residual", c.residual},
       {"noise", c.noise},
+      {"camera_gamma", c.camera_gamma},
       {"threshold", kDetectionThreshold},
       {"target",
        {{"box", {c.target.x, c.target.y, c.target.width, c.target.height}}, {"pixels", c.target_pixels}}},

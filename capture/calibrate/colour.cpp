@@ -179,6 +179,33 @@ Result<Eigen::Matrix3d> solve(const std::vector<Response>& responses) {
   return Eigen::Matrix3d(solved.transpose());
 }
 
+/// RMS over the channels of what a matrix leaves of the responses, of 255; nothing where there is none.
+std::optional<double> residual_of(const std::vector<Response>& responses) {
+  const auto m = solve(responses);
+  if (!m) return std::nullopt;
+  double squares = 0;
+  for (const Response& r : responses) squares += (*m * r.mean - projected(r.colour)).squaredNorm();
+  return std::sqrt(squares / (3.0 * static_cast<double>(responses.size())));
+}
+
+/// The gamma under which the colours' light adds up best, 1 where that is not much better than as it is.
+double gamma_of(const std::vector<Response>& responses, double residual) {
+  constexpr double kMost = 3, kStep = 0.05;
+  constexpr double kLeast = 1.2;       // less costs next to nothing
+  constexpr double kMuchBetter = 0.5;  // of the residual without
+  double best = residual * kMuchBetter;
+  double out = 1;
+  for (double gamma = kLeast; gamma < kMost + kStep / 2; gamma += kStep) {
+    std::vector<Response> straight = responses;
+    for (Response& r : straight) r.mean = 255 * (r.mean / 255).array().pow(gamma).matrix();
+    const auto left = residual_of(straight);
+    if (!left || *left >= best) continue;
+    best = *left;
+    out = gamma;
+  }
+  return out;
+}
+
 /// What the difference of a colour and its complement leaves for detection (5.2).
 void weigh_detection(const Eigen::Matrix3d& m, const std::vector<Response>& responses, double brightest,
                      const Response& r, ColourReport& report) {
@@ -227,7 +254,7 @@ Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& cap
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.matrix.data()) = m;
   out.target = target->box;
   out.target_pixels = target->pixels;
-  double brightest = 0, squares = 0, noise = 0;
+  double brightest = 0, noise = 0;
   for (const Response& r : responses) brightest = std::max(brightest, (m * r.mean).maxCoeff());
   for (const Response& r : responses) {
     ColourReport report{.colour = r.colour};
@@ -238,14 +265,13 @@ Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& cap
     }
     const Eigen::Vector3d off = estimated - projected(r.colour);
     report.residual = std::sqrt(off.squaredNorm() / 3);
-    squares += off.squaredNorm();
     noise += r.noise.squaredNorm();
     if (r.colour != kBlack && r.colour != kWhite) weigh_detection(m, responses, brightest, r, report);
     out.colours.push_back(report);
   }
-  const auto values = 3.0 * static_cast<double>(responses.size());
-  out.residual = std::sqrt(squares / values);
-  out.noise = std::sqrt(noise / values);
+  out.residual = residual_of(responses).value_or(0);
+  out.noise = std::sqrt(noise / (3.0 * static_cast<double>(responses.size())));
+  out.camera_gamma = gamma_of(responses, out.residual);
   return out;
 }
 

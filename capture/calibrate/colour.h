@@ -52,7 +52,10 @@ struct ColourCalibration {
   std::vector<ColourReport> colours;
   double residual = 0;  // RMS over all colours and channels, of 255
   double noise = 0;     // of one captured channel at one pixel, of 255
-  Roi target;           // the box around the pixels used
+  /// Of the curve with which light adds up best: captured = light^(1 / gamma). 1 where a straight response
+  /// explains the captures about as well.
+  double camera_gamma = 1;
+  Roi target;  // the box around the pixels used
   std::size_t target_pixels = 0;
 };
 

@@ -103,6 +103,25 @@ TEST(ColourCalibration, AWeakChannelShowsInTheMargin) {
   EXPECT_GT(at->residual, 50);
 }
 
+TEST(ColourCalibration, ACurvedResponseIsToldByLightThatDoesNotAddUp) {
+  for (const double gamma : {1.4, 2.2}) {
+    auto captures = all();
+    for (ColourCapture& c : captures)
+      for (std::size_t i = 0; i < c.picture.size(); ++i)
+        c.picture.data()[i] =
+            static_cast<std::uint8_t>(std::lround(255 * std::pow(c.picture.data()[i] / 255.0, 1 / gamma)));
+    const auto result = calibrate_colour(captures, {});
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    EXPECT_NEAR(result->camera_gamma, gamma, 0.15);
+    EXPECT_GT(result->residual, 8);
+  }
+  for (const double ambient : {0., 2., 20.}) {
+    const auto straight = calibrate_colour(all(200, ambient), {});
+    ASSERT_TRUE(straight.ok()) << straight.error().message;
+    EXPECT_EQ(straight->camera_gamma, 1) << ambient;
+  }
+}
+
 TEST(ColourCalibration, RefusesSaturation) {
   EXPECT_THAT(refusal(all(330)), HasSubstr("111.png: saturated, up to 100.0 %"));
   auto captures = all();
