@@ -179,12 +179,10 @@ Result<Eigen::Matrix3d> solve(const std::vector<Response>& responses) {
   return Eigen::Matrix3d(solved.transpose());
 }
 
-/// RMS over the channels of what a matrix leaves of the responses, of 255; nothing where there is none.
-std::optional<double> residual_of(const std::vector<Response>& responses) {
-  const auto m = solve(responses);
-  if (!m) return std::nullopt;
+/// RMS over the channels of what a matrix leaves of the responses, of 255.
+double residual_of(const Eigen::Matrix3d& m, const std::vector<Response>& responses) {
   double squares = 0;
-  for (const Response& r : responses) squares += (*m * r.mean - projected(r.colour)).squaredNorm();
+  for (const Response& r : responses) squares += (m * r.mean - projected(r.colour)).squaredNorm();
   return std::sqrt(squares / (3.0 * static_cast<double>(responses.size())));
 }
 
@@ -198,9 +196,11 @@ double gamma_of(const std::vector<Response>& responses, double residual) {
   for (double gamma = kLeast; gamma < kMost + kStep / 2; gamma += kStep) {
     std::vector<Response> straight = responses;
     for (Response& r : straight) r.mean = 255 * (r.mean / 255).array().pow(gamma).matrix();
-    const auto left = residual_of(straight);
-    if (!left || *left >= best) continue;
-    best = *left;
+    const auto m = solve(straight);
+    if (!m) continue;
+    const double left = residual_of(*m, straight);
+    if (left >= best) continue;
+    best = left;
     out = gamma;
   }
   return out;
@@ -269,7 +269,7 @@ Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& cap
     if (r.colour != kBlack && r.colour != kWhite) weigh_detection(m, responses, brightest, r, report);
     out.colours.push_back(report);
   }
-  out.residual = residual_of(responses).value_or(0);
+  out.residual = residual_of(m, responses);
   out.noise = std::sqrt(noise / (3.0 * static_cast<double>(responses.size())));
   out.camera_gamma = gamma_of(responses, out.residual);
   return out;

@@ -17,11 +17,11 @@ constexpr float kMuchNearer = 0.7F;  // of how far off it is where the back's is
 }  // namespace
 
 /// What is nearer shows, at the same place of the picture, a stripe further from the projector's side.
-int front_side(const Rig& rig) {
+FrontEdges::FrontEdges(const Rig& rig) {
   const auto& r = rig.projector_from_camera_rotation;
   const auto& t = rig.projector_from_camera_translation;
   const double projector_x = -(r[0] * t[0] + r[3] * t[1] + r[6] * t[2]);  // in the camera's frame
-  return projector_x >= 0 ? -1 : 1;
+  front_ = projector_x >= 0 ? -1 : 1;
 }
 
 /// In place, from the front's side on. What follows on one that was just corrected is the back's: behind a

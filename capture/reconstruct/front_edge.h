@@ -14,14 +14,14 @@
 
 namespace relievo {
 
-/// On which side of a boundary that ends before another surface the front is: -1 on its left, where what is
-/// nearer has less of them; 1 on its right, where the projector stands to the camera's left.
-int front_side(const Rig& rig);
-
 /// One thread.
 class FrontEdges {
  public:
-  explicit FrontEdges(const Rig& rig) : front_(front_side(rig)) {}
+  explicit FrontEdges(const Rig& rig);
+
+  /// On which side of a last boundary before another surface the front is: -1 on its left, where what is
+  /// nearer has less of them; 1 on its right, where the projector stands to the camera's left.
+  int front() const { return front_; }
 
   using Colours = std::vector<std::array<Primary, 2>>;  // to the left and right of each boundary
   /// Gives such boundaries, which go on from the front and not from what is behind, to the front. `shown` and
@@ -42,7 +42,7 @@ class FrontEdges {
   };
   std::size_t correct_line(std::vector<Decoded>& line, const Colours& shown, const Colours& other) const;
 
-  int front_;                     // front_side()
+  int front_;                     // see front()
   std::vector<Scratch> scratch_;  // one a worker
 };
 

@@ -17,6 +17,13 @@ constexpr std::uint8_t kStays = 0;
 constexpr std::uint8_t kGoes = 1;
 constexpr std::uint8_t kOpen = 2;  // what becomes of others decides
 
+/// Whether an edge's boundary is the one behind that of the edge before it, of a line's from `first` to
+/// `end`.
+bool follows(const SequenceResult& result, std::uint32_t first, std::uint32_t end, std::uint32_t e) {
+  return e > first && e < end && result.boundary[e - 1] >= 0 &&
+         result.boundary[e] == result.boundary[e - 1] + 1;
+}
+
 }  // namespace
 
 std::int32_t& SequenceDecoder::cell(int line, int boundary) {
@@ -62,9 +69,7 @@ void SequenceDecoder::place_on_grid(const EdgeImage& edges, int line, const Sequ
   const std::uint32_t first = edges.line_start[static_cast<std::size_t>(line)];
   const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
   const auto neighbours = [&](std::uint32_t e) {
-    const int own = out.boundary[e];
-    return (e > first && out.boundary[e - 1] == own - 1 ? 1 : 0) +
-           (e + 1 < end && out.boundary[e + 1] == own + 1 ? 1 : 0);
+    return int{follows(out, first, end, e)} + int{follows(out, first, end, e + 1)};
   };
   const auto better = [&](std::uint32_t e, std::uint32_t than) {
     const Edge &a = edges.edges[e], &b = edges.edges[than];
@@ -114,9 +119,6 @@ void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& conte
       place_on_grid(edges, line, context, out);
     }
   });
-  const auto follows = [&](std::uint32_t first, std::uint32_t last, std::uint32_t e) {
-    return e > first && e < last && out.boundary[e - 1] >= 0 && out.boundary[e] == out.boundary[e - 1] + 1;
-  };
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
     scratch.open.clear();
@@ -129,8 +131,8 @@ void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& conte
         verdict_[e] = kGoes;
         if (convincing_[e] == 0) continue;
         const bool below = goes_on(edges, line, e, b, 1, false);
-        const bool right = follows(first, last, e + 1);
-        const bool before = follows(first, last, e);
+        const bool right = follows(out, first, last, e + 1);
+        const bool before = follows(out, first, last, e);
         if (below) {
           verdict_[e] = kStays;
         } else if (goes_on(edges, line, e, b, -1, false) || (right && before)) {

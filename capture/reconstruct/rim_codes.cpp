@@ -146,7 +146,7 @@ bool is_rim(const SceneLine& scene, const Step& step, bool of_front, int alike) 
              : steepest_near(scene, front_px + way * kBeside_px, back_px + way * kBeyond_px, own.column_px);
 }
 
-/// How many of a line are taken out of `here`, which holds `count`. `front`: front_side().
+/// How many of a line are taken out of `here`, which holds `count`. `front`: FrontEdges::front().
 int drop_rims_of_line(const SceneLine& scene, const StripeColours& shown, const StripeColours& other,
                       int front, Place* here, int count) {
   int dropped = 0;

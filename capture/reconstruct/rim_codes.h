@@ -29,7 +29,7 @@ using StripeColours = std::vector<std::array<Primary, 2>>;
 
 /// Gives up boundaries of `result` (-1), and takes out of `places` and `recovered`, what may be such a rim,
 /// or lies in a shadow. `shown` and `other` are the colours under the frame's slide and under the other one;
-/// `front` is front_side() of the rig.
+/// `front` is FrontEdges::front().
 /// `places` are those of both; `image` is what the edges were found in, of `rows`. Says how many there were.
 std::size_t drop_rims(const DetectionLines& rows, const DifferenceImage& image, const StripeColours& shown,
                       const StripeColours& other, int front, WorkerPool& pool, PlaceGrid& places,

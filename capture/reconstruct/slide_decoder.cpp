@@ -70,7 +70,6 @@ struct SlideDecoder::State {
         quick_differencer(rig.colour_matrix),
         sequence(p),
         quick_sequence(p),
-        front(front_side(rig)),
         front_edges(rig),
         refiner(rig.colour_matrix),
         quick_placer(rig.colour_matrix),
@@ -94,7 +93,6 @@ struct SlideDecoder::State {
   QuickSequence quick_sequence;
   WeakSignal weak_signal;
   Tracer tracer;
-  int front;  // front_side()
   FrontEdges front_edges;
   Refiner refiner;
   LeanCorrection leaning;
@@ -271,7 +269,7 @@ void SlideDecoder::State::look_again(const DetectionLines& rows, WorkerPool& poo
                                                      .ambient = refiner.ambient()},
                                                     pool, result, edges, recovered);
   const std::size_t rims = drop_rims(rows, newer.difference, shown, sequence.shown_colours(other(order)),
-                                     front, pool, places, result, edges, recovered);
+                                     front_edges.front(), pool, places, result, edges, recovered);
   // Weighed anew among places that are better now.
   const WeighingCounts weighed =
       weighing.weigh(places, moving, kShownTolerance * consistency.scale(), pool, result, edges, recovered);
