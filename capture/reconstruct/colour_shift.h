@@ -9,6 +9,7 @@
 #include <cstddef>
 
 #include "base/pattern.h"
+#include "capture/reconstruct/colour_shift_rows.h"
 
 namespace relievo {
 
@@ -36,12 +37,10 @@ class ColourShift {
   float shift_px(const ShiftQuery& query, std::size_t blur) const;
 
  private:
-  static constexpr int kReach = 7;  // of a kernel to each side
-  static constexpr int kTaps = 2 * kReach + 1;
-
-  std::array<float, 3> luma_;   // weights of the difference's channels in luma
-  std::array<float, 3> white_;  // what each of them shows of a grey that the camera sees
-  std::array<std::array<float, kTaps>, kBlurs> kernels_;  // the blur and the low-pass along a line
+  std::array<float, 3> luma_;                       // weights of the difference's channels in luma
+  std::array<float, 3> white_;                      // what each of them shows of a grey that the camera sees
+  std::array<StripedRow::Kernel, kBlurs> kernels_;  // the blur and the low-pass along a line
+  void (*differences_)(const StripedRow& row, std::array<StripedRow::Out, 3>& out);
 };
 
 }  // namespace relievo

@@ -102,6 +102,7 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   missed_px_.resize(tried_.size());
   uncovered_.resize(tried_.size());
   dropped_.resize(tried_.size());
+  in_order_.assign(static_cast<std::size_t>(lines_), 0);
   of_lines_.resize(static_cast<std::size_t>(pool.workers()));
   for (OfLines& of : of_lines_) {
     of.decoded = of.still = of.added = 0;
@@ -241,10 +242,17 @@ bool Growth::moves(int line, float column_px) const {
   return cell >= 0 && cell < cells_ && moving_[static_cast<std::size_t>(line * cells_ + cell)] != 0;
 }
 
-Growth::Neighbours Growth::neighbours(int line, float column_px) {
+/// Of a place on a line, for `boundary`, which the line does not have.
+Growth::Neighbours Growth::neighbours(int line, int boundary, float column_px) {
   const float* here = now_.line(line);
   Neighbours out{-std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(), -1,
                  boundaries_};
+  if (in_order_[static_cast<std::size_t>(line)] != 0) {
+    const auto [left, right] = known_beside(line, boundary);
+    const float left_px = left < 0 ? out.left_px : here[left];
+    const float right_px = right == boundaries_ ? out.right_px : here[right];
+    if (left_px < column_px && right_px >= column_px) return {left_px, right_px, left, right};
+  }
   for (int b = 0; b < boundaries_; ++b) {
     const float px = here[b];
     if (px < column_px && px > out.left_px) {
@@ -256,6 +264,35 @@ Growth::Neighbours Growth::neighbours(int line, float column_px) {
     }
   }
   return out;
+}
+
+/// The nearest boundaries that a line has before and behind one; -1 and boundaries_ where there is none.
+std::array<int, 2> Growth::known_beside(int line, int boundary) {
+  const float* here = now_.line(line);
+  int left = boundary - 1;
+  int right = boundary + 1;
+  while (left >= 0 && !known(here[left])) --left;
+  while (right < boundaries_ && !known(here[right])) ++right;
+  return {left, right};
+}
+
+/// Whether the boundaries of a line come in the pattern's order.
+bool Growth::is_in_order(int line) {
+  const float* here = now_.line(line);
+  float last = -std::numeric_limits<float>::infinity();
+  for (int b = 0; b < boundaries_; ++b) {
+    if (here[b] <= last) return false;
+    if (known(here[b])) last = here[b];
+  }
+  return true;
+}
+
+void Growth::put(int line, int boundary, float column_px) {
+  float* here = now_.line(line);
+  here[boundary] = column_px;
+  const auto [left, right] = known_beside(line, boundary);
+  if ((left >= 0 && here[left] >= column_px) || (right < boundaries_ && here[right] <= column_px))
+    in_order_[static_cast<std::size_t>(line)] = 0;
 }
 
 /// From boundary + `side` to the boundary, by the nearest lines that have both; NaN where none has.
@@ -290,7 +327,7 @@ std::optional<Growth::Prediction> Growth::predict_beside(int line, int boundary)
     const float apart = static_cast<float>(-side) * pitch;
     if (!(apart > kLeastPitch * pitch_px_ && apart < kMostPitch * pitch_px_)) continue;
     const float column = from + pitch;
-    const Neighbours near = neighbours(line, column);
+    const Neighbours near = neighbours(line, boundary, column);
     if (!near.in_order(boundary, column)) continue;
     if (side < 0 ? near.left != boundary - 1 : near.right != boundary + 1) continue;
     return Prediction{near.prediction(column, sigma), true};
@@ -328,7 +365,7 @@ std::optional<Growth::Prediction> Growth::predict_between(int line, int boundary
   std::uint8_t& tried = tried_[static_cast<std::size_t>(line * boundaries_ + boundary)];
   if (std::exchange(tried, static_cast<std::uint8_t>(sources)) == sources) return std::nullopt;
   const float column = both ? 0.5F * (places.column_px[0] + places.column_px[1]) : places.column_px[0];
-  const Neighbours near = neighbours(line, column);
+  const Neighbours near = neighbours(line, boundary, column);
   if (!near.in_order(boundary, column)) return std::nullopt;
   // Where the scene holds still, what is against a boundary is as good as what is for it.
   if (!both && !moves(line, column)) return std::nullopt;
@@ -368,7 +405,7 @@ std::optional<FoundStep> Growth::look(const SlideFieldView& view, int line, int 
 
 std::size_t Growth::grow_line(const SlideFieldView& view, int line, const EdgeImage& edges,
                               SequenceResult& result, std::vector<RecoveredBoundary>& recovered) {
-  float* here = now_.line(line);
+  const float* here = now_.line(line);
   std::size_t added = 0;
   for (int b = 0; b < boundaries_; ++b) {
     if (known(here[b])) continue;
@@ -386,7 +423,7 @@ std::size_t Growth::grow_line(const SlideFieldView& view, int line, const EdgeIm
     if (!found) continue;
     ++added;
     if (take_back(line, b, found->column_px, edges, result)) continue;
-    here[b] = found->column_px;
+    put(line, b, found->column_px);
     recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
   }
   return added;
@@ -398,10 +435,10 @@ Growth::Confirmed Growth::confirm(const SlideFieldView& view, const Doubted& dou
   const auto [line, e] = doubted;
   if (line >= view.field.height) return Confirmed::kNo;
   const int b = result.doubted[e];
-  float& here = now_.line(line)[b];
+  const float here = now_.line(line)[b];
   const float column = edges.edges[e].column_px;
   if (result.boundary[e] >= 0 || known(here) || !moves(line, column)) return Confirmed::kNo;
-  const Neighbours near = neighbours(line, column);
+  const Neighbours near = neighbours(line, b, column);
   if (!near.in_order(b, column)) return Confirmed::kNo;
   const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
   if (!found || !fits_before(view, line, b, *found, false)) return Confirmed::kNo;
@@ -409,7 +446,7 @@ Growth::Confirmed Growth::confirm(const SlideFieldView& view, const Doubted& dou
     return std::fabs(now_.line(other)[b] - found->column_px) < kGoesOn_px;
   };
   if (!goes_on(line - 1) && !goes_on(line + 1)) return Confirmed::kNotYet;
-  here = found->column_px;
+  put(line, b, found->column_px);
   recovered.push_back({line, b, found->column_px, found->sigma_px, 0});
   return Confirmed::kYes;
 }
@@ -448,7 +485,7 @@ bool Growth::take_back(int line, int boundary, float found_px, const EdgeImage& 
   const float column = edges.edges[static_cast<std::size_t>(e)].column_px;
   if (!(std::fabs(column - found_px) < kDropped_px)) return false;
   result.boundary[static_cast<std::size_t>(e)] = static_cast<std::int16_t>(boundary);
-  now_.line(line)[boundary] = column;
+  put(line, boundary, column);
   return true;
 }
 
@@ -467,6 +504,7 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Wor
         remember_line(view, line, edges, result);
       of.added += restore_line(line, edges, result, of.restored);
       drop_line(view, line, edges, result);
+      in_order_[static_cast<std::size_t>(line)] = is_in_order(line) ? 1 : 0;
     }
   });
   std::size_t added = 0;

@@ -73,7 +73,10 @@ class Growth {
                            std::vector<RecoveredBoundary>& restored);
   void drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result);
   bool moves(int line, float column_px) const;
-  Neighbours neighbours(int line, float column_px);
+  Neighbours neighbours(int line, int boundary, float column_px);
+  std::array<int, 2> known_beside(int line, int boundary);
+  bool is_in_order(int line);
+  void put(int line, int boundary, float column_px);
   Around around(int line, int boundary);
   std::optional<Prediction> predict_between(int line, int boundary, const Around& places);
   std::optional<Prediction> predict_beside(int line, int boundary);
@@ -98,6 +101,7 @@ class Growth {
   std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
   std::vector<float> missed_px_;  // [line][boundary]: beside a boundary of its line it was not found there
   std::vector<std::int32_t> dropped_;    // [line][boundary]: the edge whose boundary was given up, or -1
+  std::vector<std::uint8_t> in_order_;   // lines whose boundaries are
   std::vector<std::uint8_t> uncovered_;  // [line][boundary]: find_uncovered()
   std::vector<Doubted> doubted_;         // that may still be confirmed
   std::vector<OfLines> of_lines_;        // [worker]

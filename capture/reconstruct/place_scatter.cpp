@@ -2,6 +2,7 @@
 #include "capture/reconstruct/place_scatter.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "capture/reconstruct/consistency.h"
@@ -22,6 +23,17 @@ constexpr std::size_t kFewMove = 4;  // times as many with contrast hold still
 /// Luma's part of the variance of both, of which luma's is so much more than colour's.
 float part_of_luma(float both, float more) {
   return std::clamp(0.5F * (both + more), 0.F, both);
+}
+
+/// 0 of a sample that is empty.
+template <std::size_t kCount>
+std::array<float, kCount> medians(const std::array<RankedSample*, kCount>& samples, WorkerPool& pool) {
+  std::array<float, kCount> out;
+  pool.for_ranges(static_cast<int>(kCount), [&](int begin, int end, int) {
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
+      out[i] = samples[i]->median(0);
+  });
+  return out;
 }
 
 }  // namespace
@@ -71,12 +83,11 @@ void PlaceScatter::line(const EdgeImage& edges, const SequenceResult& result,
   }
 }
 
-void PlaceScatter::settle_plain() {
-  const auto variance = [](RankedSample& squares) { return squares.median(0) * kVarianceOfMedian; };
-  const float colour_noise = noise_.colour.median(0);
-  const float luma_noise = noise_.luma.median(0);
-  const float both = std::max(0.F, variance(plain_.apart) - colour_noise - luma_noise);
-  const float more = variance(plain_.luma) - luma_noise - (variance(plain_.colour) - colour_noise);
+void PlaceScatter::settle_plain(WorkerPool& pool) {
+  const auto [apart, colour, luma, colour_noise, luma_noise] =
+      medians(std::array{&plain_.apart, &plain_.colour, &plain_.luma, &noise_.colour, &noise_.luma}, pool);
+  const float both = std::max(0.F, apart * kVarianceOfMedian - colour_noise - luma_noise);
+  const float more = luma * kVarianceOfMedian - luma_noise - (colour * kVarianceOfMedian - colour_noise);
   const float of_luma = part_of_luma(both, more);
   luma_px_ = std::sqrt(of_luma);
   colour_px_ = std::sqrt(both - of_luma);
@@ -91,19 +102,15 @@ void PlaceScatter::apart(const Edge& edge, const LumaSeen& luma, bool still, int
       .push_back((squared(luma.column_px - edge.column_px) - known) / squared(edge.contrast));
 }
 
-PlaceScatter::Errors PlaceScatter::errors() {
-  const ColourAndLumaErrors still = of_still();
+PlaceScatter::Errors PlaceScatter::errors(WorkerPool& pool) {
+  const auto [apart, colour, luma, apart_moving] =
+      medians(std::array{&contrasty_.apart, &contrasty_.colour, &contrasty_.luma, &apart_moving_}, pool);
+  const float both = std::max(0.F, apart);
+  const float of_luma = contrasty_.luma.size() < kLeastSeen ? both : part_of_luma(both, luma - colour);
+  const ColourAndLumaErrors still{{colour_px_, drawn_by_contrast_px(both - of_luma)},
+                                  {luma_px_, std::min(kMostLuma_px, std::sqrt(of_luma * kVarianceOfMedian))}};
   if (apart_moving_.size() * kFewMove < contrasty_.apart.size()) return {still, still};
-  return {still, {{colour_px_, drawn_by_contrast_px(apart_moving_.median(0))}, {luma_px_, 0}}};
-}
-
-ColourAndLumaErrors PlaceScatter::of_still() {
-  const float both = std::max(0.F, contrasty_.apart.median(0));
-  const float of_luma = contrasty_.luma.size() < kLeastSeen
-                            ? both
-                            : part_of_luma(both, contrasty_.luma.median(0) - contrasty_.colour.median(0));
-  return {{colour_px_, drawn_by_contrast_px(both - of_luma)},
-          {luma_px_, std::min(kMostLuma_px, std::sqrt(of_luma * kVarianceOfMedian))}};
+  return {still, {{colour_px_, drawn_by_contrast_px(apart_moving)}, {luma_px_, 0}}};
 }
 
 }  // namespace relievo

@@ -9,6 +9,7 @@
 
 #include <vector>
 
+#include "base/parallel.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/ranked_sample.h"
 #include "capture/reconstruct/sequence.h"
@@ -30,8 +31,8 @@ struct ColourAndLumaErrors {
   PlaceErrors colour, luma;
 };
 
-/// In this order, a frame: begin(), line() of all, settle_plain(), apart() of edges. One thread but for
-/// line() and apart(): each worker has its own memory.
+/// In this order, a frame: begin(), line() of all, settle_plain(), apart() of edges, errors(). One thread but
+/// for line() and apart(): each worker has its own memory.
 class PlaceScatter {
  public:
   void begin(int workers);
@@ -40,7 +41,7 @@ class PlaceScatter {
   /// in three is asked.
   void line(const EdgeImage& edges, const SequenceResult& result, const std::vector<LumaSeen>& seen, int line,
             int worker);
-  void settle_plain();
+  void settle_plain(WorkerPool& pool);
   /// Of luma in the frame at hand, after settle_plain().
   float luma_px() const { return luma_px_; }
 
@@ -53,11 +54,9 @@ class PlaceScatter {
     /// unknown: all is taken for colour's. Where few move it is as where nothing does.
     ColourAndLumaErrors moving;
   };
-  Errors errors();
+  Errors errors(WorkerPool& pool);
 
  private:
-  ColourAndLumaErrors of_still();
-
   struct Squares {              // of distances
     RankedSample apart;         // luma from colour,
     RankedSample colour, luma;  // and either from the cubics

@@ -20,9 +20,9 @@ constexpr float kShifting = 0.04F;    // contrast from which on zero crossings a
 constexpr float kNoEnd_px = 1e4F;     // of a stripe that ends nowhere near
 constexpr float kFarApart_px = 1.5F;  // colour and luma that do not tell the blur of chroma
 constexpr float kMostCost_px = 0.5F;
-constexpr float kKeptOfCost = 0.9F;         // from frame to frame: the camera stays what it is
-constexpr std::uint32_t kLeastOfBlur = 40;  // edges that tell it
-constexpr std::uint32_t kMostOfBlur = 128;
+constexpr float kKeptOfCost = 0.9F;       // from frame to frame: the camera stays what it is
+constexpr std::size_t kLeastOfBlur = 40;  // edges that tell it
+constexpr std::size_t kMostOfBlur = 128;
 constexpr int kShareEvery = 3;           // edges and lines that tell the ambient light
 constexpr float kShareOfNone = 0.68F;    // projected share, as blur leaves it, where no light is ambient
 constexpr int kRowReach_px = 4;          // columns compared with the lines above and below
@@ -145,21 +145,15 @@ ShiftQuery Refiner::shift_query(const DifferenceImage& image, int line, const Se
 void Refiner::find_blur(const DifferenceImage& image, const SequenceResult& result,
                         const std::vector<std::array<Primary, 2>>& colours, const EdgeImage& edges,
                         WorkerPool& pool) {
-  const auto tells = [&](std::uint32_t e) {
-    const LumaSeen& luma = seen_[e];
-    return result.boundary[e] >= 0 && luma.found && edges.edges[e].contrast > kContrasty &&
-           std::fabs(luma.column_px - edges.edges[e].column_px) < kFarApart_px;
-  };
-  std::uint32_t total = 0;
-  for (std::uint32_t e = 0; e < edges.edges.size(); ++e) total += tells(e);
+  std::size_t total = 0;
+  for (const Scratch& of : scratch_) total += of.tell_blur.size();
   if (total < kLeastOfBlur) return;
-  const std::uint32_t every = std::max(1U, total / kMostOfBlur);
+  const std::size_t every = std::max(std::size_t{1}, total / kMostOfBlur);
   tell_blur_.clear();
-  std::uint32_t seen = 0;
-  for (int line = 0; line < edges.lines; ++line)
-    for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-         e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e)
-      if (tells(e) && seen++ % every == 0) tell_blur_.push_back({line, e, {}});
+  std::size_t seen = 0;
+  for (const Scratch& of : scratch_)
+    for (const auto [line, e] : of.tell_blur)
+      if (seen++ % every == 0) tell_blur_.push_back({line, e, {}});
   pool.for_ranges(static_cast<int>(tell_blur_.size()), [&](int begin, int end, int) {
     for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
       auto& [line, e, costs] = tell_blur_[i];
@@ -178,56 +172,77 @@ void Refiner::find_blur(const DifferenceImage& image, const SequenceResult& resu
 }
 
 /// As LumaPlacer::places(), by luma without a low-pass along the line.
-void Refiner::place_sharply(int line, const LumaLine& light, int width, const LumaQuery& query,
-                            LumaPlace& out) const {
-  constexpr int kColumns = 2 * kLumaReach_px + 2;
+void Refiner::place_sharply(int line, int width, Scratch& scratch) const {
   constexpr int kMargin = LumaView::kMargin;
-  const int first = column_of(query.own_px) - kLumaReach_px - 1;
-  std::array<float, kColumns + 2 * kMargin> ratios{};
-  const int from = std::max(0, first - kMargin);
-  const int to = std::min(width, first + kColumns + kMargin);
-  sharp_->ratio(line, from, to - from, kDarkSum, ratios.data() + (from - first + kMargin));
-  const LumaView all = light.view();
-  luma_kernels().places({first, all.red + first, all.green + first, all.blue + first, ratios.data() + kMargin,
-                         all.ends + first},
-                        {placer_.weights(), share_}, &query, 1, &out);
+  Placing& placing = scratch.sharply;
+  scratch.sharp_ratio.assign(static_cast<std::size_t>(width + 2 * kMargin), 0);
+  float* ratio = scratch.sharp_ratio.data() + kMargin;
+  // The columns around each, what several have in common once.
+  int from = 0;
+  int to = 0;
+  for (const LumaQuery& query : placing.queries) {
+    const int first = column_of(query.own_px) - kLumaReach_px - 1 - kMargin;
+    const int begin = std::max(first < from ? 0 : to, first);
+    from = first;
+    to = std::min(width, first + 2 * (kLumaReach_px + 1 + kMargin));
+    if (begin < to) sharp_->ratio(line, begin, to - begin, kDarkSum, ratio + begin);
+  }
+  LumaView view = scratch.light.view();
+  view.luma = ratio;
+  luma_kernels().places(view, {placer_.weights(), share_}, placing.queries.data(),
+                        static_cast<int>(placing.queries.size()), placing.places.data());
 }
 
 void Refiner::look_at_line(const DifferenceImage& image, int line, const SequenceResult& result,
                            const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges) {
   const std::uint32_t begin = edges.line_start[static_cast<std::size_t>(line)];
   const std::uint32_t end = edges.line_start[static_cast<std::size_t>(line) + 1];
+  if (begin == end) return;
   Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-  scratch.queries.resize(end - begin);
-  scratch.edges.resize(end - begin);
-  std::size_t count = 0;
+  for (Placing* placing : {&scratch.plainly, &scratch.sharply}) {
+    placing->edges.clear();
+    placing->queries.clear();
+  }
+  placer_.read_line(image, line, wide_stripes_, scratch.light);
   for (std::uint32_t e = begin; e < end; ++e) {
     seen_[e].found = false;
     if (result.boundary[e] < 0) continue;
     const float own = edges.edges[e].column_px;
     if (own < kLumaReach_px || own + kLumaReach_px + 1 > static_cast<float>(image.width)) continue;
-    // Written where it stays: a copy of what was just written in parts would wait for it.
-    LumaQuery& query = scratch.queries[count];
-    query.own_px = own;
-    query.sides.free_left_px = e > begin ? own - edges.edges[e - 1].column_px : 100;
-    query.sides.free_right_px = e + 1 < end ? edges.edges[e + 1].column_px - own : 100;
-    query.sides.colours = colours[static_cast<std::size_t>(result.boundary[e])];
-    query.sides.narrow = false;
-    scratch.edges[count++] = e;
-  }
-  if (count == 0) return;
-  placer_.read_line(image, line, wide_stripes_, scratch.light);
-  scratch.places.resize(count);
-  placer_.places(scratch.light, share_, scratch.queries.data(), count, scratch.places.data());
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t e = scratch.edges[i];
-    const int centre = column_of(edges.edges[e].column_px);
+    const int centre = column_of(own);
     // What moves leaves stripes in the fields' sum, and the scene only seems to have contrast.
     const bool sharp = sharp_ != nullptr && !wide_stripes_ && result.still[e] != 0 &&
                        centre + kLumaReach_px < image.width &&
                        scratch.light.contrast(centre) > kSharpContrast;
-    if (sharp) place_sharply(line, scratch.light, image.width, scratch.queries[i], scratch.places[i]);
-    look_at(image, line, scratch.light, scratch.places[i], sharp, edges.edges[e], seen_[e]);
+    Placing& placing = sharp ? scratch.sharply : scratch.plainly;
+    placing.edges.push_back(e);
+    // Written where it stays: a copy of what was just written in parts would wait for it.
+    LumaQuery& query = placing.queries.emplace_back();
+    query.own_px = own;
+    query.sides.free_left_px = e > begin ? own - edges.edges[e - 1].column_px : 100;
+    query.sides.free_right_px = e + 1 < end ? edges.edges[e + 1].column_px - own : 100;
+    query.sides.colours = colours[static_cast<std::size_t>(result.boundary[e])];
+  }
+  for (Placing* placing : {&scratch.plainly, &scratch.sharply}) {
+    const std::size_t count = placing->edges.size();
+    if (count == 0) continue;
+    placing->places.resize(count);
+    const bool sharp = placing == &scratch.sharply;
+    if (sharp) {
+      place_sharply(line, image.width, scratch);
+    } else {
+      placer_.places(scratch.light, share_, placing->queries.data(), count, placing->places.data());
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t e = placing->edges[i];
+      look_at(image, line, scratch.light, placing->places[i], sharp, edges.edges[e], seen_[e]);
+    }
+  }
+  for (std::uint32_t e = begin; e < end; ++e) {
+    const Edge& edge = edges.edges[e];
+    if (seen_[e].found && edge.contrast > kContrasty &&
+        std::fabs(seen_[e].column_px - edge.column_px) < kFarApart_px)
+      scratch.tell_blur.push_back({line, e});
   }
 }
 
@@ -268,6 +283,7 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
   wide_stripes_ = usual_stripe_px(result, edges) > kWideStripe_px;
   seen_.resize(edges.edges.size());
   scratch_.resize(static_cast<std::size_t>(pool.workers()));
+  for (Scratch& of : scratch_) of.tell_blur.clear();
   scatter_.begin(pool.workers());
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line) {
@@ -275,7 +291,7 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
       scatter_.line(edges, result, seen_, line, worker);
     }
   });
-  scatter_.settle_plain();
+  scatter_.settle_plain(pool);
   find_blur(image, result, colours, edges, pool);
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line)
@@ -288,7 +304,7 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
         scatter_.apart(edge, seen_[e], result.still[e] != 0, worker);
       }
   });
-  const PlaceScatter::Errors errors = scatter_.errors();
+  const PlaceScatter::Errors errors = scatter_.errors(pool);
   pool.for_shares(edges.line_start, [&](int begin_line, int end_line, int) {
     for (int line = begin_line; line < end_line; ++line)
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];

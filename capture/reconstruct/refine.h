@@ -50,16 +50,25 @@ class Refiner {
   Place find(const DifferenceImage& image, int line, float column_px, const Sides& sides) const;
 
  private:
+  struct OnLine {
+    int line;
+    std::uint32_t edge;
+  };
+  /// Edges of a line that luma may place.
+  struct Placing {
+    std::vector<std::uint32_t> edges;
+    std::vector<LumaQuery> queries;
+    std::vector<LumaPlace> places;
+  };
   struct Scratch {
-    LumaLine light;                    // of one line
-    std::vector<LumaQuery> queries;    // of its edges that luma may place,
-    std::vector<LumaPlace> places;     // where it does,
-    std::vector<std::uint32_t> edges;  // and which they are
+    LumaLine light;  // of one line
+    Placing plainly, sharply;
+    std::vector<float> sharp_ratio;  // of the line's columns, and LumaView::kMargin more on both sides
+    std::vector<OnLine> tell_blur;   // of all its lines
   };
   void look_at_line(const DifferenceImage& image, int line, const SequenceResult& result,
                     const std::vector<std::array<Primary, 2>>& colours, int worker, EdgeImage& edges);
-  void place_sharply(int line, const LumaLine& light, int width, const LumaQuery& query,
-                     LumaPlace& out) const;
+  void place_sharply(int line, int width, Scratch& scratch) const;
   void look_at(const DifferenceImage& image, int line, const LumaLine& light, const LumaPlace& luma,
                bool sharp, Edge& edge, LumaSeen& out) const;
   static ShiftQuery shift_query(const DifferenceImage& image, int line, const SequenceResult& result,

@@ -99,6 +99,16 @@ float luma_of(const std::array<RenderedRow::In, 3>& rgb, std::size_t i) {
   return kLuma[0] * rgb[0][i] + kLuma[1] * rgb[1][i] + kLuma[2] * rgb[2][i];
 }
 
+/// Takes out of `from` what is dropped; returns how many.
+std::size_t drop_if(std::vector<RecoveredBoundary>& from, const std::vector<std::uint8_t>& dropped) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    if (dropped[i] == 0) from[kept++] = from[i];
+  const std::size_t out = from.size() - kept;
+  from.resize(kept);
+  return out;
+}
+
 }  // namespace
 
 RenderPlacer::RenderPlacer(const std::array<double, 9>& colour_matrix)
@@ -318,16 +328,21 @@ RenderCounts RenderPlacer::place(const RenderView& view, WorkerPool& pool, Seque
       }
     }
   });
+  dropped_.assign(recovered.size(), 0);
+  pool.for_ranges(static_cast<int>(recovered.size()), [&](int begin, int end, int worker) {
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+      RecoveredBoundary& r = recovered[i];
+      if (r.sigma_px <= kUnsure_px) continue;
+      ++counts_[static_cast<std::size_t>(worker)].moved;
+      dropped_[i] = !settle(view, r.line, r.boundary, worker, r.column_px, r.sigma_px);
+    }
+  });
   RenderCounts total;
   for (const RenderCounts& c : counts_) {
     total.moved += c.moved;
     total.rejected += c.rejected;
   }
-  total.rejected += std::erase_if(recovered, [&](RecoveredBoundary& r) {
-    if (r.sigma_px <= kUnsure_px) return false;
-    ++total.moved;
-    return !settle(view, r.line, r.boundary, 0, r.column_px, r.sigma_px);
-  });
+  total.rejected += drop_if(recovered, dropped_);
   usual_ = std::max(kLeastUsual, unlikes_.median(usual_));
   view.places.fill(view.places.boundaries(), pool, result, edges, recovered);
   const int lines = view.places.lines();

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "base/parallel.h"
@@ -77,7 +78,8 @@ class RenderPlacer {
   std::array<std::array<float, 3>, 3> seen_;  // [captured channel][primary]
   std::array<float, 2 * RenderedRow::kBlurReach + 1> blur_{};
   float (*unlike_)(const RenderedRow& row, float column_px);
-  std::vector<RenderCounts> counts_;  // one a worker
+  std::vector<RenderCounts> counts_;   // one a worker
+  std::vector<std::uint8_t> dropped_;  // one each of `recovered`
   RankedSample unlikes_;
   float usual_ = 0.6F;  // Found::unlike in the frame before: no camera is quite as it is taken to be
 };

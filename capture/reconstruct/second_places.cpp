@@ -34,29 +34,22 @@ std::size_t primary(const SideEvidence& e) {
 
 }  // namespace
 
-void SecondPlaces::find_candidates(const DecodedEdges& frame) {
+void SecondPlaces::find_candidates(const DecodedEdges& frame, int line, Candidates& out) const {
   const auto& colours = frame.sequence.shown_colours(frame.context.order);
-  for (auto& boundaries : by_colours_) boundaries.clear();
-  for (std::size_t b = 0; b < colours.size(); ++b)
-    by_colours_[static_cast<std::size_t>(colours[b][0] * 8 + colours[b][1])].push_back(
-        static_cast<std::int16_t>(b));
-  candidates_.clear();
-  for (int line = 1; line < frame.first.lines(); ++line) {
-    const float* first_px = frame.first.column_px(line);
-    for (std::uint32_t e = frame.edges.line_start[static_cast<std::size_t>(line)];
-         e < frame.edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-      const Edge& edge = frame.edges.edges[e];
-      if (frame.result.boundary[e] >= 0 || frame.result.still[e] == 0 || edge.at_step ||
-          edge.sigma_px > kWorst_px || frame.moving.around(line, edge.column_px) > 0)
-        continue;
-      for (const std::int16_t b : by_colours_[primary(edge.left) * 8 + primary(edge.right)]) {
-        if (!(std::fabs(first_px[b] - edge.column_px) > kApart_px)) continue;
-        const auto [left, right] = colours[static_cast<std::size_t>(b)];
-        const float own = std::min(agreement(left, edge.left), agreement(right, edge.right));
-        if (own > kLeastSide && (frame.context.other == nullptr ||
-                                 frame.sequence.other_agreement(edge, line, b, frame.context) > kLeastSide))
-          candidates_.push_back({line, b, e});
-      }
+  const float* first_px = frame.first.column_px(line);
+  for (std::uint32_t e = frame.edges.line_start[static_cast<std::size_t>(line)];
+       e < frame.edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
+    const Edge& edge = frame.edges.edges[e];
+    if (frame.result.boundary[e] >= 0 || frame.result.still[e] == 0 || edge.at_step ||
+        edge.sigma_px > kWorst_px || frame.moving.around(line, edge.column_px) > 0)
+      continue;
+    for (const std::int16_t b : by_colours_[primary(edge.left) * 8 + primary(edge.right)]) {
+      if (!(std::fabs(first_px[b] - edge.column_px) > kApart_px)) continue;
+      const auto [left, right] = colours[static_cast<std::size_t>(b)];
+      const float own = std::min(agreement(left, edge.left), agreement(right, edge.right));
+      if (own > kLeastSide && (frame.context.other == nullptr ||
+                               frame.sequence.other_agreement(edge, line, b, frame.context) > kLeastSide))
+        out.push_back({line, b, e});
     }
   }
 }
@@ -94,11 +87,24 @@ void SecondPlaces::clear() {
   found_.clear();
 }
 
-std::size_t SecondPlaces::find(const DecodedEdges& frame) {
+std::size_t SecondPlaces::find(const DecodedEdges& frame, WorkerPool& pool) {
   const DecodedGrid& first = frame.first;
+  const auto& colours = frame.sequence.shown_colours(frame.context.order);
   if (second_.boundaries() != first.boundaries() || second_.lines() != first.lines())
     second_.reset(first.boundaries(), first.lines(), kNoColumn);
-  find_candidates(frame);
+  for (auto& boundaries : by_colours_) boundaries.clear();
+  for (std::size_t b = 0; b < colours.size(); ++b)
+    by_colours_[static_cast<std::size_t>(colours[b][0] * 8 + colours[b][1])].push_back(
+        static_cast<std::int16_t>(b));
+  of_lines_.resize(static_cast<std::size_t>(pool.workers()));
+  for (Candidates& of : of_lines_) of.clear();
+  pool.for_shares(frame.edges.line_start, [&](int begin, int end, int worker) {
+    Candidates& of = of_lines_[static_cast<std::size_t>(worker)];
+    for (int line = std::max(begin, 1); line < std::min(end, first.lines()); ++line)
+      find_candidates(frame, line, of);
+  });
+  candidates_.clear();
+  for (const Candidates& of : of_lines_) candidates_.insert(candidates_.end(), of.begin(), of.end());
   taken_.assign(frame.edges.edges.size(), 0);
   const auto take = [&](const Candidate& c) {
     float& second = second_.line(c.line)[c.boundary];

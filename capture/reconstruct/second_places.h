@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/parallel.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/margin_grid.h"
@@ -33,14 +34,14 @@ struct DecodedEdges {
   const DecodedGrid& first;  // its boundaries
 };
 
-/// Keeps its memory from frame to frame. One thread.
+/// Keeps its memory from frame to frame. One thread; the result is the same for any pool.
 class SecondPlaces {
  public:
   /// Forgets what was found.
   void clear();
   /// After clear(): edges that hold still and are no boundary of `frame`, but clearly show the colours of
   /// one, where such a boundary's neighbours go on to. None on the first line. Returns how many.
-  std::size_t find(const DecodedEdges& frame);
+  std::size_t find(const DecodedEdges& frame, WorkerPool& pool);
   /// By line, then boundary.
   const std::vector<SecondPlace>& found() const { return found_; }
 
@@ -49,14 +50,16 @@ class SecondPlaces {
     int line, boundary;
     std::uint32_t edge;
   };
-  void find_candidates(const DecodedEdges& frame);
+  using Candidates = std::vector<Candidate>;
+  void find_candidates(const DecodedEdges& frame, int line, Candidates& out) const;
   float foretold_px(const DecodedEdges& frame, const Candidate& candidate) const;
   float near(const DecodedGrid& first, int line, int boundary, float column_px) const;
 
   std::array<std::vector<std::int16_t>, 64> by_colours_;  // boundaries, [left * 8 + right]
-  std::vector<Candidate> candidates_;
-  std::vector<std::uint8_t> taken_;  // one an edge
-  MarginGrid<float, 2> second_;      // columns
+  std::vector<Candidates> of_lines_;                      // one a worker,
+  Candidates candidates_;                                 // and all of them
+  std::vector<std::uint8_t> taken_;                       // one an edge
+  MarginGrid<float, 2> second_;                           // columns
   std::vector<SecondPlace> found_;
 };
 

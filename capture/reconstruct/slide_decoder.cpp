@@ -428,7 +428,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   smooth_across(pool, out);
   if (clear) {
     const std::size_t second =
-        s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out});
+        s.second_places.find({s.edges, s.result, s.sequence, s.context(s.order), s.moving, out}, pool);
     report.filters.recovered += second;
     report.matched += second;
   }

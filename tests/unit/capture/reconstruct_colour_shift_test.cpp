@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <random>
 #include <vector>
 
 namespace relievo {
@@ -87,6 +88,34 @@ TEST(ColourShift, LeavesWhatIsNearThePicturesEnds) {
   const std::vector<float> white = growing(0.2);
   for (const float column_px : {0.F, 5.F, kWidth - 6.F, kWidth - 1.F})
     EXPECT_EQ(shift.shift_px(boundary_at(white, column_px, kRed, kMagenta), kMost), 0);
+}
+
+TEST(ColourShift, EveryKernelGivesTheSame) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> grey(0, 400);
+  std::uniform_real_distribution<float> share(0, 1);
+  std::uniform_int_distribution<int> colour(0, 1);
+  for (int i = 0; i < 200; ++i) {
+    StripedRow row{.first_px = 100,
+                   .column_px = 110 + share(random),
+                   .left_end_px = 102 + 6 * share(random),
+                   .right_end_px = 113 + 6 * share(random),
+                   .luma = {share(random), share(random), share(random)},
+                   .grey = {share(random), share(random), share(random)}};
+    StripedRow::Kernel blur;
+    for (float& weight : blur) weight = share(random);
+    row.blur = &blur;
+    for (float& white : row.white) white = grey(random);
+    for (auto& signs : row.signs)
+      for (float& sign : signs) sign = colour(random) != 0 ? 1.F : -1.F;
+    std::array<StripedRow::Out, 3> expected{};
+    blur_kernels().front().differences(row, expected);
+    for (const BlurKernel& kernel : blur_kernels()) {
+      std::array<StripedRow::Out, 3> out{};
+      kernel.differences(row, out);
+      EXPECT_EQ(out, expected) << kernel.name;
+    }
+  }
 }
 
 }  // namespace

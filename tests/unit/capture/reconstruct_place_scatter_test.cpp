@@ -40,11 +40,12 @@ ColourAndLumaErrors measured(const Off& off, bool of_moving = false) {
         {surface + std::hypot(off.luma_px, kLumaNoise_px) * normal(random), kLumaNoise_px, 0, true, true});
   }
   PlaceScatter scatter;
+  WorkerPool pool(2);
   scatter.begin(1);
   for (int line = 0; line < kLines; ++line) scatter.line(frame.edges, frame.result, seen, line, 0);
-  scatter.settle_plain();
+  scatter.settle_plain(pool);
   for (std::size_t e = 0; e < seen.size(); ++e) scatter.apart(frame.edges.edges[e], seen[e], off.still, 0);
-  const PlaceScatter::Errors errors = scatter.errors();
+  const PlaceScatter::Errors errors = scatter.errors(pool);
   return of_moving ? errors.moving : errors.still;
 }
 

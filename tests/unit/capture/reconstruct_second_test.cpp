@@ -61,7 +61,7 @@ class SecondPlacesTest : public ::testing::Test {
     MovingPlaces moving;
     moving.find(kWidth, SequenceResult{.boundary = {-1}, .doubted = {-1}, .still = {1}}, edges);
     places_.clear();
-    return places_.find({edges, result_, sequence_, context_, moving, first_});
+    return places_.find({edges, result_, sequence_, context_, moving, first_}, pool_);
   }
 
   static constexpr int kWidth = 200, kLines = 9, kLine = 4, kBoundary = 10;
@@ -74,6 +74,7 @@ class SecondPlacesTest : public ::testing::Test {
   Edge edge_;
   SequenceResult result_;
   SecondPlaces places_;
+  WorkerPool pool_{2};
 };
 
 TEST_F(SecondPlacesTest, AnEdgeWhereTheBoundaryGoesOnIsItsSecondPlace) {
