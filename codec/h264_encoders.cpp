@@ -9,7 +9,10 @@ extern "C" {
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <cstdarg>
+#include <cstdio>
 
 namespace relievo {
 namespace {
@@ -34,7 +37,7 @@ Status set_x264(AVCodecContext& codec, VideoSpeed speed, double rate_factor) {
   av_opt_set_int(codec.priv_data, "forced-idr", 1, 0);
   // Who encodes says which pictures are key pictures, and nobody else. Adaptive quantisation would spend most
   // bits on the noise of what no light falls on.
-  av_opt_set(codec.priv_data, "x264-params", "keyint=infinite:scenecut=0:sliced-threads=0:aq-mode=0", 0);
+  av_opt_set(codec.priv_data, "x264-params", "keyint=infinite:scenecut=0:aq-mode=0", 0);
   av_opt_set_double(codec.priv_data, "crf", rate_factor, 0);
   return {};
 }
@@ -85,6 +88,36 @@ Status set_v4l2m2m(AVCodecContext& codec, VideoSpeed, double rate_factor) {
   return {};
 }
 
+/// What libavcodec logs on this thread as the reason why something fails, while one lives; nothing of that is
+/// printed.
+class LoggedReason {
+ public:
+  LoggedReason() {
+    here_ = this;
+    av_log_set_callback(take);
+  }
+  ~LoggedReason() { here_ = nullptr; }
+  LoggedReason(const LoggedReason&) = delete;
+  LoggedReason& operator=(const LoggedReason&) = delete;
+
+  /// The first line, in brackets; or nothing.
+  std::string text() const { return reason_.empty() ? std::string() : " (" + reason_ + ")"; }
+
+ private:
+  static void take(void* context, int level, const char* format, va_list values) {
+    if (here_ == nullptr) return av_log_default_callback(context, level, format, values);
+    if (level > AV_LOG_ERROR || !here_->reason_.empty()) return;
+    char line[200];
+    std::vsnprintf(line, sizeof line, format, values);
+    here_->reason_ = line;
+    while (!here_->reason_.empty() && std::isspace(static_cast<unsigned char>(here_->reason_.back())))
+      here_->reason_.pop_back();
+  }
+
+  inline static thread_local LoggedReason* here_ = nullptr;
+  std::string reason_;
+};
+
 /// An encoder is a row here, the best first.
 struct Row {
   VideoEncoderKind kind;
@@ -96,13 +129,14 @@ constexpr std::array kRows{Row{VideoEncoderKind::kNvenc, "h264_nvenc", set_nvenc
                            Row{VideoEncoderKind::kV4l2m2m, "h264_v4l2m2m", set_v4l2m2m},
                            Row{VideoEncoderKind::kX264, "libx264", set_x264}};
 
-void describe_pictures(const VideoFormat& format, AVCodecContext& codec) {
+void describe_pictures(const VideoFormat& format, int slices, AVCodecContext& codec) {
   codec.width = format.width;
   codec.height = format.height;
   codec.pix_fmt = static_cast<AVPixelFormat>(av_pixel_format(format));
   codec.time_base = {1, 30};  // quality is asked for, not a rate: no bit depends on it
   codec.framerate = {30, 1};
-  codec.thread_count = 1;
+  codec.thread_count = slices;
+  codec.thread_type = slices > 1 ? FF_THREAD_SLICE : FF_THREAD_FRAME;
   codec.max_b_frames = 0;
   codec.color_range = AVCOL_RANGE_JPEG;
   codec.color_primaries = AVCOL_PRI_BT709;
@@ -160,7 +194,7 @@ bool opens_for_quality(VideoEncoderKind kind) {
 }
 
 Result<AvCodec> open_h264_encoder(VideoEncoderKind kind, const VideoFormat& format, VideoSpeed speed,
-                                  double rate_factor) {
+                                  int slices, double rate_factor) {
   av_log_set_level(AV_LOG_FATAL);
   const Row& row = *std::ranges::find(kRows, kind, &Row::kind);
   const AVCodec* found = avcodec_find_encoder_by_name(row.name);
@@ -170,12 +204,13 @@ Result<AvCodec> open_h264_encoder(VideoEncoderKind kind, const VideoFormat& form
                  (is_x264 ? ": install Debian's, or choose another texture codec"
                           : ": choose another --texture-encoder, or auto")};
   AvCodec codec(avcodec_alloc_context3(found));
-  describe_pictures(format, *codec);
+  describe_pictures(format, is_x264 ? slices : 1, *codec);
+  const LoggedReason reason;
   Status ready = row.set(*codec, speed, rate_factor);
   if (ready)
     if (const int code = avcodec_open2(codec.get(), found, nullptr); code < 0)
       ready = Error{"it does not open at " + std::to_string(format.width) + "x" +
-                    std::to_string(format.height) + ": " + av_text(code)};
+                    std::to_string(format.height) + ": " + av_text(code) + reason.text()};
   if (!ready)
     return Error{std::string("H.264 cannot be encoded by ") + row.name + ": " + ready.error().message +
                  (is_x264 ? "" : "; choose another --texture-encoder, or auto")};

@@ -23,7 +23,7 @@ VideoEncoder::VideoEncoder(std::unique_ptr<State> state) : state_(std::move(stat
 VideoEncoder::VideoEncoder(VideoEncoder&&) noexcept = default;
 VideoEncoder& VideoEncoder::operator=(VideoEncoder&&) noexcept = default;
 VideoEncoder::~VideoEncoder() = default;
-Result<VideoEncoder> VideoEncoder::create(const VideoFormat&, VideoSpeed, VideoEncoderKind) {
+Result<VideoEncoder> VideoEncoder::create(const VideoFormat&, VideoSpeed, VideoEncoderKind, int) {
   return kMissing;
 }
 Result<bool> VideoEncoder::encode(const VideoView&, const VideoPictureOptions&, Bytes&) {

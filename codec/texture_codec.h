@@ -29,8 +29,8 @@ class TextureEncoder {
  public:
   virtual ~TextureEncoder() = default;
   /// Appends the section of an RGB (3 channels) or grey (1) picture to `out`; true: it decodes alone. Fails
-  /// on a picture larger than the codec takes. The same pictures in the same order give the same bytes, but
-  /// of hardware encoders.
+  /// on a picture larger than the codec takes. The same pictures in the same order give the same bytes on
+  /// one machine, but of hardware encoders.
   virtual Result<bool> encode(View8 picture, const TextureEncodeOptions& options, Bytes& out) = 0;
   /// What a log should say, once, of the pictures encoded so far: VideoEncoder::take_notice(). Else empty.
   virtual std::string take_notice() { return {}; }

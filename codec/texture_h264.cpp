@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "codec/byte_io.h"
@@ -94,6 +95,13 @@ VideoSpeed speed_for(const VideoFormat& format, double rate_hz) {
   return format.width * format.height * rate_hz < kMany ? VideoSpeed::kSuperfast : VideoSpeed::kUltrafast;
 }
 
+/// Streams in a hurry are coded in several slices at once where there are processors to spare.
+int slices_for(VideoSpeed speed) {
+  constexpr int kProcessorsEach = 4, kMost = 4;
+  if (speed != VideoSpeed::kUltrafast) return 1;
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()) / kProcessorsEach, 1, kMost);
+}
+
 class Encoder final : public TextureEncoder {
  public:
   Result<bool> encode(View8 picture, const TextureEncodeOptions& options, Bytes& out) override {
@@ -101,7 +109,8 @@ class Encoder final : public TextureEncoder {
       return Error{"texture has " + std::to_string(picture.channels) + " channels, not 3 (RGB) or 1 (grey)"};
     const VideoFormat format = h264_texture_format(picture.width, picture.height);
     if (!video_ || format_ != format || encoder_ != options.encoder) {
-      auto made = VideoEncoder::create(format, speed_for(format, options.rate_hz), options.encoder);
+      const VideoSpeed speed = speed_for(format, options.rate_hz);
+      auto made = VideoEncoder::create(format, speed, options.encoder, slices_for(speed));
       if (!made) return made.error();
       video_.emplace(std::move(*made));
       format_ = format;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "codec/h264_encoders.h"
@@ -42,6 +43,7 @@ struct VideoEncoder::State {
   VideoFormat format;
   VideoSpeed speed;
   VideoEncoderKind kind;
+  int slices = 1;
   AvCodec codec;
   AvPicture picture{av_frame_alloc()};
   std::int64_t count = 0;
@@ -50,7 +52,7 @@ struct VideoEncoder::State {
   std::string notice;
 
   Status open(double rate_factor) {
-    auto opened = open_h264_encoder(kind, format, speed, rate_factor);
+    auto opened = open_h264_encoder(kind, format, speed, slices, rate_factor);
     if (!opened) return opened.error();
     codec = std::move(*opened);
     opened_for = rate_factor;
@@ -108,15 +110,15 @@ VideoEncoder::VideoEncoder(VideoEncoder&&) noexcept = default;
 VideoEncoder& VideoEncoder::operator=(VideoEncoder&&) noexcept = default;
 VideoEncoder::~VideoEncoder() = default;
 
-Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed speed,
-                                          VideoEncoderKind kind) {
+Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed speed, VideoEncoderKind kind,
+                                          int slices) {
   if (auto status = check_video_format(format); !status) return status.error();
   std::string notice;
   if (kind == VideoEncoderKind::kAuto) {
     const bool is_usual = format.bits == 8 && format.sampling != VideoSampling::kLuma;
     kind = is_usual ? chosen_video_encoder().kind : VideoEncoderKind::kX264;
     if (kind != VideoEncoderKind::kX264) {  // which takes sizes that hardware does not
-      auto made = create(format, speed, kind);
+      auto made = create(format, speed, kind, slices);
       if (made) return made;
       kind = VideoEncoderKind::kX264;
       notice = kFellBack + made.error().message;
@@ -126,6 +128,7 @@ Result<VideoEncoder> VideoEncoder::create(const VideoFormat& format, VideoSpeed 
   state->format = format;
   state->speed = speed;
   state->kind = kind;
+  state->slices = slices;
   state->notice = std::move(notice);
   if (auto status = state->open(state->opened_for); !status) return status.error();
   state->picture->format = av_pixel_format(format);
@@ -190,7 +193,10 @@ struct VideoDecoder::State {
     const AVCodec* h264 = avcodec_find_decoder(AV_CODEC_ID_H264);
     if (h264 == nullptr) return Error{"this libavcodec has no H.264 decoder: install Debian's"};
     codec.reset(avcodec_alloc_context3(h264));
-    codec->thread_count = 1;
+    // Slices are decoded at once. One after the other, and without concealment, libavcodec takes every
+    // picture of several for a damaged one.
+    codec->thread_type = FF_THREAD_SLICE;
+    codec->thread_count = std::clamp(static_cast<int>(std::thread::hardware_concurrency()) / 2, 2, 4);
     codec->flags |= AV_CODEC_FLAG_LOW_DELAY;
     codec->err_recognition = AV_EF_EXPLODE;
     codec->error_concealment = 0;

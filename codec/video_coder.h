@@ -39,14 +39,14 @@ struct VideoPictureOptions {
   bool key = false;  // an IDR picture, with its parameter sets; the first one is, whatever is said here
 };
 
-/// One stream. No B pictures, no lookahead, no SEI; of x264 one slice and one thread, too: the same pictures
-/// give the same bytes. Hardware encoders begin anew, with a key picture, where the quality changes. One
+/// One stream. No B pictures, no lookahead, no SEI; of x264, the same pictures give the same bytes. Hardware encoders begin anew, with a key picture, where the quality changes. One
 /// thread at a time.
 class VideoEncoder {
  public:
-  /// Fails on a format that is no VideoFormat (see there), and without that H.264 encoder.
+  /// Fails on a format that is no VideoFormat (see there), and without that H.264 encoder. x264 codes so many
+  /// `slices` of a picture on a thread each; it needs a few more bytes for more of them.
   static Result<VideoEncoder> create(const VideoFormat& format, VideoSpeed speed = VideoSpeed::kSuperfast,
-                                     VideoEncoderKind kind = VideoEncoderKind::kX264);
+                                     VideoEncoderKind kind = VideoEncoderKind::kX264, int slices = 1);
   VideoEncoder(VideoEncoder&&) noexcept;
   VideoEncoder& operator=(VideoEncoder&&) noexcept;
   ~VideoEncoder();

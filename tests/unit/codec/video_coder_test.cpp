@@ -143,6 +143,36 @@ TEST(VideoCoder, TheSamePicturesGiveTheSameBytes) {
   EXPECT_EQ(all[0], all[1]);
 }
 
+TEST(VideoCoder, SlicesAreOnePictureAndTheSameBytesEachTime) {
+  Film film{{.width = 320, .height = 192}};
+  const auto slices_of = [](const Bytes& unit) {
+    int count = 0;
+    for (std::size_t i = 0; i + 3 < unit.size(); ++i)
+      count += unit[i] == 0 && unit[i + 1] == 0 && unit[i + 2] == 1 &&
+               ((unit[i + 3] & 31) == 1 || (unit[i + 3] & 31) == 5);
+    return count;
+  };
+  auto encoder = VideoEncoder::create(film.format, VideoSpeed::kUltrafast, VideoEncoderKind::kX264, 3);
+  auto again = VideoEncoder::create(film.format, VideoSpeed::kUltrafast, VideoEncoderKind::kX264, 3);
+  ASSERT_TRUE(encoder.ok() && again.ok());
+  VideoDecoder decode = decoder();
+  for (int number = 0; number < 8; ++number) {
+    Bytes unit, second;
+    const VideoView picture = film.picture(number);
+    const auto key = encoder->encode(picture, {.rate_factor = 15, .key = number == 5}, unit);
+    ASSERT_TRUE(key.ok() && again->encode(picture, {.rate_factor = 15, .key = number == 5}, second).ok());
+    EXPECT_EQ(unit, second);
+    EXPECT_EQ(slices_of(unit), 3);
+    EXPECT_EQ(*key, number == 0 || number == 5);
+    const auto said = check_access_unit(unit, film.format);
+    ASSERT_TRUE(said.ok()) << said.error().message;
+    EXPECT_EQ(*said, *key);
+    const auto view = decode.decode(unit, film.format);
+    ASSERT_TRUE(view.ok()) << view.error().message;
+    EXPECT_LT(film.error(*view), 0.02) << number;
+  }
+}
+
 TEST_P(VideoFormats, WhatIsPutIntoTheEncodersPlanesIsCodedAsACopyIs) {
   Film film{GetParam()};
   VideoEncoder copies = encoder_of(film.format), in_place = encoder_of(film.format);
@@ -300,7 +330,9 @@ TEST(VideoEncoders, AutoFallsBackAndSaysWhy) {
 TEST(VideoEncoders, AForcedOneThatIsMissingIsAnError) {
   for (const VideoEncoderKind kind :
        {VideoEncoderKind::kNvenc, VideoEncoderKind::kVaapi, VideoEncoderKind::kV4l2m2m}) {
+    testing::internal::CaptureStderr();
     const auto encoder = VideoEncoder::create({.width = 160, .height = 96}, VideoSpeed::kSuperfast, kind);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "the error says it";
     if (encoder.ok()) continue;  // this machine has it
     EXPECT_NE(encoder.error().message.find(video_encoder_name(kind)), std::string::npos);
     EXPECT_NE(encoder.error().message.find("--texture-encoder"), std::string::npos);
