@@ -52,7 +52,7 @@ std::vector<StreamConfig> ServeConfig::all_streams() const {
 }
 
 int usual_threads() {
-  return static_cast<int>(std::clamp(std::thread::hardware_concurrency() / 2, 1U, 4U));
+  return static_cast<int>(std::clamp(std::thread::hardware_concurrency() / 2, 1U, 8U));
 }
 
 bool set_decoder(std::string_view name, StreamConfig& config) {

@@ -27,7 +27,7 @@ inline constexpr std::int64_t kLeastBitRate = 100'000, kMostBitRate = 1'000'000'
 inline constexpr double kLeastDeadline_ms = 0.5, kMostDeadline_ms = 1000;  // of --deadline
 inline constexpr double kLeastTexture_db = 20, kMostTexture_db = 60;       // of --psnr
 
-/// Threads that reconstruct where nothing is said: half of the cores, 1 to 4, so that as many are left to
+/// Threads that reconstruct where nothing is said: half of the cores, 1 to 8, so that as many are left to
 /// code and send.
 int usual_threads();
 

@@ -191,7 +191,7 @@ Command serve_command() {
             ->check(CLI::Range(0, kMostFilled))
             ->type_name("N");
         app.add_option("--threads", f->threads,
-                       "Threads that reconstruct (default: half of the cores, 1 to 4)")
+                       "Threads that reconstruct (default: half of the cores, 1 to 8)")
             ->check(CLI::Range(1, 64));
         app.add_option("--texture", f->texture,
                        "How the texture is sent: jpeg (default: any receiver), webp (smaller, slower), png "
