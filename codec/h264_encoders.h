@@ -33,7 +33,8 @@ const char* h264_encoder_name(VideoEncoderKind kind);
 /// Those that take another quality only when they are opened anew; x264 takes it picture by picture.
 bool opens_for_quality(VideoEncoderKind kind);
 
-/// Not kAuto; `slices` as VideoEncoder::create() takes them. The error says what is missing and how to mend it.
+/// Not kAuto; `slices` as VideoEncoder::create() takes them. The error says what is missing and how to mend
+/// it.
 Result<AvCodec> open_h264_encoder(VideoEncoderKind kind, const VideoFormat& format, VideoSpeed speed,
                                   int slices, double rate_factor);
 

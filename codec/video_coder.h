@@ -39,8 +39,8 @@ struct VideoPictureOptions {
   bool key = false;  // an IDR picture, with its parameter sets; the first one is, whatever is said here
 };
 
-/// One stream. No B pictures, no lookahead, no SEI; of x264, the same pictures give the same bytes. Hardware encoders begin anew, with a key picture, where the quality changes. One
-/// thread at a time.
+/// One stream. No B pictures, no lookahead, no SEI; of x264, the same pictures give the same bytes. Hardware
+/// encoders begin anew, with a key picture, where the quality changes. One thread at a time.
 class VideoEncoder {
  public:
   /// Fails on a format that is no VideoFormat (see there), and without that H.264 encoder. x264 codes so many
