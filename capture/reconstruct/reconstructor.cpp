@@ -13,6 +13,7 @@
 #include "capture/reconstruct/exposure_order.h"
 #include "capture/reconstruct/field_pairs.h"
 #include "capture/reconstruct/half_way.h"
+#include "capture/reconstruct/moving_texture.h"
 #include "capture/reconstruct/slide_decoder.h"
 #include "capture/reconstruct/surface_builder.h"
 #include "capture/reconstruct/texture.h"
@@ -103,6 +104,7 @@ struct Reconstructor::State {
         triangulator(r, p, lines, line_step_px(r.scan, o.line_stride)),
         depths(p.boundaries(), r.camera.width, lines, kDepthLines),
         white_texture(r.colour_matrix, o.decoder == Decoder::kQuick, o.line_stride),
+        moving_texture(r.colour_matrix, o.line_stride),
         half_way(p.boundaries(), lines),
         surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface) {
     decoded.reset(p.boundaries(), lines);
@@ -123,6 +125,7 @@ struct Reconstructor::State {
   Triangulator triangulator;
   DepthRange depths;
   WhiteTexture white_texture;
+  MovingTexture moving_texture;
   HalfWay half_way;  // white-field
   SurfaceBuilder surface_builder;
 
@@ -210,6 +213,8 @@ void Reconstructor::State::make_texture(const CapturedFrame& frame, Image8& out)
     add_fields(frame, pool, out);
   } else {
     white_texture.make(frame, decoded, pool, out);
+    moving_texture.mend(frame, {decoded, decoder.shown_colours(), decoder.moving()}, white_texture.gains(),
+                        pool, out);
   }
 }
 

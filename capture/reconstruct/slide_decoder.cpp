@@ -435,6 +435,15 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   return true;
 }
 
+const MovingPlaces& SlideDecoder::moving() const {
+  return state_->moving;
+}
+
+const std::vector<std::array<Primary, 2>>& SlideDecoder::shown_colours() const {
+  const State& s = *state_;
+  return s.quick ? s.quick_sequence.shown_colours(s.order) : s.sequence.shown_colours(s.order);
+}
+
 const std::vector<SecondPlace>& SlideDecoder::second_places() const {
   return state_->second_places.found();
 }

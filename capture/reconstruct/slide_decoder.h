@@ -3,6 +3,7 @@
 // code takes, finds out which slide each shows, and hands each frame to the decoder that was chosen.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "base/rig.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/depth_range.h"
+#include "capture/reconstruct/moving_places.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/reconstruct/second_places.h"
 #include "capture/source/field_source.h"
@@ -40,6 +42,11 @@ class SlideDecoder {
   /// and the rig's lines whose points are left as they are; false while the other slide was not seen. Sets
   /// report.matched and .filters.
   bool decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report, DecodedGrid& out);
+
+  /// Of the frame that decode() was called for last, if it did: where things move, and the colours left and
+  /// right of each boundary. Not of the paper's decoder. Until the next call.
+  const MovingPlaces& moving() const;
+  const std::vector<std::array<Primary, 2>>& shown_colours() const;
 
   /// What the lines of the frame that decode() was called for last show a second time. Until the next call.
   const std::vector<SecondPlace>& second_places() const;

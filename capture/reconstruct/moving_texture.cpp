@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture/reconstruct/moving_texture.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace relievo {
+namespace {
+
+constexpr float kWidest_px = 40;      // of a stripe
+constexpr float kNarrowest_px = 1;    // the same
+constexpr int kMoves = 4;             // boundaries around that were elsewhere
+constexpr float kPure_px = 2;         // from a boundary on
+constexpr int kReach = 4;             // stripes to each side that are asked for a primary
+constexpr float kDepthStep = 0.012F;  // of the depth, from boundary to boundary: another surface
+constexpr float kWider = 1.5F;        // than the stripe before: the same
+constexpr float kLeft = 0.08F;        // of white light's, more than what a surface differs by
+constexpr float kLeftLevels = 4;      // and grey levels more
+constexpr float kLeastDetail = 10, kMostDetail = 2;
+constexpr float kAmbient = 0.2F;    // of what a lit stripe shows, without its light
+constexpr float kUnlike = 0.5F;     // of what the complement should show,
+constexpr float kUnlikeLevels = 6;  // and grey levels more: something else
+
+bool has(Primary colour, std::size_t channel) {
+  return (colour >> channel & 1) != 0;
+}
+
+}  // namespace
+
+/// The sum of two rows each, of which both may be the same.
+struct MovingTexture::Exposures {
+  struct Rows {
+    const std::uint8_t *above, *below;
+  };
+  Rows slide, complement;
+};
+
+MovingTexture::MovingTexture(const std::array<double, 9>& colour_matrix, int line_stride)
+    : line_stride_(line_stride) {
+  using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
+  for (std::size_t i = 0; i < 9; ++i) {
+    matrix_[i] = static_cast<float>(colour_matrix[i]);
+    inverse_[i] = static_cast<float>(inverse.data()[i]);
+  }
+}
+
+/// Eq. 3: what the projector's primaries give of a colour.
+template <class Rgb>
+MovingTexture::Light MovingTexture::light(const Rgb& rgb) const {
+  Light out;
+  for (std::size_t i = 0; i < 3; ++i)
+    out[i] = matrix_[3 * i] * static_cast<float>(rgb[0]) + matrix_[3 * i + 1] * static_cast<float>(rgb[1]) +
+             matrix_[3 * i + 2] * static_cast<float>(rgb[2]);
+  return out;
+}
+
+/// Of an exposure between two columns, on average.
+MovingTexture::Light MovingTexture::mean_light(const std::uint8_t* above, const std::uint8_t* below,
+                                               const Stripe& s) const {
+  std::array<int, 3> sums{};
+  for (int i = 3 * s.first; i < 3 * (s.last + 1); i += 3)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t at = static_cast<std::size_t>(i) + c;
+      sums[c] += above[at] + below[at];
+    }
+  Light out = light(sums);
+  for (float& value : out) value /= static_cast<float>(2 * (s.last - s.first + 1));
+  return out;
+}
+
+void MovingTexture::mend_line(const DetectionLines& rows, const ShownStripes& shown, const Light& gains,
+                              int line, Scratch& scratch, Image8& texture) {
+  touched_[static_cast<std::size_t>(line)] = 0;
+  if (line >= rows.own.height) return;
+  const float* column_px = shown.grid.column_px(line);
+  const float* depth = shown.grid.z(line);
+  const std::uint8_t* own = rows.own.row(line);
+  const std::uint8_t* above = rows.other_above(line);
+  const std::uint8_t* below = rows.other_below(line);
+  const Exposures exposures =
+      rows.shows_slide ? Exposures{{own, own}, {above, below}} : Exposures{{above, below}, {own, own}};
+  const auto moves = [&](int b) {
+    return shown.moving.around(line, 0.5F * (column_px[b] + column_px[b + 1])) >= kMoves;
+  };
+  // Whether there is a stripe of one surface between a boundary and the next.
+  const auto is_stripe = [&](int b) {
+    const float width = column_px[b + 1] - column_px[b];
+    return width > kNarrowest_px && width < kWidest_px && column_px[b] >= 1 &&
+           column_px[b + 1] + 1 <= static_cast<float>(width_ - 1) &&
+           std::fabs(depth[b + 1] - depth[b]) < kDepthStep * depth[b];
+  };
+  // Whether two that follow each other are of one.
+  const auto go_on = [&](int b) {
+    const float width = column_px[b + 1] - column_px[b];
+    const float next = column_px[b + 2] - column_px[b + 1];
+    return next <= kWider * width && width <= kWider * next;
+  };
+  std::vector<Stripe>& stripes = scratch.stripes;
+  const int count = shown.grid.boundaries() - 1;
+  for (int b = 0; b < count; ++b) {
+    if (!is_stripe(b) || !moves(b)) continue;
+    int first = b;
+    while (first > 0 && b - first < kReach && is_stripe(first - 1) && go_on(first - 1)) --first;
+    // As far as it moves, and so much beyond.
+    int last = b;
+    int still = 0;
+    while (last + 1 < count && still < kReach && is_stripe(last + 1) && go_on(last)) {
+      ++last;
+      still = moves(last) ? 0 : still + 1;
+    }
+    stripes.clear();
+    for (int i = first; i <= last; ++i) {
+      Stripe s{.left_px = column_px[i],
+               .right_px = column_px[i + 1],
+               .colour = shown.colours[static_cast<std::size_t>(i)][1],
+               .moves = moves(i)};
+      s.first = static_cast<int>(std::ceil(s.left_px + kPure_px));
+      s.last = static_cast<int>(std::floor(s.right_px - kPure_px));
+      if (s.first > s.last) s.first = s.last = static_cast<int>(0.5F * (s.left_px + s.right_px) + 0.5F);
+      stripes.push_back(s);
+    }
+    if (stripes.size() > 1) mend_surface(exposures, line, gains, stripes, texture.row(step_ * line));
+    b = last - still;
+  }
+}
+
+/// What stripes show: on average, and in white light.
+void MovingTexture::look(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes) const {
+  for (Stripe& s : stripes) {
+    s.slide = mean_light(exposures.slide.above, exposures.slide.below, s);
+    s.complement = mean_light(exposures.complement.above, exposures.complement.below, s);
+    for (std::size_t c = 0; c < 3; ++c) s.complement[c] *= gains[c];
+  }
+  const int count = static_cast<int>(stripes.size());
+  for (int i = 0; i < count; ++i) {
+    Stripe& s = stripes[static_cast<std::size_t>(i)];
+    // Of each primary: what the nearest stripes on either side show that have it if this one has not, or the
+    // other way round. The complement should show that here.
+    bool unlike = false;
+    Light expected = s.complement;
+    int missing = 0;
+    float total = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      float sum = 0;
+      float weights = 0;
+      for (const int side : {-1, 1}) {
+        for (int away = 1; away <= kReach; ++away) {
+          const int j = i + side * away;
+          if (j < 0 || j >= count) break;
+          const Stripe& other = stripes[static_cast<std::size_t>(j)];
+          if (has(other.colour, c) == has(s.colour, c)) continue;
+          const float weight = 1.F / static_cast<float>(away);
+          sum += weight * other.slide[c];
+          weights += weight;
+          break;
+        }
+      }
+      const bool lit = has(s.colour, c);
+      if (weights > 0) {
+        expected[c] = sum / weights;
+      } else if (lit) {
+        expected[c] = std::min(s.complement[c], kAmbient * s.slide[c]);
+      } else {
+        ++missing;
+        expected[c] = -1;
+        continue;
+      }
+      total += s.slide[c] + expected[c];
+      unlike |= std::fabs(s.complement[c] - expected[c]) >
+                kUnlike * (lit ? s.slide[c] : expected[c]) + kUnlikeLevels;
+    }
+    // Of what nothing on the surface tells no colour is better than another surface's.
+    for (std::size_t c = 0; c < 3; ++c)
+      if (expected[c] < 0)
+        expected[c] = missing < 3 ? total / static_cast<float>(3 - missing) - s.slide[c] : s.complement[c];
+    s.unlike = unlike;
+    const Light& other = unlike ? expected : s.complement;
+    for (std::size_t c = 0; c < 3; ++c) s.white[c] = s.slide[c] + other[c];
+  }
+}
+
+/// From the middle of each stripe to the next one's: what differs from what both show in white light by more
+/// than a surface does is left of the stripes.
+void MovingTexture::mend_surface(const Exposures& exposures, int line, const Light& gains,
+                                 std::vector<Stripe>& stripes, std::uint8_t* texture) {
+  look(exposures, gains, stripes);
+  std::uint8_t* mended = mended_.data() + static_cast<std::ptrdiff_t>(line) * width_;
+  if (std::exchange(touched_[static_cast<std::size_t>(line)], std::uint8_t{1}) == 0)
+    std::fill_n(mended, width_, std::uint8_t{0});
+  const auto middle = [](const Stripe& s) { return 0.5F * static_cast<float>(s.first + s.last); };
+  for (std::size_t i = 0; i <= stripes.size(); ++i) {
+    const Stripe& a = stripes[i > 0 ? i - 1 : 0];
+    const Stripe& b = stripes[std::min(i, stripes.size() - 1)];
+    if (!a.moves && !b.moves) continue;
+    const float from = i > 0 ? middle(a) : a.left_px;
+    const float to = i < stripes.size() ? middle(b) : b.right_px;
+    for (int x = static_cast<int>(std::ceil(from)); x < to; ++x) {
+      const float share = (static_cast<float>(x) - from) / (to - from);
+      Light seen = light(texture + 3 * x);
+      Light white;
+      for (std::size_t c = 0; c < 3; ++c) white[c] = a.white[c] + share * (b.white[c] - a.white[c]);
+      // The surface's own detail is in all channels, stripes in those that the boundary switches.
+      float of_seen = 0;
+      float of_white = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        if (has(a.colour, c) != has(b.colour, c)) continue;
+        of_seen += seen[c];
+        of_white += white[c];
+      }
+      const bool all = a.unlike || b.unlike;
+      const float detail =
+          all || of_white < kLeastDetail ? 1 : std::clamp(of_seen / of_white, 1 / kMostDetail, kMostDetail);
+      bool other = false;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const bool switched = has(a.colour, c) != has(b.colour, c);
+        const float own = detail * white[c];
+        if ((!switched && !all) || std::fabs(seen[c] - own) <= kLeft * own + kLeftLevels) continue;
+        seen[c] = own;
+        other = true;
+      }
+      if (!other) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float value =
+            inverse_[3 * c] * seen[0] + inverse_[3 * c + 1] * seen[1] + inverse_[3 * c + 2] * seen[2] + 0.5F;
+        texture[3 * x + static_cast<int>(c)] = static_cast<std::uint8_t>(std::clamp(value, 0.F, 255.F));
+      }
+      mended[x] = 1;
+    }
+  }
+}
+
+/// Rows from a line to the next one.
+void MovingTexture::mend_between(int line, Image8& texture) const {
+  const auto at = static_cast<std::size_t>(line);
+  if (touched_[at] == 0 && touched_[at + 1] == 0) return;
+  const std::uint8_t* above = texture.row(step_ * line);
+  const std::uint8_t* below = texture.row(step_ * (line + 1));
+  const std::uint8_t* of_above = mended_.data() + static_cast<std::ptrdiff_t>(line) * width_;
+  const std::uint8_t* of_below = of_above + width_;
+  for (int i = 1; i < step_; ++i) {
+    std::uint8_t* out = texture.row(step_ * line + i);
+    for (int x = 0; x < width_; ++x) {
+      const bool mended =
+          (touched_[at] != 0 && of_above[x] != 0) || (touched_[at + 1] != 0 && of_below[x] != 0);
+      if (!mended) continue;
+      for (int c = 3 * x; c < 3 * x + 3; ++c)
+        out[c] = static_cast<std::uint8_t>((above[c] * (step_ - i) + below[c] * i + step_ / 2) / step_);
+    }
+  }
+}
+
+void MovingTexture::mend(const CapturedFrame& frame, const ShownStripes& shown,
+                         const std::array<float, 3>& gains, WorkerPool& pool, Image8& texture) {
+  const DetectionLines rows(frame, line_stride_);
+  width_ = texture.width();
+  step_ = line_step_px(frame.scan, line_stride_);
+  const int lines = shown.grid.lines();
+  mended_.resize(static_cast<std::size_t>(lines) * static_cast<std::size_t>(width_));
+  touched_.resize(static_cast<std::size_t>(lines));
+  scratch_.resize(static_cast<std::size_t>(pool.workers()));
+  pool.for_ranges(lines, [&](int begin, int end, int worker) {
+    for (int line = begin; line < end; ++line)
+      mend_line(rows, shown, gains, line, scratch_[static_cast<std::size_t>(worker)], texture);
+  });
+  if (step_ == 1) return;
+  pool.for_ranges(lines - 1, [&](int begin, int end, int) {
+    for (int line = begin; line < end; ++line)
+      if (step_ * (line + 1) < texture.height()) mend_between(line, texture);
+  });
+}
+
+}  // namespace relievo
