@@ -18,10 +18,11 @@ constexpr float kDepthStep = 0.012F;  // of the depth, from boundary to boundary
 constexpr float kWider = 1.5F;        // than the stripe before: the same
 constexpr float kLeft = 0.08F;        // of white light's, more than what a surface differs by
 constexpr float kLeftLevels = 4;      // and grey levels more
-constexpr float kLeastDetail = 10, kMostDetail = 2;
-constexpr float kAmbient = 0.2F;    // of what a lit stripe shows, without its light
-constexpr float kUnlike = 0.5F;     // of what the complement should show,
-constexpr float kUnlikeLevels = 6;  // and grey levels more: something else
+constexpr float kLeastDetail = 10;    // grey levels that tell it,
+constexpr float kMostDetail = 2;      // and how much brighter or darker it is
+constexpr float kAmbient = 0.2F;      // of what a lit stripe shows, without its light
+constexpr float kUnlike = 0.5F;       // of what the complement should show,
+constexpr float kUnlikeLevels = 6;    // and grey levels more: something else
 
 bool has(Primary colour, std::size_t channel) {
   return (colour >> channel & 1) != 0;
@@ -73,7 +74,8 @@ MovingTexture::Light MovingTexture::mean_light(const std::uint8_t* above, const 
 
 void MovingTexture::mend_line(const DetectionLines& rows, const ShownStripes& shown, const Light& gains,
                               int line, Scratch& scratch, Image8& texture) {
-  touched_[static_cast<std::size_t>(line)] = 0;
+  Columns& touched = touched_[static_cast<std::size_t>(line)];
+  touched = {width_, 0};
   if (line >= rows.own.height) return;
   const float* column_px = shown.grid.column_px(line);
   const float* depth = shown.grid.z(line);
@@ -122,8 +124,14 @@ void MovingTexture::mend_line(const DetectionLines& rows, const ShownStripes& sh
       if (s.first > s.last) s.first = s.last = static_cast<int>(0.5F * (s.left_px + s.right_px) + 0.5F);
       stripes.push_back(s);
     }
-    if (stripes.size() > 1) mend_surface(exposures, line, gains, stripes, texture.row(step_ * line));
     b = last - still;
+    if (stripes.size() < 2) continue;
+    if (touched.begin >= touched.end)
+      std::fill_n(mended_.begin() + static_cast<std::ptrdiff_t>(line) * width_, width_, std::uint8_t{0});
+    touched.begin = std::min(touched.begin, static_cast<int>(stripes.front().left_px));
+    touched.end = std::max(touched.end, static_cast<int>(stripes.back().right_px) + 1);
+    mend_surface(exposures, gains, stripes, texture.row(step_ * line),
+                 mended_.data() + static_cast<std::ptrdiff_t>(line) * width_);
   }
 }
 
@@ -139,10 +147,10 @@ void MovingTexture::look(const Exposures& exposures, const Light& gains, std::ve
     Stripe& s = stripes[static_cast<std::size_t>(i)];
     // Of each primary: what the nearest stripes on either side show that have it if this one has not, or the
     // other way round. The complement should show that here.
-    bool unlike = false;
-    Light expected = s.complement;
-    int missing = 0;
-    float total = 0;
+    Light expected{};
+    std::array<bool, 3> told{};
+    float total = 0;  // of what is told, in white light
+    float count_told = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       float sum = 0;
       float weights = 0;
@@ -159,37 +167,55 @@ void MovingTexture::look(const Exposures& exposures, const Light& gains, std::ve
         }
       }
       const bool lit = has(s.colour, c);
-      if (weights > 0) {
-        expected[c] = sum / weights;
-      } else if (lit) {
-        expected[c] = std::min(s.complement[c], kAmbient * s.slide[c]);
-      } else {
-        ++missing;
-        expected[c] = -1;
-        continue;
-      }
+      told[c] = lit || weights > 0;
+      if (!told[c]) continue;
+      expected[c] = weights > 0 ? sum / weights : std::min(s.complement[c], kAmbient * s.slide[c]);
       total += s.slide[c] + expected[c];
-      unlike |= std::fabs(s.complement[c] - expected[c]) >
-                kUnlike * (lit ? s.slide[c] : expected[c]) + kUnlikeLevels;
+      ++count_told;
+      s.unlike |= std::fabs(s.complement[c] - expected[c]) >
+                  kUnlike * (lit ? s.slide[c] : expected[c]) + kUnlikeLevels;
     }
-    // Of what nothing on the surface tells no colour is better than another surface's.
-    for (std::size_t c = 0; c < 3; ++c)
-      if (expected[c] < 0)
-        expected[c] = missing < 3 ? total / static_cast<float>(3 - missing) - s.slide[c] : s.complement[c];
-    s.unlike = unlike;
-    const Light& other = unlike ? expected : s.complement;
-    for (std::size_t c = 0; c < 3; ++c) s.white[c] = s.slide[c] + other[c];
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (!s.unlike) {
+        s.white[c] = s.slide[c] + s.complement[c];
+      } else {  // of what nothing on the surface tells, no colour is better than another surface's
+        s.white[c] = told[c] ? s.slide[c] + expected[c] : total / count_told;
+      }
+    }
   }
 }
 
-/// From the middle of each stripe to the next one's: what differs from what both show in white light by more
-/// than a surface does is left of the stripes.
-void MovingTexture::mend_surface(const Exposures& exposures, int line, const Light& gains,
-                                 std::vector<Stripe>& stripes, std::uint8_t* texture) {
+/// Of what a pixel between the middles of two stripes shows, `white`, as both tell: true where it is other
+/// than a surface is, and stripes left something of themselves; then `seen` becomes what is without them.
+bool MovingTexture::is_striped(const Stripe& a, const Stripe& b, const Light& white, Light& seen) {
+  const std::array<bool, 3> switched{has(a.colour, 0) != has(b.colour, 0),
+                                     has(a.colour, 1) != has(b.colour, 1),
+                                     has(a.colour, 2) != has(b.colour, 2)};
+  const bool all = a.unlike || b.unlike;
+  // The surface's own detail is in all channels, stripes in those that the boundary switches.
+  float of_seen = 0;
+  float of_white = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (switched[c]) continue;
+    of_seen += seen[c];
+    of_white += white[c];
+  }
+  const float detail =
+      all || of_white < kLeastDetail ? 1 : std::clamp(of_seen / of_white, 1 / kMostDetail, kMostDetail);
+  bool out = false;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float own = detail * white[c];
+    if ((!switched[c] && !all) || std::fabs(seen[c] - own) <= kLeft * own + kLeftLevels) continue;
+    seen[c] = own;
+    out = true;
+  }
+  return out;
+}
+
+/// From the middle of each stripe to the next one's.
+void MovingTexture::mend_surface(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes,
+                                 std::uint8_t* texture, std::uint8_t* mended) const {
   look(exposures, gains, stripes);
-  std::uint8_t* mended = mended_.data() + static_cast<std::ptrdiff_t>(line) * width_;
-  if (std::exchange(touched_[static_cast<std::size_t>(line)], std::uint8_t{1}) == 0)
-    std::fill_n(mended, width_, std::uint8_t{0});
   const auto middle = [](const Stripe& s) { return 0.5F * static_cast<float>(s.first + s.last); };
   for (std::size_t i = 0; i <= stripes.size(); ++i) {
     const Stripe& a = stripes[i > 0 ? i - 1 : 0];
@@ -199,56 +225,37 @@ void MovingTexture::mend_surface(const Exposures& exposures, int line, const Lig
     const float to = i < stripes.size() ? middle(b) : b.right_px;
     for (int x = static_cast<int>(std::ceil(from)); x < to; ++x) {
       const float share = (static_cast<float>(x) - from) / (to - from);
-      Light seen = light(texture + 3 * x);
       Light white;
       for (std::size_t c = 0; c < 3; ++c) white[c] = a.white[c] + share * (b.white[c] - a.white[c]);
-      // The surface's own detail is in all channels, stripes in those that the boundary switches.
-      float of_seen = 0;
-      float of_white = 0;
-      for (std::size_t c = 0; c < 3; ++c) {
-        if (has(a.colour, c) != has(b.colour, c)) continue;
-        of_seen += seen[c];
-        of_white += white[c];
-      }
-      const bool all = a.unlike || b.unlike;
-      const float detail =
-          all || of_white < kLeastDetail ? 1 : std::clamp(of_seen / of_white, 1 / kMostDetail, kMostDetail);
-      bool other = false;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const bool switched = has(a.colour, c) != has(b.colour, c);
-        const float own = detail * white[c];
-        if ((!switched && !all) || std::fabs(seen[c] - own) <= kLeft * own + kLeftLevels) continue;
-        seen[c] = own;
-        other = true;
-      }
-      if (!other) continue;
+      std::uint8_t* rgb = texture + static_cast<std::ptrdiff_t>(3) * x;
+      Light seen = light(rgb);
+      if (!is_striped(a, b, white, seen)) continue;
       for (std::size_t c = 0; c < 3; ++c) {
         const float value =
             inverse_[3 * c] * seen[0] + inverse_[3 * c + 1] * seen[1] + inverse_[3 * c + 2] * seen[2] + 0.5F;
-        texture[3 * x + static_cast<int>(c)] = static_cast<std::uint8_t>(std::clamp(value, 0.F, 255.F));
+        rgb[c] = static_cast<std::uint8_t>(std::clamp(value, 0.F, 255.F));
       }
       mended[x] = 1;
     }
   }
 }
 
-/// Rows from a line to the next one.
+/// Rows from a line to the next one: where either was mended, what lies between them.
 void MovingTexture::mend_between(int line, Image8& texture) const {
-  const auto at = static_cast<std::size_t>(line);
-  if (touched_[at] == 0 && touched_[at + 1] == 0) return;
+  const Columns& of_above = touched_[static_cast<std::size_t>(line)];
+  const Columns& of_below = touched_[static_cast<std::size_t>(line) + 1];
   const std::uint8_t* above = texture.row(step_ * line);
   const std::uint8_t* below = texture.row(step_ * (line + 1));
-  const std::uint8_t* of_above = mended_.data() + static_cast<std::ptrdiff_t>(line) * width_;
-  const std::uint8_t* of_below = of_above + width_;
-  for (int i = 1; i < step_; ++i) {
-    std::uint8_t* out = texture.row(step_ * line + i);
-    for (int x = 0; x < width_; ++x) {
-      const bool mended =
-          (touched_[at] != 0 && of_above[x] != 0) || (touched_[at + 1] != 0 && of_below[x] != 0);
-      if (!mended) continue;
+  const std::uint8_t* mended = mended_.data() + static_cast<std::ptrdiff_t>(line) * width_;
+  const auto is_mended = [](const Columns& of, const std::uint8_t* row, int x) {
+    return x >= of.begin && x < of.end && row[x] != 0;
+  };
+  for (int x = std::min(of_above.begin, of_below.begin); x < std::max(of_above.end, of_below.end); ++x) {
+    if (!is_mended(of_above, mended, x) && !is_mended(of_below, mended + width_, x)) continue;
+    for (int i = 1; i < step_; ++i)
       for (int c = 3 * x; c < 3 * x + 3; ++c)
-        out[c] = static_cast<std::uint8_t>((above[c] * (step_ - i) + below[c] * i + step_ / 2) / step_);
-    }
+        texture.row(step_ * line + i)[c] =
+            static_cast<std::uint8_t>((above[c] * (step_ - i) + below[c] * i + step_ / 2) / step_);
   }
 }
 

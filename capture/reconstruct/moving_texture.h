@@ -44,10 +44,13 @@ class MovingTexture {
     float left_px, right_px;
     int first, last;  // columns where its colour is pure, one at least
     Primary colour;   // under the slide
-    bool moves;
-    bool unlike;              // the complement shows something else there
-    Light slide, complement;  // there, on average,
-    Light white;              // and what both should show together
+    bool moves = false;
+    bool unlike = false;          // the complement shows something else there
+    Light slide{}, complement{};  // there, on average,
+    Light white{};                // and what both should show together
+  };
+  struct Columns {
+    int begin, end;
   };
   struct Scratch {
     std::vector<Stripe> stripes;  // of one surface on a line
@@ -61,17 +64,18 @@ class MovingTexture {
   void mend_line(const DetectionLines& rows, const ShownStripes& shown, const Light& gains, int line,
                  Scratch& scratch, Image8& texture);
   void look(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes) const;
-  void mend_surface(const Exposures& exposures, int line, const Light& gains, std::vector<Stripe>& stripes,
-                    std::uint8_t* texture);
+  static bool is_striped(const Stripe& a, const Stripe& b, const Light& white, Light& seen);
+  void mend_surface(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes,
+                    std::uint8_t* texture, std::uint8_t* mended) const;
   void mend_between(int line, Image8& texture) const;
 
   std::array<float, 9> matrix_, inverse_;
   int line_stride_;
   int width_ = 0;
-  int step_ = 1;                       // rows from line to line
-  std::vector<std::uint8_t> mended_;   // [line][column]
-  std::vector<std::uint8_t> touched_;  // [line]: some are
-  std::vector<Scratch> scratch_;       // one a worker
+  int step_ = 1;                      // rows from line to line
+  std::vector<std::uint8_t> mended_;  // [line][column]
+  std::vector<Columns> touched_;      // [line]: within these some are; empty: none is
+  std::vector<Scratch> scratch_;      // one a worker
 };
 
 }  // namespace relievo
