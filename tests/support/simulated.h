@@ -33,6 +33,7 @@ struct Simulated {
     out.number = number;
     out.time_ns = std::llround(static_cast<double>(number) * 1e9 / rig.frame_rate);
     out.scan = rig.scan;
+    out.field_order = rig.field_order;
     out.picture = std::move(rendered.picture);
     out.complement = std::move(rendered.complement);
     return out;

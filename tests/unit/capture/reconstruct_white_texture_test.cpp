@@ -194,13 +194,17 @@ TEST(MovingTexture, StripesAreGoneFromTheSurfaceOfWhatMoves) {
     std::string scene;
     Decoder decoder;
     double better;  // dB
+    int line_stride = 1;
   };
   for (const Case& c :
        {Case{"walk", Decoder::kOrdered, 0.5}, Case{"walk", Decoder::kQuick, 0.6},
-        Case{"walk,seed=5", Decoder::kOrdered, 0.6},
+        Case{"walk,seed=5", Decoder::kOrdered, 0.6}, Case{"walk,field_order=bottom", Decoder::kOrdered, 0.5},
+        Case{"walk,roll=180", Decoder::kQuick, 0.5}, Case{"walk", Decoder::kQuick, 0.3, 2},
+        Case{"walk,scheme=one-slide", Decoder::kOrdered, 0.3},
         Case{"walk,scan=progressive,width=1280,height=720,stripes=120", Decoder::kOrdered, 1.5}}) {
     const Filmed filmed(c.scene);
-    auto reconstructor = Reconstructor::create(filmed.rig, filmed.pattern, {.decoder = c.decoder});
+    auto reconstructor = Reconstructor::create(filmed.rig, filmed.pattern,
+                                               {.decoder = c.decoder, .line_stride = c.line_stride});
     ASSERT_TRUE(reconstructor.ok()) << reconstructor.error().message;
     constexpr std::uint64_t kFirst = 12, kLast = 21;
     Frame3D frame;
@@ -213,7 +217,8 @@ TEST(MovingTexture, StripesAreGoneFromTheSurfaceOfWhatMoves) {
     const Image8 later = filmed.white(kLast + 1);
     const double mended = psnr_drawn(frame.surface, frame.texture, white, later);
     const double sum = psnr_drawn(frame.surface, added(filmed.frame(kLast)), white, later);
-    const std::string name = c.scene + " " + std::string(decoder_name(c.decoder));
+    const std::string name =
+        c.scene + " " + std::string(decoder_name(c.decoder)) + " " + std::to_string(c.line_stride);
     RecordProperty(name, std::to_string(mended));
     RecordProperty(name + " added", std::to_string(sum));
     EXPECT_GT(mended, sum + c.better) << c.scene;
