@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "capture/reconstruct/four.h"
+
 namespace relievo {
 namespace {
 
@@ -185,63 +187,64 @@ void MovingTexture::look(const Exposures& exposures, const Light& gains, std::ve
   }
 }
 
-/// Of what a pixel between the middles of two stripes shows, `white`, as both tell: true where it is other
-/// than a surface is, and stripes left something of themselves; then `seen` becomes what is without them.
-bool MovingTexture::is_striped(const Stripe& a, const Stripe& b, const Light& white, Light& seen) {
-  const std::array<bool, 3> switched{has(a.colour, 0) != has(b.colour, 0),
-                                     has(a.colour, 1) != has(b.colour, 1),
-                                     has(a.colour, 2) != has(b.colour, 2)};
+/// From the middle of a stripe to the next one's: what a pixel shows otherwise than both tell, and than a
+/// surface does, stripes left of themselves. The surface's own detail is in all channels, stripes in those
+/// that the boundary switches.
+void MovingTexture::mend_between(const Stripe& a, const Stripe& b, Columns columns, std::uint8_t* texture,
+                                 std::uint8_t* mended) const {
+  const auto four = [](const Light& v) { return Four{v[0], v[1], v[2], 0}; };
+  const auto column_of = [](const std::array<float, 9>& m, std::size_t i) {
+    return Four{m[i], m[3 + i], m[6 + i], 0};
+  };
+  const std::array matrix{column_of(matrix_, 0), column_of(matrix_, 1), column_of(matrix_, 2)};
+  const std::array inverse{column_of(inverse_, 0), column_of(inverse_, 1), column_of(inverse_, 2)};
   const bool all = a.unlike || b.unlike;
-  // The surface's own detail is in all channels, stripes in those that the boundary switches.
-  float of_seen = 0;
-  float of_white = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    if (switched[c]) continue;
-    of_seen += seen[c];
-    of_white += white[c];
+  Four kept{};  // 1 of channels that the boundary does not switch
+  for (int c = 0; c < 3; ++c)
+    kept[c] =
+        has(a.colour, static_cast<std::size_t>(c)) == has(b.colour, static_cast<std::size_t>(c)) ? 1.F : 0.F;
+  const Four least = all ? Four{} : kept * 1e9F;  // that is never mended
+  const float from = a.middle_px();
+  const float length = b.middle_px() - from;
+  const Four rise = length > 0 ? (four(b.white) - four(a.white)) / length : Four{};
+  for (int x = columns.begin; x < columns.end; ++x) {
+    std::uint8_t* rgb = texture + static_cast<std::ptrdiff_t>(3) * x;
+    Four seen = matrix[0] * static_cast<float>(rgb[0]) + matrix[1] * static_cast<float>(rgb[1]) +
+                matrix[2] * static_cast<float>(rgb[2]);
+    Four own = four(a.white) + rise * (static_cast<float>(x) - from);
+    if (!all) {
+      const Four of_seen = seen * kept;
+      const Four of_white = own * kept;
+      const float white = of_white[0] + of_white[1] + of_white[2];
+      const float detail = (of_seen[0] + of_seen[1] + of_seen[2]) / white;
+      if (white >= kLeastDetail) own *= std::clamp(detail, 1 / kMostDetail, kMostDetail);
+    }
+    const Four off = seen > own ? seen - own : own - seen;
+    const auto striped = off > kLeft * own + (least + kLeftLevels);
+    if ((striped[0] | striped[1] | striped[2]) == 0) continue;
+    seen = striped ? own : seen;
+    const Four out = inverse[0] * seen[0] + inverse[1] * seen[1] + inverse[2] * seen[2] + 0.5F;
+    for (int c = 0; c < 3; ++c) rgb[c] = static_cast<std::uint8_t>(std::clamp(out[c], 0.F, 255.F));
+    mended[x] = 1;
   }
-  const float detail =
-      all || of_white < kLeastDetail ? 1 : std::clamp(of_seen / of_white, 1 / kMostDetail, kMostDetail);
-  bool out = false;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const float own = detail * white[c];
-    if ((!switched[c] && !all) || std::fabs(seen[c] - own) <= kLeft * own + kLeftLevels) continue;
-    seen[c] = own;
-    out = true;
-  }
-  return out;
 }
 
-/// From the middle of each stripe to the next one's.
 void MovingTexture::mend_surface(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes,
                                  std::uint8_t* texture, std::uint8_t* mended) const {
   look(exposures, gains, stripes);
-  const auto middle = [](const Stripe& s) { return 0.5F * static_cast<float>(s.first + s.last); };
   for (std::size_t i = 0; i <= stripes.size(); ++i) {
     const Stripe& a = stripes[i > 0 ? i - 1 : 0];
     const Stripe& b = stripes[std::min(i, stripes.size() - 1)];
-    if (!a.moves && !b.moves) continue;
-    const float from = i > 0 ? middle(a) : a.left_px;
-    const float to = i < stripes.size() ? middle(b) : b.right_px;
-    for (int x = static_cast<int>(std::ceil(from)); x < to; ++x) {
-      const float share = (static_cast<float>(x) - from) / (to - from);
-      Light white;
-      for (std::size_t c = 0; c < 3; ++c) white[c] = a.white[c] + share * (b.white[c] - a.white[c]);
-      std::uint8_t* rgb = texture + static_cast<std::ptrdiff_t>(3) * x;
-      Light seen = light(rgb);
-      if (!is_striped(a, b, white, seen)) continue;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float value =
-            inverse_[3 * c] * seen[0] + inverse_[3 * c + 1] * seen[1] + inverse_[3 * c + 2] * seen[2] + 0.5F;
-        rgb[c] = static_cast<std::uint8_t>(std::clamp(value, 0.F, 255.F));
-      }
-      mended[x] = 1;
-    }
+    // At an end one alone tells, of what the complement does not show there.
+    if ((!a.moves && !b.moves) || (&a == &b && !a.unlike)) continue;
+    const float from = i > 0 ? a.middle_px() : a.left_px;
+    const float to = i < stripes.size() ? b.middle_px() : b.right_px;
+    mend_between(a, b, {static_cast<int>(std::ceil(from)), static_cast<int>(std::ceil(to))}, texture, mended);
   }
 }
 
 /// Rows from a line to the next one: where either was mended, what lies between them.
-void MovingTexture::mend_between(int line, Image8& texture) const {
+void MovingTexture::mend_rows_behind(int line, Image8& texture) const {
   const Columns& of_above = touched_[static_cast<std::size_t>(line)];
   const Columns& of_below = touched_[static_cast<std::size_t>(line) + 1];
   const std::uint8_t* above = texture.row(step_ * line);
@@ -275,7 +278,7 @@ void MovingTexture::mend(const CapturedFrame& frame, const ShownStripes& shown,
   if (step_ == 1) return;
   pool.for_ranges(lines - 1, [&](int begin, int end, int) {
     for (int line = begin; line < end; ++line)
-      if (step_ * (line + 1) < texture.height()) mend_between(line, texture);
+      if (step_ * (line + 1) < texture.height()) mend_rows_behind(line, texture);
   });
 }
 

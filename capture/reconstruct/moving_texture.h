@@ -48,6 +48,8 @@ class MovingTexture {
     bool unlike = false;          // the complement shows something else there
     Light slide{}, complement{};  // there, on average,
     Light white{};                // and what both should show together
+
+    float middle_px() const { return 0.5F * static_cast<float>(first + last); }
   };
   struct Columns {
     int begin, end;
@@ -64,10 +66,11 @@ class MovingTexture {
   void mend_line(const DetectionLines& rows, const ShownStripes& shown, const Light& gains, int line,
                  Scratch& scratch, Image8& texture);
   void look(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes) const;
-  static bool is_striped(const Stripe& a, const Stripe& b, const Light& white, Light& seen);
+  void mend_between(const Stripe& a, const Stripe& b, Columns columns, std::uint8_t* texture,
+                    std::uint8_t* mended) const;
   void mend_surface(const Exposures& exposures, const Light& gains, std::vector<Stripe>& stripes,
                     std::uint8_t* texture, std::uint8_t* mended) const;
-  void mend_between(int line, Image8& texture) const;
+  void mend_rows_behind(int line, Image8& texture) const;
 
   std::array<float, 9> matrix_, inverse_;
   int line_stride_;
