@@ -2,21 +2,12 @@
 #include "capture/reconstruct/colour_shift_rows.h"
 
 #include "capture/reconstruct/eight.h"
+#include "capture/reconstruct/stripe_end.h"
 
 namespace relievo {
 namespace {
 
-constexpr float kRamp_px = 3.2F;  // from one stripe's colour to the next one's, of lens, pixel and projector
 constexpr std::size_t kEight = 8;
-
-/// 0..1: how much of the stripe right of an end there is at columns. Smooth, so that no shift comes from
-/// where the columns' samples happen to lie.
-RELIEVO_INLINE void behind(const Eight& off_px, Eight& out) {
-  Eight share = 0.5F + off_px * (1 / kRamp_px);
-  share = share < 0 ? Eight{} : share;
-  share = share > 1 ? Eight{} + 1 : share;
-  out = share * share * (3 - 2 * share);
-}
 
 RELIEVO_INLINE void blur(const StripedRow::In& in, const StripedRow::Kernel& kernel, Eight& out) {
   out = Eight{};
@@ -34,9 +25,9 @@ RELIEVO_INLINE void differences_body(const StripedRow& row, std::array<StripedRo
   for (std::size_t i = 0; i < StripedRow::kIn; i += kEight) {
     const Eight column = steps + (row.first_px + static_cast<float>(i));
     Eight right, left_end, beyond_right, white;
-    behind(column - row.column_px, right);
-    behind(column - row.left_end_px, left_end);
-    behind(column - row.right_end_px, beyond_right);
+    behind_end(column - row.column_px, right);
+    behind_end(column - row.left_end_px, left_end);
+    behind_end(column - row.right_end_px, beyond_right);
     load(row.white.data() + i, white);
     const Eight beyond_left = 1 - left_end;
     Eight all{};

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "capture/reconstruct/four.h"
-
 namespace relievo {
 namespace {
 
@@ -30,6 +28,13 @@ bool has(Primary colour, std::size_t channel) {
   return (colour >> channel & 1) != 0;
 }
 
+/// A matrix, by its columns, times three numbers.
+template <class Three>
+Four times(const std::array<Four, 3>& columns, const Three& v) {
+  return columns[0] * static_cast<float>(v[0]) + columns[1] * static_cast<float>(v[1]) +
+         columns[2] * static_cast<float>(v[2]);
+}
+
 }  // namespace
 
 /// The sum of two rows each, of which both may be the same.
@@ -43,21 +48,12 @@ struct MovingTexture::Exposures {
 MovingTexture::MovingTexture(const std::array<double, 9>& colour_matrix, int line_stride)
     : line_stride_(line_stride) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
-  for (std::size_t i = 0; i < 9; ++i) {
-    matrix_[i] = static_cast<float>(colour_matrix[i]);
-    inverse_[i] = static_cast<float>(inverse.data()[i]);
-  }
-}
-
-/// Eq. 3: what the projector's primaries give of a colour.
-template <class Rgb>
-MovingTexture::Light MovingTexture::light(const Rgb& rgb) const {
-  Light out;
-  for (std::size_t i = 0; i < 3; ++i)
-    out[i] = matrix_[3 * i] * static_cast<float>(rgb[0]) + matrix_[3 * i + 1] * static_cast<float>(rgb[1]) +
-             matrix_[3 * i + 2] * static_cast<float>(rgb[2]);
-  return out;
+  const Matrix matrix = Eigen::Map<const Matrix>(colour_matrix.data());
+  const auto columns_of = [](const Eigen::Matrix3f& m, std::array<Four, 3>& out) {
+    for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(i)] = Four{m(0, i), m(1, i), m(2, i), 0};
+  };
+  columns_of(matrix.cast<float>(), matrix_);
+  columns_of(matrix.inverse().cast<float>(), inverse_);
 }
 
 /// Of an exposure between two columns, on average.
@@ -69,9 +65,7 @@ MovingTexture::Light MovingTexture::mean_light(const std::uint8_t* above, const 
       const std::size_t at = static_cast<std::size_t>(i) + c;
       sums[c] += above[at] + below[at];
     }
-  Light out = light(sums);
-  for (float& value : out) value /= static_cast<float>(2 * (s.last - s.first + 1));
-  return out;
+  return times(matrix_, sums) / static_cast<float>(2 * (s.last - s.first + 1));
 }
 
 void MovingTexture::mend_line(const DetectionLines& rows, const ShownStripes& shown, const Light& gains,
@@ -142,7 +136,7 @@ void MovingTexture::look(const Exposures& exposures, const Light& gains, std::ve
   for (Stripe& s : stripes) {
     s.slide = mean_light(exposures.slide.above, exposures.slide.below, s);
     s.complement = mean_light(exposures.complement.above, exposures.complement.below, s);
-    for (std::size_t c = 0; c < 3; ++c) s.complement[c] *= gains[c];
+    s.complement *= gains;
   }
   const int count = static_cast<int>(stripes.size());
   for (int i = 0; i < count; ++i) {
@@ -192,12 +186,6 @@ void MovingTexture::look(const Exposures& exposures, const Light& gains, std::ve
 /// that the boundary switches.
 void MovingTexture::mend_between(const Stripe& a, const Stripe& b, Columns columns, std::uint8_t* texture,
                                  std::uint8_t* mended) const {
-  const auto four = [](const Light& v) { return Four{v[0], v[1], v[2], 0}; };
-  const auto column_of = [](const std::array<float, 9>& m, std::size_t i) {
-    return Four{m[i], m[3 + i], m[6 + i], 0};
-  };
-  const std::array matrix{column_of(matrix_, 0), column_of(matrix_, 1), column_of(matrix_, 2)};
-  const std::array inverse{column_of(inverse_, 0), column_of(inverse_, 1), column_of(inverse_, 2)};
   const bool all = a.unlike || b.unlike;
   Four kept{};  // 1 of channels that the boundary does not switch
   for (int c = 0; c < 3; ++c)
@@ -206,12 +194,11 @@ void MovingTexture::mend_between(const Stripe& a, const Stripe& b, Columns colum
   const Four least = all ? Four{} : kept * 1e9F;  // that is never mended
   const float from = a.middle_px();
   const float length = b.middle_px() - from;
-  const Four rise = length > 0 ? (four(b.white) - four(a.white)) / length : Four{};
+  const Four rise = length > 0 ? (b.white - a.white) / length : Four{};
   for (int x = columns.begin; x < columns.end; ++x) {
     std::uint8_t* rgb = texture + static_cast<std::ptrdiff_t>(3) * x;
-    Four seen = matrix[0] * static_cast<float>(rgb[0]) + matrix[1] * static_cast<float>(rgb[1]) +
-                matrix[2] * static_cast<float>(rgb[2]);
-    Four own = four(a.white) + rise * (static_cast<float>(x) - from);
+    Four seen = times(matrix_, rgb);
+    Four own = a.white + rise * (static_cast<float>(x) - from);
     if (!all) {
       const Four of_seen = seen * kept;
       const Four of_white = own * kept;
@@ -223,7 +210,7 @@ void MovingTexture::mend_between(const Stripe& a, const Stripe& b, Columns colum
     const auto striped = off > kLeft * own + (least + kLeftLevels);
     if ((striped[0] | striped[1] | striped[2]) == 0) continue;
     seen = striped ? own : seen;
-    const Four out = inverse[0] * seen[0] + inverse[1] * seen[1] + inverse[2] * seen[2] + 0.5F;
+    const Four out = times(inverse_, seen) + 0.5F;
     for (int c = 0; c < 3; ++c) rgb[c] = static_cast<std::uint8_t>(std::clamp(out[c], 0.F, 255.F));
     mended[x] = 1;
   }
@@ -268,12 +255,13 @@ void MovingTexture::mend(const CapturedFrame& frame, const ShownStripes& shown,
   width_ = texture.width();
   step_ = line_step_px(frame.scan, line_stride_);
   const int lines = shown.grid.lines();
+  const Light gains_of{gains[0], gains[1], gains[2], 0};
   mended_.resize(static_cast<std::size_t>(lines) * static_cast<std::size_t>(width_));
   touched_.resize(static_cast<std::size_t>(lines));
   scratch_.resize(static_cast<std::size_t>(pool.workers()));
   pool.for_ranges(lines, [&](int begin, int end, int worker) {
     for (int line = begin; line < end; ++line)
-      mend_line(rows, shown, gains, line, scratch_[static_cast<std::size_t>(worker)], texture);
+      mend_line(rows, shown, gains_of, line, scratch_[static_cast<std::size_t>(worker)], texture);
   });
   if (step_ == 1) return;
   pool.for_ranges(lines - 1, [&](int begin, int end, int) {

@@ -13,6 +13,7 @@
 #include "base/pattern.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/detection_lines.h"
+#include "capture/reconstruct/four.h"
 #include "capture/reconstruct/moving_places.h"
 #include "capture/source/field_source.h"
 
@@ -38,7 +39,7 @@ class MovingTexture {
             WorkerPool& pool, Image8& texture);
 
  private:
-  using Light = std::array<float, 3>;  // of the projector's primaries
+  using Light = Four;  // of the projector's primaries, and 0
   /// Between two boundaries next to each other.
   struct Stripe {
     float left_px, right_px;
@@ -60,8 +61,6 @@ class MovingTexture {
   /// A line of both exposures.
   struct Exposures;
 
-  template <class Rgb>
-  Light light(const Rgb& rgb) const;
   Light mean_light(const std::uint8_t* above, const std::uint8_t* below, const Stripe& stripe) const;
   void mend_line(const DetectionLines& rows, const ShownStripes& shown, const Light& gains, int line,
                  Scratch& scratch, Image8& texture);
@@ -72,7 +71,7 @@ class MovingTexture {
                     std::uint8_t* texture, std::uint8_t* mended) const;
   void mend_rows_behind(int line, Image8& texture) const;
 
-  std::array<float, 9> matrix_, inverse_;
+  std::array<Four, 3> matrix_, inverse_;  // columns of M and of its inverse
   int line_stride_;
   int width_ = 0;
   int step_ = 1;                      // rows from line to line

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "capture/reconstruct/stripe_end.h"
+
 namespace relievo {
 namespace {
 

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/reconstruct/render_rows.h"
 
-#include <algorithm>
 #include <cstring>
 
 #include "capture/reconstruct/eight.h"
+#include "capture/reconstruct/stripe_end.h"
 
 namespace relievo {
 namespace {
-
-constexpr float kRamp_px = 3.2F;  // from one stripe's colour to the next one's, of lens, pixel and projector
 
 /// Adds how unlike `picture` is to `shown`.
 RELIEVO_INLINE void compare(const Eight& picture, const float* shown, const Eight& scale, Eight& sum) {
@@ -27,10 +25,8 @@ RELIEVO_INLINE float unlike_body(const RenderedRow& row, float column_px) {
   const Eight steps = {0, 1, 2, 3, 4, 5, 6, 7};
   const float off = row.first_px - column_px;
   for (std::size_t i = 0; i < RenderedRow::kIn; i += kEight) {
-    Eight share = 0.5F + (steps + (off + static_cast<float>(i))) * (1 / kRamp_px);
-    share = share < 0 ? Eight{} : share;
-    share = share > 1 ? Eight{} + 1 : share;
-    const Eight of_right = share * share * (3 - 2 * share);
+    Eight of_right;
+    behind_end(steps + (off + static_cast<float>(i)), of_right);
     std::memcpy(right.data() + i, &of_right, sizeof of_right);
     for (std::size_t c = 0; c < 2; ++c) {
       Eight base, rise;
@@ -76,11 +72,6 @@ float unlike_portable(const RenderedRow& row, float column_px) {
 #endif
 
 }  // namespace
-
-float behind_end(float off_px) {
-  const float share = std::clamp(0.5F + off_px * (1 / kRamp_px), 0.F, 1.F);
-  return share * share * (3 - 2 * share);
-}
 
 const std::vector<RowComparison>& row_comparisons() {
   static const std::vector<RowComparison> all = [] {

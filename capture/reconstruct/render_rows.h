@@ -31,9 +31,6 @@ struct RenderedRow {
   std::array<float, 2 * kBlurReach + 1> blur{};
 };
 
-/// 0..1: how much of the stripe right of an end there is `off_px` behind it.
-float behind_end(float off_px);
-
 /// Each of `name` gives, of the row with the boundary at a column, how unlike what is shown it is: 0..3 a
 /// column, times its weight.
 struct RowComparison {

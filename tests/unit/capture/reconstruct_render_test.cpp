@@ -9,6 +9,7 @@
 
 #include "capture/pattern/bcsl.h"
 #include "capture/reconstruct/render_place.h"
+#include "capture/reconstruct/stripe_end.h"
 #include "tests/unit/capture/decoded_frame.h"
 
 namespace relievo {
