@@ -37,6 +37,24 @@ float estimate_noise(const DifferenceImage& image) {
       });
 }
 
+/// Tells `each` the samples [first, last) of a line's blocks beside steps, and which those are.
+template <class Each>
+void for_steps(const LineSteps& steps, int line, const Each& each) {
+  if (!steps.beside(line)) return;
+  constexpr int kSamples = 3 * LineSteps::kBlock_px;
+  for (int block = 0; block < steps.blocks; ++block)
+    if (const std::uint8_t sides = steps.of_block(line, block); sides != 0)
+      each(kSamples * block, kSamples * (block + 1), sides);
+}
+
+/// What RowKernels::low_pass() makes of three lines that are all `here`, of samples [first, last).
+void low_pass_along(const std::int16_t* here, int samples, int first, int last, std::int16_t* out) {
+  for (int i = first; i < last; ++i) {
+    const bool end = i < 3 || i + 3 >= samples;
+    out[i] = static_cast<std::int16_t>(end ? 16 * here[i] : 4 * (here[i - 3] + 2 * here[i] + here[i + 3]));
+  }
+}
+
 /// `out` is `row` of RGB where columns are `share` of `motion_px` further on, its ends beyond them.
 void shift_row(const std::uint8_t* row, const float* motion_px, float share, int width, std::uint8_t* out) {
   std::copy_n(row, 3 * static_cast<std::size_t>(width), out);  // most holds still on most lines
@@ -94,7 +112,14 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
         read_rows[i] = shifted;
       }
     }
-    kernels.combine_fields(read_rows[0], read_rows[1], read_rows[2], samples, fields_at(line));
+    const FieldRows fields = fields_at(line);
+    kernels.combine_fields(read_rows[0], read_rows[1], read_rows[2], samples, fields);
+    for_steps(out.steps, line, [&](int first, int last, std::uint8_t sides) {
+      if (sides == (LineSteps::kAbove | LineSteps::kBelow)) return;  // then neither row is better
+      const std::uint8_t* other = read_rows[sides == LineSteps::kBelow ? 1 : 2];
+      kernels.combine_fields(read_rows[0] + first, other + first, other + first, last - first,
+                             {fields.difference + first, fields.sum + first});
+    });
   };
   std::int16_t* across = scratch_row(6);
   const FieldRows smooth{scratch_row(7), scratch_row(8)};
@@ -109,6 +134,10 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
     // capture/reconstruct/leaning.h.
     kernels.low_pass(above.difference, here.difference, below.difference, samples, across, smooth.difference);
     kernels.low_pass(above.sum, here.sum, below.sum, samples, across, smooth.sum);
+    for_steps(out.steps, line, [&](int first, int last, std::uint8_t) {
+      low_pass_along(here.difference, samples, first, last, smooth.difference);
+      low_pass_along(here.sum, samples, first, last, smooth.sum);
+    });
     const auto at = static_cast<std::size_t>(line);
     kernels.to_planes(
         smooth, out.width, weights,
@@ -118,11 +147,13 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
 
 void Differencer::difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out) {
   out.motion.moves.clear();
+  out.steps = {};
   difference_of_all(rows, pool, out);
 }
 
 void Differencer::aligned_difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out) {
   motion_finder_.find(rows.slide(), rows.complement(), pool, out.motion);
+  step_finder_.find(rows, pool, out.steps);
   difference_of_all(rows, pool, out);
 }
 

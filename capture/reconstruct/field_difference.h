@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/field_motion.h"
+#include "capture/reconstruct/line_steps.h"
 #include "capture/reconstruct/rows.h"
 
 namespace relievo {
@@ -38,6 +39,7 @@ struct DifferenceImage {
   int cells = 0;               // in a row of them, 0 where none was measured: all is strong
   std::vector<Signal> signal;  // [row of cells][cell], a cell is kCellWidth pixels of kCellLines lines
 
+  LineSteps steps;     // beside which no mean over lines was taken
   FieldMotion motion;  // between the fields, which both were shifted by half of it to meet half way
 
   Signal signal_at(int l, int x) const {
@@ -66,7 +68,8 @@ class Differencer {
   /// Low-pass, colour matrix (Eq. 3) and difference. `out` is overwritten; its memory is reused.
   void difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out);
 
-  /// The same, of the fields where each shows its stripes half way between both exposures.
+  /// The same, of the fields where each shows its stripes half way between both exposures; where a line
+  /// beside shows another surface, without it.
   void aligned_difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out);
 
   /// Of the calibrated fields, low-passed along the line, all channels: 255 of the paper's normalised scale.
@@ -87,6 +90,7 @@ class Differencer {
   std::array<float, 9> matrix_;
   PlaneWeights weights_;
   MotionFinder motion_finder_;
+  LineStepFinder step_finder_;
   std::vector<Scratch> scratch_;
 };
 

@@ -85,6 +85,23 @@ RELIEVO_BODY void low_pass_body(const std::int16_t* above, const std::int16_t* h
   }
 }
 
+PairProducts products_of_block(const LinePair& pair, int block) {
+  constexpr int kSamples = 3 * RowKernels::kPairBlock_px;
+  PairProducts sums;
+  for (int i = kSamples * block; i < kSamples * (block + 1); ++i) {
+    const int here = pair.own[i] - pair.other[i];
+    const int next = pair.next_own[i] - pair.next_other[i];
+    sums.across += here * next;
+    sums.here += here * here;
+    sums.next += next * next;
+  }
+  return sums;
+}
+
+void pair_products_portable(const LinePair& pair, int blocks, PairProducts* out) {
+  for (int block = 0; block < blocks; ++block) out[block] = products_of_block(pair, block);
+}
+
 RELIEVO_BODY void to_planes_body(const std::int16_t* __restrict difference,
                                  const std::int16_t* __restrict sum, int width, const PlaneWeights& weights,
                                  float* __restrict planes, float* __restrict white) {
@@ -274,6 +291,42 @@ RELIEVO_AVX2 __m256i weave_eight(__m128i d_above, __m128i d_below, __m128i own, 
   _mm256_storeu_ps(out.left.data(), evidence);  // and the right behind it
 }
 
+/// Sixteen samples of own less other.
+RELIEVO_AVX2 __m256i less(const std::uint8_t* own, const std::uint8_t* other) {
+  return _mm256_sub_epi16(_mm256_cvtepu8_epi16(sixteen_at(own)), _mm256_cvtepu8_epi16(sixteen_at(other)));
+}
+
+/// Of two blocks, which are three times sixteen samples: four sums of products of each.
+RELIEVO_AVX2 __m256i sums_of_two(const __m256i* a, const __m256i* b) {
+  const __m256i first = _mm256_madd_epi16(a[0], b[0]);
+  const __m256i middle = _mm256_madd_epi16(a[1], b[1]);  // half of it is the first block's
+  const __m256i last = _mm256_madd_epi16(a[2], b[2]);
+  return _mm256_add_epi32(middle, _mm256_add_epi32(_mm256_permute2x128_si256(first, last, 0x20),
+                                                   _mm256_permute2x128_si256(first, last, 0x31)));
+}
+
+[[gnu::target("avx2")]] void pair_products_avx2(const LinePair& pair, int blocks, PairProducts* out) {
+  int block = 0;
+  for (; block + 1 < blocks; block += 2) {
+    const std::ptrdiff_t first = std::ptrdiff_t{3 * RowKernels::kPairBlock_px} * block;
+    __m256i here[3], next[3];
+    for (int i = 0; i < 3; ++i) {
+      const std::ptrdiff_t at = first + 16 * i;
+      here[i] = less(pair.own + at, pair.other + at);
+      next[i] = less(pair.next_own + at, pair.next_other + at);
+    }
+    const __m256i squares = sums_of_two(next, next);
+    const __m256i sums =
+        _mm256_hadd_epi32(_mm256_hadd_epi32(sums_of_two(here, next), sums_of_two(here, here)),
+                          _mm256_hadd_epi32(squares, squares));
+    alignas(32) std::array<std::int32_t, 8> of_both;
+    _mm256_store_si256(reinterpret_cast<__m256i*>(of_both.data()), sums);
+    out[block] = {of_both[0], of_both[1], of_both[2]};
+    out[block + 1] = {of_both[4], of_both[5], of_both[6]};
+  }
+  if (block < blocks) out[block] = products_of_block(pair, block);
+}
+
 [[gnu::target("avx2")]] void side_evidence_avx2(const float* planes, int width, const SideWindows* windows,
                                                 int count, Sides* out) {
   for (int i = 0; i < count; ++i) one_side_evidence_avx2(planes, width, windows[i], out[i]);
@@ -282,38 +335,39 @@ RELIEVO_AVX2 __m256i weave_eight(__m128i d_above, __m128i d_below, __m128i own, 
 #endif
 
 /// All kernels for one set of instructions, as static functions of a struct.
-#define RELIEVO_KERNELS(set, attributes, weave, side_evidence)                                       \
-  struct set {                                                                                       \
-    attributes static void add_rows(const std::uint8_t* own, const std::uint8_t* above,              \
-                                    const std::uint8_t* below, int samples, std::uint8_t* out) {     \
-      add_rows_body(own, above, below, samples, out);                                                \
-    }                                                                                                \
-    attributes static void combine_fields(const std::uint8_t* slide, const std::uint8_t* above,      \
-                                          const std::uint8_t* below, int samples, FieldRows out) {   \
-      combine_fields_body(slide, above, below, samples, out.difference, out.sum);                    \
-    }                                                                                                \
-    attributes static void low_pass(const std::int16_t* above, const std::int16_t* here,             \
-                                    const std::int16_t* below, int samples, std::int16_t* across,    \
-                                    std::int16_t* out) {                                             \
-      low_pass_body(above, here, below, samples, across, out);                                       \
-    }                                                                                                \
-    attributes static void to_planes(FieldRows rows, int width, const PlaneWeights& weights,         \
-                                     PlaneRows out) {                                                \
-      to_planes_body(rows.difference, rows.sum, width, weights, out.planes, out.white);              \
-    }                                                                                                \
-    attributes static void crossings(const float* planes, int width, float least_rise,               \
-                                     std::uint8_t* flags) {                                          \
-      crossings_body(planes, width, least_rise, flags);                                              \
-    }                                                                                                \
-    static RowKernels table(const char* name) {                                                      \
-      return {name, add_rows, weave, combine_fields, low_pass, to_planes, crossings, side_evidence}; \
-    }                                                                                                \
+#define RELIEVO_KERNELS(set, attributes, weave, pair_products, side_evidence)                      \
+  struct set {                                                                                     \
+    attributes static void add_rows(const std::uint8_t* own, const std::uint8_t* above,            \
+                                    const std::uint8_t* below, int samples, std::uint8_t* out) {   \
+      add_rows_body(own, above, below, samples, out);                                              \
+    }                                                                                              \
+    attributes static void combine_fields(const std::uint8_t* slide, const std::uint8_t* above,    \
+                                          const std::uint8_t* below, int samples, FieldRows out) { \
+      combine_fields_body(slide, above, below, samples, out.difference, out.sum);                  \
+    }                                                                                              \
+    attributes static void low_pass(const std::int16_t* above, const std::int16_t* here,           \
+                                    const std::int16_t* below, int samples, std::int16_t* across,  \
+                                    std::int16_t* out) {                                           \
+      low_pass_body(above, here, below, samples, across, out);                                     \
+    }                                                                                              \
+    attributes static void to_planes(FieldRows rows, int width, const PlaneWeights& weights,       \
+                                     PlaneRows out) {                                              \
+      to_planes_body(rows.difference, rows.sum, width, weights, out.planes, out.white);            \
+    }                                                                                              \
+    attributes static void crossings(const float* planes, int width, float least_rise,             \
+                                     std::uint8_t* flags) {                                        \
+      crossings_body(planes, width, least_rise, flags);                                            \
+    }                                                                                              \
+    static RowKernels table(const char* name) {                                                    \
+      return {name,          add_rows,  weave,     combine_fields, low_pass,                       \
+              pair_products, to_planes, crossings, side_evidence};                                 \
+    }                                                                                              \
   }
 
-RELIEVO_KERNELS(Portable, , weave_portable, side_evidence_portable);
+RELIEVO_KERNELS(Portable, , weave_portable, pair_products_portable, side_evidence_portable);
 #if defined(__x86_64__)
 // Without fused multiply-add, whose results differ in the last bit from the reference's.
-RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], weave_avx2, side_evidence_avx2);
+RELIEVO_KERNELS(Avx2, [[gnu::target("avx2")]], weave_avx2, pair_products_avx2, side_evidence_avx2);
 #endif
 
 }  // namespace

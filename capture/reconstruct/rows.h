@@ -46,9 +46,20 @@ struct WovenRows {
   const std::uint8_t *own, *above, *below, *beyond_above, *beyond_below;
 };
 
+/// Both exposures' rows of a line and of the next one.
+struct LinePair {
+  const std::uint8_t *own, *other, *next_own, *next_other;
+};
+
+/// Sums over a block's samples of own less other: of one line's times the next one's, and of their squares.
+struct PairProducts {
+  std::int32_t across = 0, here = 0, next = 0;
+};
+
 /// Every pointer is to a row of its own; none overlap but where said. `samples` is 3 * width.
 struct RowKernels {
   static constexpr float kClearShare = 0.4F;
+  static constexpr int kPairBlock_px = 8;
   static constexpr float kAlike = 24;  // sum of three samples' differences: rows below it belong together
 
   const char* name;
@@ -70,6 +81,9 @@ struct RowKernels {
   /// 16 times as large as it came. `across` is scratch memory.
   void (*low_pass)(const std::int16_t* above, const std::int16_t* here, const std::int16_t* below,
                    int samples, std::int16_t* across, std::int16_t* out);
+
+  /// Of each of `blocks` blocks of kPairBlock_px pixels.
+  void (*pair_products)(const LinePair& pair, int blocks, PairProducts* out);
 
   /// Planes from interleaved rows.
   void (*to_planes)(FieldRows rows, int width, const PlaneWeights& weights, PlaneRows out);

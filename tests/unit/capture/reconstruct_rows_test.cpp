@@ -117,6 +117,37 @@ TEST_P(Rows, LowPass) {
   }
 }
 
+TEST_P(Rows, PairProducts) {
+  for (const int width : kWidths) {
+    const int samples = 3 * width;
+    const auto own = make.row<std::uint8_t>(samples, 0, 255);
+    const auto other = make.row<std::uint8_t>(samples, 0, 255);
+    const auto next_own = make.row<std::uint8_t>(samples, 0, 255);
+    const auto next_other = make.row<std::uint8_t>(samples, 0, 255);
+    const int blocks = width / RowKernels::kPairBlock_px;
+    std::vector<PairProducts> out(static_cast<std::size_t>(blocks) + 1);
+    kernels().pair_products({own.data(), other.data(), next_own.data(), next_other.data()}, blocks,
+                            out.data());
+    for (int block = 0; block < blocks; ++block) {
+      int across = 0, here = 0, next = 0;
+      for (int i = 3 * RowKernels::kPairBlock_px * block; i < 3 * RowKernels::kPairBlock_px * (block + 1);
+           ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const int p = own[k] - other[k];
+        const int q = next_own[k] - next_other[k];
+        across += p * q;
+        here += p * p;
+        next += q * q;
+      }
+      const PairProducts& sums = out[static_cast<std::size_t>(block)];
+      ASSERT_EQ(sums.across, across) << block << " of " << width;
+      ASSERT_EQ(sums.here, here) << block << " of " << width;
+      ASSERT_EQ(sums.next, next) << block << " of " << width;
+    }
+    ASSERT_EQ(out.back().here, 0) << "written beyond the last block";
+  }
+}
+
 TEST_P(Rows, ToPlanes) {
   const PlaneWeights weights{{0.9F, -0.2F, 0.3F, 0.1F, 1.1F, -0.4F, 0.F, 0.25F, 0.75F}, {0.3F, 0.6F, 0.1F}};
   for (const int width : kWidths) {
