@@ -54,7 +54,8 @@ constexpr float kAtMost_px = 0.3F;        // elsewhere, for instance where textu
 constexpr float kAtMostStill_px = 0.5F;   // or holds still
 constexpr float kLean_px = 2.5F;          // a boundary hangs together over lines that differ by less
 constexpr float kWidest_px = 40.F;        // and with the next one over less
-constexpr std::int32_t kLeastPiece = 25;  // boundaries; smaller pieces of surface are wrong codes
+constexpr std::int32_t kLeastPiece = 25;  // boundaries; smaller pieces of surface are wrong codes,
+constexpr std::int32_t kFollows = 2;  // which seldom follow each other on a line: one counts for so many more
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
@@ -254,13 +255,13 @@ void ConsistencyCheck::measure_pieces(int begin, int end) {
       if (!hangs_together(here, b)) start = b;
       piece[b] = line * boundaries_ + start;
       size[b] = 1;
-      size[start] = b - start + 1;
+      size[start] = b - start + 1 + kFollows * (b - start);
     }
     if (line > begin) join_to_above(line);
   }
 }
 
-/// Of a cell in piece_.
+/// Of a cell in piece_, as kLeastPiece counts.
 std::int32_t ConsistencyCheck::piece_size(std::int32_t i) const {
   while (piece_[static_cast<std::size_t>(i)] != i) i = piece_[static_cast<std::size_t>(i)];
   return size_[static_cast<std::size_t>(i)];

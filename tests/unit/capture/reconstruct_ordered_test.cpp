@@ -370,6 +370,25 @@ TEST(Consistency, GivesUpTheStepsOwnEdgeAndSmallPieces) {
   for (int l = 12; l < 18; ++l) EXPECT_EQ(s.result.boundary[static_cast<std::size_t>(l * 20 + 10)], -1);
 }
 
+TEST(Consistency, WhatFollowsOnTheLineSpeaksForASmallPiece) {
+  for (const bool two : {false, true}) {
+    Surface2D s = slanted(0.02F);
+    // Something thin before it: nine lines of boundary 50, or of 50 and 51.
+    for (int l = 12; l < 21; ++l) {
+      s.result.boundary[static_cast<std::size_t>(l * 20 + 10)] = 50;
+      s.result.boundary[static_cast<std::size_t>(l * 20 + 11)] = two ? 51 : -1;
+    }
+    WorkerPool pool(1);
+    ConsistencyCheck check;
+    check.check(59, pool, s.result, s.edges);
+    int kept = 0;
+    for (int l = 12; l < 21; ++l)
+      kept += (s.result.boundary[static_cast<std::size_t>(l * 20 + 10)] == 50) +
+              (s.result.boundary[static_cast<std::size_t>(l * 20 + 11)] == 51);
+    EXPECT_EQ(kept, two ? 18 : 0);
+  }
+}
+
 TEST(Consistency, GivesUpABoundaryThatADepthStepStandsInFor) {
   // From boundary 10 on the surface is another, half a stripe further left; 10 itself is hidden, and what
   // shows its colours is the step.
