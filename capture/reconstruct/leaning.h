@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "base/parallel.h"
 #include "capture/reconstruct/detection_lines.h"
@@ -30,6 +31,7 @@ class LeanCorrection {
     float slope = 0;
   };
   static float drawn_px(const Seen* here, std::ptrdiff_t stride);
+  static float one_sided_px(const Seen* here, std::ptrdiff_t stride, std::uint8_t sides);
   bool is_borrowed(const DetectionLines& rows, float noise, int line, const Seen* here) const;
 
   MarginGrid<Seen, 1> seen_;

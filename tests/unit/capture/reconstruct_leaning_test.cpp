@@ -161,6 +161,48 @@ TEST(LeanCorrection, GivesUpWhatOnlyTheLineBesideItShows) {
   }
 }
 
+// Beside the end of a surface only one row of the other exposure shows it, half a line off.
+TEST(LeanCorrection, PutsBackWhatOneRowOfTheOtherExposureShows) {
+  for (const float lean_px : {0.4F, -0.4F}) {
+    for (const bool upper : {true, false}) {
+      const Scene scene{Scan::kInterlaced, 60, 0, lean_px};
+      CapturedFrame frame = scene.frame();
+      // The other half of the rows is of another surface, green to the left and magenta to the right.
+      for (int y = upper ? kMiddle : 0; y < (upper ? kRows : kMiddle); ++y) {
+        for (int i = 0; i < 3 * kWidth; i += 3) {
+          std::uint8_t* rgb = frame.picture.row(y) + i;
+          const std::uint8_t red = rgb[0];
+          rgb[0] = rgb[2];
+          rgb[1] = red;
+        }
+      }
+      const DetectionLines rows(frame);
+      WorkerPool pool(1);
+      DifferenceImage image;
+      Differencer(kIdentity).aligned_difference(rows, pool, image);
+      EdgeImage edges;
+      EdgeFinder().find(image, pool, edges);
+      const int line =
+          upper ? kMiddle / 2 - 1 : kMiddle / 2;  // the last one, or the first one, of the surface
+      ASSERT_EQ(image.steps.at(line, 100), upper ? LineSteps::kBelow : LineSteps::kAbove);
+      SequenceResult result;
+      result.boundary.assign(edges.edges.size(), -1);
+      const auto edge_on = [&](int l) {
+        std::uint32_t out = edges.line_start[static_cast<std::size_t>(l)];
+        while (std::fabs(edges.edges[out].column_px - scene.place(2 * l)) > 2) ++out;
+        return out;
+      };
+      const int beside = upper ? line - 1 : line + 1;
+      result.boundary[edge_on(line)] = result.boundary[edge_on(beside)] = 3;
+      const auto off_px = [&] { return edges.edges[edge_on(line)].column_px - scene.place(2 * line); };
+      const float lean_by_line = 2 * lean_px;
+      EXPECT_NEAR(off_px(), (upper ? -0.25F : 0.25F) * lean_by_line, 0.03F);
+      LeanCorrection().correct(rows, image, 8, pool, result, edges);
+      EXPECT_NEAR(off_px(), 0, 0.06F) << (upper ? "upper" : "lower") << ", leaning by " << lean_px;
+    }
+  }
+}
+
 TEST(LeanCorrection, KeepsADarkLineThatShowsItsOwn) {
   Found found({Scan::kProgressive, 60, 0.8F, 0}, 0.3F);  // each line has 0.45 of the next one's light
   EXPECT_EQ(found.correct(), 0U);
