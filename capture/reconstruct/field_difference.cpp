@@ -47,14 +47,6 @@ void for_steps(const LineSteps& steps, int line, const Each& each) {
       each(kSamples * block, kSamples * (block + 1), sides);
 }
 
-/// What RowKernels::low_pass() makes of three lines that are all `here`, of samples [first, last).
-void low_pass_along(const std::int16_t* here, int samples, int first, int last, std::int16_t* out) {
-  for (int i = first; i < last; ++i) {
-    const bool end = i < 3 || i + 3 >= samples;
-    out[i] = static_cast<std::int16_t>(end ? 16 * here[i] : 4 * (here[i - 3] + 2 * here[i] + here[i + 3]));
-  }
-}
-
 /// `out` is `row` of RGB where columns are `share` of `motion_px` further on, its ends beyond them.
 void shift_row(const std::uint8_t* row, const float* motion_px, float share, int width, std::uint8_t* out) {
   std::copy_n(row, 3 * static_cast<std::size_t>(width), out);  // most holds still on most lines
@@ -90,7 +82,7 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
     for (float& w : weights.colour) w = -w;
   const int samples = 3 * out.width;
   const auto row = static_cast<std::size_t>(samples);
-  scratch.rows.resize(9 * row);
+  scratch.rows.resize(10 * row);
   const auto scratch_row = [&](int i) { return scratch.rows.data() + row * static_cast<std::size_t>(i); };
   // The three lines about the current one, each in the place that the one three lines above it had.
   const auto fields_at = [&](int line) {
@@ -123,6 +115,7 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
   };
   std::int16_t* across = scratch_row(6);
   const FieldRows smooth{scratch_row(7), scratch_row(8)};
+  std::int16_t* alone = scratch_row(9);
   read(begin - 1);
   read(begin);
   for (int line = begin; line < end; ++line) {
@@ -132,12 +125,14 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
     const FieldRows below = fields_at(line + 1);
     // A boundary that leans keeps its place, since the kernel is symmetric; where brightness changes, see
     // capture/reconstruct/leaning.h.
-    kernels.low_pass(above.difference, here.difference, below.difference, samples, across, smooth.difference);
-    kernels.low_pass(above.sum, here.sum, below.sum, samples, across, smooth.sum);
-    for_steps(out.steps, line, [&](int first, int last, std::uint8_t) {
-      low_pass_along(here.difference, samples, first, last, smooth.difference);
-      low_pass_along(here.sum, samples, first, last, smooth.sum);
-    });
+    for (const auto plane : {&FieldRows::difference, &FieldRows::sum}) {
+      kernels.low_pass(above.*plane, here.*plane, below.*plane, samples, across, smooth.*plane);
+      if (!out.steps.beside(line)) continue;
+      kernels.low_pass(here.*plane, here.*plane, here.*plane, samples, across, alone);
+      for_steps(out.steps, line, [&](int first, int last, std::uint8_t) {
+        std::copy(alone + first, alone + last, smooth.*plane + first);
+      });
+    }
     const auto at = static_cast<std::size_t>(line);
     kernels.to_planes(
         smooth, out.width, weights,
@@ -147,7 +142,7 @@ void Differencer::difference_of_lines(const DetectionLines& rows, int begin, int
 
 void Differencer::difference(const DetectionLines& rows, WorkerPool& pool, DifferenceImage& out) {
   out.motion.moves.clear();
-  out.steps = {};
+  out.steps.has_below.clear();
   difference_of_all(rows, pool, out);
 }
 

@@ -87,12 +87,11 @@ float LeanCorrection::drawn_px(const Seen* here, std::ptrdiff_t stride) {
   return lean * std::clamp(rise, -kMostRise, kMostRise);
 }
 
-/// Beside a step only the other exposure's row on the far side was taken: how far, for each line that it lies
-/// off, the place is from where the line has it.
+/// Beside a step on one side only the other exposure's row on the other side was taken: how far, for each
+/// line that it lies off, the place is from where the line has it.
 float LeanCorrection::one_sided_px(const Seen* here, std::ptrdiff_t stride, std::uint8_t sides) {
-  if (sides == (LineSteps::kAbove | LineSteps::kBelow)) return 0;
-  const bool below = sides == LineSteps::kBelow;
-  const Seen& next = here[below ? -stride : stride];  // on its surface
+  if (sides != LineSteps::kAbove && sides != LineSteps::kBelow) return 0;
+  const Seen& next = here[sides == LineSteps::kBelow ? -stride : stride];  // on its surface
   if (apart(next.column_px, here->column_px)) return 0;
   return 0.5F * (here->column_px - next.column_px);
 }
@@ -139,12 +138,10 @@ std::size_t LeanCorrection::correct(const DetectionLines& rows, const Difference
     const int x = static_cast<int>(edge.column_px);
     const Signal signal = image.signal_at(line, x);
     const float averaged = signal == Signal::kWeak ? kOfWeak : signal == Signal::kFading ? kOfFading : 0;
-    if (const std::uint8_t sides = image.steps.at(line, x); sides != 0) {
-      edge.column_px -=
-          averaged * drawn_px(seen, seen_.stride()) - rows.below * one_sided_px(seen, seen_.stride(), sides);
-      return;
-    }
-    edge.column_px -= (strong + averaged) * drawn_px(seen, seen_.stride());
+    const std::uint8_t sides = image.steps.at(line, x);
+    const float over_lines = averaged + (sides == 0 ? strong : 0);
+    edge.column_px -=
+        over_lines * drawn_px(seen, seen_.stride()) - rows.below * one_sided_px(seen, seen_.stride(), sides);
   });
   return borrowed;
 }

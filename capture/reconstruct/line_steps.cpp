@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace relievo {
 namespace {
@@ -35,7 +36,6 @@ void LineStepFinder::find(const DetectionLines& rows, WorkerPool& pool, LineStep
     return of_lines.data() + static_cast<std::size_t>(line) * blocks;
   };
   unlike_.resize(static_cast<std::size_t>(lines + 2) * blocks);
-  any_unlike_.resize(static_cast<std::size_t>(lines));
   out.below.resize(static_cast<std::size_t>(lines) * blocks);
   out.has_below.resize(static_cast<std::size_t>(lines));
   products_.resize(static_cast<std::size_t>(pool.workers()));
@@ -46,7 +46,7 @@ void LineStepFinder::find(const DetectionLines& rows, WorkerPool& pool, LineStep
     std::vector<PairProducts>& products = products_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < end; ++line) {
       std::uint8_t* here = row(unlike_, line + 1);
-      std::uint8_t& any = any_unlike_[static_cast<std::size_t>(line)];
+      std::uint8_t& any = out.has_below[static_cast<std::size_t>(line)];
       any = 0;
       std::fill_n(here, blocks, std::uint8_t{0});
       if (line + 1 == lines) continue;
@@ -62,9 +62,8 @@ void LineStepFinder::find(const DetectionLines& rows, WorkerPool& pool, LineStep
     for (int line = begin; line < end; ++line) {
       std::uint8_t* below = row(out.below, line);
       std::uint8_t& has_below = out.has_below[static_cast<std::size_t>(line)];
-      has_below = 0;
       std::fill_n(below, blocks, std::uint8_t{0});
-      if (any_unlike_[static_cast<std::size_t>(line)] == 0) continue;
+      if (std::exchange(has_below, std::uint8_t{0}) == 0) continue;
       const std::uint8_t* here = row(unlike_, line + 1);
       for (std::size_t k = 0; k < blocks; ++k) {
         below[k] = here[k] > (here - blocks)[k] && here[k] >= here[k + blocks] ? 1 : 0;

@@ -47,8 +47,7 @@ class LineStepFinder {
 
  private:
   std::vector<std::vector<PairProducts>> products_;  // each worker's, of a line
-  std::vector<std::uint8_t> unlike_;      // [line + 1][block]: how unlike the next line is, 0: it is alike
-  std::vector<std::uint8_t> any_unlike_;  // [line]
+  std::vector<std::uint8_t> unlike_;  // [line + 1][block]: how unlike the next line is, 0: it is alike
 };
 
 }  // namespace relievo

@@ -78,7 +78,7 @@ struct RowKernels {
                          int samples, FieldRows out);
 
   /// Low-pass [1 2 1] across three lines of either of FieldRows and then along the line, whose ends stay:
-  /// 16 times as large as it came. `across` is scratch memory.
+  /// 16 times as large as it came. The three may be the same. `across` is scratch memory.
   void (*low_pass)(const std::int16_t* above, const std::int16_t* here, const std::int16_t* below,
                    int samples, std::int16_t* across, std::int16_t* out);
 

@@ -11,6 +11,7 @@
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/leaning.h"
 #include "capture/reconstruct/weak_signal.h"
+#include "tests/unit/capture/drawn_frame.h"
 
 namespace relievo {
 namespace {
@@ -39,17 +40,9 @@ struct Scene {
   }
 
   CapturedFrame frame() const {
-    CapturedFrame out{.scan = scan};
-    out.picture = Image8(kWidth, kRows, 3);
-    if (scan == Scan::kProgressive) out.complement = Image8(kWidth, kRows, 3);
-    for (int y = 0; y < kRows; ++y) {
-      for (int i = 0; i < 3 * kWidth; ++i) {
-        const bool odd = scan == Scan::kInterlaced && y % 2 == 1;
-        out.picture.row(y)[i] = value(y, i / 3, i % 3, odd);
-        if (scan == Scan::kProgressive) out.complement.row(y)[i] = value(y, i / 3, i % 3, true);
-      }
-    }
-    return out;
+    return drawn_frame(scan, kWidth, kRows, [&](int row, int x, int channel, bool complement) {
+      return value(row, x, channel, complement);
+    });
   }
 };
 

@@ -2,14 +2,17 @@
 // Where a line and the next one show different surfaces, and what is not mixed there.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <tuple>
 
 #include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/line_steps.h"
+#include "tests/unit/capture/drawn_frame.h"
 
 namespace relievo {
 namespace {
@@ -35,19 +38,9 @@ struct Scene {
     return (kStripes[stripe] >> channel & 1) != 0;
   }
   CapturedFrame frame() const {
-    CapturedFrame out{.scan = scan};
-    out.picture = Image8(kWidth, kRows, 3);
-    if (scan == Scan::kProgressive) out.complement = Image8(kWidth, kRows, 3);
-    const auto value = [&](int row, int i, bool complement) -> std::uint8_t {
-      return row >= lit_from && lit(row, i / 3, i % 3) != complement ? 150 : 20;
-    };
-    for (int y = 0; y < kRows; ++y) {
-      for (int i = 0; i < 3 * kWidth; ++i) {
-        out.picture.row(y)[i] = value(y, i, scan == Scan::kInterlaced && y % 2 == 1);
-        if (scan == Scan::kProgressive) out.complement.row(y)[i] = value(y, i, true);
-      }
-    }
-    return out;
+    return drawn_frame(scan, kWidth, kRows, [&](int row, int x, int channel, bool complement) {
+      return static_cast<std::uint8_t>(row >= lit_from && lit(row, x, channel) != complement ? 150 : 20);
+    });
   }
 };
 
