@@ -46,19 +46,17 @@ void Detector::boundaries_of_line(int line, float scale, LineScratch& scratch, D
             [](const Crossing& a, const Crossing& b) { return a.column_px < b.column_px; });
 
   for (std::size_t i = 0; i < crossings.size();) {
-    // A crossing's variance goes with 1 / slope^2, which is the weight of the mean.
-    float weight = 0;
+    // The paper has no rule for crossings of several channels at one place: their mean is one boundary.
+    const float first = crossings[i].column_px;
     float sum = 0;
     float slope = 0;
-    const float first = crossings[i].column_px;
+    const std::size_t begin = i;
     for (; i < crossings.size() && crossings[i].column_px - first < options_.merge_px; ++i) {
-      const float w = crossings[i].slope * crossings[i].slope;
-      weight += w;
-      sum += w * (crossings[i].column_px - first);
+      sum += crossings[i].column_px - first;
       slope += crossings[i].slope;
     }
     Boundary boundary;
-    boundary.column_px = first + sum / weight;
+    boundary.column_px = first + sum / static_cast<float>(i - begin);
     boundary.slope = slope;
     const int centre = static_cast<int>(std::lround(boundary.column_px));
     for (int d = delta; d <= delta + options_.search_px; ++d) {

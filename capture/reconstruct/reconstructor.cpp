@@ -106,7 +106,8 @@ struct Reconstructor::State {
         white_texture(r.colour_matrix, o.decoder == Decoder::kQuick, o.line_stride),
         moving_texture(r.colour_matrix, o.line_stride),
         half_way(p.boundaries(), lines),
-        surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface) {
+        surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface,
+                        o.decoder == Decoder::kPaper ? 0 : SurfaceOptions{}.least_component) {
     decoded.reset(p.boundaries(), lines);
     if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), lines);
     if (p.slides == 1) exposure_order.emplace(r, p, o.line_stride);

@@ -21,7 +21,7 @@ namespace relievo {
 enum class Decoder {
   kOrdered,  // by the sequence's order along and across lines (capture/reconstruct/sequence.h)
   kQuick,  // the same with less care, for live use where time is short (capture/reconstruct/quick_sequence.h)
-  kPaper,  // as the paper writes it (5.2, 5.3): the readable reference
+  kPaper,  // as the paper writes it (5.2, 5.3), no piece too small for it: the readable reference
 };
 
 /// "ordered", "quick" or "paper".

@@ -5,15 +5,17 @@ namespace relievo {
 namespace {
 
 // A dense piece of surface has about as many pixels for each boundary as stripes are wide.
-constexpr int kLeastDenseComponent = 60;
+constexpr int kPixelsForBoundary = 6;
 constexpr int kLinesApart = 8;  // that tell the usual standard deviation
 
 }  // namespace
 
-SurfaceBuilder::SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options)
+SurfaceBuilder::SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options,
+                               int least_component)
     : width_px_(rig.camera.width),
       height_px_(rig.camera.height),
       line_step_px_(line_step_px),
+      least_component_(least_component),
       options_(options),
       depth_slope_(rig) {}
 
@@ -71,13 +73,14 @@ void SurfaceBuilder::build(DecodedGrid& grid, const std::vector<SecondPlace>& se
     counts.alone += sampled.alone;
     counts.duplicate += sampled.duplicate;
     made = build_surface(pixels_.pixels,
-                         {.least_component = kLeastDenseComponent,
+                         {.least_component = kPixelsForBoundary * least_component_,
                           .pool = &pool,
                           .picture = &picture,
                           .boundaries = pixels_.boundaries.data()},
                          scratch_, out);
   } else {
-    const SurfaceOptions options{.links = &links_, .pool = &pool, .picture = &picture};
+    const SurfaceOptions options{
+        .least_component = least_component_, .links = &links_, .pool = &pool, .picture = &picture};
     made = build_surface(grid, options, scratch_, out);
     made.small_component += second_.add(second, grid, scale, options, triangulator, out);
   }

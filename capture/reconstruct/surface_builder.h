@@ -24,7 +24,9 @@ namespace relievo {
 /// Keeps its scratch memory from frame to frame. One thread.
 class SurfaceBuilder {
  public:
-  SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options);
+  /// `least_component` (SurfaceOptions) is in boundaries, of a dense surface, too.
+  SurfaceBuilder(const Rig& rig, int line_step_px, const SurfaceBuilderOptions& options,
+                 int least_component = SurfaceOptions{}.least_component);
 
   /// Of boundaries with their points, and what lines show of them a second time, which is no part of a dense
   /// surface: `grid` gains what fills holes. Fills `out` but for what it holds of old, and adds what the
@@ -36,7 +38,7 @@ class SurfaceBuilder {
   float usual_sigma_px(const DecodedGrid& grid);
   std::size_t fill(const ColumnScale& scale, const Triangulator& triangulator, DecodedGrid& grid);
 
-  int width_px_, height_px_, line_step_px_;
+  int width_px_, height_px_, line_step_px_, least_component_;
   SurfaceBuilderOptions options_;
   DepthSlope depth_slope_;
   RankedSample sigmas_px_;
