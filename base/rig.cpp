@@ -41,6 +41,15 @@ std::string_view to_string(FieldOrder order) {
   return order == FieldOrder::kTop ? "top" : "bottom";
 }
 
+CameraColours colours_of(const Rig& rig) {
+  return {rig.colour_matrix, rig.camera_gamma};
+}
+
+void set_colours(const CameraColours& colours, Rig& rig) {
+  rig.colour_matrix = colours.matrix;
+  rig.camera_gamma = colours.gamma;
+}
+
 bool is_rotation(const std::array<double, 9>& m) {
   constexpr double kTolerance = 1e-4;
   const auto dot = [&](std::size_t i, std::size_t j) {
@@ -65,6 +74,7 @@ std::string to_yaml(const Rig& rig) {
   out += matrix("projector_from_camera_rotation", 3, 3, rig.projector_from_camera_rotation);
   out += matrix("projector_from_camera_translation", 3, 1, rig.projector_from_camera_translation);
   out += matrix("colour_matrix", 3, 3, rig.colour_matrix);
+  if (rig.camera_gamma != 1) out += "camera_gamma: " + number(rig.camera_gamma) + "\n";
   if (rig.stereo_rms_px > 0) out += "stereo_rms_px: " + number(rig.stereo_rms_px) + "\n";
   if (rig.scale_error > 0) out += "scale_error: " + number(rig.scale_error) + "\n";
   if (rig.world_from_camera) {

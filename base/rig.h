@@ -40,6 +40,13 @@ struct CameraPose {
   std::array<double, 3> translation{};  // metres
 };
 
+/// What a camera's values tell of the projector's colours (paper 4.4).
+struct CameraColours {
+  std::array<double, 9> matrix{1, 0, 0, 0, 1,
+                               0, 0, 0, 1};  // row-major; M of Eq. 1: projected RGB = M * light
+  double gamma = 1;  // captured = 255 (light / 255)^(1 / gamma), channel by channel; 1: captured is light
+};
+
 struct Rig {
   Scan scan = Scan::kInterlaced;
   FieldOrder field_order = FieldOrder::kTop;  // of an interlaced scan
@@ -49,7 +56,8 @@ struct Rig {
   // X_projector = rotation * X_camera + translation, metres
   std::array<double, 9> projector_from_camera_rotation{};     // row-major
   std::array<double, 3> projector_from_camera_translation{};  // metres
-  std::array<double, 9> colour_matrix{};  // row-major; M of Eq. 1: projected RGB = M * captured RGB
+  std::array<double, 9> colour_matrix{};                      // CameraColours has its terms
+  double camera_gamma = 1;                                    // the same
   // How good its calibration found it; 0: not said.
   double stereo_rms_px = 0;  // what the board's corners are off by in either picture
   double scale_error = 0;    // what sizes are wrong by, relative, RMS over the places of the board
@@ -61,6 +69,9 @@ struct Rig {
 std::string_view to_string(Scan scan);
 /// "top" or "bottom".
 std::string_view to_string(FieldOrder order);
+
+CameraColours colours_of(const Rig& rig);
+void set_colours(const CameraColours& colours, Rig& rig);
 
 /// Whether the rows of a row-major 3x3 matrix are orthonormal, within 1e-4, and right-handed.
 bool is_rotation(const std::array<double, 9>& matrix);

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "capture/camera_response.h"
 #include "capture/pattern/pattern_check.h"
 #include "capture/storage_file.h"
 
@@ -120,6 +121,8 @@ Rig rig_of(const StorageFile& file) {
   matrix(file, "projector_from_camera_rotation", 3, 3, rig.projector_from_camera_rotation);
   matrix(file, "projector_from_camera_translation", 3, 1, rig.projector_from_camera_translation);
   matrix(file, "colour_matrix", 3, 3, rig.colour_matrix);
+  if (file.has("camera_gamma"))
+    rig.camera_gamma = number(file, "camera_gamma", 1, CameraResponse::kMostGamma);
   if (file.has("stereo_rms_px")) rig.stereo_rms_px = number(file, "stereo_rms_px", 0, kMaxPixels);
   if (file.has("scale_error")) rig.scale_error = number(file, "scale_error", 0, 1);
   if (file.has("world_from_camera_rotation") || file.has("world_from_camera_translation")) {

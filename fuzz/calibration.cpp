@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const fuzz::MemoryFile written({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
     FUZZ_CHECK(read_rig(written.path()).ok());
   }
-  if (const auto part = read_rig_part(file.path())) FUZZ_CHECK(part->colour_matrix.has_value());
+  if (const auto part = read_rig_part(file.path())) FUZZ_CHECK(part->colours.has_value());
   static_cast<void>(read_pattern(file.path()).ok());
   return 0;
 }

@@ -10,6 +10,7 @@
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
+#include "capture/camera_response.h"
 #include "capture/picture_file.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
@@ -29,6 +30,7 @@ struct Options {
   std::string out;
   std::string update;
   std::vector<int> roi;
+  std::optional<double> gamma;
   bool json = false;
 };
 
@@ -87,11 +89,12 @@ void print(const ColourCalibration& c, const std::string& out) {
     }
     std::printf("\n");
   }
-  const auto& m = c.matrix;
+  const auto& m = c.camera.matrix;
   for (int row = 0; row < 3; ++row) {
     const auto at = static_cast<std::size_t>(3 * row);
     std::printf("%s  %8.4f %8.4f %8.4f\n", row == 0 ? "matrix   " : "         ", m[at], m[at + 1], m[at + 2]);
   }
+  if (c.camera.gamma != 1) std::printf("gamma      %.2f, taken out of what is decoded\n", c.camera.gamma);
   std::printf("residual   %.2f of 255 (RMS)\nwritten    %s\n", c.residual, out.c_str());
 }
 
@@ -102,16 +105,6 @@ void warn_of_weak_colours(const ColourCalibration& c) {
         "colour " + primary_name(r.colour) + " will hardly be detected: its " + kChannels[r.weakest_channel] +
         " channel differs too little from the complement's; check that capture and the projector's colours");
   }
-}
-
-void warn_of_a_curve(const ColourCalibration& c) {
-  if (c.camera_gamma == 1) return;
-  char gamma[16];
-  std::snprintf(gamma, sizeof gamma, "%.1f", c.camera_gamma);
-  log_warning("light does not add up in these captures: the camera's response is curved, as by a gamma of " +
-              std::string(gamma) +
-              ", which costs depth precision and leaves stripes in textures; switch the camera's gamma off "
-              "(100 of v4l2's control) and take all captures again");
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -134,13 +127,14 @@ Status run(const Options& options, StopSignal& stop) {
   if (!captures) return captures.error();
   ColourOptions how;
   if (!options.roi.empty()) how.roi = Roi{options.roi[0], options.roi[1], options.roi[2], options.roi[3]};
+  how.camera_gamma = options.gamma;
   const auto calibration = calibrate_colour(*captures, how);
   if (!calibration) return calibration.error().in(options.captures);
 
   const std::string out = options.out.empty() ? options.update : options.out;
-  std::string text = colour_yaml(calibration->matrix);
+  std::string text = colour_yaml(calibration->camera);
   if (before.whole) {
-    before.whole->colour_matrix = calibration->matrix;
+    set_colours(calibration->camera, *before.whole);
     text = to_yaml(*before.whole);
   }
   if (const Status written = write_whole_file(out, text); !written) return written;
@@ -150,7 +144,6 @@ Status run(const Options& options, StopSignal& stop) {
     print(*calibration, out);
   }
   warn_of_weak_colours(*calibration);
-  warn_of_a_curve(*calibration);
   return {};
 }
 
@@ -172,6 +165,9 @@ std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
       "Take the captures from a live source first, into the folder: a white sheet at rest under black, "
       "red, green and blue, each with its complement");
   add_live_projector_options(app, *source, o->projector);
+  app.add_option("--gamma", o->gamma,
+                 "The camera's, 1: its values are light (default: that with which the captures add up)")
+      ->check(CLI::Range(1., CameraResponse::kMostGamma));
   app.add_option("--roi", o->roi, "The target, where it should not be looked for: X,Y,WIDTH,HEIGHT")
       ->delimiter(',')
       ->expected(4);

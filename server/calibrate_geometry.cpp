@@ -123,7 +123,7 @@ Status run(const Options& options, StopSignal& stop) {
   }
   const std::string out = options.out.empty() ? options.update : options.out;
   ViewCode code{.stripes = {}, .projector = options.projector};
-  if (before.colour_matrix) code.colour_matrix = *before.colour_matrix;
+  code.colours = before.colours.value_or(CameraColours{});
   if (!options.source.empty()) {
     CameraOptions camera = options.camera;
     if (options.pattern != "gray") camera.pattern = options.pattern;
@@ -134,7 +134,7 @@ Status run(const Options& options, StopSignal& stop) {
                                          .folder = options.views,
                                          .views = options.live_views,
                                          .threads = options.threads,
-                                         .colour_matrix = code.colour_matrix,
+                                         .colours = code.colours,
                                          .projector = options.live_projector.choice()},
                                         *board, stop);
     if (!taken) return taken.error();
@@ -158,7 +158,7 @@ Status run(const Options& options, StopSignal& stop) {
   Rig rig = before.whole.value_or(Rig{});
   rig.scan = before.scan.value_or(options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive);
   rig.frame_rate = before.frame_rate.value_or(options.frame_rate);
-  rig.colour_matrix = before.colour_matrix.value_or(std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
+  set_colours(code.colours, rig);
   rig = with_geometry(rig, *geometry);
   if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
   if (const auto seen = upright(rig, {}); !seen) log_warning(seen.error().message);

@@ -88,10 +88,10 @@ class ViewTaker {
   /// True where there are enough.
   Result<bool> take(const StillCollector& collector) {
     const auto [width, height] = Size{info_.rig.projector.width, info_.rig.projector.height};
-    auto stack = sort_stripes(collector.pairs(), info_.pattern, width, height, options_.colour_matrix, pool_);
+    auto stack = sort_stripes(collector.pairs(), info_.pattern, width, height, options_.colours, pool_);
     if (!stack) return not_used(stack.error().message);
     const std::string name = view_name(next_);
-    const MeasuredView view = measure_view(name, *stack, board_, options_.colour_matrix, pool_);
+    const MeasuredView view = measure_view(name, *stack, board_, options_.colours, pool_);
     if (!view.refused.empty()) return not_used(view.refused);
     if (coverage_.repeats(view)) return not_used("the board is where it was in a view before; move it");
     const fs::path folder = fs::path(options_.folder) / name;

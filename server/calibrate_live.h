@@ -3,7 +3,6 @@
 // projects what they need. Where it projects, call it from the main thread.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 
@@ -23,8 +22,8 @@ struct LiveOptions {
   std::string folder;  // made where it is missing; views in it are kept
   int views = 8;       // to take
   int threads = 2;
-  std::array<double, 9> colour_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};  // as far as it is known
-  std::optional<LiveProjector> projector;                          // none: somebody else projects
+  CameraColours colours;                   // as far as they are known
+  std::optional<LiveProjector> projector;  // none: somebody else projects
 };
 
 /// Takes a view, FOLDER/view_NN, each time that the board is held still at a new pose under the stripes along

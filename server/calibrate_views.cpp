@@ -47,9 +47,8 @@ OneView measure_one(const fs::path& folder, const ViewCode& code, const Board& b
     if (!stack) return OneView{{.name = name, .corners = {}, .refused = stack.error().message}};
     return OneView{measure_view(name, *stack, board, how, pool), stack->width(), stack->height()};
   };
-  return code.stripes
-             ? measured(read_stripe_stack(folder, *code.stripes, width, height, go_on), code.colour_matrix)
-             : measured(read_gray_stack(folder, width, height, go_on), GrayDecodeOptions{});
+  return code.stripes ? measured(read_stripe_stack(folder, *code.stripes, width, height, go_on), code.colours)
+                      : measured(read_gray_stack(folder, width, height, go_on), GrayDecodeOptions{});
 }
 
 }  // namespace

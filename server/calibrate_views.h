@@ -2,7 +2,6 @@
 // A folder of views of a board, each a folder of pictures, measured.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +19,7 @@ namespace relievo {
 struct ViewCode {
   std::optional<Pattern> stripes;  // none: Gray code
   Size projector;
-  std::array<double, 9> colour_matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  CameraColours colours;
 };
 
 struct MeasuredViews {

@@ -35,10 +35,10 @@ std::string colour_report(const ColourCalibration& c) {
     colours.push_back(colour);
   }
   const nlohmann::json json = {
-      {"colour_matrix", c.matrix},
+      {"colour_matrix", c.camera.matrix},
       {"residual", c.residual},
       {"noise", c.noise},
-      {"camera_gamma", c.camera_gamma},
+      {"camera_gamma", c.camera.gamma},
       {"threshold", kDetectionThreshold},
       {"target",
        {{"box", {c.target.x, c.target.y, c.target.width, c.target.height}}, {"pixels", c.target_pixels}}},

@@ -79,9 +79,9 @@ class ColourTask final : public CalibrationTask {
   bool enough() const override { return result_.has_value(); }
   Result<CalibrationResult> solve() override {
     if (!result_) return Error{"no capture of the sheet was good enough"};
-    std::string text = colour_yaml(result_->matrix);
+    std::string text = colour_yaml(result_->camera);
     if (before_.whole) {
-      before_.whole->colour_matrix = result_->matrix;
+      set_colours(result_->camera, *before_.whole);
       text = to_yaml(*before_.whole);
     }
     return CalibrationResult{std::move(text), colour_report(*result_)};
@@ -102,7 +102,7 @@ class BoardTask final : public CalibrationTask {
         before_(std::move(before)),
         pool_(kThreads),
         coverage_(info.rig.camera, info.rig.projector) {
-    if (before_.colour_matrix) colours_ = *before_.colour_matrix;
+    if (before_.colours) colours_ = *before_.colours;
   }
 
   std::string projector_shows() const override { return "stripes"; }
@@ -146,7 +146,7 @@ class BoardTask final : public CalibrationTask {
     const auto geometry = calibrate_geometry(views_, camera, projector, {});
     if (!geometry) return geometry.error();
     Rig rig = before_.whole.value_or(rig_);
-    rig.colour_matrix = colours_;
+    set_colours(colours_, rig);
     rig = with_geometry(rig, *geometry);
     return CalibrationResult{to_yaml(rig), geometry_report(*geometry)};
   }
@@ -167,7 +167,7 @@ class BoardTask final : public CalibrationTask {
   const Rig rig_;  // the source's: its sizes, scan and rate
   const Pattern pattern_;
   const RigPart before_;
-  std::array<double, 9> colours_{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  CameraColours colours_;
   WorkerPool pool_;
   Coverage coverage_;
   std::size_t taken_ = 0;

@@ -50,7 +50,7 @@ Rig guessed_rig(const Rig& source, const RigPart& part) {
   rig.projector = guessed_lens(source.projector.width, source.projector.height);
   rig.projector_from_camera_rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   rig.projector_from_camera_translation = {-kGuessedBaseline_m, 0, 0};
-  rig.colour_matrix = part.colour_matrix.value_or(std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
+  set_colours(part.colours.value_or(CameraColours{}), rig);
   return rig;
 }
 

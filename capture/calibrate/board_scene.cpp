@@ -94,6 +94,7 @@ Image8 render_colour_capture(const Rig& rig, Primary colour, double distance_m,
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rig.colour_matrix.data()).inverse();
   const Eigen::Vector3d light =
       seen * Eigen::Vector3d(colour & 1 ? 1 : 0, colour & 2 ? 1 : 0, colour & 4 ? 1 : 0);
+  const CameraResponse response(rig.camera_gamma);
   SceneRandom random(options.seed + 101u * colour);
   Image8 out(rig.camera.width, rig.camera.height, 3);
   const auto& t = rig.projector_from_camera_translation;
@@ -114,7 +115,7 @@ Image8 render_colour_capture(const Rig& rig, Primary colour, double distance_m,
       for (int c = 0; c < 3; ++c) {
         const double value = (lit ? light[c] : 0) + options.ambient * 0.25;
         out.row(y)[3 * x + c] =
-            exposed(kBoardExposure * options.exposure * albedo * value, options.noise, random);
+            exposed(kBoardExposure * options.exposure * albedo * value, options.noise, response, random);
       }
     }
   }

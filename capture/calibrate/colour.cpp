@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "capture/calibrate/white_target.h"
+#include "capture/camera_response.h"
 
 namespace relievo {
 namespace {
@@ -186,23 +188,39 @@ double residual_of(const Eigen::Matrix3d& m, const std::vector<Response>& respon
   return std::sqrt(squares / (3.0 * static_cast<double>(responses.size())));
 }
 
+/// Captures in light.
+std::vector<Response> in_light(std::vector<Response> responses, double gamma) {
+  for (Response& r : responses) {
+    const Eigen::Array3d captured = r.mean.array() / 255;
+    r.mean = 255 * captured.pow(gamma).matrix();
+    r.noise = r.noise.array() * gamma * captured.pow(gamma - 1);
+  }
+  return responses;
+}
+
 /// The gamma under which the colours' light adds up best, 1 where that is not much better than as it is.
-double gamma_of(const std::vector<Response>& responses, double residual) {
-  constexpr double kMost = 3, kStep = 0.05;
+double gamma_of(const std::vector<Response>& responses) {
+  constexpr double kMost = CameraResponse::kMostGamma, kStep = 0.05, kFineStep = 0.01;
   constexpr double kLeast = 1.2;       // less costs next to nothing
   constexpr double kMuchBetter = 0.5;  // of the residual without
-  double best = residual * kMuchBetter;
-  double out = 1;
-  for (double gamma = kLeast; gamma < kMost + kStep / 2; gamma += kStep) {
-    std::vector<Response> straight = responses;
-    for (Response& r : straight) r.mean = 255 * (r.mean / 255).array().pow(gamma).matrix();
+  const auto left = [&](double gamma) {
+    const std::vector<Response> straight = in_light(responses, gamma);
     const auto m = solve(straight);
-    if (!m) continue;
-    const double left = residual_of(*m, straight);
-    if (left >= best) continue;
-    best = left;
-    out = gamma;
-  }
+    return m ? residual_of(*m, straight) : std::numeric_limits<double>::infinity();
+  };
+  double best = left(1) * kMuchBetter;
+  double out = 1;
+  if (!std::isfinite(best)) return out;  // too few colours: a curve does not tell them apart, either
+  const auto look = [&](double from, double to, double step) {
+    for (double gamma = from; gamma < to + step / 2; gamma += step) {
+      const double residual = left(gamma);
+      if (residual >= best) continue;
+      best = residual;
+      out = gamma;
+    }
+  };
+  look(kLeast, kMost, kStep);
+  if (out > 1) look(out - kStep, out + kStep, kFineStep);
   return out;
 }
 
@@ -245,33 +263,36 @@ Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& cap
   std::vector<Response> each;
   for (const ColourCapture& capture : captures) each.push_back(respond(capture, target->mask));
   if (const Status good = check_exposure(captures, each, target->mask, options); !good) return good.error();
-  const std::vector<Response> responses = average(each);
+  const std::vector<Response> captured = average(each);
+  const double gamma = options.camera_gamma ? *options.camera_gamma : gamma_of(captured);
+  const std::vector<Response> responses = in_light(captured, gamma);
   const auto matrix = solve(responses);
   if (!matrix) return matrix.error();
   const Eigen::Matrix3d& m = *matrix;
 
   ColourCalibration out;
-  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.matrix.data()) = m;
+  out.camera.gamma = gamma;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.camera.matrix.data()) = m;
   out.target = target->box;
   out.target_pixels = target->pixels;
   double brightest = 0, noise = 0;
   for (const Response& r : responses) brightest = std::max(brightest, (m * r.mean).maxCoeff());
-  for (const Response& r : responses) {
+  for (std::size_t i = 0; i < responses.size(); ++i) {
+    const Response& r = responses[i];
     ColourReport report{.colour = r.colour};
     const Eigen::Vector3d estimated = m * r.mean;
     for (int c = 0; c < 3; ++c) {
-      report.captured[static_cast<std::size_t>(c)] = r.mean[c];
+      report.captured[static_cast<std::size_t>(c)] = captured[i].mean[c];
       report.estimated[static_cast<std::size_t>(c)] = estimated[c];
     }
     const Eigen::Vector3d off = estimated - projected(r.colour);
     report.residual = std::sqrt(off.squaredNorm() / 3);
-    noise += r.noise.squaredNorm();
+    noise += captured[i].noise.squaredNorm();
     if (r.colour != kBlack && r.colour != kWhite) weigh_detection(m, responses, brightest, r, report);
     out.colours.push_back(report);
   }
   out.residual = residual_of(m, responses);
   out.noise = std::sqrt(noise / (3.0 * static_cast<double>(responses.size())));
-  out.camera_gamma = gamma_of(responses, out.residual);
   return out;
 }
 

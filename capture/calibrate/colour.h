@@ -12,6 +12,7 @@
 #include "base/image.h"
 #include "base/pattern.h"
 #include "base/result.h"
+#include "base/rig.h"
 
 namespace relievo {
 
@@ -27,17 +28,18 @@ struct Roi {
 };
 
 struct ColourOptions {
-  std::optional<Roi> roi;         // of the white target; found where it is not given
-  double saturated_share = 0.01;  // of the target's pixels at 254 or above in a channel: refused
-  double dimmest_white = 50;      // of 255: brightest channel of the target under white; refused below
-  double ambient_share = 0.25;    // of the white level, under black: refused above
+  std::optional<Roi> roi;              // of the white target; found where it is not given
+  double saturated_share = 0.01;       // of the target's pixels at 254 or above in a channel: refused
+  double dimmest_white = 50;           // of 255: brightest channel of the target under white; refused below
+  double ambient_share = 0.25;         // of the white level, under black: refused above
+  std::optional<double> camera_gamma;  // where it is known, 1..CameraResponse::kMostGamma; else told by light
 };
 
 /// A colour as it comes back: averaged over the target, and what its detection rests on.
 struct ColourReport {
   Primary colour = 0;
   std::array<double, 3> captured{};   // mean RGB, of 255
-  std::array<double, 3> estimated{};  // M * captured, of 255; the colour itself is 0 or 255 a channel
+  std::array<double, 3> estimated{};  // M * light, of 255; the colour itself is 0 or 255 a channel
   double residual = 0;                // RMS over the channels of estimated minus projected, of 255
   /// Of palette colours only: the least |D| over channels of the difference to the complement's capture, with
   /// the brightest calibrated channel scaled to 255 as the paper's decoder does (5.2); negative where a
@@ -48,14 +50,13 @@ struct ColourReport {
 };
 
 struct ColourCalibration {
-  std::array<double, 9> matrix{};  // row-major M: projected RGB = M * captured RGB
+  /// Its gamma: as asked for, or that of the curve with which light adds up best, 1 where a straight response
+  /// explains the captures about as well.
+  CameraColours camera;
   std::vector<ColourReport> colours;
   double residual = 0;  // RMS over all colours and channels, of 255
   double noise = 0;     // of one captured channel at one pixel, of 255
-  /// Of the curve with which light adds up best: captured = light^(1 / gamma). 1 where a straight response
-  /// explains the captures about as well.
-  double camera_gamma = 1;
-  Roi target;  // the box around the pixels used
+  Roi target;           // the box around the pixels used
   std::size_t target_pixels = 0;
 };
 

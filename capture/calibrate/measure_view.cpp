@@ -124,10 +124,10 @@ MeasuredView measure_view(const std::string& name, const GrayStack& stack, const
 }
 
 MeasuredView measure_view(const std::string& name, const StripeStack& stack, const Board& board,
-                          const std::array<double, 9>& colour_matrix, WorkerPool& pool) {
+                          const CameraColours& colours, WorkerPool& pool) {
   const auto seen = find_board(even_light(stack), board);
   if (seen.size() < kLeastCorners) return without(name, no_board(board, seen.size()));
-  auto edges = decode_stripes(stack, colour_matrix, pool);
+  auto edges = decode_stripes(stack, colours, pool);
   if (!edges) return without(name, edges.error().message);
   return with_projector(name, seen, board, *edges);
 }

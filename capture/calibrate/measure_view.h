@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/rig.h"
 #include "capture/calibrate/board.h"
 #include "capture/calibrate/bundle.h"
 #include "capture/calibrate/stripe_decode.h"
@@ -28,8 +29,8 @@ struct MeasuredView {
 MeasuredView measure_view(const std::string& name, const GrayStack& stack, const Board& board,
                           const GrayDecodeOptions& options, WorkerPool& pool);
 
-/// The same under our own stripes. `colour_matrix` is the rig's, or the identity where it is not known.
+/// The same under our own stripes. `colours` are the rig's, or what is left out where they are not known.
 MeasuredView measure_view(const std::string& name, const StripeStack& stack, const Board& board,
-                          const std::array<double, 9>& colour_matrix, WorkerPool& pool);
+                          const CameraColours& colours, WorkerPool& pool);
 
 }  // namespace relievo

@@ -15,13 +15,13 @@ struct RigPart {
   std::optional<Rig> whole;  // where all of it is there; then the others are too
   std::optional<Scan> scan;
   std::optional<double> frame_rate;
-  std::optional<std::array<double, 9>> colour_matrix;
+  std::optional<CameraColours> colours;
 };
 
 /// A whole rig.yaml, or one of the keys above alone. Errors name the file and the key.
 Result<RigPart> read_rig_part(const std::filesystem::path& file);
 
-/// The text of a rig.yaml that has a colour matrix only.
-std::string colour_yaml(const std::array<double, 9>& colour_matrix);
+/// The text of a rig.yaml that has colours only.
+std::string colour_yaml(const CameraColours& colours);
 
 }  // namespace relievo

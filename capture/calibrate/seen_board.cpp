@@ -70,8 +70,8 @@ double SceneRandom::normal() {
   return std::sqrt(-2 * std::log(u)) * std::cos(2 * std::numbers::pi * uniform());
 }
 
-std::uint8_t exposed(double value, double noise, SceneRandom& random) {
-  return static_cast<std::uint8_t>(std::clamp(value + noise * random.normal() + 0.5, 0.0, 255.0));
+std::uint8_t exposed(double value, double noise, const CameraResponse& response, SceneRandom& random) {
+  return response.value_of(static_cast<float>(value + noise * random.normal()));
 }
 
 Pose projector_pose(const Rig& rig) {
@@ -83,7 +83,10 @@ Pose projector_pose(const Rig& rig) {
 }
 
 SeenBoard::SeenBoard(const Rig& rig, const BoardSurface& surface, const Pose& camera_from_board, int samples)
-    : rig_(rig), each_(static_cast<std::size_t>(samples * samples)), samples_(samples) {
+    : rig_(rig),
+      response_(rig.camera_gamma),
+      each_(static_cast<std::size_t>(samples * samples)),
+      samples_(samples) {
   traced_.reserve(static_cast<std::size_t>(rig.camera.width * rig.camera.height) * each_);
   for (int y = 0; y < rig.camera.height; ++y) trace_row(surface, camera_from_board, y);
 }
@@ -145,8 +148,8 @@ Image8 SeenBoard::under(const GraySlide& slide, const BoardSceneOptions& options
       }
       sum += light * sample.albedo;
     }
-    picture.data()[i] =
-        exposed(kBoardExposure * options.exposure * sum / static_cast<double>(each_), options.noise, random);
+    picture.data()[i] = exposed(kBoardExposure * options.exposure * sum / static_cast<double>(each_),
+                                options.noise, response_, random);
   }
   return picture;
 }
@@ -183,7 +186,7 @@ Image8 SeenBoard::under(const StripeSlide& slide, const BoardSceneOptions& optio
     }
     if (options.chroma > 0) blur_chroma(row, options.chroma);
     for (std::size_t i = 0; i < row.size(); ++i)
-      picture.row(y)[i] = exposed(static_cast<double>(row[i]), options.noise, random);
+      picture.row(y)[i] = exposed(static_cast<double>(row[i]), options.noise, response_, random);
   }
   return picture;
 }

@@ -9,6 +9,7 @@
 #include "base/rig.h"
 #include "capture/calibrate/board_surface.h"
 #include "capture/calibrate/bundle.h"
+#include "capture/camera_response.h"
 #include "capture/pattern/gray_code.h"
 #include "capture/source/sim/stripe_light.h"
 
@@ -51,6 +52,7 @@ class SeenBoard {
   float reach(std::size_t pixel, bool along_rows) const;
 
   Rig rig_;
+  CameraResponse response_;
   std::size_t each_;  // samples a pixel
   int samples_;
   std::vector<Sample> traced_;
@@ -72,7 +74,7 @@ class SceneRandom {
 };
 
 /// `value` with noise as a camera's 8 bits.
-std::uint8_t exposed(double value, double noise, SceneRandom& random);
+std::uint8_t exposed(double value, double noise, const CameraResponse& response, SceneRandom& random);
 
 /// Grey level of albedo 1 in the projector's white.
 constexpr double kBoardExposure = 220;

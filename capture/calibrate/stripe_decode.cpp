@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "capture/camera_response.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/refine.h"
@@ -38,18 +39,19 @@ struct Found {
 /// One axis, as columns.
 class AxisDecoder {
  public:
-  AxisDecoder(const Pattern& pattern, const std::array<double, 9>& colour_matrix, WorkerPool& pool)
+  AxisDecoder(const Pattern& pattern, const CameraColours& colours, WorkerPool& pool)
       : pattern_(pattern),
-        differencer_(colour_matrix),
-        refiner_(colour_matrix),
+        response_(colours.gamma),
+        differencer_(colours.matrix),
+        refiner_(colours.matrix),
         sequences_{SequenceDecoder(pattern), SequenceDecoder(reversed(pattern))},
         pool_(pool) {}
 
-  void add(Image8 lit, Image8 complement) {
+  void add(const Image8& lit, const Image8& complement) {
     CapturedFrame frame;
     frame.scan = Scan::kProgressive;
-    frame.picture = std::move(lit);
-    frame.complement = std::move(complement);
+    frame.picture = response_.straightened(lit);
+    frame.complement = response_.straightened(complement);
     differencer_.difference(frame, pool_, images_.emplace_back());
     edge_finder_.find(images_.back(), pool_, edges_.emplace_back());
     lit_.push_back(std::move(frame.picture));
@@ -115,6 +117,7 @@ class AxisDecoder {
   }
 
   const Pattern& pattern_;
+  CameraResponse response_;
   Differencer differencer_;
   EdgeFinder edge_finder_;
   Refiner refiner_;
@@ -195,8 +198,7 @@ Pattern row_pattern(const Pattern& pattern, int projector_width, int projector_h
 }
 
 Result<StripeStack> sort_stripes(std::vector<StripePair> pairs, const Pattern& pattern, int projector_width,
-                                 int projector_height, const std::array<double, 9>& colour_matrix,
-                                 WorkerPool& pool) {
+                                 int projector_height, const CameraColours& colours, WorkerPool& pool) {
   StripeStack out{projector_width, projector_height, pattern, {}, {}};
   for (StripePair& pair : pairs) (along_rows(pair) ? out.rows : out.columns).push_back(std::move(pair));
   if (const Status checked = check(out); !checked) {
@@ -208,10 +210,13 @@ Result<StripeStack> sort_stripes(std::vector<StripePair> pairs, const Pattern& p
   const Pattern rows = row_pattern(pattern, projector_width, projector_height);
   for (const bool turn : {false, true}) {
     auto& slides = turn ? out.rows : out.columns;
-    AxisDecoder decoder(turn ? rows : pattern, colour_matrix, pool);
+    AxisDecoder decoder(turn ? rows : pattern, colours, pool);
     for (const StripePair& pair : slides) {
-      decoder.add(turn ? turned(pair.lit) : pair.lit.clone(),
-                  turn ? turned(pair.complement) : pair.complement.clone());
+      if (turn) {
+        decoder.add(turned(pair.lit), turned(pair.complement));
+      } else {
+        decoder.add(pair.lit, pair.complement);
+      }
     }
     decoder.decode();
     if (decoder.swapped()) std::swap(slides[0], slides[1]);
@@ -219,14 +224,14 @@ Result<StripeStack> sort_stripes(std::vector<StripePair> pairs, const Pattern& p
   return out;
 }
 
-Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const std::array<double, 9>& colour_matrix,
+Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const CameraColours& colours,
                                       WorkerPool& pool) {
   if (const Status checked = check(stack); !checked) return checked.error();
   const int width = stack.width(), height = stack.height();
   ProjectorEdges out{.width = width, .height = height, .columns = {}, .rows = {}};
   const Pattern rows = row_pattern(stack.pattern, stack.projector_width, stack.projector_height);
-  AxisDecoder along_columns(stack.pattern, colour_matrix, pool), along_rows(rows, colour_matrix, pool);
-  for (const StripePair& pair : stack.columns) along_columns.add(pair.lit.clone(), pair.complement.clone());
+  AxisDecoder along_columns(stack.pattern, colours, pool), along_rows(rows, colours, pool);
+  for (const StripePair& pair : stack.columns) along_columns.add(pair.lit, pair.complement);
   for (const StripePair& pair : stack.rows) along_rows.add(turned(pair.lit), turned(pair.complement));
   std::vector<GrayEdge> edges;
   for (const Found& f : along_columns.decode()) {

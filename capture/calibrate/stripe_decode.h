@@ -6,13 +6,13 @@
 // (capture/reconstruct) after exchanging its columns and rows.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "base/image.h"
 #include "base/parallel.h"
 #include "base/pattern.h"
 #include "base/result.h"
+#include "base/rig.h"
 #include "capture/calibrate/local_homography.h"
 
 namespace relievo {
@@ -41,12 +41,11 @@ Pattern row_pattern(const Pattern& pattern, int projector_width, int projector_h
 /// along rows are told apart by their pictures, and slides by their code. Fails where there are not as many
 /// of each as the pattern has slides, and as decode_stripes().
 Result<StripeStack> sort_stripes(std::vector<StripePair> pairs, const Pattern& pattern, int projector_width,
-                                 int projector_height, const std::array<double, 9>& colour_matrix,
-                                 WorkerPool& pool);
+                                 int projector_height, const CameraColours& colours, WorkerPool& pool);
 
 /// The boundaries of both axes. The slides may come in any order: the code tells them apart. Fails where the
 /// stack is not one or two slides of each axis in pictures of one size, or hardly a boundary is decoded.
-Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const std::array<double, 9>& colour_matrix,
+Result<ProjectorEdges> decode_stripes(const StripeStack& stack, const CameraColours& colours,
                                       WorkerPool& pool);
 
 }  // namespace relievo

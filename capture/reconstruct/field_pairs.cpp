@@ -56,10 +56,11 @@ std::uint8_t clamp_byte(float v) {
 FieldPairs::FieldPairs(Scheme scheme, const Rig& rig)
     : scheme_(scheme), colour_matrix_(rig.colour_matrix), frame_ns_(std::llround(1e9 / rig.frame_rate)) {}
 
-const CapturedFrame* FieldPairs::read(const CapturedFrame& frame, WorkerPool& pool) {
+const CapturedFrame* FieldPairs::read(const SeenFrame& seen, WorkerPool& pool) {
+  const CapturedFrame& frame = seen.light;
   if (scheme_ == Scheme::kWhiteFrame) {
     if (is_white(frame)) {
-      copy_picture(frame.picture, white_);
+      copy_picture(seen.captured.picture, white_);
       white_time_ns_ = texture_time_ns_ = frame.time_ns;
       ++textures_;
       return nullptr;

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/camera_response.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -20,13 +21,14 @@ class FieldPairs {
  public:
   FieldPairs(Scheme scheme, const Rig& rig);
 
-  /// The frame as a slide and its complement: `frame` itself, or under white-field one made of it (valid
-  /// until the next call). Null where the frame was white (white-frame). The frame's size must be the rig's.
-  const CapturedFrame* read(const CapturedFrame& frame, WorkerPool& pool);
+  /// The frame as a slide and its complement, in light: `frame.light` itself, or under white-field one made
+  /// of it (valid until the next call). Null where the frame was white (white-frame). The frame's size must
+  /// be the rig's.
+  const CapturedFrame* read(const SeenFrame& frame, WorkerPool& pool);
 
-  /// The scene in white light where the scheme shows it, as of `frame`, the one read last: under white-field
-  /// its white field, under white-frame the last white frame. False where there is none, and the texture is
-  /// to be made of the slide and its complement. `out` is reused where its size fits.
+  /// The scene in white light where the scheme shows it, as of `frame`, captured as read last: under
+  /// white-field its white field, under white-frame the last white frame. False where there is none, and the
+  /// texture is to be made of the slide and its complement. `out` is reused where its size fits.
   bool white(const CapturedFrame& frame, Image8& out) const;
   /// When what white() gives was exposed, or else the frame read last.
   std::int64_t texture_time_ns() const { return texture_time_ns_; }
@@ -48,7 +50,7 @@ class FieldPairs {
   std::int64_t texture_time_ns_ = 0;
   std::uint64_t textures_ = 0;
   std::vector<float> contrasts_;  // white-frame: of the last frames' two exposures, 0..1
-  Image8 white_;                  // white-frame: the last white frame; white-field: the frame before
+  Image8 white_;  // white-frame: the last white frame, captured; white-field: the frame before, in light
   std::int64_t white_time_ns_ = 0;
   CapturedFrame made_;  // white-field
 };

@@ -45,10 +45,10 @@ struct MovingTexture::Exposures {
   Rows slide, complement;
 };
 
-MovingTexture::MovingTexture(const std::array<double, 9>& colour_matrix, int line_stride)
-    : line_stride_(line_stride) {
+MovingTexture::MovingTexture(const CameraColours& colours, int line_stride)
+    : response_(colours.gamma), line_stride_(line_stride) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Matrix matrix = Eigen::Map<const Matrix>(colour_matrix.data());
+  const Matrix matrix = Eigen::Map<const Matrix>(colours.matrix.data());
   const auto columns_of = [](const Eigen::Matrix3f& m, std::array<Four, 3>& out) {
     for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(i)] = Four{m(0, i), m(1, i), m(2, i), 0};
   };
@@ -197,7 +197,8 @@ void MovingTexture::mend_between(const Stripe& a, const Stripe& b, Columns colum
   const Four rise = length > 0 ? (b.white - a.white) / length : Four{};
   for (int x = columns.begin; x < columns.end; ++x) {
     std::uint8_t* rgb = texture + static_cast<std::ptrdiff_t>(3) * x;
-    Four seen = times(matrix_, rgb);
+    Four seen = times(matrix_, std::array{response_.light_of(rgb[0]), response_.light_of(rgb[1]),
+                                          response_.light_of(rgb[2])});
     Four own = a.white + rise * (static_cast<float>(x) - from);
     if (!all) {
       const Four of_seen = seen * kept;
@@ -210,8 +211,8 @@ void MovingTexture::mend_between(const Stripe& a, const Stripe& b, Columns colum
     const auto striped = off > kLeft * own + (least + kLeftLevels);
     if ((striped[0] | striped[1] | striped[2]) == 0) continue;
     seen = striped ? own : seen;
-    const Four out = times(inverse_, seen) + 0.5F;
-    for (int c = 0; c < 3; ++c) rgb[c] = static_cast<std::uint8_t>(std::clamp(out[c], 0.F, 255.F));
+    const Four out = times(inverse_, seen);
+    for (int c = 0; c < 3; ++c) rgb[c] = response_.value_of(out[c]);
     mended[x] = 1;
   }
 }

@@ -11,6 +11,8 @@
 #include "base/image.h"
 #include "base/parallel.h"
 #include "base/pattern.h"
+#include "base/rig.h"
+#include "capture/camera_response.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/four.h"
@@ -29,12 +31,12 @@ struct ShownStripes {
 /// Keeps its scratch memory from frame to frame. One thread.
 class MovingTexture {
  public:
-  /// `colour_matrix` is M of Eq. 1 and must have an inverse; `line_stride` that of the grids.
-  explicit MovingTexture(const std::array<double, 9>& colour_matrix, int line_stride = 1);
+  /// The colours' matrix must have an inverse; `line_stride` is that of the grids.
+  explicit MovingTexture(const CameraColours& colours, int line_stride = 1);
 
-  /// `texture`, RGB and the fields' sum, gets the slide's own light where things move and the complement,
-  /// times `gains`, shows something else. Rows between lines become what lies between these there. The same
-  /// for any number of threads.
+  /// `frame` is in light. `texture`, the fields' sum in the camera's values, RGB, gets the slide's own light
+  /// where things move and the complement, times `gains`, shows something else. Rows between lines become
+  /// what lies between these there. The same for any number of threads.
   void mend(const CapturedFrame& frame, const ShownStripes& shown, const std::array<float, 3>& gains,
             WorkerPool& pool, Image8& texture);
 
@@ -71,6 +73,7 @@ class MovingTexture {
                     std::uint8_t* texture, std::uint8_t* mended) const;
   void mend_rows_behind(int line, Image8& texture) const;
 
+  CameraResponse response_;
   std::array<Four, 3> matrix_, inverse_;  // columns of M and of its inverse
   int line_stride_;
   int width_ = 0;

@@ -97,14 +97,15 @@ struct Reconstructor::State {
         pattern(p),
         options(o),
         pool(o.threads),
+        response(r.camera_gamma),
         steps(p, r),
         pairs(p.scheme, r),
         decoder(r, p, o),
         lines(line_count(r, o.line_stride)),
         triangulator(r, p, lines, line_step_px(r.scan, o.line_stride)),
         depths(p.boundaries(), r.camera.width, lines, kDepthLines),
-        white_texture(r.colour_matrix, o.decoder == Decoder::kQuick, o.line_stride),
-        moving_texture(r.colour_matrix, o.line_stride),
+        white_texture(colours_of(r), o.decoder == Decoder::kQuick, o.line_stride),
+        moving_texture(colours_of(r), o.line_stride),
         half_way(p.boundaries(), lines),
         surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface,
                         o.decoder == Decoder::kPaper ? 0 : SurfaceOptions{}.least_component) {
@@ -118,6 +119,7 @@ struct Reconstructor::State {
   Pattern pattern;
   ReconstructOptions options;
   WorkerPool pool;
+  CameraResponse response;
   StepKeeper steps;
   std::optional<ExposureOrder> exposure_order;  // of a single slide
   FieldPairs pairs;
@@ -137,7 +139,8 @@ struct Reconstructor::State {
   Image8 last_texture;  // white-field: of the frame before
   std::int64_t last_texture_time_ns = 0;
   ReconstructReport report;
-  const CapturedFrame* pair = nullptr;  // what the last frame's exposures show; null: no slide
+  CapturedFrame straight;               // the last frame in light, of a camera with a curve
+  const CapturedFrame* pair = nullptr;  // what the last frame's exposures show, in light; null: no slide
 
   std::mutex spare_mutex;
   std::vector<Frame3D> spare;  // handed back; guarded by spare_mutex
@@ -146,6 +149,7 @@ struct Reconstructor::State {
   Result<const CapturedFrame*> observe(const CapturedFrame& captured);
   Frame3D blank_frame();
   void make_surface(DecodedGrid& grid, const std::vector<SecondPlace>& second, Surface& out);
+  SeenFrame seen(const CapturedFrame& frame) const;
   void make_texture(const CapturedFrame& frame, Image8& out);
   std::optional<Frame3D> surface_between(const CapturedFrame& frame);
 };
@@ -169,12 +173,18 @@ Result<const CapturedFrame*> Reconstructor::State::observe(const CapturedFrame& 
   report.step = steps.report();
   if (report.step.restarted) forget();
   if (frame == nullptr) return frame;
-  pair = pairs.read(*frame, pool);
+  if (!response.is_straight()) response.straighten(*frame, pool, straight);
+  pair = pairs.read(seen(*frame), pool);
   report.white = pair == nullptr;
   if (pair == nullptr) return frame;
   decoder.observe(*pair, pool, report);
   report.detect_ms = clock.lap_ms();
   return frame;
+}
+
+/// Of the frame that was observed last.
+SeenFrame Reconstructor::State::seen(const CapturedFrame& frame) const {
+  return {frame, response.is_straight() ? frame : straight};
 }
 
 /// Whatever it holds is overwritten.
@@ -211,11 +221,11 @@ void Reconstructor::State::make_texture(const CapturedFrame& frame, Image8& out)
   } else if (pairs.white(frame, out)) {
     return;
   } else if (options.decoder == Decoder::kPaper) {
-    add_fields(frame, pool, out);
+    add_fields(frame, response, pool, out);
   } else {
-    white_texture.make(frame, decoded, pool, out);
-    moving_texture.mend(frame, {decoded, decoder.shown_colours(), decoder.moving()}, white_texture.gains(),
-                        pool, out);
+    white_texture.make(seen(frame), decoded, pool, out);
+    moving_texture.mend(seen(frame).light, {decoded, decoder.shown_colours(), decoder.moving()},
+                        white_texture.gains(), pool, out);
   }
 }
 

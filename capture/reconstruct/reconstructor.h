@@ -88,8 +88,8 @@ class Reconstructor {
   const ReconstructReport& report() const;
 
   /// What the last add() decoded: a slide and its complement, of the frame itself or made of it as the scheme
-  /// and projector and camera out of step need. Null where it decoded nothing. Valid until the next add(), as
-  /// long as the frame that it was given.
+  /// and projector and camera out of step need, in light (CameraResponse). Null where it decoded nothing.
+  /// Valid until the next add(), as long as the frame that it was given.
   const CapturedFrame* decoded() const;
 
  private:

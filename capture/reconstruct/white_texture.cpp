@@ -29,10 +29,6 @@ float mix(const std::array<float, 9>& m, std::size_t row, const float* rgb) {
 // The loops over every sample, compiled for wider registers too: the same operations, so the same results.
 #define RELIEVO_INLINE __attribute__((always_inline)) inline
 
-RELIEVO_INLINE void to_floats(const std::uint8_t* from, int samples, float* to) {
-  for (int i = 0; i < samples; ++i) to[i] = from[i];
-}
-
 RELIEVO_INLINE void store_sum(const float* a, const float* b, int samples, std::uint8_t* to) {
   for (int i = 0; i < samples; ++i)
     to[i] = static_cast<std::uint8_t>(static_cast<int>(std::min(std::max(a[i] + b[i] + 0.5F, 0.F), 255.F)));
@@ -47,49 +43,46 @@ RELIEVO_INLINE void differences(const std::uint8_t* a, const std::uint8_t* b, in
 
 /// Between `above` and `below`, the nearer to the one whose differences are smaller; sums of three samples in
 /// a row, which for green are the pixel's own three.
-RELIEVO_INLINE void weigh(const std::uint8_t* above, const std::uint8_t* below, const std::int16_t* d_above,
+RELIEVO_INLINE void weigh(const float* above, const float* below, const std::int16_t* d_above,
                           const std::int16_t* d_below, int samples, float* to) {
   for (int i = 0; i < samples; ++i) {
     const auto a = static_cast<float>(d_above[i - 1] + d_above[i] + d_above[i + 1]);
     const auto b = static_cast<float>(d_below[i - 1] + d_below[i] + d_below[i + 1]);
     const float fa = a * a + RowKernels::kAlike * RowKernels::kAlike;
     const float fb = b * b + RowKernels::kAlike * RowKernels::kAlike;
-    const auto low = static_cast<float>(below[i]);
-    to[i] = low + fb / (fa + fb) * (static_cast<float>(above[i]) - low);
+    to[i] = below[i] + fb / (fa + fb) * (above[i] - below[i]);
   }
 }
 
-/// One row of an interlaced picture: its own samples and those of the other field.
+/// One row of an interlaced picture and those beside it.
 struct RowView {
-  const std::uint8_t *own, *above, *below;        // the row, and those beside it, of the other field
-  const std::uint8_t *field_above, *field_below;  // the next of its own field
+  const std::uint8_t *own, *field_above, *field_below;  // values of the row, and of the next of its own field
+  const float *above, *below;                           // light of the rows beside it, of the other field
   int samples;
 };
 struct RowScratch {
   std::int16_t *above, *below;
-  float *own, *other;
 };
-RELIEVO_INLINE void split_body(const RowView& row, const RowScratch& scratch) {
+RELIEVO_INLINE void other_body(const RowView& row, const RowScratch& scratch, float* to) {
   differences(row.own, row.field_above, row.samples, scratch.above);
   differences(row.own, row.field_below, row.samples, scratch.below);
-  weigh(row.above, row.below, scratch.above, scratch.below, row.samples, scratch.other);
-  to_floats(row.own, row.samples, scratch.own);
+  weigh(row.above, row.below, scratch.above, scratch.below, row.samples, to);
 }
 #undef RELIEVO_INLINE
 
 struct Loops {
-  void (*split)(const RowView& row, const RowScratch& scratch);
+  void (*other)(const RowView& row, const RowScratch& scratch, float* to);  // the other field's light there
   void (*store_sum)(const float* a, const float* b, int samples, std::uint8_t* to);
 };
-void split_portable(const RowView& row, const RowScratch& scratch) {
-  split_body(row, scratch);
+void other_portable(const RowView& row, const RowScratch& scratch, float* to) {
+  other_body(row, scratch, to);
 }
 void store_sum_portable(const float* a, const float* b, int samples, std::uint8_t* to) {
   store_sum(a, b, samples, to);
 }
 #if defined(__x86_64__)
-[[gnu::target("avx2")]] void split_avx2(const RowView& row, const RowScratch& scratch) {
-  split_body(row, scratch);
+[[gnu::target("avx2")]] void other_avx2(const RowView& row, const RowScratch& scratch, float* to) {
+  other_body(row, scratch, to);
 }
 [[gnu::target("avx2")]] void store_sum_avx2(const float* a, const float* b, int samples, std::uint8_t* to) {
   store_sum(a, b, samples, to);
@@ -99,21 +92,24 @@ void store_sum_portable(const float* a, const float* b, int samples, std::uint8_
 const Loops& loops() {
   static const Loops best = [] {
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) return Loops{split_avx2, store_sum_avx2};
+    if (__builtin_cpu_supports("avx2")) return Loops{other_avx2, store_sum_avx2};
 #endif
-    return Loops{split_portable, store_sum_portable};
+    return Loops{other_portable, store_sum_portable};
   }();
   return best;
 }
 
 }  // namespace
 
-WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly, int line_stride)
-    : line_stride_(line_stride), quickly_(quickly), every_(quickly ? kEveryQuickly : kEvery) {
+WhiteTexture::WhiteTexture(const CameraColours& colours, bool quickly, int line_stride)
+    : response_(colours.gamma),
+      line_stride_(line_stride),
+      quickly_(quickly),
+      every_(quickly ? kEveryQuickly : kEvery) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
+  const Matrix inverse = Eigen::Map<const Matrix>(colours.matrix.data()).inverse();
   for (std::size_t i = 0; i < 9; ++i) {
-    matrix_[i] = static_cast<float>(colour_matrix[i]);
+    matrix_[i] = static_cast<float>(colours.matrix[i]);
     inverse_[i] = static_cast<float>(inverse.data()[i]);
   }
 }
@@ -184,12 +180,19 @@ void WhiteTexture::level(float* row, int width) const {
   }
 }
 
+void WhiteTexture::store_sum(const Scratch& scratch, int samples, std::uint8_t* to) const {
+  const float* own = scratch.own.data();
+  const float* other = scratch.other.data();
+  if (response_.is_straight()) return loops().store_sum(own, other, samples, to);
+  for (int i = 0; i < samples; ++i) to[i] = response_.value_of(own[i] + other[i]);
+}
+
 void WhiteTexture::progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const {
   const int width = frame.picture.width();
-  to_floats(frame.picture.row(y), 3 * width, scratch.own.data());
-  to_floats(frame.complement.row(y), 3 * width, scratch.other.data());
+  response_.light_of(frame.picture.row(y), 3 * width, scratch.own.data());
+  response_.light_of(frame.complement.row(y), 3 * width, scratch.other.data());
   level(scratch.other.data(), width);
-  loops().store_sum(scratch.own.data(), scratch.other.data(), 3 * width, out.row(y));
+  store_sum(scratch, 3 * width, out.row(y));
 }
 
 void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const {
@@ -202,25 +205,33 @@ void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& sc
   // A row above or below is of the other field, but the next ones are of this one: the more alike they are,
   // the more what lies between belongs to the same surface. At the picture's edge only one is there.
   const bool inside = y >= 2 && y + 2 < height;
-  const RowView row{own,      above, below, picture.row(inside ? y - 2 : y), picture.row(inside ? y + 2 : y),
-                    3 * width};
-  if (!level_) {
-    row_kernels().weave_rows({own, above, below, row.field_above, row.field_below}, 3 * width,
+  const std::uint8_t* field_above = picture.row(inside ? y - 2 : y);
+  const std::uint8_t* field_below = picture.row(inside ? y + 2 : y);
+  if (!level_ && response_.is_straight()) {
+    row_kernels().weave_rows({own, above, below, field_above, field_below}, 3 * width,
                              scratch.differences.data(), out.row(y));
     return;
   }
-  float* other = scratch.other.data();
-  loops().split(row, {scratch.above.data() + 1, scratch.below.data() + 1, scratch.own.data(), other});
-  level(y % 2 == first_row(frame.field_order, 0) ? other : scratch.own.data(), width);
-  loops().store_sum(scratch.own.data(), other, 3 * width, out.row(y));
+  const auto light = [&](const std::uint8_t* row, std::vector<float>& to) {
+    response_.light_of(row, 3 * width, to.data());
+    return to.data();
+  };
+  loops().other(
+      {own, field_above, field_below, light(above, scratch.own), light(below, scratch.beside), 3 * width},
+      {scratch.above.data() + 1, scratch.below.data() + 1}, scratch.other.data());
+  light(own, scratch.own);
+  if (level_)
+    level(y % 2 == first_row(frame.field_order, 0) ? scratch.other.data() : scratch.own.data(), width);
+  store_sum(scratch, 3 * width, out.row(y));
 }
 
-void WhiteTexture::make(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool, Image8& out) {
-  measure_gains(frame, grid, pool);
+void WhiteTexture::make(const SeenFrame& seen, const DecodedGrid& grid, WorkerPool& pool, Image8& out) {
+  measure_gains(seen.light, grid, pool);
+  const CapturedFrame& frame = seen.captured;
   const int width = frame.picture.width();
   const int height = frame.picture.height();
   if (height < 2 || (!level_ && (quickly_ || frame.scan == Scan::kProgressive))) {
-    add_fields(frame, pool, out);
+    add_fields(frame, response_, pool, out);
     return;
   }
   if (out.width() != width || out.height() != height || out.channels() != 3) out = Image8(width, height, 3);
@@ -231,6 +242,7 @@ void WhiteTexture::make(const CapturedFrame& frame, const DecodedGrid& grid, Wor
     s.below.resize(samples + 2);
     s.own.resize(samples);
     s.other.resize(samples);
+    s.beside.resize(samples);
     s.differences.resize(2 * (samples + 2));
   }
   pool.for_ranges(height, [&](int begin, int end, int worker) {

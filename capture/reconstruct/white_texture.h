@@ -11,6 +11,8 @@
 
 #include "base/image.h"
 #include "base/parallel.h"
+#include "base/rig.h"
+#include "capture/camera_response.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/ranked_sample.h"
@@ -21,15 +23,14 @@ namespace relievo {
 /// Keeps its scratch memory from frame to frame. One thread.
 class WhiteTexture {
  public:
-  /// `colour_matrix` is M of Eq. 1. `quickly`: by fewer boundaries, and where nothing is to be brought level
-  /// by adding the fields. `line_stride` is that of the grids, as in ReconstructOptions.
-  explicit WhiteTexture(const std::array<double, 9>& colour_matrix, bool quickly = false,
-                        int line_stride = 1);
+  /// `quickly`: by fewer boundaries, and where nothing is to be brought level by adding the fields.
+  /// `line_stride` is that of the grids, as in ReconstructOptions.
+  explicit WhiteTexture(const CameraColours& colours, bool quickly = false, int line_stride = 1);
 
-  /// RGB, the size of the camera's picture; values saturate at 255. Across each boundary of `grid`, what the
-  /// slide loses of a primary its complement gains, so they tell how bright one is by the other. `out` is
-  /// reused where its size fits.
-  void make(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool, Image8& out);
+  /// RGB, the size of the camera's picture, in the camera's values, which saturate at 255. Across each
+  /// boundary of `grid`, what the slide loses of a primary its complement gains, so they tell how bright one
+  /// is by the other. `out` is reused where its size fits.
+  void make(const SeenFrame& frame, const DecodedGrid& grid, WorkerPool& pool, Image8& out);
 
   /// What the complement's calibrated red, green and blue were multiplied by in the last frame.
   const std::array<float, 3>& gains() const { return gains_; }
@@ -37,15 +38,17 @@ class WhiteTexture {
  private:
   struct Scratch {
     std::vector<std::int16_t> above, below;  // [3 width + 2]: how much the field's own rows differ
-    std::vector<float> own, other;           // [3 width]
+    std::vector<float> own, other, beside;   // [3 width]
     std::vector<std::uint8_t> differences;   // as weave_rows() asks for
   };
   void measure_gains(const CapturedFrame& frame, const DecodedGrid& grid, WorkerPool& pool);
   void measure_ratios(const DetectionLines& rows, const DecodedGrid& grid, int line, int worker);
   void level(float* row, int width) const;
+  void store_sum(const Scratch& scratch, int samples, std::uint8_t* to) const;
   void progressive_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
   void interlaced_row(const CapturedFrame& frame, int y, Scratch& scratch, Image8& out) const;
 
+  CameraResponse response_;
   std::array<float, 9> matrix_;
   std::array<float, 9> inverse_;
   std::array<float, 9>

@@ -139,6 +139,7 @@ Rig make_rig(const SimOptions& o, const SceneView& view) {
   for (std::size_t i = 0; i < 9; ++i) mixed[i] = (i % 4 == 0 ? 1 - o.crosstalk : 0) + o.crosstalk * seen[i];
   const Mat3 matrix = inverse(mixed);
   for (std::size_t i = 0; i < 9; ++i) rig.colour_matrix[i] = static_cast<double>(matrix.m[i]);
+  rig.camera_gamma = o.gamma;
   return rig;
 }
 
@@ -165,7 +166,8 @@ Renderer::Renderer(const SimOptions& options, const Rig& rig, const Pattern& pat
       rig_(rig),
       scene_(std::move(scene)),
       pattern_(pattern),
-      rays_(pixel_rays(rig.camera)) {
+      rays_(pixel_rays(rig.camera)),
+      response_(rig.camera_gamma) {
   for (int slide = 0; slide < pattern.slides; ++slide) {
     lights_.emplace_back(pattern, slide, rig.projector.width, options.defocus);
   }
@@ -441,8 +443,7 @@ void Renderer::quantise(const Row& row, std::uint64_t noise_key, std::uint8_t* o
     const std::size_t start = (noise_key >> (16 * c)) & (kNoiseValues - 1);
     for (std::size_t x = 0; x < width; ++x) {
       const float noise = noise_.empty() ? 0 : noise_[(start + x) & (kNoiseValues - 1)];
-      const float value = in[x] + noise + 0.5f;
-      out[3 * x + c] = static_cast<std::uint8_t>(value < 0 ? 0 : value > 255 ? 255 : value);
+      out[3 * x + c] = response_.value_of(in[x] + noise);
     }
   }
 }

@@ -12,6 +12,7 @@
 #include "base/image.h"
 #include "base/pattern.h"
 #include "base/rig.h"
+#include "capture/camera_response.h"
 #include "capture/pattern/schedule.h"
 #include "capture/source/sim/scene.h"
 #include "capture/source/sim/sim_options.h"
@@ -83,8 +84,9 @@ class Renderer {
   Rig rig_;
   std::shared_ptr<const Scene> scene_;
   Pattern pattern_;
-  std::vector<StripeLight> lights_;    // one a slide
-  std::vector<Vec3> rays_;             // one a pixel, z = 1
+  std::vector<StripeLight> lights_;  // one a slide
+  std::vector<Vec3> rays_;           // one a pixel, z = 1
+  CameraResponse response_;
   Mat3 camera_colour_from_projected_;  // crosstalk, inverse of Eq. 1's M
   Mat3 projector_from_camera_;
   Vec3 projector_translation_, projector_centre_;

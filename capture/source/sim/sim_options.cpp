@@ -40,6 +40,7 @@ constexpr Key kKeys[] = {
     {"gloss", &SimOptions::gloss, 0, 100, "times each material's gloss"},
     {"albedo", &SimOptions::albedo, 0, 2, "times each material's albedo"},
     {"crosstalk", &SimOptions::crosstalk, 0, 1, "of the colour channels, 0: none"},
+    {"gamma", &SimOptions::gamma, 1, 3, "of the camera, whose rig.yaml says so"},
     {"exposure", &SimOptions::exposure, 0.01, 100, "times the scene's own"},
     {"rays", &SimOptions::rays, 1, 8,
      "rays of a pixel each way where shapes meet, 1: one through its middle alone"},

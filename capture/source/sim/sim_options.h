@@ -43,6 +43,7 @@ struct SimOptions {
   double gloss = 1.0;      // times each material's own gloss
   double albedo = 1.0;     // times each material's own albedo: dark scenes
   double crosstalk = 1.0;  // 0: the camera sees the projector's primaries as they are
+  double gamma = 1.0;      // of the camera: CameraColours
   double exposure = 1.0;   // times the exposure that puts white at working distance to 230
   int rays = 1;  // of a pixel, each way, where shapes and their faces meet; 1: one through its middle alone
   double distortion = 0.0;  // times the lens distortion of a cheap camera and projector

@@ -69,6 +69,35 @@ TEST(CalibrationExample, FromNothingToAReconstruction) {
   EXPECT_LT(calibrated.at("median_um_per_m").get<double>(), 1000);
 }
 
+// A camera whose gamma cannot be switched off: colours tell it, and what is decoded with them is as exact.
+TEST(CalibrationExample, ACurvedCameraIsStraightened) {
+  const TempFolder folder;
+  const std::string out = (folder / "example").string(), rig = (folder / "rig.yaml").string();
+  const json example =
+      report({"calibrate", "example", "--rig", "object,gamma=2.2", "--out", out, "--views", "4", "--json"});
+  const json colour = report({"calibrate", "colour", out + "/colours", "--out", rig, "--json"});
+  EXPECT_NEAR(colour.at("camera_gamma").get<double>(), 2.2, 0.05);
+  EXPECT_LT(colour.at("residual").get<double>(), 3);
+  report({"calibrate", "geometry", out + "/views", "--board", example.at("board"), "--projector",
+          example.at("projector"), "--update", rig, "--json"});
+  const auto written = read_rig(rig);
+  ASSERT_TRUE(written.ok()) << written.error().message;
+  EXPECT_EQ(written->camera_gamma, colour.at("camera_gamma").get<double>());
+
+  const std::string take = (folder / "take").string();
+  ASSERT_EQ(server({"simulate", "--scene", "object,gamma=2.2", "--frames", "3", "--out", take}).status, 0);
+  const json with_truth = report({"evaluate", take, "--json"});
+  report({"calibrate", "colour", out + "/colours", "--update", take + "/rig.yaml", "--json"});
+  const json told = report({"evaluate", take, "--json"});
+  EXPECT_LT(told.at("rms_um_per_m").get<double>(), 1.1 * with_truth.at("rms_um_per_m").get<double>());
+
+  const json as_is =
+      report({"calibrate", "colour", out + "/colours", "--gamma", "1", "--out", rig, "--json"});
+  EXPECT_EQ(as_is.at("camera_gamma"), 1);
+  EXPECT_GT(as_is.at("residual").get<double>(), 10);
+  EXPECT_NE(server({"calibrate", "colour", out + "/colours", "--gamma", "0.45", "--out", rig}).status, 0);
+}
+
 TEST(CalibrationExample, CharucoBoardUnderGrayCode) {
   const TempFolder folder;
   const std::string out = (folder / "example").string(), rig = (folder / "rig.yaml").string();

@@ -94,7 +94,7 @@ TEST(SortStripes, PairsInAnyOrderBecomeAStack) {
   const auto pair = [](const StripePair& p) { return StripePair{p.lit.clone(), p.complement.clone()}; };
   const auto sort = [&](std::vector<StripePair> pairs) {
     WorkerPool pool(2);
-    return sort_stripes(std::move(pairs), *pattern, 800, 600, rig.colour_matrix, pool);
+    return sort_stripes(std::move(pairs), *pattern, 800, 600, colours_of(rig), pool);
   };
   std::vector<StripePair> mixed;
   mixed.push_back(pair(stack.rows[1]));

@@ -189,12 +189,13 @@ TEST(RigPart, ColoursThatAreNoNumbersAreRefused) {
 
 TEST(RigPart, ColoursAloneReadBackExactly) {
   const TempFolder folder;
-  const std::array<double, 9> colours = {1.25, -0.1, 1.0 / 3, 0, 1, 0, -1e-7, 0, 2};
+  const CameraColours colours{{1.25, -0.1, 1.0 / 3, 0, 1, 0, -1e-7, 0, 2}, 1 + 1.0 / 3};
   std::ofstream(folder / "rig.yaml") << colour_yaml(colours);
   const auto part = read_rig_part(folder / "rig.yaml");
   ASSERT_TRUE(part.ok()) << part.error().message;
   EXPECT_FALSE(part->whole);
-  EXPECT_EQ(part->colour_matrix, colours);
+  EXPECT_EQ(part->colours->matrix, colours.matrix);
+  EXPECT_EQ(part->colours->gamma, colours.gamma);
   std::ofstream(folder / "empty.yaml") << "%YAML:1.0\n---\nscan: interlaced\n";
   EXPECT_THAT(read_rig_part(folder / "empty.yaml").error().message, HasSubstr("is no rig.yaml"));
 }

@@ -34,7 +34,7 @@ Rig coloured_truth() {
   return rig;
 }
 
-constexpr std::array<double, 9> kNoMatrix = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+const CameraColours kNotKnown;
 
 Pattern stripes(int count) {
   return *make_pattern(6, 2, 0, count);
@@ -96,8 +96,8 @@ TEST(Stripes, BoundariesOfBothAxesAreWhereTheBoardPutsThem) {
   const StripeStack whole = render_stripe_view(rig, kBoard, pose, stripes(64), 0.7, {.chroma = 1});
   WorkerPool pool(2);
   for (const bool halves : {false, true}) {
-    const auto edges = halves ? decode_stripes(interlaced(whole), rig.colour_matrix, pool)
-                              : decode_stripes(whole, rig.colour_matrix, pool);
+    const auto edges = halves ? decode_stripes(interlaced(whole), colours_of(rig), pool)
+                              : decode_stripes(whole, colours_of(rig), pool);
     ASSERT_TRUE(edges.ok()) << edges.error().message;
     const Quality columns = quality(edges->columns, rig, pose, 0), rows = quality(edges->rows, rig, pose, 1);
     EXPECT_GT(columns.edges, 20000u);
@@ -115,7 +115,7 @@ TEST(Stripes, SlidesMayComeInEitherOrder) {
   StripeStack stack = render_stripe_view(rig, kBoard, pose, stripes(64), 0.7, {});
   std::swap(stack.columns[0], stack.columns[1]);
   WorkerPool pool(2);
-  const auto edges = decode_stripes(stack, rig.colour_matrix, pool);
+  const auto edges = decode_stripes(stack, colours_of(rig), pool);
   ASSERT_TRUE(edges.ok()) << edges.error().message;
   EXPECT_LT(quality(edges->columns, rig, pose, 0).wrong, 0.01);
 }
@@ -127,14 +127,14 @@ TEST(Stripes, OneSlideIsEnoughForFewStripes) {
   ASSERT_TRUE(pattern.ok());
   WorkerPool pool(2);
   const auto edges =
-      decode_stripes(render_stripe_view(rig, kBoard, pose, *pattern, 0.7, {}), rig.colour_matrix, pool);
+      decode_stripes(render_stripe_view(rig, kBoard, pose, *pattern, 0.7, {}), colours_of(rig), pool);
   ASSERT_TRUE(edges.ok()) << edges.error().message;
   EXPECT_LT(quality(edges->columns, rig, pose, 0).wrong, 0.01);
   EXPECT_LT(quality(edges->rows, rig, pose, 1).wrong, 0.01);
 }
 
 /// Of six views, interlaced, with or without the colour matrix.
-Geometry calibrated(const Rig& rig, bool interlaced_camera, const std::array<double, 9>& colour_matrix) {
+Geometry calibrated(const Rig& rig, bool interlaced_camera, const CameraColours& colours) {
   const auto poses = example_poses(rig, kBoard, 1.0, 6, 1);
   std::vector<MeasuredView> views;
   WorkerPool pool(2);
@@ -142,8 +142,8 @@ Geometry calibrated(const Rig& rig, bool interlaced_camera, const std::array<dou
     const StripeStack stack = render_stripe_view(rig, kBoard, poses[i], stripes(64), 0.7,
                                                  {.chroma = 1, .seed = static_cast<std::uint32_t>(i)});
     const std::string name = "view " + std::to_string(i);
-    views.push_back(interlaced_camera ? measure_view(name, interlaced(stack), kBoard, colour_matrix, pool)
-                                      : measure_view(name, stack, kBoard, colour_matrix, pool));
+    views.push_back(interlaced_camera ? measure_view(name, interlaced(stack), kBoard, colours, pool)
+                                      : measure_view(name, stack, kBoard, colours, pool));
     EXPECT_EQ(views.back().refused, "");
   }
   auto geometry = calibrate(rig, views);
@@ -153,7 +153,7 @@ Geometry calibrated(const Rig& rig, bool interlaced_camera, const std::array<dou
 
 TEST(Stripes, ViewsGiveTheRigBack) {
   const Rig rig = coloured_truth();
-  const Geometry geometry = calibrated(rig, false, rig.colour_matrix);
+  const Geometry geometry = calibrated(rig, false, colours_of(rig));
   EXPECT_EQ(geometry.views, 6u);
   EXPECT_GT(geometry.corners, 370u);
   EXPECT_LT(geometry.stereo_rms, 0.09);
@@ -167,7 +167,7 @@ TEST(Stripes, ViewsGiveTheRigBack) {
 
 TEST(Stripes, AProjectorMayHangFromTheCeiling) {
   const Rig rig = test::hung_up(coloured_truth());
-  const Geometry geometry = calibrated(rig, false, rig.colour_matrix);
+  const Geometry geometry = calibrated(rig, false, colours_of(rig));
   EXPECT_EQ(geometry.views, 6u);
   EXPECT_LT(geometry.stereo_rms, 0.09);
   const auto off = compare_rigs(rig_of(geometry), rig, 1.0);
@@ -178,7 +178,7 @@ TEST(Stripes, AProjectorMayHangFromTheCeiling) {
 
 TEST(Stripes, InterlacedViewsWithoutColourCalibrationAreGoodEnough) {
   const Rig rig = coloured_truth();
-  const Geometry geometry = calibrated(rig, true, kNoMatrix);
+  const Geometry geometry = calibrated(rig, true, kNotKnown);
   EXPECT_EQ(geometry.views, 6u);
   EXPECT_LT(geometry.stereo_rms, 0.2);
   const auto off = compare_rigs(rig_of(geometry), rig, 1.0);
@@ -203,7 +203,7 @@ TEST(StripeFolder, SlidesAsWrittenAreDecodedBack) {
     const auto stack = read_stripe_stack(slides, pattern, 320, 240);
     ASSERT_TRUE(stack.ok()) << stack.error().message;
     WorkerPool pool(1);
-    const auto edges = decode_stripes(*stack, kNoMatrix, pool);
+    const auto edges = decode_stripes(*stack, kNotKnown, pool);
     ASSERT_TRUE(edges.ok()) << edges.error().message;
     EXPECT_GT(edges->columns.edges.size(), 2u * 15 * 230);
     // Beside a field's rows, what lies between them is interpolated: some edges there are given up.
@@ -235,10 +235,10 @@ TEST(Stripes, DarkPicturesAreRefused) {
     stack.rows.push_back({Image8(64, 48, 3), Image8(64, 48, 3)});
   }
   WorkerPool pool(1);
-  EXPECT_THAT(decode_stripes(stack, kNoMatrix, pool).error().message,
+  EXPECT_THAT(decode_stripes(stack, kNotKnown, pool).error().message,
               HasSubstr("hardly any stripe along columns"));
   stack.rows.pop_back();
-  EXPECT_THAT(decode_stripes(stack, kNoMatrix, pool).error().message, HasSubstr("there must be 2 slides"));
+  EXPECT_THAT(decode_stripes(stack, kNotKnown, pool).error().message, HasSubstr("there must be 2 slides"));
 }
 
 /// Corners of a ChArUco board against its true pose.
@@ -250,7 +250,7 @@ TEST(Charuco, PartOfTheBoardIsEnough) {
   for (const double left_m : {-0.42, 0.14}) {  // the camera sees 0.3 m to either side
     pose[3] = left_m;
     const StripeStack stack = render_stripe_view(rig, board, pose, stripes(64), 0.7, {});
-    const MeasuredView view = measure_view("view", stack, board, rig.colour_matrix, pool);
+    const MeasuredView view = measure_view("view", stack, board, colours_of(rig), pool);
     EXPECT_EQ(view.refused, "");
     EXPECT_GT(view.corners.size(), 20u);
     EXPECT_LT(view.corners.size(), 85u);  // of 88
@@ -272,7 +272,7 @@ TEST(Charuco, AnotherDictionaryIsNotTheBoard) {
   const StripeStack stack =
       render_stripe_view(rig, *parse_board("charuco:10x8:25mm:18mm:5X5_100"), pose, stripes(64), 0.7, {});
   const MeasuredView view =
-      measure_view("view", stack, *parse_board("charuco:10x8:25mm:18mm:6X6_50"), rig.colour_matrix, pool);
+      measure_view("view", stack, *parse_board("charuco:10x8:25mm:18mm:6X6_50"), colours_of(rig), pool);
   EXPECT_THAT(view.refused, HasSubstr("is it the board and the dictionary given?"));
 }
 

@@ -209,6 +209,20 @@ TEST(Accuracy, TheClearPathsBoundariesLieBetterThanThePublishedOnes) {
   }
 }
 
+TEST(Accuracy, ACurvedCameraIsAsExactAsAStraightOne) {
+  for (const std::string scene :
+       {"object,stripes=80", "face,scan=progressive,width=640,height=320,stripes=80"}) {
+    for (const Decoder decoder : {Decoder::kOrdered, Decoder::kQuick}) {
+      const Score straight = score_of(Filmed(scene), decoder),
+                  curved = score_of(Filmed(scene + ",gamma=2.2"), decoder);
+      EXPECT_GT(curved.completeness, straight.completeness - 0.001) << scene;
+      EXPECT_LT(curved.outliers, straight.outliers + 0.0003) << scene;
+      EXPECT_LT(curved.median_um_per_m, 1.1 * straight.median_um_per_m) << scene;
+      EXPECT_LT(curved.rms_um_per_m, 1.1 * straight.rms_um_per_m) << scene;
+    }
+  }
+}
+
 // In a fraction of the time: between the two, and nowhere behind the paper's.
 TEST(Accuracy, TheQuickDecoderIsBetterThanThePapers) {
   for (const char* spec : {"object,stripes=71,chroma=1.6", "face,frames=8", "walk,frames=8"}) {

@@ -241,6 +241,25 @@ TEST(RigFile, SaysHowGoodItsCalibrationFoundItWhereThatIsKnown) {
   }
 }
 
+TEST(RigFile, AStraightCameraIsNotSaidToBeOne) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml";
+  Rig rig = test::small_rig(Scan::kInterlaced);
+  const std::string without = to_yaml(rig);
+  EXPECT_EQ(without.find("camera_gamma"), std::string::npos);
+  rig.camera_gamma = 2 + 1.0 / 7;
+  test::write_text(file, to_yaml(rig));
+  const Result<Rig> read = read_rig(file);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->camera_gamma, rig.camera_gamma);
+  for (const char* wrong : {"0.45", "5", "sRGB", ".Nan"}) {
+    test::write_text(file, without + "camera_gamma: " + wrong + "\n");
+    const Result<Rig> refused = read_rig(file);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_THAT(refused.error().message, HasSubstr("camera_gamma"));
+  }
+}
+
 TEST(RigFile, SaysWhereItsCameraStandsWhereThatIsKnown) {
   test::TempFolder folder;
   const auto file = folder.path() / "rig.yaml";

@@ -73,8 +73,8 @@ TEST_F(CalibrationSessionTest, ColoursAreTakenAndKept) {
   EXPECT_EQ(streams_.paused, 1);
   EXPECT_EQ(streams_.resumed, 1);
   const auto part = read_rig_part(rig_);
-  ASSERT_TRUE(part && part->colour_matrix);
-  EXPECT_NEAR((*part->colour_matrix)[0], 1.19, 0.6);
+  ASSERT_TRUE(part && part->colours);
+  EXPECT_NEAR(part->colours->matrix[0], 1.19, 0.6);
   EXPECT_FALSE(session->order("take")) << "it is over";
 }
 
