@@ -33,6 +33,7 @@ constexpr std::int64_t kMaxLate_ns =
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
 constexpr double kSilentFrames = 10;  // times a frame's without one: the source has stalled
 constexpr std::int64_t kSilentAtLeast_ns = kNanosecondsPerSecond;
+constexpr double kSaidBehind_s = 2;  // of frames that may be dropped before the log says so
 constexpr std::int64_t kLookInterval_ns = kNanosecondsPerSecond;  // between pictures whose error is measured
 constexpr std::uint64_t kFramesForASurface = 30;                  // far more than any schedule needs
 constexpr std::uint64_t kMixedForASurface =
@@ -70,7 +71,8 @@ class ThreadedPipeline final : public Pipeline {
         options_(options),
         reconstructor_(std::move(reconstructor)),
         pace_{options.reconstruct.decoder, options.reconstruct.line_stride},
-        pace_control_(line_count(source.info().rig, 1)),
+        pace_control_(line_count(source.info().rig, 1), source.info().rig.frame_rate),
+        drops_(kSaidBehind_s * source.info().rig.frame_rate),
         encoder_(reconstructor_.rig(), reconstructor_.pattern()),
         volume_(options.encode.volume) {}
 
@@ -292,15 +294,16 @@ class ThreadedPipeline final : public Pipeline {
         push(to_encode_,
              Reconstructed{*std::move(made), item->capture_time_ns + later_ns, pace_.line_stride});
       }
-      keep_pace(item->frame, ms);
+      keep_pace(item->frame, milliseconds(steady_now_ns() - begin));
     }
   }
 
-  /// After a frame that was reconstructed in `ms`.
+  /// After a frame that took this thread `ms`.
   void keep_pace(const CapturedFrame& frame, double ms) {
     const std::uint64_t dropped = to_reconstruct_.drops() + observed_;
-    pace_control_.add(steady_now_ns(), ms, dropped - std::exchange(dropped_, dropped));
-    if (!options_.auto_pace) return say_behind();
+    const std::uint64_t since = dropped - std::exchange(dropped_, dropped);
+    if (!options_.auto_pace) return say_behind(since);
+    pace_control_.add(steady_now_ns(), ms, since);
     const Pace pace = pace_control_.now();
     if (pace == pace_) return;
     ReconstructOptions options = options_.reconstruct;
@@ -316,8 +319,9 @@ class ThreadedPipeline final : public Pipeline {
   }
 
   /// Logged once, where frames are dropped for more than a moment.
-  void say_behind() {
-    if (!pace_control_.at_least() || std::exchange(said_behind_, true)) return;
+  void say_behind(std::uint64_t dropped) {
+    drops_.add(dropped);
+    if (!drops_.too_many() || std::exchange(said_behind_, true)) return;
     log_warning("this machine is too slow for all of the camera's frames with " + to_string(pace_) +
                 ": serve with --decoder auto or more --threads");
   }
@@ -470,7 +474,8 @@ class ThreadedPipeline final : public Pipeline {
   Reconstructor reconstructor_;  // changes with the pace, under the mutex, as pace_
   Pace pace_;
   PaceControl pace_control_;
-  std::uint64_t dropped_ = 0;  // when pace_control_ was told last
+  DropWatch drops_;            // where the pace is not chosen here
+  std::uint64_t dropped_ = 0;  // when one of the two was told last
   bool said_behind_ = false;
   FrameEncoder encoder_;
   WorkingVolume volume_;
