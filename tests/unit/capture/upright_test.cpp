@@ -114,7 +114,7 @@ TEST_P(Turned, SurfacesAreWhereTheyAre) {
     if (n > 1) scorer.add(truth, *made ? &(*made)->surface : nullptr);
   }
   EXPECT_GT(scorer.score().completeness, decoder == Decoder::kPaper ? 0.97 : 0.98);
-  EXPECT_LT(scorer.score().outliers, decoder == Decoder::kPaper ? 0.003 : 0.001);
+  EXPECT_LT(scorer.score().outliers, decoder == Decoder::kPaper ? 0.005 : 0.001);
 }
 
 INSTANTIATE_TEST_SUITE_P(
