@@ -42,9 +42,10 @@ struct CameraPose {
 
 /// What a camera's values tell of the projector's colours (paper 4.4).
 struct CameraColours {
-  std::array<double, 9> matrix{1, 0, 0, 0, 1,
-                               0, 0, 0, 1};  // row-major; M of Eq. 1: projected RGB = M * light
-  double gamma = 1;  // captured = 255 (light / 255)^(1 / gamma), channel by channel; 1: captured is light
+  /// Row-major; M of Eq. 1: projected RGB = M * light.
+  std::array<double, 9> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  /// Captured = 255 (light / 255)^(1 / gamma), channel by channel; 1: captured is light.
+  double gamma = 1;
 };
 
 struct Rig {
@@ -56,8 +57,9 @@ struct Rig {
   // X_projector = rotation * X_camera + translation, metres
   std::array<double, 9> projector_from_camera_rotation{};     // row-major
   std::array<double, 3> projector_from_camera_translation{};  // metres
-  std::array<double, 9> colour_matrix{};                      // CameraColours has its terms
-  double camera_gamma = 1;                                    // the same
+  // As CameraColours has them.
+  std::array<double, 9> colour_matrix{};
+  double camera_gamma = 1;
   // How good its calibration found it; 0: not said.
   double stereo_rms_px = 0;  // what the board's corners are off by in either picture
   double scale_error = 0;    // what sizes are wrong by, relative, RMS over the places of the board

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "capture/camera_response.h"
 #include "codec/export.h"
 
 namespace relievo {
@@ -99,6 +100,13 @@ std::string filter_table(const FilterCounts& filters, std::size_t frames) {
   return out + "</table>\n";
 }
 
+CapturedFrame in_light(const CapturedFrame& frame, const Rig& rig) {
+  CapturedFrame out;
+  WorkerPool pool(1);
+  CameraResponse(rig.camera_gamma).straighten(frame, pool, out);
+  return out;
+}
+
 }  // namespace
 
 Result<EvaluationPictures> EvaluationPictures::create(const std::filesystem::path& folder, const Rig& rig,
@@ -120,7 +128,7 @@ Status EvaluationPictures::add(const CapturedFrame& frame, int slide, const Fram
       write("completeness", draw_completeness(frame, judgement)),
       write("slide", draw_field(frame, false)),
       write("complement", draw_field(frame, true)),
-      write("difference", draw_difference(frame, rig_)),
+      write("difference", draw_difference(in_light(frame, rig_), rig_)),
       write("boundaries", draw_boundaries(frame, surface, pattern_, slide)),
       write("depth", draw_depth(surface, rig_)),
       write("normals", draw_normals(surface, rig_)),

@@ -29,7 +29,7 @@ struct MeasuredView {
 MeasuredView measure_view(const std::string& name, const GrayStack& stack, const Board& board,
                           const GrayDecodeOptions& options, WorkerPool& pool);
 
-/// The same under our own stripes. `colours` are the rig's, or what is left out where they are not known.
+/// The same under our own stripes. `colours` are the rig's, or CameraColours{} where they are not known.
 MeasuredView measure_view(const std::string& name, const StripeStack& stack, const Board& board,
                           const CameraColours& colours, WorkerPool& pool);
 

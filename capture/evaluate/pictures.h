@@ -15,7 +15,8 @@ namespace relievo {
 /// The exposure under the slide, or under its complement; the missing lines of an interlaced one repeated.
 Image8 draw_field(const CapturedFrame& frame, bool complement);
 
-/// The decoder's difference image: grey is none, each channel lighter or darker with its sign.
+/// The decoder's difference image of a frame in light: grey is none, each channel lighter or darker with its
+/// sign.
 Image8 draw_difference(const CapturedFrame& frame, const Rig& rig);
 
 /// Boundaries that are vertices, in the colours projected on their two sides, over the dimmed frame. `slide`

@@ -62,8 +62,8 @@ struct RigCheck {
 /// `frame` as the camera gave it.
 ExposureCheck check_exposure(const CapturedFrame& frame);
 
-/// `captured` as the camera gave it; `decoded` is what was made of it (Reconstructor::decoded()), and `grid`
-/// where boundaries were found in that.
+/// `captured` as the camera gave it; `decoded` is what was made of it (Reconstructor::decoded()), in light,
+/// and `grid` where boundaries were found in that.
 RigCheck check_rig(const CapturedFrame& captured, const CapturedFrame& decoded,
                    const std::vector<GridPoint>& grid, const Rig& rig, const Pattern& pattern);
 
