@@ -3,16 +3,9 @@
 
 #include <cmath>
 
+#include "base/fit_image.h"
+
 namespace relievo {
-namespace {
-
-void fit(const Image8& like, Image8& out) {
-  if (out.width() != like.width() || out.height() != like.height() || out.channels() != like.channels())
-    out = Image8(like.width(), like.height(), like.channels());
-}
-
-}  // namespace
-
 CameraResponse::CameraResponse(double gamma) {
   for (std::size_t i = 0; i < light_.size(); ++i) {
     light_[i] = static_cast<float>(255 * std::pow(static_cast<double>(i) / 255, gamma));
@@ -41,7 +34,7 @@ void CameraResponse::straighten(const CapturedFrame& captured, WorkerPool& pool,
   out.field_order = captured.field_order;
   out.lost_before = captured.lost_before;
   const auto whole = [&](const Image8& from, Image8& to) {
-    fit(from, to);
+    fit_image(from.width(), from.height(), from.channels(), to);
     const int samples = from.width() * from.channels();
     pool.for_ranges(from.height(), [&](int begin, int end, int) {
       for (int y = begin; y < end; ++y)

@@ -9,6 +9,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "base/fit_image.h"
+
 namespace relievo {
 namespace {
 
@@ -212,8 +214,7 @@ void halve(const Image8& picture, Image8& out) {
   const int across = picture.width() % 2 == 0 ? 2 : 1;
   const int down = picture.height() % 2 == 0 ? 2 : 1;
   const int width = picture.width() / across, height = picture.height() / down;
-  if (out.width() != width || out.height() != height || out.channels() != picture.channels())
-    out = Image8(width, height, picture.channels());
+  fit_image(width, height, picture.channels(), out);
   // Two steps, so that the first is one of vectors: half of the work, and of the memory that is read.
   std::vector<std::uint16_t> sums(static_cast<std::size_t>(picture.width() * picture.channels()));
   for (int y = 0; y < height; ++y) {

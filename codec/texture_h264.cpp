@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/fit_image.h"
 #include "codec/byte_io.h"
 #include "codec/video_coder.h"
 
@@ -158,7 +159,7 @@ class Decoder final : public TextureDecoder {
     if (!view) return view.error();
     const int columns = static_cast<int>(width);
     const int rows = static_cast<int>(height);
-    if (out.width() != columns || out.height() != rows || out.channels() != 3) out = Image8(columns, rows, 3);
+    fit_image(columns, rows, 3, out);
     return to_rgb(*view, out);
   }
 

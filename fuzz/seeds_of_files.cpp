@@ -55,7 +55,7 @@ Status calibration_seeds(const fs::path&, const fs::path& out) {
   const std::string head = "%YAML:1.0\n---\n";
   write("rig", to_yaml(test::striped_scene().rig));
   write("pattern", to_yaml(test::striped_scene().pattern));
-  write("colours", colour_yaml({1, 0, 0, 0, 1, 0, 0, 0, 1}));
+  write("colours", to_yaml(RigPart{.colours = CameraColours{}}));
   write("sltk", head + matrix("cam_size", 2, 1, "2592., 1944.") + matrix("pro_size", 2, 1, "1280., 800.") +
                     matrix("cam_K", 3, 3, lens) + matrix("pro_K", 3, 3, lens) +
                     matrix("cam_kc", 1, 5, "-0.2, 0.1, 0., 0., 0.") +

@@ -132,12 +132,8 @@ Status run(const Options& options, StopSignal& stop) {
   if (!calibration) return calibration.error().in(options.captures);
 
   const std::string out = options.out.empty() ? options.update : options.out;
-  std::string text = colour_yaml(calibration->camera);
-  if (before.whole) {
-    set_colours(calibration->camera, *before.whole);
-    text = to_yaml(*before.whole);
-  }
-  if (const Status written = write_whole_file(out, text); !written) return written;
+  before.colours = calibration->camera;
+  if (const Status written = write_whole_file(out, to_yaml(before)); !written) return written;
   if (options.json) {
     print_json(*calibration, out);
   } else {

@@ -79,12 +79,8 @@ class ColourTask final : public CalibrationTask {
   bool enough() const override { return result_.has_value(); }
   Result<CalibrationResult> solve() override {
     if (!result_) return Error{"no capture of the sheet was good enough"};
-    std::string text = colour_yaml(result_->camera);
-    if (before_.whole) {
-      set_colours(result_->camera, *before_.whole);
-      text = to_yaml(*before_.whole);
-    }
-    return CalibrationResult{std::move(text), colour_report(*result_)};
+    before_.colours = result_->camera;
+    return CalibrationResult{to_yaml(before_), colour_report(*result_)};
   }
 
  private:

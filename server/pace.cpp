@@ -53,16 +53,14 @@ void PaceControl::add(std::int64_t now_ns, double ms, std::uint64_t dropped) {
   ++frames_;
   if (frames_ <= kUnsettled) {  // what is too long even for these is certain
     if (dropped > 0 && ms > kFirstFrame * period_ms_) down(now_ns, ms / kFirstFrame);
-    calm_from_ns_ = now_ns;
+    begin_calm(now_ns);
     return;
   }
   recent_ms_[frames_ % kRecent] = ms;
   drops_.add(dropped);
   if (dropped > 0) {
     dropped_at_ = frames_;
-    calm_from_ns_ = now_ns;
-    calm_ms_ = 0;
-    calm_frames_ = 0;
+    begin_calm(now_ns);
   } else {
     calm_ms_ += ms;
     ++calm_frames_;
@@ -103,9 +101,7 @@ void PaceControl::down(std::int64_t now_ns, double ms) {
 void PaceControl::up_if_it_fits(std::int64_t now_ns) {
   if (now_ns - calm_from_ns_ < kCalm_ns || calm_frames_ < kRecent) return;
   const double ms = calm_ms_ / static_cast<double>(calm_frames_);
-  calm_from_ns_ = now_ns;
-  calm_ms_ = 0;
-  calm_frames_ = 0;
+  begin_calm(now_ns);
   if (pace_ == 0) return;
   Failed& above = failed_[pace_ - 1];
   if (above.below_ms <= 0) above.below_ms = ms;
@@ -119,7 +115,11 @@ void PaceControl::change_to(std::size_t pace) {
   pace_ = pace;
   frames_ = 0;
   dropped_at_ = 0;
-  drops_ = DropWatch(kBurst_s * 1e3 / period_ms_);
+  drops_.forget();  // and what was calm: the first frame begins that anew
+}
+
+void PaceControl::begin_calm(std::int64_t now_ns) {
+  calm_from_ns_ = now_ns;
   calm_ms_ = 0;
   calm_frames_ = 0;
 }

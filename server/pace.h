@@ -30,6 +30,7 @@ class DropWatch {
   /// A frame was reconstructed after so many others were dropped.
   void add(std::uint64_t dropped);
   bool too_many() const { return beyond_ > burst_; }
+  void forget() { beyond_ = 0; }
 
  private:
   double burst_;
@@ -66,6 +67,7 @@ class PaceControl {
   void down(std::int64_t now_ns, double ms);
   void up_if_it_fits(std::int64_t now_ns);
   void change_to(std::size_t pace);
+  void begin_calm(std::int64_t now_ns);
   double typical_ms() const;
 
   const double period_ms_;

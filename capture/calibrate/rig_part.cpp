@@ -8,6 +8,25 @@
 #include "capture/storage_file.h"
 
 namespace relievo {
+namespace {
+
+std::string colour_yaml(const CameraColours& colours) {
+  const std::array<double, 9>& m = colours.matrix;
+  std::string out =
+      "%YAML:1.0\n---\n# Colour only: relievo-server calibrate geometry --update this-file adds the rest.\n"
+      "colour_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ ";
+  char number[48];
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    std::snprintf(number, sizeof number, "%s%.17e", i ? ", " : "", m[i]);
+    out += number;
+  }
+  out += " ]\n";
+  if (colours.gamma == 1) return out;
+  std::snprintf(number, sizeof number, "camera_gamma: %.17e\n", colours.gamma);
+  return out + number;
+}
+
+}  // namespace
 
 Result<RigPart> read_rig_part(const std::filesystem::path& path) {
   const auto file = StorageFile::open(path, StorageForm::kYaml);
@@ -32,20 +51,11 @@ Result<RigPart> read_rig_part(const std::filesystem::path& path) {
   return part;
 }
 
-std::string colour_yaml(const CameraColours& colours) {
-  const std::array<double, 9>& m = colours.matrix;
-  std::string out =
-      "%YAML:1.0\n---\n# Colour only: relievo-server calibrate geometry --update this-file adds the rest.\n"
-      "colour_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ ";
-  char number[48];
-  for (std::size_t i = 0; i < m.size(); ++i) {
-    std::snprintf(number, sizeof number, "%s%.17e", i ? ", " : "", m[i]);
-    out += number;
-  }
-  out += " ]\n";
-  if (colours.gamma == 1) return out;
-  std::snprintf(number, sizeof number, "camera_gamma: %.17e\n", colours.gamma);
-  return out + number;
+std::string to_yaml(const RigPart& part) {
+  if (!part.whole) return colour_yaml(*part.colours);
+  Rig rig = *part.whole;
+  set_colours(*part.colours, rig);
+  return to_yaml(rig);
 }
 
 }  // namespace relievo

@@ -21,7 +21,7 @@ struct RigPart {
 /// A whole rig.yaml, or one of the keys above alone. Errors name the file and the key.
 Result<RigPart> read_rig_part(const std::filesystem::path& file);
 
-/// The text of a rig.yaml that has colours only.
-std::string colour_yaml(const CameraColours& colours);
+/// The text of a rig.yaml: whole with the part's colours, which must be there, or these alone.
+std::string to_yaml(const RigPart& part);
 
 }  // namespace relievo

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/fit_image.h"
 #include "capture/pattern/schedule.h"
 #include "capture/reconstruct/texture.h"
 
@@ -24,14 +25,9 @@ constexpr int kSampleRows = 4;
 constexpr float kDark = 0.15F;  // of the brightest white: darker places say nothing
 constexpr int kBins = 128;      // of a channel's share of what white shows
 
-void fit(Image8& image, int width, int height) {
-  if (image.width() != width || image.height() != height || image.channels() != 3)
-    image = Image8(width, height, 3);
-}
-
 /// The rows of one field over the whole picture: the rows between are the mean of those above and below.
 void spread_field(const View8& field, int first, int height, Image8& out) {
-  fit(out, field.width, height);
+  fit_image(field.width, height, 3, out);
   const int samples = field.width * 3;
   for (int y = 0; y < height; ++y) {
     std::uint8_t* to = out.row(y);
@@ -190,7 +186,7 @@ const CapturedFrame* FieldPairs::with_complement(const CapturedFrame& frame, Wor
   made_.scan = frame.scan;
   made_.field_order = frame.field_order;
   copy_picture(frame.picture, made_.picture);
-  if (progressive) fit(made_.complement, width, height);
+  if (progressive) fit_image(width, height, 3, made_.complement);
   Image8& out = progressive ? made_.complement : made_.picture;
   const int first = progressive ? 0 : first_row(frame.field_order, 1);
   const int step = progressive ? 1 : 2;

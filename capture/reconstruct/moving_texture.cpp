@@ -45,10 +45,11 @@ struct MovingTexture::Exposures {
   Rows slide, complement;
 };
 
-MovingTexture::MovingTexture(const CameraColours& colours, int line_stride)
-    : response_(colours.gamma), line_stride_(line_stride) {
+MovingTexture::MovingTexture(const std::array<double, 9>& colour_matrix, const CameraResponse& response,
+                             int line_stride)
+    : response_(response), line_stride_(line_stride) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Matrix matrix = Eigen::Map<const Matrix>(colours.matrix.data());
+  const Matrix matrix = Eigen::Map<const Matrix>(colour_matrix.data());
   const auto columns_of = [](const Eigen::Matrix3f& m, std::array<Four, 3>& out) {
     for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(i)] = Four{m(0, i), m(1, i), m(2, i), 0};
   };

@@ -11,7 +11,6 @@
 #include "base/image.h"
 #include "base/parallel.h"
 #include "base/pattern.h"
-#include "base/rig.h"
 #include "capture/camera_response.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/detection_lines.h"
@@ -31,8 +30,9 @@ struct ShownStripes {
 /// Keeps its scratch memory from frame to frame. One thread.
 class MovingTexture {
  public:
-  /// The colours' matrix must have an inverse; `line_stride` is that of the grids.
-  explicit MovingTexture(const CameraColours& colours, int line_stride = 1);
+  /// `colour_matrix` is M of Eq. 1 and must have an inverse; `line_stride` that of the grids.
+  MovingTexture(const std::array<double, 9>& colour_matrix, const CameraResponse& response,
+                int line_stride = 1);
 
   /// `frame` is in light. `texture`, the fields' sum in the camera's values, RGB, gets the slide's own light
   /// where things move and the complement, times `gains`, shows something else. Rows between lines become

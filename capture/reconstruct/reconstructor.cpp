@@ -104,8 +104,8 @@ struct Reconstructor::State {
         lines(line_count(r, o.line_stride)),
         triangulator(r, p, lines, line_step_px(r.scan, o.line_stride)),
         depths(p.boundaries(), r.camera.width, lines, kDepthLines),
-        white_texture(colours_of(r), o.decoder == Decoder::kQuick, o.line_stride),
-        moving_texture(colours_of(r), o.line_stride),
+        white_texture(r.colour_matrix, response, o.decoder == Decoder::kQuick, o.line_stride),
+        moving_texture(r.colour_matrix, response, o.line_stride),
         half_way(p.boundaries(), lines),
         surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface,
                         o.decoder == Decoder::kPaper ? 0 : SurfaceOptions{}.least_component) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "base/fit_image.h"
 #include "capture/reconstruct/rows.h"
 
 namespace relievo {
@@ -15,8 +16,7 @@ void add_all(const CapturedFrame& frame, WorkerPool& pool, Image8& out, const Ad
   const View8 picture = frame.picture.view();
   const int height = picture.height;
   const int samples = picture.width * 3;
-  if (out.width() != picture.width || out.height() != height || out.channels() != 3)
-    out = Image8(picture.width, height, 3);
+  fit_image(picture.width, height, 3, out);
   pool.for_ranges(height, [&](int begin, int end, int) {
     for (int y = begin; y < end; ++y) {
       if (frame.scan == Scan::kProgressive) {
@@ -53,8 +53,7 @@ void add_fields(const CapturedFrame& frame, const CameraResponse& response, Work
 }
 
 void copy_picture(const Image8& from, Image8& to) {
-  if (to.width() != from.width() || to.height() != from.height() || to.channels() != from.channels())
-    to = Image8(from.width(), from.height(), from.channels());
+  fit_image(from.width(), from.height(), from.channels(), to);
   std::copy_n(from.data(), from.size(), to.data());
 }
 

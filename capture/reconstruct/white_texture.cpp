@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/fit_image.h"
 #include "capture/pattern/schedule.h"
 #include "capture/reconstruct/rows.h"
 #include "capture/reconstruct/texture.h"
@@ -101,15 +102,16 @@ const Loops& loops() {
 
 }  // namespace
 
-WhiteTexture::WhiteTexture(const CameraColours& colours, bool quickly, int line_stride)
-    : response_(colours.gamma),
+WhiteTexture::WhiteTexture(const std::array<double, 9>& colour_matrix, const CameraResponse& response,
+                           bool quickly, int line_stride)
+    : response_(response),
       line_stride_(line_stride),
       quickly_(quickly),
       every_(quickly ? kEveryQuickly : kEvery) {
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  const Matrix inverse = Eigen::Map<const Matrix>(colours.matrix.data()).inverse();
+  const Matrix inverse = Eigen::Map<const Matrix>(colour_matrix.data()).inverse();
   for (std::size_t i = 0; i < 9; ++i) {
-    matrix_[i] = static_cast<float>(colours.matrix[i]);
+    matrix_[i] = static_cast<float>(colour_matrix[i]);
     inverse_[i] = static_cast<float>(inverse.data()[i]);
   }
 }
@@ -234,7 +236,7 @@ void WhiteTexture::make(const SeenFrame& seen, const DecodedGrid& grid, WorkerPo
     add_fields(frame, response_, pool, out);
     return;
   }
-  if (out.width() != width || out.height() != height || out.channels() != 3) out = Image8(width, height, 3);
+  fit_image(width, height, 3, out);
   scratch_.resize(static_cast<std::size_t>(pool.workers()));
   for (Scratch& s : scratch_) {
     const std::size_t samples = static_cast<std::size_t>(width) * 3;

@@ -11,7 +11,6 @@
 
 #include "base/image.h"
 #include "base/parallel.h"
-#include "base/rig.h"
 #include "capture/camera_response.h"
 #include "capture/reconstruct/decoded_grid.h"
 #include "capture/reconstruct/detection_lines.h"
@@ -23,9 +22,10 @@ namespace relievo {
 /// Keeps its scratch memory from frame to frame. One thread.
 class WhiteTexture {
  public:
-  /// `quickly`: by fewer boundaries, and where nothing is to be brought level by adding the fields.
-  /// `line_stride` is that of the grids, as in ReconstructOptions.
-  explicit WhiteTexture(const CameraColours& colours, bool quickly = false, int line_stride = 1);
+  /// `colour_matrix` is M of Eq. 1. `quickly`: by fewer boundaries, and where nothing is to be brought level
+  /// by adding the fields. `line_stride` is that of the grids, as in ReconstructOptions.
+  WhiteTexture(const std::array<double, 9>& colour_matrix, const CameraResponse& response,
+               bool quickly = false, int line_stride = 1);
 
   /// RGB, the size of the camera's picture, in the camera's values, which saturate at 255. Across each
   /// boundary of `grid`, what the slide loses of a primary its complement gains, so they tell how bright one

@@ -190,7 +190,7 @@ TEST(RigPart, ColoursThatAreNoNumbersAreRefused) {
 TEST(RigPart, ColoursAloneReadBackExactly) {
   const TempFolder folder;
   const CameraColours colours{{1.25, -0.1, 1.0 / 3, 0, 1, 0, -1e-7, 0, 2}, 1 + 1.0 / 3};
-  std::ofstream(folder / "rig.yaml") << colour_yaml(colours);
+  std::ofstream(folder / "rig.yaml") << to_yaml(RigPart{.colours = colours});
   const auto part = read_rig_part(folder / "rig.yaml");
   ASSERT_TRUE(part.ok()) << part.error().message;
   EXPECT_FALSE(part->whole);

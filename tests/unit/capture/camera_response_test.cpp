@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "capture/reconstruct/reconstructor.h"
 #include "tests/support/simulated.h"
 
 namespace relievo {

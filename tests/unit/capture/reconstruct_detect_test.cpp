@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/support/make_surface.h"
+#include "tests/unit/capture/drawn_frame.h"
 
 namespace relievo {
 namespace {
@@ -265,20 +266,13 @@ TEST(Detect, BlackStripesAreNeverAColour) {
 
 // As published: no crossing counts for more, also one as steep again.
 TEST(Detect, CrossingsOfSeveralChannelsAreOneBoundaryInTheirMiddle) {
-  CapturedFrame frame;
-  frame.scan = Scan::kProgressive;
-  frame.picture = Image8(32, 4, 3);
-  frame.complement = Image8(32, 4, 3);
-  for (int y = 0; y < 4; ++y) {
-    for (int x = 0; x < 32; ++x) {
-      const int difference[] = {16 * (x - 15), -8 * (x - 16), -100};  // red rises, green falls a pixel later
-      for (int c = 0; c < 3; ++c) {
-        const int half = std::clamp(difference[c] / 2, -100, 100);
-        frame.picture.row(y)[3 * x + c] = static_cast<std::uint8_t>(128 + half);
-        frame.complement.row(y)[3 * x + c] = static_cast<std::uint8_t>(128 - half);
-      }
-    }
-  }
+  const CapturedFrame frame =
+      drawn_frame(Scan::kProgressive, 32, 4, [](int, int x, int channel, bool complement) {
+        const int difference[] = {16 * (x - 15), -8 * (x - 16),
+                                  -100};  // red rises, green falls a pixel later
+        const int half = std::clamp(difference[channel] / 2, -100, 100);
+        return static_cast<std::uint8_t>(complement ? 128 - half : 128 + half);
+      });
   const auto found = line_of(detect(frame), 1);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_NEAR(found[0].column_px, 15.5, 1e-3);

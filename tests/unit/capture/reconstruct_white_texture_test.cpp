@@ -295,7 +295,7 @@ TEST(WhiteTexture, GainsAreThoseOfTheComplement) {
   grid.reset(filmed.pattern.boundaries(), filmed.rig.camera.height);
   for (const GridPoint& at : (*frame)->surface.grid)
     grid.put(at.line, at.boundary, at.column_px, at.sigma_px, 0);
-  WhiteTexture texture(colours_of(filmed.rig));
+  WhiteTexture texture(filmed.rig.colour_matrix, CameraResponse());
   WorkerPool pool(1);
   Image8 out;
   texture.make({second, second}, grid, pool, out);
@@ -322,7 +322,7 @@ TEST(WhiteTexture, SmallPicturesAreAdded) {
     CapturedFrame frame;
     frame.picture = Image8(7, height, 3);
     std::fill_n(frame.picture.data(), frame.picture.size(), std::uint8_t{60});
-    WhiteTexture texture(CameraColours{});
+    WhiteTexture texture({1, 0, 0, 0, 1, 0, 0, 0, 1}, CameraResponse());
     WorkerPool pool(1);
     Image8 out;
     texture.make({frame, frame}, DecodedGrid(), pool, out);

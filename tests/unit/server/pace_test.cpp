@@ -74,6 +74,12 @@ class Machine {
     return changes;
   }
 
+  /// The pace that it has come to after so long.
+  Pace after(double seconds, const Costs& costs, const Load& load = {}) {
+    run(seconds, costs, load);
+    return control.now();
+  }
+
   PaceControl control;
   std::uint64_t dropped = 0;
   bool slow_start = false;  // the first frames of a pace take longer, as they do
@@ -116,8 +122,7 @@ TEST(PaceControl, GoesAsFarDownAsItMustAndStays) {
   for (const auto& [frame_ms, pace] :
        {std::pair{33.4, kQuick}, std::pair{16.7, kHalf}, std::pair{8.4, kQuarter}}) {
     Machine machine(frame_ms);
-    machine.run(12, {86, 23, 12, 6});
-    EXPECT_EQ(machine.control.now(), pace) << to_string(machine.control.now());
+    EXPECT_EQ(machine.after(12, {86, 23, 12, 6}), pace) << to_string(machine.control.now());
     EXPECT_GT(std::exchange(machine.dropped, 0), 0U);
     EXPECT_EQ(machine.run(300, {86, 23, 12, 6}), 0) << "tries what it knows to take too long";
     EXPECT_EQ(machine.dropped, 0U);
@@ -155,10 +160,8 @@ TEST(PaceControl, WhereItWentTooLowItIsBackInSeconds) {
   const auto starting = [](double s) { return s < 1 ? 2. : 1.; };
   Machine machine(16.7);
   machine.slow_start = true;
-  machine.run(1, {92, 25, 13, 7.2}, starting);
-  EXPECT_EQ(machine.control.now(), kQuarter);
-  machine.run(2, {92, 25, 13, 7.2}, starting);
-  EXPECT_EQ(machine.control.now(), kHalf);
+  EXPECT_EQ(machine.after(1, {92, 25, 13, 7.2}, starting), kQuarter);
+  EXPECT_EQ(machine.after(2, {92, 25, 13, 7.2}, starting), kHalf);
   machine.dropped = 0;
   EXPECT_EQ(machine.run(300, {92, 25, 13, 7.2}, starting), 0);
   EXPECT_EQ(machine.dropped, 0U);
@@ -171,10 +174,8 @@ TEST(PaceControl, FollowsOthersThatComeAndGo) {
     machine.slow_start = true;
     const auto load = [&](double s) { return static_cast<int>(s) / each_s % 2 == 1 ? 2.5 : 1.; };
     for (int i = 0; i < 5; ++i) {
-      machine.run(each_s - .1, costs, load);
-      EXPECT_EQ(machine.control.now(), kOrdered) << i << " of " << each_s;
-      machine.run(each_s, costs, load);
-      EXPECT_EQ(machine.control.now(), kQuick) << i << " of " << each_s;
+      EXPECT_EQ(machine.after(each_s - .1, costs, load), kOrdered) << i << " of " << each_s;
+      EXPECT_EQ(machine.after(each_s, costs, load), kQuick) << i << " of " << each_s;
       machine.run(.1, costs, load);
     }
     EXPECT_LE(machine.dropped, 5 * 10U);
@@ -184,27 +185,22 @@ TEST(PaceControl, FollowsOthersThatComeAndGo) {
 TEST(PaceControl, IsBackSoonAlsoWhereItHadBeenTriedInVain) {
   // 20 ms of quick seem to leave time for ordered frames until they are tried.
   Machine machine(83.5);
-  machine.run(600, {95, 20, 11, 6});
-  EXPECT_EQ(machine.control.now(), kQuick);
-  machine.run(3, {62, 13, 7, 4});
-  EXPECT_EQ(machine.control.now(), kOrdered);
+  EXPECT_EQ(machine.after(600, {95, 20, 11, 6}), kQuick);
+  EXPECT_EQ(machine.after(3, {62, 13, 7, 4}), kOrdered);
 }
 
 TEST(PaceControl, LeavesEnoughLines) {
   for (const auto& [lines, pace] :
        {std::pair{1080, kQuarter}, std::pair{240, kHalf}, std::pair{144, kQuick}}) {
     Machine machine(1, lines);
-    machine.run(30, {86, 23, 12, 6});
-    EXPECT_EQ(machine.control.now(), pace) << to_string(machine.control.now());
+    EXPECT_EQ(machine.after(30, {86, 23, 12, 6}), pace) << to_string(machine.control.now());
   }
 }
 
 TEST(PaceControl, ComesBackWhenOthersLeaveTheMachineAlone) {
   Machine machine(33.4);
-  machine.run(5, {60, 16, 8, 4});
-  EXPECT_EQ(machine.control.now(), kQuick);
-  machine.run(20, {24, 6.5, 3.5, 2});
-  EXPECT_EQ(machine.control.now(), kOrdered);
+  EXPECT_EQ(machine.after(5, {60, 16, 8, 4}), kQuick);
+  EXPECT_EQ(machine.after(20, {24, 6.5, 3.5, 2}), kOrdered);
 }
 
 TEST(PaceControl, OneLateFrameChangesNothing) {
