@@ -8,6 +8,7 @@
 #include "capture/reconstruct/consistency.h"
 #include "capture/reconstruct/continuity.h"
 #include "capture/reconstruct/detect.h"
+#include "capture/reconstruct/doubtful.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_difference.h"
 #include "capture/reconstruct/field_place.h"
@@ -37,11 +38,6 @@
 
 namespace relievo {
 namespace {
-
-// Of what the ordered decoder lets be unsure: less was asked about the quick one's boundaries before.
-constexpr float kQuickTolerance = 0.8F;
-// And of what the picture was looked at for: that has confirmed it.
-constexpr float kShownTolerance = 1.5F;
 
 SlideOrder other(SlideOrder order) {
   return order == SlideOrder::kNewerIsFirst ? SlideOrder::kNewerIsSecond : SlideOrder::kNewerIsFirst;
@@ -108,7 +104,6 @@ struct SlideDecoder::State {
   PlaceGrid places;
   SequenceCounts quick_counts;
   Persistence persistence;
-  Weighing weighing;
   RenderPlacer render_placer;
   SecondPlaces second_places;
 
@@ -245,13 +240,13 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
   moving.find(newer.quick.width, consistency, places);
   recovered.clear();
   const std::size_t carried = persistence.carry(moving, pool, places, recovered);
-  const WeighingCounts weighed =
-      weighing.weigh(places, moving, kQuickTolerance * consistency.scale(), pool, out);
+  const std::size_t weighed = weigh(places, pool, out);
+  const std::size_t doubtful = give_up_doubtful(pool, out);
   smooth_across(pool, out);
   report.filters.unsupported = quick_counts.unsupported;
   report.filters.completed = quick_counts.completed;
-  report.filters.rejected = checked.rejected + by_before.rejected + weighed.rejected;
-  report.filters.moved = checked.moved + weighed.moved;
+  report.filters.rejected = checked.rejected + by_before.rejected + doubtful;
+  report.filters.moved = checked.moved + weighed;
   report.filters.recovered = by_before.carried + carried;
   report.matched =
       quick_counts.in_order - quick_counts.unsupported + quick_counts.completed + report.filters.recovered;
@@ -271,10 +266,9 @@ void SlideDecoder::State::look_again(const DetectionLines& rows, WorkerPool& poo
   const std::size_t rims = drop_rims(rows, newer.difference, shown, sequence.shown_colours(other(order)),
                                      front_edges.front(), pool, places, result, edges, recovered);
   // Weighed anew among places that are better now.
-  const WeighingCounts weighed =
-      weighing.weigh(places, moving, kShownTolerance * consistency.scale(), pool, result, edges, recovered);
-  report.filters.rejected += rendered.rejected + rims + weighed.rejected;
-  report.filters.moved += rendered.moved + weighed.moved;
+  const std::size_t weighed = weigh(places, pool, result, edges, recovered);
+  report.filters.rejected += rendered.rejected + rims;
+  report.filters.moved += rendered.moved + weighed;
   report.filters.recovered += rendered.restored;
   report.matched += rendered.restored;
 }
@@ -416,15 +410,13 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   const std::size_t carried = s.persistence.carry(s.moving, pool, s.places, s.recovered);
   report.filters.recovered += carried;
   report.matched += carried;
-  const WeighingCounts weighed =
-      s.weighing.weigh(s.places, s.moving, s.consistency.scale(), pool, s.result, s.edges, s.recovered);
-  report.filters.rejected += weighed.rejected;
-  report.filters.moved += weighed.moved;
+  report.filters.moved += weigh(s.places, pool, s.result, s.edges, s.recovered);
   // Of speckle no picture can be told.
   const bool clear = !s.moving.much() && !s.consistency.speckled();
   // Without an earlier frame under the slide nothing tells what moves.
   if (clear && s.have_same) s.look_again(rows, pool, report);
   report.filters.duplicate = s.fill(pool, out);
+  report.filters.rejected += give_up_doubtful(pool, out);
   smooth_across(pool, out);
   if (clear) {
     const std::size_t second =

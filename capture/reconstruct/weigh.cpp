@@ -2,6 +2,8 @@
 #include "capture/reconstruct/weigh.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 
 #include "capture/reconstruct/column_grid.h"
@@ -25,34 +27,18 @@ constexpr float kAgree = 3.F;     // standard deviations between a place and wha
 constexpr float kUnsure_px = 0.08F;  // what is surer than this stays as it is
 constexpr float kOwn = 1.3F;         // times its standard deviation: blur across a step is no noise
 constexpr float kOwnLeast_px = 0.02F;
-constexpr float kOut_px = 0.15F;    // outwards, at the end of a surface
-constexpr float kStrong_px = 0.5F;  // standard deviation of what is foretold and nothing agrees with
-constexpr float kMost_px = 0.85F;   // standard deviation, after weighing, times how far neighbours pulled,
-constexpr float kMostMoving_px = 0.55F;  // and where so many boundaries around were elsewhere: there it is
-constexpr int kMoves = 4;                // the silhouette's, and errors are several times as large
+constexpr float kOut_px = 0.15F;  // outwards, at the end of a surface
 
-}  // namespace
-
-/// A place's own column and all that is foretold of it and agrees, by their variances. Nothing where it is to
-/// be given up.
-std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, float most_px) const {
+/// A place's own column and all that is foretold of it and agrees, by their variances.
+Place weighed(const Place* own, std::ptrdiff_t stride) {
   const float own_variance = squared(kOwn * own->sigma_px) + squared(kOwnLeast_px);
   float weights = 1 / own_variance;
   float sum = weights * own->column_px;
-  float off = 0;
-  int count = 0;
-  bool against = false;
   const auto take = [&](float column_px, float variance) {
     const float apart = squared(column_px - own->column_px);
-    const float expected = variance + own_variance;
-    if (!(apart < kAgree * kAgree * expected)) {
-      against = against || (apart == apart && variance < kStrong_px * kStrong_px);
-      return;  // nor what is not known
-    }
+    if (!(apart < kAgree * kAgree * (variance + own_variance))) return;  // nor what is not known
     weights += 1 / variance;
     sum += column_px / variance;
-    off += apart / expected;
-    ++count;
   };
   // From three neighbours in one direction, or two.
   const auto foretell = [&](std::ptrdiff_t step, bool across) {
@@ -80,45 +66,28 @@ std::optional<Place> Weighing::weighed(const Place* own, std::ptrdiff_t stride, 
   take(0.5F * (above.column_px + below.column_px),
        squared(kAlong) * (squared(kStraight_px + kBetween * std::fabs(apart)) +
                           squared(kOwn / 2) * (squared(above.sigma_px) + squared(below.sigma_px))));
-  if (count == 0 && against) return std::nullopt;
   // Where the surface ends its end is its own.
   float column_px = sum / weights;
   if (!own[-1].known()) column_px = std::max(column_px, own->column_px - kOut_px);
   if (!own[1].known()) column_px = std::min(column_px, own->column_px + kOut_px);
-  const float sigma_px = 1 / std::sqrt(weights);
-  const float doubt = count == 0 ? 0 : off / static_cast<float>(count);
-  if (sigma_px * (1 + doubt) > most_px * scale_) return std::nullopt;
-  return Place{column_px, sigma_px};
+  return {column_px, 1 / std::sqrt(weights)};
 }
 
-/// Weighs a place; false where it is to be given up.
-bool Weighing::settle(const PlaceGrid& places, const MovingPlaces& moving, int line, int boundary,
-                      float& column_px, float& sigma_px) const {
+/// Weighs a place, unless the grid has another one of that boundary.
+void settle(const PlaceGrid& places, int line, int boundary, float& column_px, float& sigma_px) {
   const Place* own = places.line(line) + boundary;
-  if (own->column_px != column_px) return true;  // the grid has another one of that boundary
-  const float most_px = moving.around(line, column_px) >= kMoves ? kMostMoving_px : kMost_px;
-  const std::optional<Place> now = weighed(own, places.stride(), most_px);
-  if (!now) return false;
-  column_px = now->column_px;
-  sigma_px = now->sigma_px;
-  return true;
+  if (own->column_px != column_px) return;
+  const Place now = weighed(own, places.stride());
+  column_px = now.column_px;
+  sigma_px = now.sigma_px;
 }
 
-WeighingCounts Weighing::total() const {
-  WeighingCounts total;
-  for (const WeighingCounts& c : counts_) {
-    total.moved += c.moved;
-    total.rejected += c.rejected;
-  }
-  return total;
-}
+}  // namespace
 
-WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale,
-                               WorkerPool& pool, DecodedGrid& out) {
-  scale_ = scale;
-  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
-  pool.for_ranges(places.lines(), [&](int begin, int end, int worker) {
-    WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
+std::size_t weigh(const PlaceGrid& places, WorkerPool& pool, DecodedGrid& out) {
+  std::atomic<std::size_t> weighed{0};
+  pool.for_ranges(places.lines(), [&](int begin, int end, int) {
+    std::size_t own = 0;
     for (int line = begin; line < end; ++line) {
       const Place* from = places.line(line);
       const DecodedRow to = out.decoded(line);
@@ -129,51 +98,37 @@ WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& movi
       }
       for (int b = 0; b < places.boundaries(); ++b) {
         if (!from[b].known() || from[b].sigma_px < kUnsure_px) continue;
-        if (settle(places, moving, line, b, to.column_px[b], to.sigma_px[b])) {
-          ++counts.moved;
-        } else {
-          to.column_px[b] = kNoColumn;
-          ++counts.rejected;
-        }
+        settle(places, line, b, to.column_px[b], to.sigma_px[b]);
+        ++own;
       }
     }
+    weighed += own;
   });
-  return total();
+  return weighed;
 }
 
-WeighingCounts Weighing::weigh(const PlaceGrid& places, const MovingPlaces& moving, float scale,
-                               WorkerPool& pool, SequenceResult& result, EdgeImage& edges,
-                               std::vector<RecoveredBoundary>& recovered) {
-  scale_ = scale;
-  counts_.assign(static_cast<std::size_t>(pool.workers()), {});
-  pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
-    WeighingCounts& counts = counts_[static_cast<std::size_t>(worker)];
+std::size_t weigh(const PlaceGrid& places, WorkerPool& pool, const SequenceResult& result, EdgeImage& edges,
+                  std::vector<RecoveredBoundary>& recovered) {
+  std::atomic<std::size_t> weighed{0};
+  pool.for_shares(edges.line_start, [&](int begin, int end, int) {
+    std::size_t own = 0;
     for (int line = begin; line < end; ++line) {
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
         Edge& edge = edges.edges[e];
-        std::int16_t& boundary = result.boundary[e];
-        if (boundary < 0 || edge.sigma_px < kUnsure_px) continue;
-        if (settle(places, moving, line, boundary, edge.column_px, edge.sigma_px)) {
-          ++counts.moved;
-        } else {
-          boundary = -1;
-          ++counts.rejected;
-        }
+        if (result.boundary[e] < 0 || edge.sigma_px < kUnsure_px) continue;
+        settle(places, line, result.boundary[e], edge.column_px, edge.sigma_px);
+        ++own;
       }
     }
+    weighed += own;
   });
-  WeighingCounts total = this->total();
-  const std::size_t found = recovered.size();
-  std::size_t sure = 0;
-  std::erase_if(recovered, [&](RecoveredBoundary& r) {
-    const bool is_sure = r.sigma_px < kUnsure_px;
-    sure += is_sure;
-    return !is_sure && !settle(places, moving, r.line, r.boundary, r.column_px, r.sigma_px);
-  });
-  total.moved += recovered.size() - sure;
-  total.rejected += found - recovered.size();
-  return total;
+  for (RecoveredBoundary& r : recovered) {
+    if (r.sigma_px < kUnsure_px) continue;
+    settle(places, r.line, r.boundary, r.column_px, r.sigma_px);
+    ++weighed;
+  }
+  return weighed;
 }
 
 }  // namespace relievo

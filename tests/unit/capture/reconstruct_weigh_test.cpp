@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is done once all boundaries of a frame are found: carried from the frame before, and weighed.
+// What is done once all boundaries of a frame are found: carried from the frame before, weighed, given up.
 #include "capture/reconstruct/weigh.h"
 
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "capture/reconstruct/column_grid.h"
+#include "capture/reconstruct/decoded_grid.h"
+#include "capture/reconstruct/doubtful.h"
 #include "capture/reconstruct/persistence.h"
 #include "tests/unit/capture/decoded_frame.h"
 
@@ -46,9 +49,9 @@ struct Frame : DecodedFrame {
     out.find(kWidth_px, result, edges);
     return out;
   }
-  WeighingCounts weigh() {
+  std::size_t weigh() {
     fill();
-    return Weighing().weigh(places, moving(), 1, pool, result, edges, recovered);
+    return relievo::weigh(places, pool, result, edges, recovered);
   }
   std::size_t carry(Persistence& persistence) {
     fill();
@@ -61,9 +64,7 @@ TEST(Weighing, AnUnsurePlaceGoesToWhatItsNeighboursForetell) {
   f.move(7, 5, 0.4F, 0.3F);
   f.lose(9, 0);
   f.recovered.push_back({9, 0, Frame::place(9, 0) - 0.4F, 0.3F, 0});
-  const WeighingCounts counts = f.weigh();
-  EXPECT_EQ(counts.moved, 2U);
-  EXPECT_EQ(counts.rejected, 0U);
+  EXPECT_EQ(f.weigh(), 2U);
   EXPECT_NEAR(f.edge(7, 5).column_px, Frame::place(7, 5), 0.05);
   EXPECT_LT(f.edge(7, 5).sigma_px, 0.1F);
   ASSERT_EQ(f.recovered.size(), 1U);
@@ -74,8 +75,7 @@ TEST(Weighing, AnUnsurePlaceGoesToWhatItsNeighboursForetell) {
 TEST(Weighing, ASurePlaceStaysWhereItIs) {
   Frame f;
   f.move(7, 5, 0.4F, 0.03F);
-  const WeighingCounts counts = f.weigh();
-  EXPECT_EQ(counts.moved, 0U);
+  EXPECT_EQ(f.weigh(), 0U);
   EXPECT_FLOAT_EQ(f.edge(7, 5).column_px, Frame::place(7, 5) + 0.4F);
 }
 
@@ -107,52 +107,64 @@ TEST(Weighing, WhereASurfaceEndsItTurnsAwaySoonerThanItsBendTells) {
   EXPECT_NEAR(apart.unsure_px, 0.7F, 1e-6F);
 }
 
-TEST(Weighing, WhatStaysUnsureIsGivenUp) {
+/// A grid of the frame's places, as far as they are known, after what is doubtful was given up. How many
+/// were.
+std::size_t doubtful(Frame& f, DecodedGrid& grid) {
+  grid.reset(kBoundaries, kLines);
+  for (int line = 0; line < kLines; ++line) {
+    grid.start_line(line);
+    for (int b = 0; b < kBoundaries; ++b) {
+      const Edge& e = f.edge(line, b);
+      if (f.result.boundary[Frame::at(line, b)] >= 0) grid.put(line, b, e.column_px, e.sigma_px, 1);
+    }
+  }
+  return give_up_doubtful(f.pool, grid);
+}
+bool known(const DecodedGrid& grid, int line, int boundary) {
+  return grid.column_px(line)[boundary] == grid.column_px(line)[boundary];
+}
+
+TEST(Doubtful, WhatIsOutOfLineWithLittleToTellItsPlace) {
+  DecodedGrid grid;
   Frame f;
-  for (int line = 0; line < kLines; ++line)
-    for (int b = 0; b < kBoundaries; ++b)
-      if (line != 7 || b != 5) f.lose(line, b);
-  f.edge(7, 5).sigma_px = 0.4F;
-  EXPECT_EQ(f.weigh().rejected, 0U);
-  f.edge(7, 5).sigma_px = 0.9F;
-  f.recovered.push_back({15, 3, 60, 0.9F, 0});
-  EXPECT_EQ(f.weigh().rejected, 2U);
-  EXPECT_EQ(f.result.boundary[Frame::at(7, 5)], -1);
-  EXPECT_TRUE(f.recovered.empty());
+  EXPECT_EQ(doubtful(f, grid), 0U);
+  f.move(7, 5, 0, 0.5F);  // in line with those around
+  EXPECT_EQ(doubtful(f, grid), 0U);
+  f.move(7, 5, 0.3F, 0.5F);
+  f.move(13, 3, 0.3F, 0.2F);  // as far out of line, but surer
+  EXPECT_EQ(doubtful(f, grid), 1U);
+  EXPECT_FALSE(known(grid, 7, 5));
+  EXPECT_TRUE(known(grid, 13, 3));
 }
 
-TEST(Weighing, WhereThingsMoveMoreSo) {
-  Frame still, moving;
-  for (int line = 0; line < kLines; ++line) {
-    for (int b = 0; b < kBoundaries; ++b) {
-      if (b == 5 && line == 7) continue;
-      // The left of the picture, too far away to say anything of this place but that its surroundings move.
-      if (b < 4 && line > 4 && line < 10) {
-        moving.result.still[Frame::at(line, b)] = 0;
-        continue;
-      }
-      still.lose(line, b);
-      moving.lose(line, b);
-    }
+TEST(Doubtful, BesideANarrowStripeSooner) {
+  DecodedGrid grid;
+  for (const auto& [stripe_px, given_up] : {std::pair{5.F, 1U}, {8.F, 0U}}) {
+    Frame f;
+    for (int line = 0; line < kLines; ++line) f.edge(line, kBoundaries - 1).column_px += stripe_px - 8;
+    f.move(7, kBoundaries - 1, 0.15F, 0.3F);
+    EXPECT_EQ(doubtful(f, grid), given_up) << stripe_px;
   }
-  still.edge(7, 5).sigma_px = moving.edge(7, 5).sigma_px = 0.65F;
-  EXPECT_EQ(still.weigh().rejected, 0U);
-  EXPECT_EQ(moving.weigh().rejected, 1U);
 }
 
-TEST(Weighing, SoIsWhatNeighboursPullFar) {
-  Frame alone, pulled;
-  for (int line = 0; line < kLines; ++line) {
-    for (int b = 0; b < kBoundaries; ++b) {
-      if (b == 5 && (line == 7 || line == 8 || line == 9)) continue;
-      alone.lose(line, b);
-      pulled.lose(line, b);
-    }
+TEST(Doubtful, WhatIsInFrontIsNoNarrowStripe) {
+  DecodedGrid grid;
+  Frame f;
+  for (int line = 0; line < kLines; ++line) f.edge(line, kBoundaries - 1).column_px -= 38;
+  f.move(7, kBoundaries - 1, 0.15F, 0.2F);
+  EXPECT_EQ(doubtful(f, grid), 0U);
+}
+
+TEST(Doubtful, WhereNothingIsAroundItsStandardDeviationTells) {
+  DecodedGrid grid;
+  for (const auto& [sigma_px, given_up] : {std::pair{0.1F, 0U}, {0.3F, 1U}}) {
+    Frame f;
+    for (int line = 0; line < kLines; ++line)
+      for (int b = 0; b < kBoundaries; ++b)
+        if (line != 7 || b != 5) f.lose(line, b);
+    f.edge(7, 5).sigma_px = sigma_px;
+    EXPECT_EQ(doubtful(f, grid), given_up) << sigma_px;
   }
-  alone.move(7, 5, 0, 0.45F);
-  pulled.move(7, 5, 1.6F, 0.45F);
-  EXPECT_EQ(alone.weigh().rejected, 0U);
-  EXPECT_EQ(pulled.weigh().rejected, 1U);
 }
 
 TEST(Persistence, WhatStandsStillIsThereThoughThisSlideDoesNotShowIt) {

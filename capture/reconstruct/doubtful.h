@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Places that are probably wrong though nothing else gave them up: a few in a thousand, which make most of a
+// surface's mean square error.
+#pragma once
+
+#include <cstddef>
+
+#include "base/parallel.h"
+#include "capture/reconstruct/decoded_grid.h"
+
+namespace relievo {
+
+/// Gives up places of `grid` by three things that tell of large errors on simulated scenes, most of what
+/// learners told that were shown all neighbours and the picture: a large standard deviation; narrow stripes
+/// beside it, where a surface turns away and edges blur into each other; and that it is out of line with the
+/// three above and with the three below. Returns how many. The same for any number of threads.
+std::size_t give_up_doubtful(WorkerPool& pool, DecodedGrid& grid);
+
+}  // namespace relievo
