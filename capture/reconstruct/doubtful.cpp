@@ -19,7 +19,9 @@ namespace {
 // Measured on simulated scenes: log-odds of a large error are linear in the logarithms of the three, with
 // about these ratios.
 constexpr float kSure_px = 0.06F;  // what is surer stays
-constexpr float kMost_px = 0.45F;  // standard deviation, beside stripes of kStripe_px, so far out of line:
+constexpr float kMost_px = 0.53F;  // standard deviation, beside stripes of kStripe_px, so far out of line:
+constexpr float kMostMoving_px = 0.45F;  // and where so many boundaries around were elsewhere
+constexpr int kMoves = 4;
 constexpr float kOutOfLine_px = 0.1F;  // it counts by its root,
 constexpr float kStripe_px = 8;        // and this by its square
 constexpr float kLeastOutOfLine_px = 0.03F;
@@ -41,7 +43,7 @@ float within(float v, float least, float most, float unknown) {
 }
 
 /// Of the place at `column`; `line` cells further on is the one on the next line.
-bool doubtful(const float* column, std::ptrdiff_t line, float sigma_px) {
+bool doubtful(const float* column, std::ptrdiff_t line, float sigma_px, float most_px) {
   // Not in order beside what is in front.
   const float stripe_px =
       within(std::fmin(std::fabs(column[1] - column[0]), std::fabs(column[0] - column[-1])), kNarrowest_px,
@@ -50,13 +52,13 @@ bool doubtful(const float* column, std::ptrdiff_t line, float sigma_px) {
   const float below = out_of_line_px(*column, {column[line], column[2 * line], column[3 * line]});
   const float off_px =
       within(std::fmin(above, below), kLeastOutOfLine_px, kMostOutOfLine_px, kUnknownOutOfLine_px);
-  return squared(sigma_px / kMost_px) * (off_px / kOutOfLine_px) * squared(squared(kStripe_px / stripe_px)) >
+  return squared(sigma_px / most_px) * (off_px / kOutOfLine_px) * squared(squared(kStripe_px / stripe_px)) >
          1;
 }
 
 }  // namespace
 
-std::size_t give_up_doubtful(WorkerPool& pool, DecodedGrid& grid) {
+std::size_t give_up_doubtful(const MovingPlaces& moving, WorkerPool& pool, DecodedGrid& grid) {
   constexpr float kGivenUp = std::numeric_limits<float>::infinity();  // a standard deviation
   const std::ptrdiff_t next_line = grid.column_px(1) - grid.column_px(0);
   std::atomic<std::size_t> given_up{0};
@@ -65,9 +67,11 @@ std::size_t give_up_doubtful(WorkerPool& pool, DecodedGrid& grid) {
     for (int line = begin; line < end; ++line) {
       const DecodedRow row = grid.decoded(line);
       for (int b = 0; b < grid.boundaries(); ++b) {
-        if (row.column_px[b] == row.column_px[b] && row.sigma_px[b] >= kSure_px &&
-            doubtful(row.column_px + b, next_line, row.sigma_px[b]))
-          row.sigma_px[b] = kGivenUp;
+        const float column_px = row.column_px[b];
+        const float sigma_px = row.sigma_px[b];
+        if (column_px != column_px || sigma_px < kSure_px) continue;
+        const float most_px = moving.around(line, column_px) >= kMoves ? kMostMoving_px : kMost_px;
+        if (doubtful(row.column_px + b, next_line, sigma_px, most_px)) row.sigma_px[b] = kGivenUp;
       }
     }
   });

@@ -118,7 +118,7 @@ std::size_t doubtful(Frame& f, DecodedGrid& grid) {
       if (f.result.boundary[Frame::at(line, b)] >= 0) grid.put(line, b, e.column_px, e.sigma_px, 1);
     }
   }
-  return give_up_doubtful(f.pool, grid);
+  return give_up_doubtful(f.moving(), f.pool, grid);
 }
 bool known(const DecodedGrid& grid, int line, int boundary) {
   return grid.column_px(line)[boundary] == grid.column_px(line)[boundary];
@@ -135,6 +135,17 @@ TEST(Doubtful, WhatIsOutOfLineWithLittleToTellItsPlace) {
   EXPECT_EQ(doubtful(f, grid), 1U);
   EXPECT_FALSE(known(grid, 7, 5));
   EXPECT_TRUE(known(grid, 13, 3));
+}
+
+TEST(Doubtful, WhereThingsMoveSooner) {
+  DecodedGrid grid;
+  for (const bool moves : {false, true}) {
+    Frame f;
+    for (int line = 5; moves && line < 10; ++line)
+      for (int b = 3; b < 8; ++b) f.result.still[Frame::at(line, b)] = 0;
+    f.move(7, 5, 0.3F, 0.28F);
+    EXPECT_EQ(doubtful(f, grid), moves ? 1U : 0U);
+  }
 }
 
 TEST(Doubtful, BesideANarrowStripeSooner) {
