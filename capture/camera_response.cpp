@@ -6,6 +6,7 @@
 #include "base/fit_image.h"
 
 namespace relievo {
+
 CameraResponse::CameraResponse(double gamma) {
   for (std::size_t i = 0; i < light_.size(); ++i) {
     light_[i] = static_cast<float>(255 * std::pow(static_cast<double>(i) / 255, gamma));

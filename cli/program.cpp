@@ -59,6 +59,13 @@ std::string first_word(int argc, char** argv) {
   return {};
 }
 
+/// The program with the command that was given, and the command in that.
+std::string name_in_full(const CLI::App& app) {
+  std::string name = app.get_name();
+  for (const CLI::App* given : app.get_subcommands()) name += ' ' + name_in_full(*given);
+  return name;
+}
+
 // Results that could not be written (a full disk, a closed pipe) are a failure, not silence.
 int flush_results(const std::string& name, int code) {
   std::cout.flush();
@@ -80,9 +87,10 @@ int parse_and_run(const std::string& name, const std::string& description,
     CLI::App* sub = app.add_subcommand(command.name, command.description)->group("Commands");
     add_common_flags(*sub, verbosity);
     actions.emplace_back(sub, command.define(*sub));
+    for (CLI::App* nested : sub->get_subcommands([](CLI::App*) { return true; }))
+      add_common_flags(*nested, verbosity);
   }
 
-  std::string chosen = name;
   const std::string word = first_word(argc, argv);
   const bool known =
       std::any_of(commands.begin(), commands.end(), [&](const Command& c) { return c.name == word; });
@@ -97,9 +105,8 @@ int parse_and_run(const std::string& name, const std::string& description,
   } catch (const CLI::Success& e) {  // --help, in its kinds
     return flush_results(name, app.exit(e));
   } catch (const CLI::ParseError& e) {
-    for (const CLI::App* sub : app.get_subcommands()) chosen = name + ' ' + sub->get_name();
     const bool no_verb = std::string_view(e.what()).starts_with("A subcommand is required");
-    return usage_error(chosen, no_verb ? "which command?" : e.what());
+    return usage_error(name_in_full(app), no_verb ? "which command?" : e.what());
   }
 
   if (verbosity.verbose) set_log_level(LogLevel::kDebug);
@@ -111,7 +118,7 @@ int parse_and_run(const std::string& name, const std::string& description,
     if (status.ok()) return flush_results(name, kExitDone);
     std::cout.flush();
     std::fflush(stdout);
-    say_failed(name + ' ' + sub->get_name(), status.error().message);
+    say_failed(name_in_full(app), status.error().message);
     return kExitFailed;
   }
   return kExitUsage;  // not reached: one command is required

@@ -30,11 +30,13 @@ std::shared_ptr<WebOptions> add_web_flags(CLI::App& app) {
       ->type_name("N")
       ->check(CLI::Range(1, kMostClients));
   app.add_option("--max-per-address", options->max_per_address,
-                 "Connections of one address (default 32; any number from this machine)")
+                 "Connections of one address (default 32, and any number from this machine; given, it holds "
+                 "for this machine, too)")
       ->type_name("N")
       ->check(CLI::Range(1, kMostClients));
   app.add_option("--max-rate", options->max_rate,
-                 "Requests a second of one address (default 200; any number from this machine)")
+                 "Requests a second of one address (default 200, and any number from this machine; given, it "
+                 "holds for this machine, too)")
       ->type_name("N")
       ->check(number(kLeastWebRate, kMostWebRate));
   return options;

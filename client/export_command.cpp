@@ -16,6 +16,7 @@
 #include "client/recorded_stream.h"
 #include "client/time_range.h"
 #include "codec/frame3d_codec.h"
+#include "codec/video_file.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -178,6 +179,8 @@ Command export_command() {
           if (options->draco && !format_named(options->format).has_draco)
             throw CLI::ValidationError(
                 "--draco", "there is no Draco in " + options->format + ": it is of glb and animation");
+          if (options->format == "video" && !is_video_name(options->out))
+            throw CLI::ValidationError("--out", "a video's name ends in .mp4 or .mkv");
         });
         app.footer(
             "Examples:\n"

@@ -107,11 +107,9 @@ VideoFile& VideoFile::operator=(VideoFile&&) noexcept = default;
 VideoFile::~VideoFile() = default;
 
 Result<VideoFile> VideoFile::create(const fs::path& file) {
-  const std::string ending = file.extension().string();
-  if (ending != ".mp4" && ending != ".mkv")
-    return Error{file.string() + ": a video's name ends in .mp4 or .mkv"};
+  if (!is_video_name(file)) return Error{file.string() + ": a video's name ends in .mp4 or .mkv"};
   av_log_set_level(AV_LOG_ERROR);
-  return VideoFile(std::make_unique<State>(file, ending == ".mp4" ? "mp4" : "matroska"));
+  return VideoFile(std::make_unique<State>(file, file.extension() == ".mp4" ? "mp4" : "matroska"));
 }
 
 Status VideoFile::add(std::span<const std::uint8_t> section, int width, int height, std::int64_t time_ns) {

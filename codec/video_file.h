@@ -12,10 +12,14 @@
 
 namespace relievo {
 
+inline bool is_video_name(const std::filesystem::path& file) {
+  return file.extension() == ".mp4" || file.extension() == ".mkv";
+}
+
 /// A file of that name appears, or is replaced, when finish() succeeds. One thread.
 class VideoFile {
  public:
-  /// The name's ending says which: .mp4 or .mkv. Fails where it is another, and in builds without libavformat
+  /// Fails where is_video_name() does not hold, and in builds without libavformat
   /// or H.264.
   static Result<VideoFile> create(const std::filesystem::path& file);
   VideoFile(VideoFile&&) noexcept;

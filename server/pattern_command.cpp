@@ -123,10 +123,12 @@ Status write_video(const Options& options, const Pattern& pattern, StopSignal& s
   return {};
 }
 
+bool is_video(const Options& options) {
+  return fs::path(options.out).extension() == ".mkv";
+}
+
 Status run(const Options& options, StopSignal& stop) {
-  if (fs::path(options.out).extension() == ".mkv") {
-    if (options.gray || options.both_axes)
-      return Error{options.out + ": Gray code and --both-axes are written as pictures, give a folder"};
+  if (is_video(options)) {
     const auto pattern = pattern_of(options.pattern);
     if (!pattern) return pattern.error();
     if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;
@@ -223,6 +225,10 @@ Command pattern_command() {
             ->check(number(0.01, 36000))
             ->capture_default_str();
         app.add_flag("--json", o->json, "Print the result as JSON");
+        app.final_callback([o] {
+          if (is_video(*o) && (o->gray || o->both_axes))
+            throw CLI::ValidationError("--out", "Gray code and --both-axes are pictures: give a folder");
+        });
         app.footer(scheme_help());
         return [o](StopSignal& stop) { return run(*o, stop); };
       }};

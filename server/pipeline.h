@@ -85,7 +85,7 @@ class Pipeline {
   /// Ends run() soon. Any thread, any number of times.
   virtual void stop() = 0;
 
-  /// Some reader cannot decode what comes: a key frame follows soon. Wishes within 0.25 s of one are met
+  /// Some reader cannot decode what comes: a key frame follows soon. Wishes within 0.1 s of one are met
   /// together. Any thread, any number of times; returns at once.
   virtual void request_key_frame() = 0;
 

@@ -272,6 +272,10 @@ Command serve_command() {
         app.add_flag("--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");
         add_rig_flags(app, f->camera);
         add_camera_flags(app, f->camera);
+        app.final_callback([f] {
+          if (f->decoder == "auto" && f->half_lines)
+            throw CLI::ValidationError("--half-lines", "--decoder auto leaves out lines where it has to");
+        });
         app.footer(
             "Examples:\n"
             "  relievo-server serve                                        the simulated face\n"

@@ -77,8 +77,7 @@ class Video final : public ShotOutput {
 
 Result<std::unique_ptr<ShotOutput>> ShotOutput::create(const std::string& out) {
   if (out.ends_with(".png")) return std::unique_ptr<ShotOutput>(std::make_unique<OnePicture>(out));
-  if (!out.ends_with(".mp4") && !out.ends_with(".mkv"))
-    return std::unique_ptr<ShotOutput>(std::make_unique<Folder>(out));
+  if (!is_video_name(out)) return std::unique_ptr<ShotOutput>(std::make_unique<Folder>(out));
   auto file = VideoFile::create(out);
   if (!file) return file.error();
   return std::unique_ptr<ShotOutput>(std::make_unique<Video>(out, *std::move(file)));

@@ -240,7 +240,7 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   per_status("relievo_stream_bits_per_second", "gauge", "Of frames, over the last few seconds.",
              [](T s) { return s.bit_rate; });
   per_status("relievo_stream_rate_level", "gauge",
-             "How much coarser than asked for, to keep a bit rate; 0 not at all.",
+             "How much coarser than asked for, to keep bit rate, deadline or PSNR; 0 not at all.",
              [](T s) { return s.rate_level; });
 
   const auto per_rung = [&](const char* name, const char* type, const char* help, auto value) {

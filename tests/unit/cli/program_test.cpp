@@ -116,6 +116,24 @@ TEST(Program, WrongUsageIsExitTwoAndOneLine) {
   }
 }
 
+TEST(Program, ACommandWithinACommandIsNamedAndTakesTheCommonFlags) {
+  const std::vector<Command> commands = {
+      {"calibrate", "calibrates", [](CLI::App& app) {
+         auto captures = std::make_shared<std::string>();
+         app.require_subcommand(1);
+         app.add_subcommand("colour", "the colours")->add_option("captures", *captures)->required();
+         return [captures](StopSignal&) { return Status(Error{"too dark"}); };
+       }}};
+  auto o = run(commands, {"calibrate", "colour"});
+  EXPECT_EQ(o.code, 2);
+  EXPECT_EQ(o.err, "tool calibrate colour: captures is required (see tool calibrate colour --help)\n");
+  o = run(commands, {"calibrate", "colour", "folder"});
+  EXPECT_EQ(o.code, 1);
+  EXPECT_EQ(o.err, "tool calibrate colour: error: too dark\n");
+  EXPECT_THAT(run(commands, {"calibrate", "colour", "--help"}).out, HasSubstr("--log-json"));
+  EXPECT_EQ(run(commands, {"calibrate", "colour", "--version"}).code, 0);
+}
+
 TEST(Program, UnknownCommandIsNamed) {
   const auto o = run(one_command([](int, StopSignal&) { return Status(); }), {"-v", "wrok", "--count", "1"});
   EXPECT_EQ(o.code, 2);
