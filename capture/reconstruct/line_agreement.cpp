@@ -119,9 +119,9 @@ void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& conte
       place_on_grid(edges, line, context, out);
     }
   });
+  for (Scratch& s : scratch_) s.open.clear();  // a worker without a line leaves its own as it was
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-    scratch.open.clear();
     for (int line = begin; line < end; ++line) {
       const std::uint32_t first = edges.line_start[static_cast<std::size_t>(line)];
       const std::uint32_t last = edges.line_start[static_cast<std::size_t>(line) + 1];
@@ -149,10 +149,12 @@ void SequenceDecoder::check(const EdgeImage& edges, const SequenceContext& conte
       verdict_[o.edge] = above || both ? kStays : kGoes;
     }
   }
+  for (Scratch& s : scratch_) {
+    s.unsupported = 0;
+    s.open.clear();  // now those without a boundary
+  }
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
-    scratch.unsupported = 0;
-    scratch.open.clear();  // now those without a boundary
     for (int line = begin; line < end; ++line) {
       for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
