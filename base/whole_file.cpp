@@ -19,7 +19,30 @@ std::string write_failure(int error) {
   return std::generic_category().message(error);
 }
 
-Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+namespace {
+
+std::string what_it_is(mode_t mode) {
+  return S_ISDIR(mode) ? "folder" : S_ISFIFO(mode) ? "pipe" : S_ISSOCK(mode) ? "socket" : "device";
+}
+
+/// The file that a rename is to replace, not the link to it. What is there and no file stays.
+Result<std::filesystem::path> where_it_leads(const std::filesystem::path& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0) return path;  // a new file, or an error that writing it says
+  if (!S_ISREG(info.st_mode))
+    return Error{"cannot write " + path.string() + ": it is a " + what_it_is(info.st_mode) + ", not a file"};
+  std::error_code failed;
+  auto target = std::filesystem::canonical(path, failed);
+  if (failed) return Error{"cannot write " + path.string() + ": " + failed.message()};
+  return target;
+}
+
+}  // namespace
+
+Status write_whole_file(const std::filesystem::path& named, std::span<const std::uint8_t> bytes) {
+  const auto leads = where_it_leads(named);
+  if (!leads) return leads.error();
+  const std::filesystem::path& path = *leads;
   const auto failed = [&](int error) {
     return Error{"cannot write " + path.string() + ": " + write_failure(error)};
   };
@@ -64,8 +87,7 @@ Result<int> open_file_to_read(const std::filesystem::path& path) {
   struct stat info {};
   if (::fstat(file, &info) == 0 && S_ISREG(info.st_mode)) return file;
   ::close(file);
-  const std::string what = S_ISDIR(info.st_mode) ? "folder" : S_ISFIFO(info.st_mode) ? "pipe" : "device";
-  return cannot_read(path, "it is a " + what + ", not a file");
+  return cannot_read(path, "it is a " + what_it_is(info.st_mode) + ", not a file");
 }
 
 Result<std::string> read_whole_file(const std::filesystem::path& path, std::size_t most) {

@@ -13,8 +13,9 @@
 
 namespace relievo {
 
-/// Writes under a temporary name beside `path`, then renames: replaces a file of that name, leaves nothing
-/// behind on failure. The error names the file.
+/// Writes under a temporary name beside `path`, then renames: replaces a file of that name, or what a link of
+/// that name leads to, leaves nothing behind on failure. Refuses to replace what is no file. The error names
+/// the file.
 Status write_whole_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 Status write_whole_file(const std::filesystem::path& path, std::string_view text);
 

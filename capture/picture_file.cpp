@@ -146,8 +146,8 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
   if (*declared > kMostPicturePixels || *declared > kMostPicturePixelsPerByte * file.size())
     return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
   try {
-    const cv::Mat bgr =
-        cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())), cv::IMREAD_COLOR);
+    const cv::Mat bgr = cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())),
+                                     cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
     if (bgr.empty()) return Error{name + " cannot be read as a picture: is it damaged?"};
     Image8 rgb(bgr.cols, bgr.rows, 3);
     cv::Mat out(rgb.height(), rgb.width(), CV_8UC3, rgb.data());

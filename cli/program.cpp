@@ -66,6 +66,13 @@ std::string name_in_full(const CLI::App& app) {
   return name;
 }
 
+/// CLI11 says of a word that is no command that a command is required.
+std::string what_is_wrong(const CLI::ParseError& e, const CLI::App& app) {
+  if (!std::string_view(e.what()).starts_with("A subcommand is required")) return e.what();
+  const std::vector<std::string> left = app.remaining(true);
+  return left.empty() ? "which command?" : "there is no command '" + left.front() + "'";
+}
+
 // Results that could not be written (a full disk, a closed pipe) are a failure, not silence.
 int flush_results(const std::string& name, int code) {
   std::cout.flush();
@@ -105,8 +112,7 @@ int parse_and_run(const std::string& name, const std::string& description,
   } catch (const CLI::Success& e) {  // --help, in its kinds
     return flush_results(name, app.exit(e));
   } catch (const CLI::ParseError& e) {
-    const bool no_verb = std::string_view(e.what()).starts_with("A subcommand is required");
-    return usage_error(name_in_full(app), no_verb ? "which command?" : e.what());
+    return usage_error(name_in_full(app), what_is_wrong(e, app));
   }
 
   if (verbosity.verbose) set_log_level(LogLevel::kDebug);

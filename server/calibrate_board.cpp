@@ -34,13 +34,17 @@ Status run(const Options& options) {
   const auto board = parse_board(options.board);
   if (!board) return board.error();
   constexpr double kInch_m = 0.0254;
-  const auto square_px = static_cast<int>(std::lround(board->square_m / kInch_m * options.dpi));
+  constexpr double kLeastDots = 10, kMostDots = 32000;
+  const double square_dots = std::round(board->square_m / kInch_m * options.dpi);
+  const double least_dots = board->charuco() ? square_dots * board->marker_m / board->square_m : square_dots;
   const double largest = std::max(board->columns, board->rows) + 3.0;
-  if (square_px < 10 || square_px * largest > 32000) {
-    return Error{options.board + " at " + std::to_string(options.dpi) + " dots an inch has squares of " +
-                 std::to_string(square_px) + " dots: give " + (square_px < 10 ? "a larger" : "a smaller") +
-                 " --dpi, so that they have 10 or more and the picture 32000 at most"};
+  const bool too_large = square_dots * largest > kMostDots;
+  if (too_large || least_dots < kLeastDots) {
+    return Error{options.board + " at " + std::to_string(options.dpi) + " dots an inch is too " +
+                 (too_large ? "large: give a smaller" : "small: give a larger") +
+                 " --dpi, so that squares and markers have 10 dots or more and the picture 32000 at most"};
   }
+  const auto square_px = static_cast<int>(square_dots);
   const Image8 picture = with_margin(draw_board(*board, square_px), square_px);
   if (const Status written = write_png(options.out, picture); !written) return written;
   const double dots_per_mm = square_px / board->square_m / 1000;
@@ -51,7 +55,7 @@ Status run(const Options& options) {
                                  {"width_mm", width_mm},
                                  {"height_mm", height_mm},
                                  {"inner_corners", {board->columns, board->rows}}};
-    std::printf("%s\n", json.dump(2).c_str());
+    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     return {};
   }
   std::printf("%s: print it %.1f x %.1f mm large, margin included, on something flat and matt,\n",

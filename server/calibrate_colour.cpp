@@ -71,7 +71,7 @@ bool is_palette(Primary colour) {
 void print_json(const ColourCalibration& c, const std::string& out) {
   auto json = nlohmann::json::parse(colour_report(c));
   json["rig"] = out;
-  std::printf("%s\n", json.dump(2).c_str());
+  std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
 void print(const ColourCalibration& c, const std::string& out) {

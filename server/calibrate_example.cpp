@@ -104,7 +104,7 @@ Status run(const Options& options, StopSignal& stop) {
                                  {"truth", (out / "truth.yaml").string()},
                                  {"board", options.board},
                                  {"projector", size}};
-    std::printf("%s\n", json.dump(2).c_str());
+    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     return {};
   }
   std::printf("%d views of a board and 8 captures of a white sheet, in %s. Next:\n", options.views,

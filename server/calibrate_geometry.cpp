@@ -60,7 +60,7 @@ void print_json(const Geometry& g, const std::optional<RigDifference>& d, const 
                        {"depth_rms_mm", 1000 * d->depth_rms_m},
                        {"depth_mean_mm", 1000 * d->depth_mean_m}};
   }
-  std::printf("%s\n", json.dump(2).c_str());
+  std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
 void print_lens(const char* name, const PinholeModel& lens, const double* sigma) {

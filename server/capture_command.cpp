@@ -100,7 +100,7 @@ Status run(const Options& options, StopSignal& stop) {
                                  {"damaged_pictures", counts.damaged_pictures},
                                  {"restarts", counts.restarts},
                                  {"reconnects", counts.reconnects}};
-    std::printf("%s\n", json.dump(2).c_str());
+    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
     std::printf("%zu frames in %s; lost %llu, damaged pictures %llu\n", frames, options.out.c_str(),
                 static_cast<unsigned long long>(counts.lost_frames),

@@ -150,7 +150,9 @@ Status run(const Options& options) {
   if (options.json) {
     nlohmann::json devices = nlohmann::json::array();
     for (const DeviceDescription& device : found) devices.push_back(to_json(device));
-    std::printf("%s\n", nlohmann::json({{"devices", devices}}).dump(2).c_str());
+    std::puts(nlohmann::json({{"devices", devices}})
+                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
+                  .c_str());
   } else {
     for (const DeviceDescription& device : found) print(device);
     if (found.empty()) log_info("no camera found; -v says what was looked at");

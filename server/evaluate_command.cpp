@@ -55,15 +55,18 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
                                 {"rms_um_per_m", s.rms_um_per_m},
                                 {"p95_um_per_m", s.p95_um_per_m},
                                 {"filters", counts}};
-    std::printf("%s\n", out.dump(2).c_str());
+    std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     return;
   }
   std::printf("frames        %zu of %zu\n", s.frames, s.of);
   std::printf("vertices      %.0f a frame\n", s.vertices_per_frame);
   std::printf("completeness  %.4f of the visible boundaries\n", s.completeness);
   std::printf("outliers      %.3f %%\n", 100 * s.outliers);
-  std::printf("depth error   median %.1f, RMS %.1f, 95 %% under %.1f um a metre\n", s.median_um_per_m,
-              s.rms_um_per_m, s.p95_um_per_m);
+  if (std::isnan(s.median_um_per_m))
+    std::puts("depth error   not known: no vertex is right");
+  else
+    std::printf("depth error   median %.1f, RMS %.1f, 95 %% under %.1f um a metre\n", s.median_um_per_m,
+                s.rms_um_per_m, s.p95_um_per_m);
   print_filters(filters, s.frames);
 }
 

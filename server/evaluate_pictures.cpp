@@ -81,14 +81,17 @@ double share(std::size_t part, std::size_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
 }
 
+std::string error(double um_per_m) {
+  return std::isnan(um_per_m) ? "not known" : format("%.1f &micro;m/m", um_per_m);
+}
+
 std::string figures(const Score& s) {
   return "<table>" + row("frames scored", format("%zu of %zu", s.frames, s.of)) +
          row("vertices a frame", format("%.0f", s.vertices_per_frame)) +
          row("completeness", format("%.4f", s.completeness)) +
          row("outliers", format("%.3f %%", 100 * s.outliers)) +
-         row("median error", format("%.1f &micro;m/m", s.median_um_per_m)) +
-         row("RMS error", format("%.1f &micro;m/m", s.rms_um_per_m)) +
-         row("95 % under", format("%.1f &micro;m/m", s.p95_um_per_m)) + "</table>\n";
+         row("median error", error(s.median_um_per_m)) + row("RMS error", error(s.rms_um_per_m)) +
+         row("95 % under", error(s.p95_um_per_m)) + "</table>\n";
 }
 
 std::string filter_table(const FilterCounts& filters, std::size_t frames) {

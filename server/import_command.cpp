@@ -76,7 +76,7 @@ void print(const Report& r, const Options& options) {
       out["compare"] = {{"points", *r.reference_points},
                         {"nearest_mm", {{"median", r.nearest.median}, {"p90", r.nearest.p90}}}};
     }
-    std::printf("%s\n", out.dump(2).c_str());
+    std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     return;
   }
   std::printf("decoded     %zu of %zu lit pixels (%zu with an unclear bit, %zu unlike all around)\n",

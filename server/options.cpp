@@ -3,19 +3,18 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <map>
 #include <string>
 
 namespace relievo {
 
 void add_decoder_option(CLI::App& app, Decoder& decoder) {
-  const std::map<std::string, Decoder> names{
-      {"ordered", Decoder::kOrdered}, {"quick", Decoder::kQuick}, {"paper", Decoder::kPaper}};
-  app.add_option(
-         "--decoder", decoder,
+  app.add_option_function<std::string>(
+         "--decoder", [&decoder](const std::string& name) { decoder = decoder_named(name).value(); },
          "ordered (by the sequence along and across lines: the best), quick (the same with less care, in a "
          "fraction of its time) or paper (as published)")
-      ->transform(CLI::CheckedTransformer(names).description(""))
+      ->check([](const std::string& name) {
+        return decoder_named(name) ? std::string() : "give ordered, quick or paper, not '" + name + "'";
+      })
       ->type_name("NAME");
 }
 

@@ -50,7 +50,9 @@ Status write_gray(const Options& options) {
   }
   const std::size_t count = gray_slides(options.size.width, options.size.height).size();
   if (options.json) {
-    std::printf("%s\n", nlohmann::json({{"folder", options.out}, {"slides", count}}).dump(2).c_str());
+    std::puts(nlohmann::json({{"folder", options.out}, {"slides", count}})
+                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
+                  .c_str());
   } else {
     std::printf(
         "%zu slides of Gray code, %dx%d, in %s: project them in the order of their names, one picture each\n",
@@ -70,7 +72,7 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   if (options.json) {
     const nlohmann::json json = {
         {"folder", options.out}, {"slides", count}, {"stripes", pattern.stripes()}, {"row_stripes", rows}};
-    std::printf("%s\n", json.dump(2).c_str());
+    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
     std::printf(
         "%zu slides, %dx%d, of %d stripes along columns and %d along rows, in %s: project them in the order "
@@ -112,7 +114,7 @@ Status write_video(const Options& options, const Pattern& pattern, StopSignal& s
                                  {"interlaced", options.interlaced},
                                  {"scheme", to_string(pattern.scheme)},
                                  {"stripes", pattern.stripes()}};
-    std::printf("%s\n", json.dump(2).c_str());
+    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
     std::printf(
         "%llu %s of %d stripes, %dx%d, %.2f a second, %.1f s, in %s: play it in a loop, full screen\n",
@@ -166,13 +168,13 @@ Status run(const Options& options, StopSignal& stop) {
   const std::vector<std::uint8_t> bytes(yaml.begin(), yaml.end());
   if (auto s = write_whole_file(fs::path(options.out) / files.back(), bytes); !s) return s;
   if (options.json) {
-    std::printf("%s\n", nlohmann::json({{"folder", options.out},
-                                        {"files", files},
-                                        {"order", order},
-                                        {"scheme", to_string(pattern->scheme)},
-                                        {"stripes", pattern->stripes()}})
-                            .dump(2)
-                            .c_str());
+    std::puts(nlohmann::json({{"folder", options.out},
+                              {"files", files},
+                              {"order", order},
+                              {"scheme", to_string(pattern->scheme)},
+                              {"stripes", pattern->stripes()}})
+                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
+                  .c_str());
     return {};
   }
   std::printf("%d stripes on %d slides, %dx%d, in %s\n", pattern->stripes(), pattern->slides, width, height,

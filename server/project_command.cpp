@@ -63,7 +63,7 @@ Status list(const Options& options) {
     for (const DisplayMode& mode : output.modes)
       std::printf("  %dx%d at %.0f Hz\n", mode.width, mode.height, mode.refresh_hz);
   }
-  if (options.json) std::printf("%s\n", all.dump(2).c_str());
+  if (options.json) std::puts(all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   return {};
 }
 
@@ -103,7 +103,7 @@ Status report(const ShowReport& shown, const Options& options, const DisplayOutp
                                  {"refresh_hz", shown.refresh_hz},
                                  {"synchronised", shown.synchronised},
                                  {"counted_by_display", shown.counted}};
-    std::printf("%s\n", json.dump(2).c_str());
+    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
     std::printf("%llu pictures in %llu refreshes of %.2f Hz on %s, %llu missed\n",
                 static_cast<unsigned long long>(shown.pictures),

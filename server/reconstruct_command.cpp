@@ -82,7 +82,7 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
                                   {"surface", t.surface_ms.median()},
                                   {"texture", t.texture_ms.median()},
                                   {"total", t.total_ms.median()}}}};
-    std::printf("%s\n", out.dump(2).c_str());
+    std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     return;
   }
   if (t.scheme == Scheme::kComplementary || t.scheme == Scheme::kOneSlide) {
@@ -183,6 +183,10 @@ Status run(const Options& options, StopSignal& stop) {
     }
     return Error{
         "no frame could be reconstructed: the take needs two readable frames under different slides"};
+  }
+  if (totals.vertices == 0 && !stop.stopped()) {
+    return Error{"no surface was found in any frame, so that the files in " + options.out +
+                 " are empty: are the pictures dark or over-exposed, and rig.yaml and pattern.yaml theirs?"};
   }
   return {};
 }

@@ -52,7 +52,9 @@ Status run(const Options& options, StopSignal& stop) {
   if (stopped) return {};  // asked for; nothing is left behind
   if (!done) return done;
   if (options.json) {
-    std::printf("%s\n", nlohmann::json({{"take", options.out}, {"frames", written}}).dump(2).c_str());
+    std::puts(nlohmann::json({{"take", options.out}, {"frames", written}})
+                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
+                  .c_str());
   } else {
     std::printf("%llu frames with truth in %s\n", static_cast<unsigned long long>(written),
                 options.out.c_str());

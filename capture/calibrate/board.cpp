@@ -42,13 +42,15 @@ cv::Ptr<cv::aruco::CharucoBoard> charuco_of(const Board& board) {
       cv::aruco::getPredefinedDictionary(dictionary_number(board.dictionary).value_or(0)));
 }
 
+constexpr const char* kLength = R"((\d{1,6}\.?\d{0,6}|\.\d{1,6})(mm|cm|m))";
+
 double length_m(const std::string& number, const std::string& unit) {
   return std::atof(number.c_str()) * (unit == "mm" ? 0.001 : unit == "cm" ? 0.01 : 1);
 }
 
 Result<Board> parse_charuco(const std::string& text) {
-  static const std::regex pattern(
-      R"(charuco:(\d{1,3})[xX](\d{1,3}):([0-9.]{1,12})(mm|cm|m):([0-9.]{1,12})(mm|cm|m)(:[A-Za-z0-9_]{1,32})?)");
+  static const std::regex pattern(std::string(R"(charuco:(\d{1,3})[xX](\d{1,3}):)") + kLength + ":" +
+                                  kLength + "(:[A-Za-z0-9_]{1,32})?");
   std::smatch match;
   if (!std::regex_match(text, match, pattern)) return Error{text + kUsage};
   Board board{std::stoi(match[1]) - 1, std::stoi(match[2]) - 1, length_m(match[3], match[4]),
@@ -143,7 +145,7 @@ std::vector<BoardCorner> find_charuco(const cv::Mat& picture, const cv::Mat& str
 
 Result<Board> parse_board(const std::string& text) {
   if (text.rfind("charuco", 0) == 0) return parse_charuco(text);
-  static const std::regex pattern(R"(chessboard:(\d{1,3})[xX](\d{1,3}):([0-9.]{1,12})(mm|cm|m))");
+  static const std::regex pattern(std::string(R"(chessboard:(\d{1,3})[xX](\d{1,3}):)") + kLength);
   std::smatch match;
   if (!std::regex_match(text, match, pattern)) return Error{text + kUsage};
   Board board{std::stoi(match[1]), std::stoi(match[2]), length_m(match[3], match[4])};

@@ -68,7 +68,7 @@ Result<WhiteTarget> find_white_target(const std::vector<ColourCapture>& captures
   cv::Mat mask;
   if (roi) {
     if (roi->x < 0 || roi->y < 0 || roi->width < 1 || roi->height < 1 ||
-        roi->x + roi->width > picture.width() || roi->y + roi->height > picture.height()) {
+        roi->width > picture.width() - roi->x || roi->height > picture.height() - roi->y) {
       return Error{"the region given is not inside the pictures of " + std::to_string(picture.width()) + "x" +
                    std::to_string(picture.height())};
     }

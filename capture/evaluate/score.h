@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "base/frame3d.h"
@@ -21,10 +22,12 @@ struct Score {
   double vertices_per_frame = 0;
   double completeness =
       0;  // of the visible boundary pixels, those with a right vertex within 1.2 px along the line
-  double outliers = 0;         // of the vertices, those over 2 % of depth off, or where nothing is
-  double median_um_per_m = 0;  // of the right vertices
-  double rms_um_per_m = 0;
-  double p95_um_per_m = 0;
+  double outliers = 0;  // of the vertices, those over 2 % of depth off, or where nothing is
+  /// Of the right vertices; NaN where there are none.
+  double median_um_per_m = kNone, rms_um_per_m = kNone, p95_um_per_m = kNone;
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// The truth on even rows at the time of a frame's first field (0), as it is, or of its second (1): between

@@ -117,6 +117,7 @@ Result<std::vector<TakeStamp>> read_timestamps(const std::filesystem::path& file
       return Error{name + " line " + std::to_string(number) + ": " + what};
     };
     if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.empty() && in.peek() == std::istringstream::traits_type::eof()) break;  // an editor's last line
     if (number == 1) {
       if (line != "frame,time_s") return refuse("must be the header \"frame,time_s\"");
       continue;
@@ -145,8 +146,8 @@ Result<Image8> read_picture(const std::filesystem::path& file, int width, int he
                  ", but rig.yaml says " + std::to_string(width) + " x " + std::to_string(height)};
   }
   try {
-    const cv::Mat bgr =
-        cv::imdecode(cv::_InputArray(bytes.data(), static_cast<int>(bytes.size())), cv::IMREAD_COLOR);
+    const cv::Mat bgr = cv::imdecode(cv::_InputArray(bytes.data(), static_cast<int>(bytes.size())),
+                                     cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
     if (bgr.cols != width || bgr.rows != height || bgr.type() != CV_8UC3)
       return Error{name + " cannot be decoded"};
     Image8 image(width, height, 3);

@@ -65,7 +65,7 @@ Status write_frame(const fs::path& take, std::uint64_t number, const CapturedFra
 Status write(const fs::path& take, FieldSource& source, const std::function<const ImageF&()>& truth,
              const TakeOptions& options) {
   std::error_code code;
-  const fs::path target = fs::absolute(take, code).lexically_normal();
+  const fs::path target = fs::weakly_canonical(fs::absolute(take, code), code);  // where links lead
   const fs::path whole = target.has_filename() ? target : target.parent_path();  // "take/"
   if (fs::exists(whole, code) && !(fs::is_directory(whole, code) && fs::is_empty(whole, code))) {
     return Error{take.string() + " exists already: give a new folder or remove it"};

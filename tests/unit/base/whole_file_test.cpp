@@ -2,6 +2,7 @@
 #include "base/whole_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <iterator>
@@ -36,6 +37,24 @@ TEST(WholeFile, AFolderInItsPlaceStaysWhatItIs) {
   EXPECT_FALSE(write_whole_file(folder / "taken", "text").ok());
   EXPECT_TRUE(std::filesystem::is_directory(folder / "taken"));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(WholeFile, ALinkStaysOneAndWhatItLeadsToIsReplaced) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_whole_file(folder / "bench.yaml", "old").ok());
+  std::filesystem::create_symlink("bench.yaml", folder / "rig.yaml");
+  ASSERT_TRUE(write_whole_file(folder / "rig.yaml", "new").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "rig.yaml"));
+  EXPECT_EQ(read_whole_file(folder / "bench.yaml", 10).value(), "new");
+}
+
+TEST(WholeFile, APipeInItsPlaceStaysWhatItIs) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  const auto written = write_whole_file(folder / "pipe", "text");
+  ASSERT_FALSE(written.ok());
+  EXPECT_NE(written.error().message.find("it is a pipe, not a file"), std::string::npos);
+  EXPECT_TRUE(std::filesystem::is_fifo(folder / "pipe"));
 }
 
 TEST(WholeFile, IsReadUpToTheSizeItMayHave) {

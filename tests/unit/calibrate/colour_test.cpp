@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace relievo {
@@ -165,6 +166,9 @@ TEST(ColourCalibration, RefusesIncompleteSets) {
 TEST(ColourCalibration, RefusesWhereThereIsNoTarget) {
   EXPECT_THAT(refusal(all(0)), HasSubstr("no white target is found"));
   EXPECT_THAT(refusal(all(), {.roi = Roi{100, 80, 50, 50}}), HasSubstr("not inside the pictures of 120x90"));
+  constexpr int kMost = std::numeric_limits<int>::max();
+  for (const Roi& roi : {Roi{kMost - 7, 0, 50, 50}, Roi{0, kMost - 7, 50, 50}, Roi{1, 1, kMost, kMost}})
+    EXPECT_THAT(refusal(all(), {.roi = roi}), HasSubstr("not inside the pictures of 120x90"));
   EXPECT_EQ(refusal(all(), {.roi = Roi{40, 30, 40, 30}}), "accepted");
 }
 

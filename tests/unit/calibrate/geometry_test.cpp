@@ -264,7 +264,8 @@ TEST(Board, ParsesAndRefuses) {
   EXPECT_NEAR(parse_board("chessboard:4x3:2.5cm")->square_m, 0.025, 1e-12);
   for (const char* wrong :
        {"", "chessboard", "chessboard:9x7", "chessboard:9x7:75", "chessboard:2x7:75mm", "chessboard:9x7:0mm",
-        "charuco:9x7:30mm", "charuco:9x7:30mm:30mm", "charuco:2x7:30mm:20mm", "charuco:9x7:30mm:20mm:8X8_50",
+        "chessboard:9x7:1.2.3mm", "chessboard:9x7:.mm", "chessboard:9x7:9999999m", "charuco:9x7:30mm",
+        "charuco:9x7:30mm:30mm", "charuco:2x7:30mm:20mm", "charuco:9x7:30mm:20mm:8X8_50",
         "charuco:20x20:30mm:20mm"}) {
     EXPECT_FALSE(parse_board(wrong).ok()) << wrong;
   }

@@ -173,6 +173,32 @@ TEST(TakeSource, TimestampsAreParsedStrictly) {
   }
   test::write_text(folder.path() / "timestamps.csv", "frame,time_s\r\n0,0\r\n");
   EXPECT_TRUE(open_source("take:" + folder.path().string(), {}));
+  test::write_text(folder.path() / "timestamps.csv", "frame,time_s\n0,0\n\n");  // as some editors end a file
+  EXPECT_TRUE(open_source("take:" + folder.path().string(), {}));
+}
+
+// A camera's rows are what they are: fields would change places.
+TEST(TakeSource, FramesAreNotTurnedByWhatTheirMetadataSays) {
+  test::TempFolder folder;
+  test::write_small_take(folder.path(), Scan::kInterlaced, 1);
+  const std::filesystem::path file = take_picture(folder.path(), 0);
+  std::string png = test::read_text(file);
+  // Big-endian TIFF with orientation 3, behind the signature and IHDR.
+  const std::string exif(
+      "\0\0\0\x1a"
+      "eXIf"
+      "MM\0\x2a\0\0\0\x08"
+      "\0\x01"
+      "\x01\x12\0\x03\0\0\0\x01\0\x03\0\0"
+      "\0\0\0\0"
+      "\x84\x5f\x64\xce",
+      38);
+  png.insert(33, exif);
+  test::write_text(file, png);
+  auto frame = open(folder.path())->next();
+  ASSERT_TRUE(frame && *frame) << frame.error().message;
+  for (int i = 0; i < 96; ++i)
+    ASSERT_EQ((*frame)->picture.row(0)[i], test::small_pixel(0, static_cast<std::size_t>(i)));
 }
 
 TEST(TakeSource, OpeningNamesWhatIsMissing) {

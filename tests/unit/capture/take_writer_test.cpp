@@ -80,6 +80,15 @@ TEST(TakeWriter, RefusesAFolderWithSomethingInIt) {
   EXPECT_TRUE(write_take(folder.path() / "empty/", *source, {}));
 }
 
+TEST(TakeWriter, GoesWhereALinkLeads) {
+  test::TempFolder folder;
+  std::filesystem::create_directory(folder.path() / "large_disk");
+  std::filesystem::create_directory_symlink("large_disk", folder.path() / "take");
+  ASSERT_TRUE(write_take(folder.path() / "take", *small_sim(""), {.frames = 1}));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "take"));
+  EXPECT_EQ(entries(folder.path() / "large_disk" / "frames"), 1u);
+}
+
 TEST(TakeWriter, StoppedLeavesNothingBehind) {
   test::TempFolder folder;
   const auto source = small_sim("");

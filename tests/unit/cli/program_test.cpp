@@ -127,6 +127,9 @@ TEST(Program, ACommandWithinACommandIsNamedAndTakesTheCommonFlags) {
   auto o = run(commands, {"calibrate", "colour"});
   EXPECT_EQ(o.code, 2);
   EXPECT_EQ(o.err, "tool calibrate colour: captures is required (see tool calibrate colour --help)\n");
+  EXPECT_EQ(run(commands, {"calibrate"}).err, "tool calibrate: which command? (see tool calibrate --help)\n");
+  EXPECT_EQ(run(commands, {"calibrate", "colours"}).err,
+            "tool calibrate: there is no command 'colours' (see tool calibrate --help)\n");
   o = run(commands, {"calibrate", "colour", "folder"});
   EXPECT_EQ(o.code, 1);
   EXPECT_EQ(o.err, "tool calibrate colour: error: too dark\n");
