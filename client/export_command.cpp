@@ -13,11 +13,10 @@
 #include "client/commands.h"
 #include "client/export_formats.h"
 #include "client/options.h"
+#include "client/range_frames.h"
 #include "client/recorded_stream.h"
 #include "client/time_range.h"
-#include "codec/frame3d_codec.h"
 #include "codec/video_file.h"
-#include "idl/cdr.h"
 
 namespace relievo {
 namespace {
@@ -44,36 +43,9 @@ const ExportFormat& format_named(const std::string& name) {
 
 struct Exported {
   std::uint64_t written = 0;
-  std::uint64_t unreadable = 0;
-  std::uint64_t waiting = 0;  // for the key frame they build on
-  std::string first_problem;
+  LeftOut left_out;
   bool stopped = false;
 };
-
-Status export_frame(ExportWriter& writer, const RawSample& sample, FrameDecoder& decoder,
-                    Exported& exported) {
-  const auto unreadable = [&](const Error& error) {
-    if (exported.unreadable++ == 0) exported.first_problem = error.message;
-    return Status();
-  };
-  const auto view = read_frame_cdr(sample.cdr);
-  if (!view) return unreadable(view.error());
-  if (read_frame_header(view->data) && !decoder.can_decode(view->data)) {
-    if (exported.waiting++ == 0)
-      log_warning("the recording begins between key frames: frames before the first one cannot be shown");
-    return {};
-  }
-  const auto frame = decoder.decode(view->data);
-  if (!frame) return unreadable(frame.error());
-  if (auto status = writer.add(*frame, view->data); !status) return status;
-  ++exported.written;
-  return {};
-}
-
-/// Frames before the range may be what those in it build on.
-void remember(const RawSample& sample, FrameDecoder& decoder) {
-  if (const auto view = read_frame_cdr(sample.cdr)) (void)decoder.remember(view->data);
-}
 
 Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, RecordedStream& recorded) {
   ExportTarget target{.out = options.out,
@@ -90,24 +62,19 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
   if (!range) return range.error().in(options.file);
   const auto writer = make_writer(options, recorded);
   if (!writer) return writer.error().in(options.file);
-  if (auto status = recorded.seek(range->from_ns); !status) return status.error();
+  auto frames = RangeFrames::open(recorded, *range);
+  if (!frames) return frames.error();
   Exported exported;
-  FrameDecoder decoder;
   Progress progress("export", "frames", range->frames);
-  for (;;) {
-    auto sample = recorded.next();
-    if (!sample) return sample.error();
-    if (!*sample || (*sample)->receive_time_ns > range->to_ns) break;
-    if ((*sample)->topic != Topic::kFrame) continue;
-    if ((*sample)->receive_time_ns < range->from_ns) {
-      remember(**sample, decoder);
-      continue;
-    }
-    if (auto status = export_frame(**writer, **sample, decoder, exported); !status) return status.error();
-    progress.update(exported.written);
+  while (!exported.stopped) {
+    const auto next = frames->next();
+    if (!next) return next.error();
+    if (!*next) break;
+    if (auto status = (*writer)->add((*next)->frame, (*next)->data); !status) return status.error();
+    progress.update(++exported.written);
     exported.stopped = stop.stopped();
-    if (exported.stopped) break;
   }
+  exported.left_out = frames->left_out();
   if (exported.written > 0)
     if (auto status = (*writer)->finish(); !status) return status.error();
   return exported;
@@ -121,16 +88,17 @@ Status run(const Options& options, StopSignal& stop) {
   if (!exported) return exported.error();
   const std::string written = std::to_string(exported->written) + " frames are in " + options.out.string();
   if (exported->stopped) return Error{"stopped early: " + written};
-  if (exported->unreadable > 0) {
-    return Error{std::to_string(exported->unreadable) + " frames could not be decoded (" +
-                 exported->first_problem + "); the other " + written};
-  }
-  if (exported->written == 0) return Error{options.file + ": no frame in that range is whole"};
+  const LeftOut& left_out = exported->left_out;
+  if (left_out.unreadable > 0) return Error{left_out.text() + "; the other " + written};
+  if (exported->written == 0)
+    return Error{options.file + ": no frame in that range is whole, with the key frame it builds on"};
+  if (left_out.frames() > 0) log_warning(left_out.text());
   if (options.json) {
     std::puts(
         nlohmann::json({{"frames", exported->written},
                         {format_named(options.format).is_one_file ? "file" : "folder", options.out.string()},
                         {"format", options.format},
+                        {"unreadable", left_out.frames()},
                         {"damaged", recorded->damaged()}})
             .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
             .c_str());

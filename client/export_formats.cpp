@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/export_formats.h"
 
-#include <cstdio>
 #include <string>
 
 #include "base/whole_file.h"
+#include "client/frame_names.h"
 #include "client/picture_video.h"
 #include "codec/export.h"
 #include "codec/frame_layout.h"
@@ -17,14 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using Made = Result<std::unique_ptr<ExportWriter>>;
 
-std::string file_name(std::uint64_t number, const char* ending) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%06llu%s", static_cast<unsigned long long>(number), ending);
-  return text;
-}
-
-/// A file a frame, named after the camera's. The folder comes with the first, so that a failure leaves no
-/// empty one.
+/// A file a frame, by FrameNames. The folder comes with the first, so that a failure leaves no empty one.
 class FolderWriter : public ExportWriter {
  public:
   explicit FolderWriter(fs::path folder) : folder_(std::move(folder)) {}
@@ -33,13 +26,14 @@ class FolderWriter : public ExportWriter {
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) return Error{"cannot make the folder " + folder_.string() + ": " + error.message()};
-    return write(folder_, frame);
+    return write(folder_, names_.name(frame), frame);
   }
 
  private:
-  virtual Status write(const fs::path& folder, const Frame3D& frame) = 0;
+  virtual Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) = 0;
 
   fs::path folder_;
+  FrameNames names_;
 };
 
 using WriteFile = Status (*)(const fs::path& file, const Frame3D& frame);
@@ -50,8 +44,8 @@ class FileWriter final : public FolderWriter {
       : FolderWriter(std::move(folder)), ending_(ending), write_(file) {}
 
  private:
-  Status write(const fs::path& folder, const Frame3D& frame) override {
-    return write_(folder / file_name(frame.number, ending_), frame);
+  Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) override {
+    return write_(folder / (name + ending_), frame);
   }
 
   const char* ending_;
@@ -64,8 +58,8 @@ class GlbWriter final : public FolderWriter {
       : FolderWriter(target.out), options_{.draco = target.draco} {}
 
  private:
-  Status write(const fs::path& folder, const Frame3D& frame) override {
-    return write_glb(folder / file_name(frame.number, ".glb"), frame, options_);
+  Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) override {
+    return write_glb(folder / (name + ".glb"), frame, options_);
   }
 
   GlbOptions options_;
@@ -81,19 +75,19 @@ class DepthWriter final : public FolderWriter {
         unit_m_(target.depth_unit_m) {}
 
  private:
-  Status write(const fs::path& folder, const Frame3D& frame) override {
+  Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) override {
     if (auto status = write_camera_json(folder / "camera.json", pinhole_, unit_m_); !status) return status;
     if (!frame.texture.empty()) {
       const bool fits = frame.texture.width() == camera_.width && frame.texture.height() == camera_.height;
       if (!fits) return Error{"the texture is not of the camera's size: depth would not lie on it"};
       const bool is_straight = camera_.distortion == pinhole_.distortion;
       const Image8 shown = is_straight ? Image8() : straightened(frame.texture.view(), camera_);
-      if (auto status = write_png(folder / file_name(frame.number, ".png"),
-                                  is_straight ? frame.texture.view() : shown.view());
+      if (auto status =
+              write_png(folder / (name + ".png"), is_straight ? frame.texture.view() : shown.view());
           !status)
         return status;
     }
-    return write_depth_png(folder / file_name(frame.number, ".depth.png"), frame.surface, pinhole_, unit_m_);
+    return write_depth_png(folder / (name + ".depth.png"), frame.surface, pinhole_, unit_m_);
   }
 
   PinholeModel camera_, pinhole_;

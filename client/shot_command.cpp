@@ -18,6 +18,7 @@
 #include "cli/size_option.h"
 #include "client/commands.h"
 #include "client/options.h"
+#include "client/range_frames.h"
 #include "client/recorded_stream.h"
 #include "client/shot/output.h"
 #include "client/shot/render.h"
@@ -82,7 +83,9 @@ class Camera {
   std::optional<ShotView> view_;
 };
 
-Status of_recording(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
+/// Returns how many frames could not be decoded.
+Result<std::uint64_t> draw_recording(const Options& options, Camera& camera, ShotOutput& output,
+                                     StopSignal& stop) {
   auto recorded = RecordedStream::open(options.input, options.stream);
   if (!recorded) return recorded.error();
   recorded->warn_if_cut();
@@ -92,32 +95,23 @@ Status of_recording(const Options& options, Camera& camera, ShotOutput& output, 
   if (const auto info = recorded->read_info()) rig = info->rig.camera;
   if (options.view == "rig" && !rig)
     return Error{options.input + " says nothing of the rig's camera: use --view orbit"};
-  if (auto status = recorded->seek(range->from_ns); !status) return status.error();
+  auto frames = RangeFrames::open(*recorded, *range);
+  if (!frames) return frames.error();
 
   Progress progress("shot", "frames", options.out.ends_with(".png") ? 1 : range->frames);
-  FrameDecoder decoder;
   while (!stop.stopped() && !output.full()) {
-    auto sample = recorded->next();
-    if (!sample) return sample.error();
-    if (!*sample || (*sample)->receive_time_ns > range->to_ns) break;
-    if ((*sample)->topic != Topic::kFrame) continue;
-    const auto view = read_frame_cdr((*sample)->cdr);
-    if (!view || !decoder.can_decode(view->data)) continue;
-    if ((*sample)->receive_time_ns < range->from_ns) {
-      (void)decoder.remember(view->data);
-      continue;
-    }
-    const auto frame = decoder.decode(view->data);
-    if (!frame) {
-      log_warning("a frame is left out: " + frame.error().message);
-      continue;
-    }
-    if (auto status = output.add(*frame, camera.take(*frame, rig)); !status) return status;
+    const auto next = frames->next();
+    if (!next) return next.error();
+    if (!*next) break;
+    if (auto status = output.add((*next)->frame, camera.take((*next)->frame, rig)); !status)
+      return status.error();
     progress.update(output.count());
   }
   if (output.count() == 0 && !stop.stopped())
     return Error{options.input + ": no frame in that range can be decoded"};
-  return {};
+  const LeftOut& left_out = frames->left_out();
+  if (left_out.frames() > 0) log_warning(left_out.text());
+  return left_out.frames();
 }
 
 /// The latest frame of a live stream: a renderer that is slower than the camera leaves frames out.
@@ -165,7 +159,7 @@ class LatestFrame {
   std::optional<Frame3D> frame_;
 };
 
-Status of_live(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
+Status draw_live(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
   LatestFrame latest;
   auto subscriber = Subscriber::create(*options.domain, options.input, latest.callbacks());
   if (!subscriber) return subscriber.error();
@@ -196,21 +190,28 @@ Status run(const Options& options, StopSignal& stop) {
   if (!output.has_transparency() && options.background == "transparent")
     return Error{"a video has no transparency: give another --background, or a folder of pictures"};
   Camera camera(options);
-  const Status drawn =
-      file ? of_recording(options, camera, output, stop) : of_live(options, camera, output, stop);
-  if (!drawn) return drawn;
+  std::uint64_t left_out = 0;
+  if (file) {
+    const auto drawn = draw_recording(options, camera, output, stop);
+    if (!drawn) return drawn.error();
+    left_out = *drawn;
+  } else if (auto drawn = draw_live(options, camera, output, stop); !drawn) {
+    return drawn;
+  }
   if (output.count() > 0) {
     if (const Status finished = output.finish(); !finished) return finished;
   }
+  const std::string written = std::to_string(output.count()) + " pictures are in " + options.out;
+  if (stop.stopped() && !output.full()) return Error{"stopped early: " + written};
   if (options.json) {
-    nlohmann::json j{{"pictures", output.count()}, {"out", options.out}, {"last", output.last()}};
+    nlohmann::json j{{"pictures", output.count()},
+                     {"out", options.out},
+                     {"last", output.last()},
+                     {"unreadable", left_out}};
     if (options.mode == "depth") j["depth_m"] = {camera.depth().from_m, camera.depth().to_m};
     std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-  } else if (output.count() == 1) {
-    std::puts(output.last().c_str());
   } else {
-    std::printf("%llu pictures are in %s\n", static_cast<unsigned long long>(output.count()),
-                options.out.c_str());
+    std::puts(output.count() == 1 ? output.last().c_str() : written.c_str());
   }
   if (options.mode == "depth" && !options.json)
     log_info("depth from " + std::to_string(camera.depth().from_m) + " m (yellow) to " +

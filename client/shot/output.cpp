@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/shot/output.h"
 
-#include <cstdio>
 #include <filesystem>
 #include <utility>
 
+#include "client/frame_names.h"
 #include "client/picture_video.h"
 #include "codec/export.h"
 
@@ -36,13 +36,13 @@ class Folder final : public ShotOutput {
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) return Error{"cannot make the folder " + folder_.string() + ": " + error.message()};
-    char name[48];
-    std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(frame.number));
-    if (auto status = write_png(folder_ / name, picture.view()); !status) return status.error();
-    return (folder_ / name).string();
+    const fs::path file = folder_ / (names_.name(frame) + ".png");
+    if (auto status = write_png(file, picture.view()); !status) return status.error();
+    return file.string();
   }
 
   fs::path folder_;
+  FrameNames names_;
 };
 
 class Video final : public ShotOutput {

@@ -62,6 +62,30 @@ TEST(RecordingFormats, FramesAreDescribedAndExported) {
   EXPECT_THAT(late.err, HasSubstr("no frame in that range"));
 }
 
+TEST(RecordingFormats, EveryFrameHasAFileOfItsOwn) {
+  const TempFolder folder;
+  const std::string file = folder / "white.mcap";
+  const auto served = run({program("relievo-server"), "serve", "--source", "sim:face,width=320,height=240",
+                           "--scheme", "white-field", "--web", "none", "--domain", kDomain, "--interface",
+                           "lo", "--fast", "--frames", "5", "--record", file});
+  ASSERT_EQ(served.status, 0) << served.err;
+  const auto count = recorded_frames(file).size();
+  ASSERT_GT(count, 5u) << "two surfaces a frame";
+  const auto files_of = [&](const std::string& verb, const std::string& out) {
+    const auto done = run({program("relievo"), verb, file, "--out", folder / out, "--json"});
+    EXPECT_EQ(done.status, 0) << done.err;
+    std::size_t files = 0, between = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / out)) {
+      ++files;
+      between += entry.path().stem().string().ends_with("_between");
+    }
+    EXPECT_GT(between, 1u);
+    return files;
+  };
+  EXPECT_EQ(files_of("export", "ply"), count);
+  EXPECT_EQ(files_of("shot", "png"), count);
+}
+
 TEST(RecordingFormats, ARecordingIsCodedAnew) {
   const TempFolder folder;
   const std::string original = folder / "fine.mcap";

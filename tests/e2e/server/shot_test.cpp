@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `relievo shot`: pictures of a recording, read by OpenCV.
 #include <gmock/gmock.h>
+#include <signal.h>
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -92,6 +93,19 @@ TEST_F(Shot, ALiveStreamIsDrawnToo) {
            "--interface", "lo", "--wait", "60", "--out", in("live.png"), "--size", "320x240"});
   ASSERT_EQ(drawn.status, 0) << drawn.err;
   EXPECT_EQ(cv::imread(in("live.png")).size(), cv::Size(320, 240));
+}
+
+TEST_F(Shot, WhoStopsItIsToldHowMuchIsThere) {
+  Process serving(serve("sim:face", {"--stream", "endless"}));
+  ASSERT_TRUE(serving.wait_for_text("stream endless"));
+  Process drawing({program("relievo").string(), "shot", "endless", "--domain", std::to_string(own_domain()),
+                   "--interface", "lo", "--seconds", "100000", "--out", in("stopped"), "--size", "160x120"});
+  ASSERT_TRUE(eventually([&] { return std::filesystem::exists(in("stopped")); })) << drawing.err();
+  drawing.signal(SIGINT);
+  EXPECT_EQ(drawing.wait(), 1);
+  EXPECT_EQ(drawing.out(), "");
+  EXPECT_THAT(drawing.err(), HasSubstr("stopped early: "));
+  EXPECT_THAT(drawing.err(), HasSubstr(" pictures are in " + in("stopped")));
 }
 
 #ifdef RELIEVO_VIDEO

@@ -10,7 +10,7 @@
 #include "client/time_range.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
-#include "tests/support/make_grid.h"
+#include "tests/support/make_recording.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo {
@@ -28,31 +28,14 @@ std::int64_t time_of(int frame) {
   return kStart_ns + frame * kStep_ns;
 }
 
-/// Small surfaces as a stream's encoder makes them, frame i at time_of(i).
+/// Frame i at time_of(i).
 void write_recording(const std::filesystem::path& file) {
-  const test::GridScene scene{.width = 160, .height = 96, .stripes = 20};
-  FrameEncoder encoder(test::grid_rig(scene), test::grid_pattern(scene));
-  const EncodeOptions options{
-      .geometry = GeometryCodec::kGrid, .texture = TextureCodec::kNone, .key_interval = kKeyInterval};
-  auto writer = RecordingWriter::create(file, {});
-  ASSERT_TRUE(writer.ok());
-  const TopicType& type = topic_type(Topic::kFrame);
-  const auto channel = (*writer)->add_channel({type.type_name, "omgidl", type.idl},
-                                              {type.topic_name, "cdr", type.type_name, {{"stream", "s"}}});
-  ASSERT_TRUE(channel.ok());
+  test::MadeRecording recording(file, kKeyInterval);
   for (int i = 0; i < kFrames; ++i) {
-    Frame3D frame = test::grid_frame(scene);
-    frame.number = static_cast<std::uint64_t>(i);
-    const auto data = encoder.encode(frame, options);
-    ASSERT_TRUE(data.ok());
-    ASSERT_EQ(is_key_frame(*data), i % kKeyInterval == 0);
     const auto number = static_cast<std::uint64_t>(i);
-    ASSERT_TRUE((*writer)
-                    ->write({*channel, static_cast<std::uint32_t>(i), time_of(i), time_of(i),
-                             write_frame_cdr({"s", number, number, time_of(i), time_of(i), *data})})
-                    .ok());
+    ASSERT_EQ(recording.add(number, number, time_of(i)), i % kKeyInterval == 0);
   }
-  ASSERT_TRUE((*writer)->finish().ok());
+  recording.finish();
 }
 
 class RecordedStreamTest : public testing::Test {

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the files of frames are called, without their endings.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "base/frame3d.h"
+
+namespace relievo {
+
+/// A name of its own for each frame of a folder, after the camera's frame. One thread.
+class FrameNames {
+ public:
+  /// "000012", or "000012_between"; where the same was asked for before, as after a restart of the server,
+  /// whose numbers start again: "000012-2" and so on.
+  std::string name(const Frame3D& frame);
+
+ private:
+  std::map<std::pair<std::uint64_t, bool>, std::uint64_t> given_;  // how often, by number and `between`
+};
+
+}  // namespace relievo

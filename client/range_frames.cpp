@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/range_frames.h"
+
+#include <utility>
+
+#include "idl/cdr.h"
+
+namespace relievo {
+namespace {
+
+/// Of two surfaces published for one camera frame the first is the one between (scheme white-field).
+bool is_between(const FrameView& frame, const std::optional<RawSample>& following) {
+  const auto next = following ? read_frame_cdr(following->cdr) : Result<FrameView>(Error{});
+  return next && next->number == frame.number && next->sequence == frame.sequence + 1;
+}
+
+}  // namespace
+
+std::string LeftOut::text() const {
+  const std::string why =
+      unreadable > 0 ? first_problem : "the key frame that they build on is damaged, or not in the recording";
+  return std::to_string(frames()) + " frames could not be decoded and were left out: " + why;
+}
+
+Result<RangeFrames> RangeFrames::open(RecordedStream& recorded, const TimeRange& range) {
+  if (auto status = recorded.seek(range.from_ns); !status) return status.error();
+  RangeFrames frames(recorded, range);
+  if (auto status = frames.read_ahead(); !status) return status.error();
+  return frames;
+}
+
+Result<std::optional<DecodedFrame>> RangeFrames::next() {
+  while (ahead_ && ahead_->receive_time_ns <= range_.to_ns) {
+    DecodedFrame out{.frame = {}, .sample = *std::move(ahead_), .data = {}};
+    if (auto status = read_ahead(); !status) return status.error();
+    const auto view = read_frame_cdr(out.sample.cdr);
+    if (out.sample.receive_time_ns < range_.from_ns) {
+      if (view) (void)decoder_.remember(view->data);  // those in the range may build on it
+      continue;
+    }
+    if (!view) {
+      leave_out(view.error());
+      continue;
+    }
+    if (read_frame_header(view->data) && !decoder_.can_decode(view->data)) {
+      ++left_out_.without_key_frame;
+      continue;
+    }
+    if (auto status = decoder_.decode(view->data, out.frame); !status) {
+      leave_out(status.error());
+      continue;
+    }
+    out.frame.between = is_between(*view, ahead_);
+    out.data = view->data;
+    return std::optional(std::move(out));
+  }
+  return std::optional<DecodedFrame>();
+}
+
+Status RangeFrames::read_ahead() {
+  do {
+    auto sample = recorded_->next();
+    if (!sample) return sample.error();
+    ahead_ = *std::move(sample);
+  } while (ahead_ && ahead_->topic != Topic::kFrame);
+  return {};
+}
+
+void RangeFrames::leave_out(const Error& problem) {
+  if (left_out_.unreadable++ == 0) left_out_.first_problem = problem.message;
+}
+
+}  // namespace relievo

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frames of a part of a recording, decoded.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "base/frame3d.h"
+#include "base/result.h"
+#include "client/recorded_stream.h"
+#include "client/time_range.h"
+#include "codec/frame3d_codec.h"
+
+namespace relievo {
+
+struct DecodedFrame {
+  Frame3D frame;
+  RawSample sample;                    // that it was recorded as,
+  std::span<const std::uint8_t> data;  // and in it the bytes that it was decoded from
+};
+
+/// Frames that could not be decoded.
+struct LeftOut {
+  std::uint64_t unreadable = 0;         // their bytes are wrong,
+  std::string first_problem;            // in this way
+  std::uint64_t without_key_frame = 0;  // what they build on is not there
+
+  std::uint64_t frames() const { return unreadable + without_key_frame; }
+  /// For a log, where there are some: how many, and why.
+  std::string text() const;
+};
+
+/// One thread.
+class RangeFrames {
+ public:
+  /// `recorded` must outlive it; nobody else reads it meanwhile.
+  static Result<RangeFrames> open(RecordedStream& recorded, const TimeRange& range);
+
+  /// The next one that can be decoded; nothing at the end of the range. What cannot is counted.
+  Result<std::optional<DecodedFrame>> next();
+
+  const LeftOut& left_out() const { return left_out_; }
+
+ private:
+  RangeFrames(RecordedStream& recorded, const TimeRange& range) : recorded_(&recorded), range_(range) {}
+  Status read_ahead();
+  void leave_out(const Error& problem);
+
+  RecordedStream* recorded_;
+  TimeRange range_;
+  FrameDecoder decoder_;
+  std::optional<RawSample> ahead_;  // the next frame
+  LeftOut left_out_;
+};
+
+}  // namespace relievo
