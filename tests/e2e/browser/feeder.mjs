@@ -116,6 +116,13 @@ export async function press(page, key) {
   await still(page);
 }
 
+/** Loads the page anew, and stays in it when the browser asks; fails where it does not ask. */
+export async function stayWhenAsked(page) {
+  const asked = page.waitForEvent('dialog');
+  await page.evaluate(() => void setTimeout(() => location.reload()));
+  await (await asked).dismiss();
+}
+
 /** The page's parts may grow by a line before the view follows: its middle is off by no more than this. */
 export const kJitter_px = 13;
 

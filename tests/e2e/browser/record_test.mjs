@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: where the server has no folder for recordings, the record button saves what the page
 // keeps and what follows as a recording that `relievo` reads whole and the page shows as it was; where it has one, the
-// server records there, with what came before, and lists the file, which plays while it is being written and grows.
+// server records there, with what came before, and lists the file, which plays while it is being written and grows. Nobody
+// leaves unasked with what is not saved, and of a server that has gone nothing is said to go on.
 // Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -9,7 +10,7 @@ import { mkdirSync, mkdtempSync, readdirSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
-import { inState, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { inState, look, pagesOf, runChecks, shownPast, stayWhenAsked } from './feeder.mjs';
 import { Server } from './server.mjs';
 
 const [serverPath, relievoPath] = process.argv.slice(2);
@@ -41,6 +42,8 @@ async function order(action, server = recordingServer, stream = 'kept') {
 }
 const orderBrief = (action) => order(action, briefServer, 'brief');
 let last; // the surface shown last while it was recorded
+const pressedIs = (page, is) => page.waitForFunction((p) => document.querySelector('#tool-record')?.getAttribute('aria-pressed') === p, is);
+const pillSays = (page, words) => page.waitForFunction((w) => new RegExp(w).test(document.querySelector('#recording:not([hidden])')?.textContent), words);
 
 const checks = {
   async 'what is kept and what follows is saved'(page) {
@@ -62,6 +65,19 @@ const checks = {
     await file.saveAs(saved);
     await page.waitForFunction(() => /object-.*\.mcap: \d+ frames/.test(document.querySelector('#recording')?.textContent));
     assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'false');
+  },
+
+  async 'who would leave with what is not saved is asked first'() {
+    const page = await open();
+    await shownPast(page, 2);
+    await page.click('#tool-record');
+    await pressedIs(page, 'true');
+    await stayWhenAsked(page);
+    await Promise.all([page.waitForEvent('download'), page.click('#tool-record')]);
+    await pillSays(page, 'object-.*mcap: ');
+    await page.reload(); // not asked: it is saved
+    await shownPast(page, 1);
+    await page.close();
   },
 
   async 'relievo reads it whole'() {
@@ -255,7 +271,24 @@ const checks = {
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder, where the list did not say so before.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);
-    assert.ok(complaints.length <= 1);
+    assert.ok(complaints.length <= 2); // once a page
+  },
+
+  async 'of a server that has gone it is not known whether it records, and it cannot be stopped'() {
+    const page = await openBrief();
+    await shownPast(page, 2);
+    await page.click('#tool-record');
+    await pressedIs(page, 'true');
+    await pillSays(page, '^0:0[1-9], ');
+    await briefServer.kill();
+    await pillSays(page, '^Not known whether the server still records; at last 0:\\d\\d, ');
+    assert.equal(await page.getAttribute('#tool-record', 'aria-pressed'), 'mixed');
+    const said = await page.textContent('#recording');
+    await page.waitForTimeout(2500);
+    assert.equal(await page.textContent('#recording'), said, 'it counts on');
+    await page.click('#tool-record');
+    await pillSays(page, '^Not stopped: the server does not answer');
+    await page.close();
   },
 };
 

@@ -8,7 +8,7 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
-import { depthOf, Feeder, inState, isRim, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
+import { depthOf, Feeder, inState, isRim, look, pagesOf, runChecks, shownPast, stayWhenAsked, still } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
 const origin = `http://127.0.0.1:${feeder.port}`;
@@ -126,7 +126,10 @@ const checks = {
       const ground = getComputedStyle(document.documentElement).getPropertyValue('--ground').trim();
       return { x: Math.round(x), y: Math.round(y), ground: [1, 3, 5].map((i) => parseInt(ground.slice(i, i + 2), 16)) };
     });
+    assert.match(await page.textContent('#recording:not([hidden])'), /^video 0:\d\d, [\d.]+ MB$/);
+    await stayWhenAsked(page); // it is not saved yet
     const { name, bytes } = await saved(page, 'Stop video');
+    await page.waitForSelector('#recording', { state: 'hidden' });
     assert.match(name, /\.(webm|mp4)$/);
     assert.ok(bytes.length > 2000, `${bytes.length} bytes`);
     const isWebm = bytes.readUInt32BE(0) === 0x1a45dfa3;

@@ -125,6 +125,7 @@ class Viewer {
         link: () => this.link(),
         playback: () => this.session.source?.playback ?? null,
         info: () => this.session.info,
+        filming: (video) => this.record.filming(video),
       });
       void addImmersive(this.view, (why) => {
         this.note = why;

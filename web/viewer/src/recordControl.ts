@@ -7,16 +7,22 @@ import { clockText } from './playback';
 import type { ServerRecording, StreamInfo } from './protocol';
 import type { LiveSource } from './liveSource';
 import { text } from './strings';
+import { askBeforeLeaving, mayLeave } from './unsaved';
 
 const say = text.record;
 const kEveryMs = 1000; // between questions to a server that records
 const kSaidMs = 10_000; // how long it is said where a recording went
 const kMostBytes = 1e9; // kept here, in memory
+const kPatienceMs = 5000; // with a server that was asked
 
-interface Taken {
-  messages: ArrayBuffer[];
+/** What runs in this page. */
+export interface Running {
   bytes: number;
-  since: number; // performance.now()
+  readonly since: number; // performance.now()
+}
+
+interface Taken extends Running {
+  messages: ArrayBuffer[];
 }
 
 export interface Recorded {
@@ -29,7 +35,10 @@ export class RecordControl {
   private readonly pill = element('recording');
   private of: Recorded | null = null;
   private server: ServerRecording | null = null; // null: it has no folder, or was not asked yet
+  private heardAt = 0; // when the server said so, Date.now()
+  private isUnheard = false; // it did not answer since
   private taken: Taken | null = null; // by this page
+  private video: Running | null = null;
   private serverHasNone = false; // no folder: known once it was asked
   private asking = false;
   private timer = 0;
@@ -47,7 +56,13 @@ export class RecordControl {
     window.clearTimeout(this.timer);
     this.of = of;
     this.server = null;
-    this.serverHasNone = false;
+    this.isUnheard = this.serverHasNone = false;
+    this.show();
+  }
+
+  /** A video of the view that runs; null: none. */
+  filming(video: Running | null): void {
+    this.video = video;
     this.show();
   }
 
@@ -82,13 +97,14 @@ export class RecordControl {
     const why = response === null ? say.unreachable : response.ok ? null : (await response.text()).trim();
     this.asking = false;
     if (this.of !== of) return;
-    if (response?.status === 404 || response?.status === 405) {
+    const isStart = action === 'start';
+    if (isStart && (response?.status === 404 || response?.status === 405)) {
       this.serverHasNone = true; // also a server that knows no such thing
       this.start();
     } else if (response?.status === 409) {
       void this.follow(); // somebody else was quicker
     } else if (why !== null) {
-      this.say(say.failed(why), true);
+      this.say(isStart ? say.failed(why) : say.notStopped(why), true);
     } else {
       this.take((await response!.json()) as ServerRecording);
     }
@@ -100,20 +116,30 @@ export class RecordControl {
     const response = await this.ask({});
     if (this.of !== of) return;
     if (response?.ok === true) this.take((await response.json()) as ServerRecording);
-    else this.again(); // it may come back
+    else this.miss();
   }
 
   private ask(init: RequestInit): Promise<Response | null> {
     const url = new URL(`api/recording/${encodeURIComponent(this.of!.stream)}`, document.baseURI);
-    return fetch(url, { cache: 'no-store', ...init }).catch(() => null);
+    return fetch(url, { cache: 'no-store', signal: AbortSignal.timeout(kPatienceMs), ...init }).catch(() => null);
   }
 
   private take(told: ServerRecording): void {
     const before = this.server;
     this.server = told;
+    this.heardAt = Date.now();
+    this.isUnheard = false;
     if (told.state === 'failed') this.say(say.failed(told.message), true);
     if (told.state === 'off' && before?.state === 'recording') this.say(say.savedThere(told.file || before.file, told.frames || before.frames));
     if (told.state === 'recording') this.again();
+    if (told.state === 'recording' && before?.state !== 'recording') this.saidUntil = 0;
+    this.show();
+  }
+
+  /** It may come back. */
+  private miss(): void {
+    this.isUnheard = true;
+    this.again();
     this.show();
   }
 
@@ -127,6 +153,8 @@ export class RecordControl {
     const messages = source.keptMessages();
     const taken = { messages, bytes: messages.reduce((sum, m) => sum + m.byteLength, 0), since: performance.now() };
     this.taken = taken;
+    this.saidUntil = 0;
+    askBeforeLeaving(taken);
     source.tap = (message) => {
       taken.messages.push(message);
       taken.bytes += message.byteLength;
@@ -139,8 +167,8 @@ export class RecordControl {
     const { of, taken } = this;
     this.taken = null;
     of!.source.tap = null;
-    if (taken!.messages.length === 0) return this.say(say.nothing, true);
     try {
+      if (taken!.messages.length === 0) return this.say(say.nothing, true);
       const [{ writeRecording }, { samplesOf }, { writeStreamInfo }] = await Promise.all([
         import('./recordingFile'),
         import('./sample'),
@@ -154,6 +182,8 @@ export class RecordControl {
       this.say(say.savedHere(name, taken!.messages.length, content.size));
     } catch (error) {
       this.say(say.failed(error instanceof Error ? error.message : String(error)), true);
+    } finally {
+      mayLeave(taken!);
     }
   }
 
@@ -167,17 +197,28 @@ export class RecordControl {
 
   private show(): void {
     const { isRecording } = this;
+    const isUnknown = this.taken === null && this.isUnheard;
     this.button.hidden = this.of === null;
-    this.button.setAttribute('aria-pressed', String(isRecording));
+    this.button.setAttribute('aria-pressed', isRecording && isUnknown ? 'mixed' : String(isRecording));
     const title = isRecording ? say.stop : this.serverHasNone ? say.startHere : say.start;
     this.button.title = title;
     this.button.setAttribute('aria-label', title);
-    this.pill.hidden = !isRecording && performance.now() > this.saidUntil;
-    if (!isRecording) return;
-    this.pill.className = 'on';
-    const { server, taken } = this;
-    const elapsedMs = taken !== null ? performance.now() - taken.since : Date.now() - server!.started_ns / 1e6;
-    const bytes = taken?.bytes ?? server!.bytes;
-    setText(this.pill, say.running(clockText(elapsedMs).replace(/\.\d+$/, ''), bytes));
+    const isSaid = performance.now() < this.saidUntil;
+    this.pill.hidden = !isSaid && !isRecording && this.video === null;
+    if (isSaid || this.pill.hidden) return;
+    this.pill.className = isRecording && isUnknown ? 'unknown' : 'on';
+    const words = [isRecording ? this.recordingWords() : null, this.video === null ? null : say.video(runningWords(this.video))];
+    this.pill.title = words.filter((w) => w !== null).join(' · ');
+    setText(this.pill, this.pill.title);
+  }
+
+  private recordingWords(): string {
+    if (this.taken !== null) return runningWords(this.taken);
+    const { started_ns, bytes } = this.server!;
+    const words = say.running(timeText((this.isUnheard ? this.heardAt : Date.now()) - started_ns / 1e6), bytes);
+    return this.isUnheard ? say.unknown(words) : words;
   }
 }
+
+const timeText = (ms: number): string => clockText(ms).replace(/\.\d+$/, '');
+const runningWords = ({ since, bytes }: Running): string => say.running(timeText(performance.now() - since), bytes);

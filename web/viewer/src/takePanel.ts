@@ -5,8 +5,10 @@ import { button, make, setText } from './dom';
 import { copy, download, fileName } from './download';
 import type { StreamInfo } from './protocol';
 import { RangeCard } from './rangeCard';
+import type { Running } from './recordControl';
 import type { Playback } from './source';
 import { text } from './strings';
+import { askBeforeLeaving, mayLeave } from './unsaved';
 import type { View } from './view';
 
 const say = text.take;
@@ -22,6 +24,8 @@ export interface Takeable {
   link(): string;
   playback(): Playback | null;
   info(): StreamInfo | null;
+  /** A video runs; null: no more. */
+  filming(video: Running | null): void;
 }
 
 export class TakePanel {
@@ -79,19 +83,25 @@ export class TakePanel {
     const { view } = this.of;
     const recorder = new MediaRecorder(view.canvas.captureStream(kVideoRate), { mimeType: type });
     const parts: Blob[] = [];
+    const video: Running = { bytes: 0, since: performance.now() };
     recorder.ondataavailable = ({ data }) => {
       parts.push(data);
-      setText(this.status, say.filmed(parts.reduce((sum, { size }) => sum + size, 0)));
+      video.bytes += data.size;
+      setText(this.status, say.filmed(video.bytes));
     };
     recorder.onstop = () => {
       this.recorder = null;
       view.endFilm();
+      this.of.filming(null);
       setText(this.video, say.video);
       this.video.setAttribute('aria-pressed', 'false');
       this.save(new Blob(parts, { type }), type.includes('mp4') ? 'mp4' : 'webm');
+      mayLeave(video);
     };
     recorder.start(1000);
     this.recorder = recorder;
+    askBeforeLeaving(video);
+    this.of.filming(video);
     setText(this.video, say.videoStop);
     this.video.setAttribute('aria-pressed', 'true');
   }
