@@ -95,17 +95,18 @@ bool may_act(const HttpRequest& request, const RouteContext& context) {
 
 /// Upgrades to `target`, unless something speaks against it.
 HttpReply websocket(const HttpRequest& request, WsTarget target, const RouteContext& context) {
-  if (!request.upgrade) {
-    HttpReply reply = text_reply(426, "this address speaks WebSocket only");
-    reply.headers.emplace_back("Upgrade", "websocket");
-    return reply;
-  }
   if (!may_act(request, context))
     return refused(Refusal::kOrigin, 403, "a page of another site may not open this stream");
   const int places = context.options.max_clients.value_or(kClients);
   if (context.counts.clients >= places) {
     HttpReply reply = refused(Refusal::kClients, 503, "all " + std::to_string(places) + " places are taken");
     reply.headers.emplace_back("Retry-After", "5");
+    return reply;
+  }
+  // Behind what speaks against it: browsers do not tell pages why, so these ask for it without an upgrade.
+  if (!request.upgrade) {
+    HttpReply reply = text_reply(426, "this address speaks WebSocket only");
+    reply.headers.emplace_back("Upgrade", "websocket");
     return reply;
   }
   HttpReply reply;

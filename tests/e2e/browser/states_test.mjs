@@ -3,15 +3,16 @@
 // says in words what is the matter, on a card that covers no control and is not cut off, on desktops and phones, dark and
 // light; the button on it can be reached by keys. A panel whose part cannot be loaded says so, and is tried again. With
 // a folder: makes the pictures of docs/viewer.md there.
-// Run as: node states_test.mjs GATEWAY_FEEDER [SCREENSHOTS], in web/viewer. Exit 77: no Chromium here.
+// Run as: in_own_domain node states_test.mjs GATEWAY_FEEDER RELIEVO_SERVER [SCREENSHOTS], in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
 import { Feeder, inState, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { Server } from './server.mjs';
 import { makeSheet } from './sheet.mjs';
 import { withoutWebGl } from './web.mjs';
 
-const [feederPath, screenshots] = process.argv.slice(2);
+const [feederPath, serverPath, screenshots] = process.argv.slice(2);
 const kDesktop = { viewport: { width: 1000, height: 640 } };
 const kPhone = { viewport: { width: 390, height: 780 }, hasTouch: true };
 const kAllLooks = {
@@ -163,6 +164,39 @@ const checks = {
 
   async 'no error in the page until here'() {
     assert.deepEqual(complaints, []);
+  },
+
+  async 'refused: a name that no stream can have, with those there are'() {
+    feeder.say('start ball\nstatus running');
+    const made = await pages(async (options) => {
+      const page = await open(`/?stream=${encodeURIComponent('<b>x</b>')}`, options);
+      await inState(page, 'refused');
+      await page.waitForSelector('#streams option[value="ball"]', { state: 'attached' });
+      return page;
+    });
+    await inspect('A name that is none', made, /No stream can have this name/);
+  },
+
+  async 'refused: all places are taken, until one is free'() {
+    const server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--max-clients', '1']);
+    const [made, first] = [[], await newPage(kDesktop)];
+    await first.goto(server.address);
+    await shownPast(first, 1);
+    for (const [look, options] of Object.entries(kLooks)) {
+      const page = await newPage(options);
+      await page.goto(server.address);
+      await page.waitForFunction(() => document.querySelector('#card-title').textContent === 'All places are taken');
+      await page.waitForSelector('#streams option[value="object"]', { state: 'attached' });
+      made.push({ look, page });
+    }
+    const waiting = await newPage(kDesktop);
+    await waiting.goto(server.address);
+    await inState(waiting, 'lost');
+    await inspect('Full', made, /All places are taken.*no more pages/s);
+    await first.close();
+    await shownPast(waiting, 1);
+    await waiting.close();
+    await server.kill();
   },
 
   async 'reconnecting, and found again'() {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: the list shows each stream with its picture, and a second stream stands beside the first
 // where the page says it does, is picked, measured and gone back in like the first, by a button and by the address, until it is taken away or another one is chosen;
-// or stands where a person has placed it by what both see, also turned.
+// or stands where a person has placed it by what both see, also turned. One that is gone is dimmed and named, and can be taken away.
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
@@ -368,6 +368,44 @@ const checks = {
     await linked.waitForFunction(() => /of another stream/.test(document.querySelector('#panel-measure')?.textContent));
     assert.deepEqual((await look(linked)).measurements, []);
     await linked.close();
+  },
+
+  async 'one beside the first that is gone is dimmed and named, and can be taken away'() {
+    const page = await open('/?stream=other,ball', { viewport: { width: 1200, height: 750 } });
+    await besides(page, 1);
+    await still(page);
+    const redOf = async () => {
+      const [{ frame, pose }] = (await look(page)).besides;
+      const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, pointOf(30 / kPicture.width, 30 / kPicture.height, frame)));
+      return (await page.evaluate(({ x, y }) => window.relievo.pixelAt(x, y), at))[0];
+    };
+    const before = await redOf();
+    feeder.say('gone');
+    await page.waitForFunction(() => window.relievo.diagnostics().besides[0].word === 'Ended');
+    await still(page);
+    near((await redOf()) / before, 0.34, 0.05, 'how much is left of its red');
+    assert.match(await page.textContent('#source'), /ball · Ended/);
+    await page.keyboard.press('n');
+    await page.waitForSelector(`${rowOf('ball')} small:text-is("gone")`);
+    await page.click(`${rowOf('ball')} button:text-is("Beside")[aria-pressed="true"]`);
+    await page.waitForFunction(() => window.relievo.diagnostics().besides.length === 0);
+    await page.waitForFunction(() => document.querySelectorAll('.streams li b').length === 1);
+    await page.close();
+    feeder.say('start ball');
+  },
+
+  async 'one that never was is named, and the choice of a time line stays'() {
+    const page = await open('/?stream=ball,nobody', { viewport: { width: 1200, height: 750 } });
+    await shownPast(page, 3);
+    await page.waitForFunction(() => /nobody · Waiting/.test(document.querySelector('#source')?.textContent));
+    const choice = page.getByLabel('Stream that the time line is of');
+    assert.deepEqual(await choice.locator('option').allTextContents(), ['ball', 'nobody · Waiting']);
+    await choice.selectOption('nobody');
+    await page.waitForSelector('#timeline.empty');
+    assert.equal(await page.isVisible('#timeline input[type=range]'), false);
+    await choice.selectOption('ball');
+    await page.waitForSelector('#timeline input[type=range]', { state: 'visible' });
+    await page.close();
   },
 
   async 'no error, no request to another host'() {

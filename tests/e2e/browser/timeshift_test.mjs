@@ -150,6 +150,10 @@ const onFeeder = {
     assert.ok(playing && !following);
     assert.ok(index < first + times.length - 5, `at ${index} of ${first + times.length}`);
     await page.waitForFunction(() => document.querySelector('#badge-text')?.textContent === 'Behind live');
+    await page.keyboard.press(' ');
+    await inState(page, 'shifted');
+    await page.waitForTimeout(3000); // what was shown before is no part of it
+    assert.match(await page.textContent('#statistics'), /network ?[1-9]/, 'what comes is kept');
   },
 
   async 'L is live again'(page) {
@@ -227,6 +231,12 @@ const onFeeder = {
     const { index } = await playback(page);
     await seek(page, index - 3);
     await inState(page, 'shifted');
+    await page.waitForFunction(() => / · Offline$/.test(document.querySelector('#badge-text').textContent));
+    await page.keyboard.press('b');
+    assert.match(await page.textContent('#quality-why'), /does not answer/);
+    await page.keyboard.press('n');
+    await page.waitForSelector('#panel-streams small:has-text("not known")');
+    await page.keyboard.press('Escape');
     await page.keyboard.press('l');
     await inState(page, 'lost');
     await errors(page);

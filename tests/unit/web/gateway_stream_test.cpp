@@ -279,6 +279,7 @@ TEST_F(GatewayStream, MoreClientsThanAllowedAreTold) {
     WsClient second(port, "face");
     EXPECT_EQ(second.status(), 101);
     EXPECT_EQ(WsClient(port, "face").status(), 503);
+    EXPECT_EQ(request(port, "GET", "/ws/face").status, 503) << "as a page is told that asks why";
   }
   EXPECT_TRUE(eventually([&] { return WsClient(port, "face").status() == 101; })) << "a place became free";
 }

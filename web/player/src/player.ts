@@ -23,6 +23,7 @@ const kStates: Record<ReturnType<typeof present>['state'], PlayerState> = {
   unsupported: 'failed',
   connecting: 'loading',
   lost: 'lost',
+  refused: 'failed',
   empty: 'idle',
   waiting: 'loading',
   starting: 'loading',
@@ -340,26 +341,8 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     if (this.failure !== null) return { state: 'failed', message: this.failure };
     const session = this.parts?.session;
     if (!session || this.src === '') return { state: 'idle', message: '' };
-    const { source, info, status } = session;
-    if (source === null) return { state: 'loading', message: '' };
-    const { playing, following } = source.playback;
-    const playingNow = playing ? 'playing' : 'paused';
-    const told = present({
-      problem: null,
-      everConnected: session.everConnected,
-      connected: source.connected,
-      retryInS: source.retryInS,
-      stream: this.stream,
-      announced: info !== null,
-      seen: session.seen,
-      serverState: status?.state ?? null,
-      serverMessage: status?.message ?? '',
-      quietMs: performance.now() - session.lastFrameAt,
-      frameRate: info?.frame_rate ?? 0,
-      hint: '',
-      file: following === null ? playingNow : null,
-      shifted: following === false ? playingNow : null,
-    });
+    if (session.source === null) return { state: 'loading', message: '' };
+    const told = present({ ...session.facts, problem: null, stream: this.stream, hint: '' });
     return { state: kStates[told.state], message: told.title === '' ? this.notice : `${told.title}. ${told.text}` };
   }
 }

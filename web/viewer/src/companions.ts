@@ -6,6 +6,7 @@ import { rigPlace } from './placement';
 import { writtenOf, type ListedStream, type Quality, type StreamInfo } from './protocol';
 import { Session } from './session';
 import type { Playback, SourceEvents } from './source';
+import { isOver, present, type Presentation } from './state';
 import type { Beside, View } from './view';
 
 interface Companion {
@@ -28,13 +29,24 @@ export class Companions {
     return [...this.shown.keys()];
   }
 
+  /** What the page would say of each if it were alone; those of which nothing comes any more are dimmed. */
+  tell(): ReadonlyMap<string, Presentation> {
+    const told = new Map<string, Presentation>();
+    for (const [name, { session, beside }] of this.shown) {
+      const now = present({ ...session.facts, problem: null, stream: name, hint: '' });
+      this.view.dimBeside(beside, isOver(now) ? now.label : '');
+      told.set(name, now);
+    }
+    return told;
+  }
+
   /** For tests and bug reports. */
   report(): object[] {
     return [...this.shown].map(([name, { session, beside }]) => {
       const { shown, errors, frame } = session.meter.report();
       const { index = null, following = null, times = null } = session.source?.playback ?? {};
       const pose = this.view.poseOf(name);
-      return { name, shown, errors, frame, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following, frames: times?.length ?? null };
+      return { name, word: beside.word, shown, errors, frame, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following, frames: times?.length ?? null };
     });
   }
 

@@ -3,7 +3,7 @@
 import { openSocket, socketUrl, take } from './early';
 import { parseFramePrefix, parseServerMessage, type Quality } from './protocol';
 import type { SourceEvents } from './source';
-import { backoffS } from './state';
+import { backoffS, type Refusal } from './state';
 import { VideoTextures } from './videoTexture';
 
 const kClockEveryMs = 4000;
@@ -11,15 +11,19 @@ const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
-/** Where the server wants a token that its page does not have (any more), the page it answers with asks for it. */
-async function signInAgain(server: string): Promise<void> {
-  if (server !== document.baseURI) return; // a page that embeds a stream of elsewhere stays
-  // A WebSocket that is refused does not say why.
-  const response = await fetch(new URL('api/streams', server), { cache: 'no-store' }).catch(() => null);
+const kRefusals: Record<number, Refusal> = { 400: 'name', 503: 'places' };
+
+/** A WebSocket that is refused does not say why; who asks for the same without one is told. */
+async function refusalOf(stream: string, server: string): Promise<Refusal | null> {
+  if (server !== document.baseURI) return null; // a page that embeds a stream of elsewhere stays
+  const response = await fetch(new URL(`ws/${encodeURIComponent(stream)}`, server), { cache: 'no-store' }).catch(() => null);
+  // It wants a token that the page does not have (any more): the page that it answers with asks for it.
   if (response?.status === 401) location.reload();
+  return kRefusals[response?.status ?? 0] ?? null;
 }
 
 export class Connection {
+  refusal: Refusal | null = null; // of the last attempt, once the server has said it
   private socket: WebSocket | null = null;
   private attempt = 0;
   private retryAt: number | null = null; // performance.now()
@@ -89,6 +93,7 @@ export class Connection {
     this.lastHeard = performance.now();
     socket.onopen = () => {
       this.attempt = 0;
+      this.refusal = null;
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
       this.sayWhatIsWanted();
@@ -120,7 +125,12 @@ export class Connection {
     if (this.stopped) return;
     this.retryAt = performance.now() + backoffS(this.attempt++) * 1000;
     this.events.lost();
-    void signInAgain(this.server);
+    void this.askWhy();
+  }
+
+  private async askWhy(): Promise<void> {
+    const refusal = await refusalOf(this.stream, this.server);
+    if (!this.connected) this.refusal = refusal;
   }
 
   private tick(): void {

@@ -20,6 +20,7 @@ export interface Drawing {
   range: Range | null; // of the depth mode's colours
   ground: Ranges | null; // null: not drawn
   poses: (Rigid | null)[]; // by surface, of its camera's frame in the scene; null: not drawn
+  dimmed: readonly number[]; // surfaces that are not of now
   background: string | null;
   smooth: boolean; // rims, in modes that show a picture or relief
   timed: boolean; // how long the graphics take is told

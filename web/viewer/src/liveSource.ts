@@ -8,6 +8,7 @@ import { History } from './history';
 import type { Loop } from './playback';
 import type { FramePrefix, Quality } from './protocol';
 import type { FrameSource, Kept, Playback, SourceEvents } from './source';
+import type { Refusal } from './state';
 import { StorePlayer } from './storePlayer';
 
 export class LiveSource implements FrameSource, Playback {
@@ -46,6 +47,9 @@ export class LiveSource implements FrameSource, Playback {
   }
   get retryInS(): number | null {
     return this.connection.retryInS;
+  }
+  get refusal(): Refusal | null {
+    return this.connection.refusal;
   }
   get live(): boolean {
     return this.player === null;
@@ -198,6 +202,7 @@ export class LiveSource implements FrameSource, Playback {
       ++this.withPage;
       this.events.frame(prefix, message, false);
     } else {
+      this.events.kept?.(message.byteLength);
       this.topUp();
       if (this.returning) this.player?.seek(Infinity);
     }

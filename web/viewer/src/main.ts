@@ -16,13 +16,13 @@ import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame } from './messages';
 import { rigPlace } from './placement';
-import { offeredRungs, wantedQuality, writtenOf, type Quality } from './protocol';
+import { wantedQuality, writtenOf, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
 import { address, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { Session } from './session';
-import { present, type Presentation } from './state';
+import { isOver, present, type Presentation } from './state';
 import { text } from './strings';
 import { ServerList } from './streamList';
 import type { StreamsPanel } from './streamsPanel';
@@ -285,8 +285,8 @@ class Viewer {
   /** Null: what is shown is no live stream. */
   private get offered(): Offered | null {
     if (!(this.session.source instanceof LiveSource)) return null;
-    const { rung: now, status } = this.session;
-    return { want: this.quality, now, of: offeredRungs(status) };
+    const { rung: now, rungs: of, source } = this.session;
+    return { want: this.quality, now, of, offline: !source.connected };
   }
 
   private writeAddress(): void {
@@ -382,12 +382,12 @@ class Viewer {
   }
 
   // Of the first stream, or of the one beside it that a person has chosen.
-  private showTimeline(): void {
-    const names = this.companions?.names ?? [];
-    if (!names.includes(this.timed ?? '')) this.timed = null;
-    const first = this.session.source?.playback ?? null;
-    this.timeline.show(this.timed === null ? first : (this.companions?.playback(this.timed) ?? null));
-    this.timeline.offer(names.length === 0 ? [] : [this.stream ?? this.file ?? '', ...names], this.timed);
+  private showTimeline(besides = this.companions?.tell() ?? new Map<string, Presentation>()): void {
+    if (!besides.has(this.timed ?? '')) this.timed = null;
+    const playback = this.session.source?.playback ?? null;
+    this.timeline.show(this.timed === null ? playback : (this.companions?.playback(this.timed) ?? null));
+    const first = this.stream ?? this.file ?? '';
+    this.timeline.offer(new Map([[first, first], ...[...besides].map(([name, told]) => [name, called(name, told)] as const)]), this.timed);
   }
 
   // On the screen's beat.
@@ -438,39 +438,29 @@ class Viewer {
   }
 
   private refresh(): void {
-    const now = performance.now();
-    const { source, info, status, seen } = this.session;
-    const playing = source === null ? null : source.playback.playing ? 'playing' : 'paused';
-    const following = source?.playback.following ?? null; // null: of a recording
+    const { source, info, status, seen, facts } = this.session;
     const offline = source !== null && !source.connected; // it tries again by itself
-    if (!offline) void this.list();
+    if (!offline || facts.refusal !== null) void this.list();
     this.presentation = present({
+      ...facts,
+      ...(source === null ? { connected: this.server.arrived, retryInS: this.server.retryInS } : {}),
       problem: this.problem,
-      everConnected: this.session.everConnected,
-      connected: source === null ? this.server.arrived : source.connected,
-      retryInS: source === null ? this.server.retryInS : source.retryInS,
       stream: this.stream,
-      announced: info !== null,
-      seen,
-      serverState: status?.state ?? null,
-      serverMessage: status?.message ?? '',
-      quietMs: now - this.session.lastFrameAt,
-      frameRate: info?.frame_rate ?? 0,
       hint: this.server.hint,
-      file: following !== null ? null : (playing ?? (this.file !== null ? 'surface' : null)),
-      shifted: following === false ? playing : null,
+      file: facts.file ?? (source === null && this.file !== null ? 'surface' : null),
     });
     if (this.fileProblem !== null) {
       const { name, why, overPicture } = this.fileProblem;
       this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: overPicture };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
-    this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? []);
-    this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note);
+    this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? [], this.server.arrived && (!offline || facts.refusal !== null));
+    const besides = this.companions?.tell() ?? new Map<string, Presentation>();
+    this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
     this.qualityControl.show(this.offered);
     this.pictures.watch(this.liveCamera);
-    this.showTimeline();
-    this.ui.showStatistics(seen ? this.session.meter.statistics(now, status) : []);
+    this.showTimeline(besides);
+    this.ui.showStatistics(seen ? this.session.meter.statistics(performance.now(), status) : []);
   }
 
   private async list(): Promise<void> {
@@ -500,6 +490,12 @@ class Viewer {
     endHeld();
   }
 }
+
+// Of what is beside the first one: those that are gone, or never were there.
+const isMissing = (told: Presentation): boolean => isOver(told) || told.state === 'waiting';
+const called = (name: string, told: Presentation): string => text.streams.withWord(name, isMissing(told) ? told.label : '');
+const besidesText = (besides: ReadonlyMap<string, Presentation>): string =>
+  [...besides].flatMap(([name, told]) => (isMissing(told) ? [called(name, told)] : [])).join(', ');
 
 const sentence = (words: string): string => `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
 

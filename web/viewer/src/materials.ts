@@ -12,6 +12,7 @@ const kClay = 0xd2ccc2;
 const kWire = 0x86b7ff;
 const kFill = 0x11151b;
 const kColours = 256;
+const kDimmed = 0.34; // as body.dim of style.css
 
 const kLensHead = `
 uniform vec4 lens; // k1 k2 p1 p2
@@ -54,6 +55,7 @@ if (share < 0.5) discard;
 export class Materials {
   private readonly lens = { lens: { value: new THREE.Vector4() }, lensRest: { value: new THREE.Vector2() } };
   private smooth_ = false;
+  private dimmed_ = false;
   private readonly depthRange = { value: new THREE.Vector2(0, 1) };
 
   readonly textured: THREE.MeshBasicMaterial;
@@ -86,9 +88,7 @@ export class Materials {
   ) {
     this.textured = new THREE.MeshBasicMaterial({ map, side: THREE.DoubleSide });
     this.points = new THREE.PointsMaterial({ map, size: 2, sizeAttenuation: false });
-    for (const material of Object.values(this)) {
-      if (material instanceof THREE.Material) this.giveLens(material);
-    }
+    for (const material of this.all) this.giveLens(material);
   }
 
   /** The distortion that bends what is drawn; null: none. */
@@ -115,14 +115,23 @@ export class Materials {
     }
   }
 
+  set dimmed(dimmed: boolean) {
+    if (dimmed === this.dimmed_) return;
+    this.dimmed_ = dimmed;
+    for (const material of this.all) {
+      material.blending = dimmed ? THREE.CustomBlending : THREE.NormalBlending;
+      material.blendSrc = THREE.ConstantAlphaFactor;
+      material.blendDst = THREE.OneMinusConstantAlphaFactor;
+      material.blendAlpha = kDimmed;
+    }
+  }
+
   setPointSize(pixels: number): void {
     this.points.size = this.plainPoints.size = this.colouredPoints.size = pixels;
   }
 
   dispose(): void {
-    for (const material of Object.values(this)) {
-      if (material instanceof THREE.Material) material.dispose();
-    }
+    for (const material of this.all) material.dispose();
   }
 
   /** Of a surface with triangles. */
@@ -140,6 +149,10 @@ export class Materials {
     if (mode === 'confidence' && has.quality) return this.colouredPoints;
     if (has.texture) return this.points;
     return has.colours ? this.colouredPoints : this.plainPoints;
+  }
+
+  private get all(): THREE.Material[] {
+    return Object.values(this).filter((part) => part instanceof THREE.Material);
   }
 
   // Its colours stand for numbers: no light falls on them.

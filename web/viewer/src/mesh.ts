@@ -128,6 +128,11 @@ export class SurfaceMesh {
     this.derive();
   }
 
+  /** The ground shows through: it is not of now. */
+  set dimmed(dimmed: boolean) {
+    this.materials.dimmed = dimmed;
+  }
+
   setDepthRange(range: Range): void {
     this.materials.setDepthRange(range);
   }

@@ -14,7 +14,7 @@ export class Meter {
   readonly clock = new ClockOffset();
   readonly journal = new Journal();
   skipped = 0; // decoded here, replaced before they were drawn
-  private readonly drops = new DropCounter();
+  private drops = new DropCounter();
   private readonly frames = new Rate();
   private readonly bytes = new Rate();
   private readonly latency = new RollingMedian();
@@ -22,11 +22,19 @@ export class Meter {
   private received = 0;
   private shownFrames = 0;
   private errors = 0;
+  private before = { skipped: 0, errors: 0 }; // of other sources
   private lastError = '';
   private number = 0;
   private sequence = 0;
   private vertices = 0;
   private triangles = 0;
+
+  /** Of another source from now on. */
+  begin(): void {
+    this.restart();
+    this.drops = new DropCounter();
+    this.before = { skipped: this.skipped, errors: this.errors };
+  }
 
   /** A new connection or stream. */
   restart(): void {
@@ -42,12 +50,16 @@ export class Meter {
     this.restart();
   }
 
+  /** Over the network. */
+  came(bytes: number, now: number): void {
+    this.bytes.add(now, bytes);
+  }
+
   /** `live`: what is missing before it was lost, and its age is a latency. */
   arrived(prefix: FramePrefix, message: ArrayBuffer, now: number, live: boolean): void {
     ++this.received;
     this.journal.arrived(prefix, message, performance.timeOrigin + now);
     if (live) this.drops.add(prefix.sequence, prefix.drops);
-    this.bytes.add(now, message.byteLength);
   }
 
   decoded(prefix: FramePrefix, utcMs: number): void {
@@ -83,7 +95,7 @@ export class Meter {
       vertices: this.vertices,
       triangles: this.triangles,
       decodeMs: this.decode.get(),
-      drops: { link, viewer: this.skipped, gaps },
+      drops: { link, viewer: this.skipped - this.before.skipped, gaps },
     };
   }
 
@@ -110,11 +122,13 @@ export class Meter {
       ? status.drops_capture + status.drops_reconstruct + status.drops_encode + status.drops_publish
       : 0;
     const { link, gaps } = this.drops;
-    const total = server + link + gaps + this.skipped;
+    const viewer = this.skipped - this.before.skipped;
+    const errors = this.errors - this.before.errors;
+    const total = server + link + gaps + viewer;
     const places = [
       [server, 'server'],
       [link, 'link'],
-      [this.skipped, 'viewer'],
+      [viewer, 'viewer'],
       [gaps, 'gaps'],
     ].flatMap(([count, place]) => (count === 0 ? [] : [`${count} ${place}`]));
     const latency = this.latency.get();
@@ -156,8 +170,8 @@ export class Meter {
         kind: total === 0 ? 'plain' : 'warn',
       },
     ];
-    if (this.errors > 0) {
-      statistics.push({ label: say.errors, value: String(this.errors), title: this.lastError, kind: 'bad' });
+    if (errors > 0) {
+      statistics.push({ label: say.errors, value: String(errors), title: this.lastError, kind: 'bad' });
     }
     return statistics;
   }

@@ -10,6 +10,7 @@ export interface Offered {
   readonly want: Quality | null; // null: nobody has chosen, and full comes
   readonly now: Rung;
   readonly of: readonly Rung[];
+  readonly offline?: boolean; // nothing comes
 }
 
 /** What there is to choose; what is wanted stays in it where the stream has it no more. */
@@ -18,7 +19,8 @@ export function choices({ want, of }: Offered): Quality[] {
 }
 
 /** One line: what comes now, and why. */
-export function whyText({ want, now, of }: Offered): string {
+export function whyText({ want, now, of, offline }: Offered): string {
+  if (offline === true) return say.offline;
   const lower = of.length > 1;
   if (!lower && now === 'full') return want === null || want === 'full' || want === 'auto' ? say.only : say.missing(say.names[want]);
   if (want === null) return say.notChosen(say.names[now]);

@@ -5,8 +5,10 @@ import { Decoder } from './decoder';
 import { closePictures } from './frameMemory';
 import type { DecodedFrame } from './messages';
 import { Meter } from './meter';
-import type { FramePrefix, Rung, ServerMessage, StreamInfo, StreamStatus } from './protocol';
+import { offeredRungs, type FramePrefix, type Rung, type ServerMessage, type StreamInfo, type StreamStatus } from './protocol';
 import type { FrameSource, SourceEvents } from './source';
+import type { Facts } from './state';
+import { ServerDrops } from './statistics';
 
 export interface SessionEvents {
   /** What is known of the source has changed. */
@@ -31,6 +33,7 @@ export class Session {
   info: StreamInfo | null = null; // while the stream is announced
   status: StreamStatus | null = null;
   rung: Rung = 'full'; // how much detail comes now
+  rungs: readonly Rung[] = ['full']; // and could come, as far as the server has said
   seen = false; // a frame was shown
   lastFrameAt = 0;
   everConnected = false;
@@ -38,6 +41,7 @@ export class Session {
   private waiting: Waiting | null = null; // decoded, not drawn
   private taken: DecodedFrame | null = null; // drawn now
   private live = false; // the frame that came last
+  private readonly serverDrops = new ServerDrops();
   private readonly pause = (): void => this.meter.pause();
 
   constructor(private readonly events: SessionEvents) {
@@ -56,6 +60,27 @@ export class Session {
     document.removeEventListener('visibilitychange', this.pause);
   }
 
+  /** What is known of its source. */
+  get facts(): Omit<Facts, 'problem' | 'stream' | 'hint'> {
+    const { source, info, status } = this;
+    const playing = source === null ? null : source.playback.playing ? 'playing' : 'paused';
+    const following = source?.playback.following ?? null; // null: of a recording
+    return {
+      everConnected: this.everConnected,
+      connected: source?.connected ?? true,
+      retryInS: source?.retryInS ?? null,
+      refusal: source?.refusal ?? null,
+      announced: info !== null,
+      seen: this.seen,
+      serverState: status?.state ?? null,
+      serverMessage: status?.message ?? '',
+      quietMs: performance.now() - this.lastFrameAt,
+      frameRate: info?.frame_rate ?? 0,
+      file: following === null ? playing : null,
+      shifted: following === false ? playing : null,
+    };
+  }
+
   /** From now on, instead of what was watched before; null: nothing. */
   watch(open: ((events: SourceEvents) => FrameSource) | null): void {
     this.source?.stop();
@@ -63,7 +88,9 @@ export class Session {
     this.info = this.status = null;
     this.seen = false;
     this.rung = 'full';
-    this.meter.restart();
+    this.rungs = ['full'];
+    this.serverDrops.restart();
+    this.meter.begin();
     this.source = null;
     if (open === null) return;
     this.source = open({
@@ -79,6 +106,7 @@ export class Session {
       },
       message: (message) => this.onMessage(message),
       frame: (prefix, bytes, forLater) => this.onFrame(prefix, bytes, forLater),
+      kept: (bytes) => this.meter.came(bytes, performance.now()),
       clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
       nonsense: (message) => this.meter.failed(message),
     });
@@ -104,7 +132,8 @@ export class Session {
       this.lastFrameAt = performance.now();
       this.events.described(message, this.seen);
     } else if (message.type === 'status') {
-      this.status = message;
+      this.status = this.serverDrops.since(message);
+      this.rungs = offeredRungs(message);
     } else if (message.type === 'quality') {
       this.rung = message.now;
     } else if (message.type === 'waiting' || message.type === 'gone') {
@@ -119,6 +148,8 @@ export class Session {
     const live = this.source?.live === true;
     if (live !== this.live) this.meter.pause(); // what was left out in going back or returning is no loss
     this.live = live;
+    const isKept = !live && this.source?.kept != null; // it came before
+    if (!forLater && !isKept) this.meter.came(bytes.byteLength, this.lastFrameAt);
     if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, live);
     this.underway.set(this.decoder.decode(bytes, prefix.bytes), { prefix, forLater });
   }

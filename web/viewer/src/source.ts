@@ -3,6 +3,7 @@
 import type { FrameStore } from './frameStore';
 import type { Loop } from './playback';
 import type { FramePrefix, ServerMessage, Written } from './protocol';
+import type { Refusal } from './state';
 
 export interface SourceEvents {
   open(): void;
@@ -10,6 +11,8 @@ export interface SourceEvents {
   message(message: ServerMessage): void;
   /** `forLater`: only decoded, since the frames behind it build on it; its credit is not asked back. */
   frame(prefix: FramePrefix, message: ArrayBuffer, forLater: boolean): void;
+  /** So much came and is not shown now, but kept. */
+  kept?(bytes: number): void;
   clock(t0: number, serverMs: number, t1: number): void;
   /** Something makes no sense; if it was a frame, its credit is given back. */
   nonsense(message: string): void;
@@ -19,6 +22,8 @@ export interface FrameSource {
   readonly connected: boolean;
   /** Whole seconds until the next attempt; null while connected or connecting for the first time. */
   readonly retryInS: number | null;
+  /** Why the server lets nobody in, where it says so. */
+  readonly refusal?: Refusal | null;
   readonly playback: Playback;
   /** Whether what comes now is of now: what is missing was lost, its age is a latency. */
   readonly live: boolean;

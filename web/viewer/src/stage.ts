@@ -98,7 +98,7 @@ export class Stage {
     this.renderer.forceContextLoss(); // else the browser keeps it until it collects
   }
 
-  private prepare({ width, height, ratio, world, projection, mode, lens, range, ground, poses, background, smooth }: Drawing): void {
+  private prepare({ width, height, ratio, world, projection, mode, lens, range, ground, poses, dimmed, background, smooth }: Drawing): void {
     const size = [width, height, ratio].join();
     if (size !== this.size && !this.renderer.xr.isPresenting) {
       this.size = size;
@@ -120,6 +120,7 @@ export class Stage {
       if (pose !== null) mesh.place(pose);
       mesh.mode = mode;
       mesh.smooth = smooth;
+      mesh.dimmed = dimmed.includes(surface);
       mesh.setPixelRatio(ratio);
       mesh.setLens(surface === 0 ? lens : null);
       if (range !== null) mesh.setDepthRange(range);

@@ -6,6 +6,7 @@ export type State =
   | 'unsupported'
   | 'connecting'
   | 'lost'
+  | 'refused'
   | 'empty'
   | 'waiting'
   | 'starting'
@@ -15,11 +16,15 @@ export type State =
   | 'stalled'
   | 'ended';
 
+/** Why a server lets a page not watch: it has as many as it may, or no stream can have such a name. */
+export type Refusal = 'places' | 'name';
+
 export interface Facts {
   problem: string | null; // why nothing can be shown here at all
   everConnected: boolean;
   connected: boolean; // the WebSocket or, while no stream is chosen, the list
   retryInS: number | null; // until the next attempt
+  refusal: Refusal | null; // of the last one
   stream: string | null; // chosen
   announced: boolean; // the server knows the stream
   seen: boolean; // a frame of it was shown
@@ -67,10 +72,18 @@ export function present(facts: Facts): Presentation {
     const { playing, paused, surface } = text.file;
     return make('file', { playing, paused, surface }[facts.file]);
   }
-  if (facts.shifted !== null) return make('shifted', text.shifted[facts.shifted]);
+  if (facts.shifted !== null) {
+    const now = present({ ...facts, shifted: null });
+    const how = text.shifted[facts.shifted];
+    return make('shifted', isOver(now) ? text.shifted.over(how, now.label) : how);
+  }
   if (!facts.connected) {
     if (!facts.everConnected && facts.retryInS === null) {
       return make('connecting', say.connecting[0], { title: say.connecting[1], text: say.connecting[2] });
+    }
+    if (facts.refusal === 'name') return make('refused', say.noName[0], { title: say.noName[1], text: say.noName[2], dim: true });
+    if (facts.refusal === 'places') {
+      return make('lost', say.full[0], { title: say.full[1], text: say.full[2] + say.again(facts.retryInS), dim: true });
     }
     const what = facts.seen ? say.lastPicture : facts.everConnected ? '' : say.filesOpen;
     return make('lost', say.lost[0], { title: say.lost[1], text: what + say.again(facts.retryInS), dim: true });
@@ -94,6 +107,11 @@ export function present(facts: Facts): Presentation {
     return make('stalled', say.stalled[0], { title: say.stalled[1], text: since + (facts.serverMessage || say.comesBack), dim: true });
   }
   return make('live', say.live);
+}
+
+/** Nothing comes of it any more, as far as is known. */
+export function isOver({ state }: Presentation): boolean {
+  return state === 'lost' || state === 'refused' || state === 'ended';
 }
 
 /** Seconds to wait before attempt n (0, 1, ...) to connect again. */

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Figures for the statistics line. Pure: every time is given, in milliseconds.
+import type { StreamStatus } from './protocol';
 
 /** Events in a sliding window, for rates. */
 export class Rate {
@@ -87,6 +88,24 @@ export class ClockOffset {
       if (best === null || sample.roundTrip < best.roundTrip) best = sample;
     }
     return best;
+  }
+}
+
+const kServerDrops = ['drops_capture', 'drops_reconstruct', 'drops_encode', 'drops_publish'] as const;
+
+/** The server counts from its own start; this from when it was first asked. */
+export class ServerDrops {
+  private before: StreamStatus | null = null;
+
+  restart(): void {
+    this.before = null;
+  }
+
+  since(status: StreamStatus): StreamStatus {
+    const { before } = this;
+    const isNewRun = before === null || kServerDrops.some((kind) => status[kind] < before[kind]);
+    this.before = isNewRun ? status : before;
+    return { ...status, ...Object.fromEntries(kServerDrops.map((kind) => [kind, status[kind] - this.before![kind]])) };
   }
 }
 

@@ -71,9 +71,11 @@ export class StreamsPanel {
     }
   }
 
-  /** `first`: shown, and `besides` it. */
-  show(streams: readonly ListedStream[], first: string | null, besides: readonly string[]): void {
+  /** `first`: shown, and `besides` it; `known`: what is listed is so now. */
+  show(listed: readonly ListedStream[], first: string | null, besides: readonly string[], known: boolean): void {
     if (!this.isOpen) return;
+    const gone = besides.filter((name) => !listed.some((s) => s.name === name));
+    const streams: ListedStream[] = [...listed, ...gone.map((name) => ({ name, source: '', state: say.gone }))];
     this.none.hidden = streams.length > 0;
     this.placement.row.hidden = this.note.hidden = besides.length === 0;
     const isKnown = besides.every((name) => this.view !== null && this.view.placeOf(name) !== null);
@@ -85,7 +87,8 @@ export class StreamsPanel {
     }
     for (const stream of streams) {
       const row = this.rows.get(stream.name) ?? this.add(stream.name);
-      setText(row.about, `${stream.source} · ${typeof stream.recording === 'string' ? say.recording : stream.state}`);
+      const state = !known ? say.notKnown : typeof stream.recording === 'string' ? say.recording : stream.state;
+      setText(row.about, say.withWord(stream.source, state));
       const isFirst = stream.name === first;
       row.item.classList.toggle('shown', isFirst);
       row.show.setAttribute('aria-pressed', String(isFirst));
@@ -93,7 +96,7 @@ export class StreamsPanel {
       row.beside!.disabled = isFirst;
       row.place!.hidden = this.aligner === null || !besides.includes(stream.name);
       row.rig.hidden = stream.camera !== true;
-      this.draw(row, stream.name, stream.recording ?? null);
+      if (!gone.includes(stream.name)) this.draw(row, stream.name, stream.recording ?? null);
     }
   }
 

@@ -58,14 +58,15 @@ export class Timeline {
     window.clearInterval(this.timer);
   }
 
-  /** The streams that it can be of, the first one first; none: there is no choice. `chosen` null: the first. */
-  offer(names: readonly string[], chosen: string | null): void {
-    this.streams.hidden = names.length < 2;
-    if (names.join() !== this.offered) {
-      this.offered = names.join();
-      this.streams.replaceChildren(...names.map((name) => make('option', { value: name }, name)));
+  /** The streams that it can be of, by name, and how each is called, the first one first; none: there is no choice. `chosen` null: the first. */
+  offer(streams: ReadonlyMap<string, string>, chosen: string | null): void {
+    this.streams.hidden = streams.size < 2;
+    const offered = JSON.stringify([...streams]);
+    if (offered !== this.offered) {
+      this.offered = offered;
+      this.streams.replaceChildren(...[...streams].map(([value, called]) => make('option', { value }, called)));
     }
-    const at = Math.max(0, names.indexOf(chosen ?? ''));
+    const at = Math.max(0, [...streams.keys()].indexOf(chosen ?? ''));
     if (this.streams.selectedIndex !== at) this.streams.selectedIndex = at;
   }
 
@@ -100,7 +101,7 @@ export class Timeline {
 
   private showPreview(track: HTMLElement): void {
     const p = this.playback;
-    if (p === null || this.pointedX === null || this.box.hidden) return;
+    if (p === null || this.pointedX === null || this.isEmpty) return;
     const { left, width } = track.getBoundingClientRect();
     const share = Math.min(1, Math.max(0, (this.pointedX - left - kInset) / Math.max(1, width - 2 * kInset)));
     const atMs = this.begin + share * (this.end - this.begin);
@@ -111,7 +112,7 @@ export class Timeline {
   /** True where the key is one of the time line's. */
   command(key: string): boolean {
     const p = this.playback;
-    if (p === null || this.box.hidden) return false;
+    if (p === null || this.isEmpty) return false;
     const faster = (by: number): void => {
       const at = kSpeeds.findIndex((s) => s >= p.speed);
       p.setSpeed(kSpeeds[Math.min(kSpeeds.length - 1, Math.max(0, at + by))]!);
@@ -133,6 +134,10 @@ export class Timeline {
     return commands[key] !== undefined;
   }
 
+  // A stream that has just begun has nothing to go back to.
+  private get isEmpty(): boolean {
+    return this.playback === null || this.playback.times.length < 2;
+  }
   private get begin(): number {
     return this.playback!.times[0]!;
   }
@@ -161,9 +166,10 @@ export class Timeline {
 
   private refresh(): void {
     const p = this.playback;
-    const hidden = p === null || p.times.length < 2; // a stream that has just begun has nothing to go back to
-    this.box.hidden = hidden;
-    if (p === null || hidden || (!this.dirty && !p.playing)) return;
+    const { isEmpty } = this;
+    this.box.hidden = isEmpty && this.streams.hidden; // another one may be chosen
+    this.box.classList.toggle('empty', isEmpty);
+    if (p === null || isEmpty || (!this.dirty && !p.playing)) return;
     this.slider.min = String(this.begin);
     this.slider.max = String(this.end);
     const position = p.position;

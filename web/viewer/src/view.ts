@@ -17,6 +17,7 @@ import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
 import { Resolution, findGraphics } from './resolution';
 import type { Stage } from './stage';
+import { text } from './strings';
 import type { Extent } from './surface';
 
 const kStill_ms = 1000; // without a drawing: the picture stands still and can be as fine as the screen
@@ -34,6 +35,7 @@ export interface Beside extends Shown {
   readonly name: string;
   extent: Extent | null; // of its first frame
   readonly comesQuietly: boolean; // the eye stays where it is
+  word: string; // what is said of it where it is not of now; empty: it is
 }
 
 /** A place of one of the surfaces, in the frame of its own camera. */
@@ -176,7 +178,7 @@ export class View {
 
   /** The surface of another stream; what it shows comes by showBeside(). All are seen when it appears, unless it `comesQuietly`. */
   addBeside(name: string, comesQuietly = false): Beside {
-    const beside: Beside = { id: this.nextId++, name, frame: null, picture: null, extent: null, comesQuietly };
+    const beside: Beside = { id: this.nextId++, name, frame: null, picture: null, extent: null, comesQuietly, word: '' };
     this.besides.push(beside);
     return beside;
   }
@@ -195,6 +197,13 @@ export class View {
     if (beside.extent !== null || frame.extent === null) return;
     beside.extent = frame.extent;
     this.arrange(beside.comesQuietly);
+  }
+
+  /** It is dimmed, and this stands with its name; empty: it is of now. */
+  dimBeside(beside: Beside, word: string): void {
+    if (beside.word === word) return;
+    beside.word = word;
+    this.invalidate();
   }
 
   set placement(placement: Placement) {
@@ -452,6 +461,7 @@ export class View {
       range: this.range,
       ground: this.showsGround ? this.ground.ranges : null,
       poses,
+      dimmed: this.besides.flatMap(({ id, word }) => (word === '' ? [] : [id])),
       background: this.background_,
       smooth: this.drawsSmooth,
       timed,
@@ -485,7 +495,7 @@ export class View {
   private get labels(): readonly Label[] {
     const ground = this.showsGround ? this.ground.labels : [];
     if (this.besides.length === 0 || this.navigator.isRigView) return ground;
-    const { names } = this;
+    const names = [this.name, ...this.besides.map(({ name, word }) => text.streams.withWord(name, word))];
     const above = this.extents.flatMap((extent, i): Label[] => {
       if (extent === null) return [];
       const { min, max } = extent;

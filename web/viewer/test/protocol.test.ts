@@ -39,5 +39,6 @@ describe('what a person may choose, and is told', () => {
     expect(whyText({ want: 'texture', now: 'full', of: three })).toMatch(/^Full comes until “Picture alone”/);
     expect(whyText({ want: 'texture', now: 'full', of: ['full', 'reduced'] })).toMatch(/has no “Picture alone”/);
     expect(whyText({ want: null, now: 'full', of: ['full'] })).toMatch(/in full only/);
+    expect(whyText({ want: 'full', now: 'full', of: three, offline: true })).toMatch(/does not answer/);
   });
 });

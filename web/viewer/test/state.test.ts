@@ -8,6 +8,7 @@ const live: Facts = {
   everConnected: true,
   connected: true,
   retryInS: null,
+  refusal: null,
   stream: 'face',
   announced: true,
   seen: true,
@@ -29,6 +30,8 @@ describe('present', () => {
     ['the first attempt', { everConnected: false, connected: false }, 'connecting'],
     ['a server that is not there', { everConnected: false, connected: false, retryInS: 2 }, 'lost'],
     ['a lost connection', { connected: false, retryInS: 3 }, 'lost'],
+    ['a server whose places are taken', { connected: false, retryInS: 3, refusal: 'places' }, 'lost'],
+    ['a name that no stream can have', { everConnected: false, connected: false, retryInS: 3, refusal: 'name' }, 'refused'],
     ['nothing to watch', { stream: null, announced: false, seen: false }, 'empty'],
     ['a stream that is not there yet', { announced: false, seen: false }, 'waiting'],
     ['a stream that left', { announced: false }, 'ended'],
@@ -48,6 +51,19 @@ describe('present', () => {
     expect(present({ ...live, stream: null }).hint).toBe(live.hint);
     expect(present({ ...live, connected: false, retryInS: 3 }).text).toContain('in 3 s');
     expect(present({ ...live, serverState: 'stalled', serverMessage: 'No signal.' }).text).toContain('No signal.');
+  });
+
+  it('says why it was refused', () => {
+    expect(present({ ...live, connected: false, retryInS: 3, refusal: 'places' })).toMatchObject({ label: 'Full', title: 'All places are taken' });
+    expect(present({ ...live, connected: false, refusal: 'name' }).title).toBe('No stream can have this name');
+  });
+
+  it('says of what was that nothing comes any more', () => {
+    const label = (facts: Partial<Facts>): string => present({ ...live, shifted: 'paused', ...facts }).label;
+    expect(label({})).toBe('Paused');
+    expect(label({ connected: false, retryInS: 1 })).toBe('Paused · Offline');
+    expect(label({ serverState: 'ended' })).toBe('Paused · Ended');
+    expect(label({ quietMs: 1e9 })).toBe('Paused'); // nothing is shown of what comes
   });
 
   it('is patient with slow streams', () => {

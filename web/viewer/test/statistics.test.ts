@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: the figures of the statistics line mean what they say.
 import { describe, expect, it } from 'vitest';
-import { ClockOffset, DropCounter, Rate, RollingMedian } from '../src/statistics';
-import { parseFramePrefix, parseServerMessage } from '../src/protocol';
+import { Meter } from '../src/meter';
+import { ClockOffset, DropCounter, Rate, RollingMedian, ServerDrops } from '../src/statistics';
+import { parseFramePrefix, parseServerMessage, type StreamStatus } from '../src/protocol';
 
 describe('Rate', () => {
   it('is events over time', () => {
@@ -59,6 +60,33 @@ describe('DropCounter', () => {
     drops.restart();
     drops.add(50, 48);
     expect([drops.link, drops.gaps]).toEqual([0, 0]);
+  });
+});
+
+describe('ServerDrops', () => {
+  const status = (drops: number): StreamStatus => ({ state: 'running', message: '', drops_capture: drops, drops_reconstruct: 7, drops_encode: 0, drops_publish: 0 });
+  it('counts from when it was asked first, also of a server that began anew', () => {
+    const drops = new ServerDrops();
+    const counts = [400, 403, 1, 4].map((n) => drops.since(status(n)));
+    expect(counts.map((s) => [s.drops_capture, s.drops_reconstruct])).toEqual([[0, 0], [3, 0], [0, 0], [3, 0]]);
+  });
+});
+
+describe('Meter', () => {
+  const said = (meter: Meter, label: string): string | undefined => meter.statistics(0, null).find((s) => s.label === label)?.value;
+  it('begins to count with each source', () => {
+    const meter = new Meter();
+    const arrived = (sequence: number): void =>
+      meter.arrived({ bytes: 48, sequence, captureMs: 0, publishMs: 0, sentMs: 0, drops: 0 }, new ArrayBuffer(200), 0, true);
+    arrived(1);
+    arrived(4);
+    meter.skipped = 3;
+    meter.failed('damaged');
+    expect(said(meter, 'drops')).toBe('5 (3 viewer, 2 gaps)');
+    expect(said(meter, 'errors')).toBe('1');
+    meter.begin();
+    expect(said(meter, 'drops')).toBe('0');
+    expect(said(meter, 'errors')).toBeUndefined();
   });
 });
 
