@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace relievo {
@@ -18,5 +19,14 @@ bool valid_host(std::string_view host);
 /// The name in an absolute target ("http://name/path") goes before `host`. Nothing where either is none.
 /// Points into both.
 std::optional<RequestTarget> request_target(std::string_view target, std::string_view host);
+
+/// What is behind the first '?', empty where there is none.
+std::string_view query_of(std::string_view target);
+
+/// A name or a value of a query: "%2C" is a comma, '+' a space. What is no such escape stays as it is.
+std::string percent_decoded(std::string_view text);
+
+/// In whatever case `text` is.
+bool begins_with(std::string_view text, std::string_view lower_case);
 
 }  // namespace relievo

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "web/gateway/request_target.h"
+
 namespace relievo {
 namespace {
 
@@ -21,7 +23,10 @@ HttpReply no_picture(std::string_view name) {
   std::string names;
   for (const RigPicture& picture : kRigPictures)
     names += (names.empty() ? "" : ", ") + std::string(picture.name);
-  return text_reply(400, "there is no picture '" + std::string(name.substr(0, 64)) + "': ask for " + names);
+  const bool plain = std::all_of(name.begin(), name.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  return text_reply(400, "there is no " +
+                             (plain ? "picture '" + std::string(name.substr(0, 64)) + "'" : "such picture") +
+                             ": ask for " + names);
 }
 
 bool is_picture(std::string_view name) {
@@ -30,14 +35,12 @@ bool is_picture(std::string_view name) {
 }
 
 /// The value of pictures= in a target's query, empty where there is none.
-std::string_view pictures_in(std::string_view target) {
+std::string pictures_in(std::string_view target) {
   constexpr std::string_view kName = "pictures=";
-  auto query = target.substr(std::min(target.find('?'), target.size()));
-  while (!query.empty()) {
-    query.remove_prefix(1);  // ? or &
+  for (auto query = query_of(target); !query.empty();) {
     const std::string_view one = query.substr(0, query.find('&'));
-    if (one.starts_with(kName)) return one.substr(kName.size());
-    query = query.substr(one.size());
+    if (one.starts_with(kName)) return percent_decoded(one.substr(kName.size()));
+    query.remove_prefix(std::min(one.size() + 1, query.size()));
   }
   return {};
 }
@@ -47,7 +50,8 @@ std::string_view pictures_in(std::string_view target) {
 HttpReply rig_look(std::string_view stream, const HttpRequest& request, RigControl* control) {
   if (control == nullptr) return no_rig();
   std::vector<std::string> wanted;
-  for (std::string_view list = pictures_in(request.target); !list.empty();) {
+  const std::string pictures = pictures_in(request.target);
+  for (std::string_view list = pictures; !list.empty();) {
     const std::string_view name = list.substr(0, list.find(','));
     if (!is_picture(name)) return no_picture(name);
     wanted.emplace_back(name);

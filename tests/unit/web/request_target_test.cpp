@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: of a query's escapes only whole ones are undone, whatever bytes come.
+#include "web/gateway/request_target.h"
+
+#include <gtest/gtest.h>
+
+namespace relievo::test {
+namespace {
+
+TEST(RequestTarget, EscapesOfAQueryAreUndone) {
+  EXPECT_EQ(percent_decoded("camera%2Ccoverage%2cbreaks"), "camera,coverage,breaks");
+  EXPECT_EQ(percent_decoded("a+b%20c%2B"), "a b c+");
+  EXPECT_EQ(percent_decoded("%00%ff"), std::string("\0\xff", 2));
+  EXPECT_EQ(percent_decoded("%252C"), "%2C") << "once";
+  for (const char* none : {"", "%", "%2", "%%", "%zz", "%-1", "%+1", "% 1", "%0x", "a%", "\xff%\xff\xff"})
+    EXPECT_EQ(percent_decoded(none).size(), std::string_view(none).size()) << none;
+}
+
+TEST(RequestTarget, AQueryIsWhatIsBehindTheFirstMark) {
+  EXPECT_EQ(query_of("/"), "");
+  EXPECT_EQ(query_of("/?"), "");
+  EXPECT_EQ(query_of("/a?b=c?d"), "b=c?d");
+}
+
+}  // namespace
+}  // namespace relievo::test
