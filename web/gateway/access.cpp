@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sys/random.h>
+#include <sys/stat.h>
 #include <utility>  // before Asio 1.74 in C++20
 
 #include "web/gateway/access.h"
@@ -10,6 +11,7 @@
 #include <sstream>
 
 #include "base/log.h"
+#include "base/time.h"
 #include "base/whole_file.h"
 
 namespace relievo {
@@ -57,11 +59,11 @@ Result<std::vector<std::string>> read_tokens(const std::filesystem::path& file) 
 }  // namespace
 
 FileMark mark_of(const std::filesystem::path& file) {
-  std::error_code failed;
-  FileMark mark;
-  mark.time = std::filesystem::last_write_time(file, failed);
-  mark.bytes = std::filesystem::file_size(file, failed);
-  return failed ? FileMark{} : mark;
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return {};
+  return {.time_ns = status.st_mtim.tv_sec * kNanosecondsPerSecond + status.st_mtim.tv_nsec,
+          .bytes = static_cast<std::uint64_t>(status.st_size),
+          .inode = status.st_ino};
 }
 
 Result<Tokens> Tokens::load(const std::filesystem::path& file) {

@@ -2,6 +2,7 @@
 // Who may watch: tokens, pages of which sites, and the certificate they see. One thread.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -17,10 +18,10 @@ class context;
 
 namespace relievo {
 
-/// A file's content changed where this did.
+/// A file's content changed where this did; all 0 where there is none.
 struct FileMark {
-  std::filesystem::file_time_type time{};
-  std::uintmax_t bytes = 0;
+  std::int64_t time_ns = 0;
+  std::uint64_t bytes = 0, inode = 0;  // another file moved in its place may have both its time and its size
   bool operator==(const FileMark&) const = default;
 };
 FileMark mark_of(const std::filesystem::path& file);
@@ -38,7 +39,8 @@ class Tokens {
   bool needed() const { return !tokens_.empty(); }
   /// In a time that does not tell how much of a token is right.
   bool accepts(std::string_view token) const;
-  /// Where the file has changed; what is wrong with it is logged, and the old tokens stay.
+  /// Where the file has changed, for which each call looks; what is wrong with it is logged, and the old
+  /// tokens stay.
   void reload();
   const std::string& first() const { return tokens_.front(); }
 

@@ -148,6 +148,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
     reply.refusal = Refusal::kRate;
     return reply;
   }
+  credentials_.tokens.reload();  // also on a connection that has been open since before
   return relievo::answer(request, {.hub = hub_,
                                    .counts = counts_,
                                    .tokens = credentials_.tokens,
@@ -242,7 +243,6 @@ void Server::on_accept(std::shared_ptr<Transport> transport) {
   if (!limits.connect(transport->peer().address, steady_now_ns())) return counts_.refuse(Refusal::kAddress);
   auto place = std::make_shared<Place>(std::move(transport), limits);
   if (!make_room()) return counts_.refuse(Refusal::kPlaces);
-  credentials_.tokens.reload();
   Transport* held = place->transport.get();
   const auto connection = HttpConnection::make(*this, std::shared_ptr<Transport>(std::move(place), held),
                                                credentials_.tls ? credentials_.tls->context() : nullptr);

@@ -137,6 +137,34 @@ TEST_F(GatewayTokens, ANewFileCountsAndABrokenOneDoesNot) {
   EXPECT_TRUE(client.next_of("frame")) << "who watches goes on";
 }
 
+TEST_F(GatewayTokens, OneThatWasTakenOutIsRefusedOnAConnectionThatIsKept) {
+  TcpClient client(port);
+  const auto ask = [&](const std::string& method, const std::string& target) {
+    client.send(method + " " + target + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n" +
+                bearer(kToken) + "\r\n");
+    return read_response(client).status;
+  };
+  ASSERT_EQ(ask("GET", "/api/streams"), 200);
+  ASSERT_EQ(ask("POST", "/api/projector"), 404);
+  ASSERT_EQ(ask("GET", "/recordings/none.mcap"), 404);
+  std::ofstream(file) << "a-token-made-yesterday\n";
+  EXPECT_EQ(ask("GET", "/api/streams"), 401);
+  EXPECT_EQ(ask("POST", "/api/projector"), 401);
+  EXPECT_EQ(ask("GET", "/recordings/none.mcap"), 401);
+  std::ofstream(file) << kToken << "\n";
+  EXPECT_EQ(ask("GET", "/api/streams"), 200) << "all on one connection";
+}
+
+TEST_F(GatewayTokens, AFileMovedInItsPlaceCountsWhateverItsTime) {
+  const std::string next = folder / "next";
+  std::ofstream(file) << kToken << "\n";
+  ASSERT_EQ(request(port, "GET", "/api/streams", bearer(kToken)).status, 200);
+  std::ofstream(next) << "incorrect-horse-batte\n";  // as long
+  std::filesystem::last_write_time(next, std::filesystem::last_write_time(file));
+  std::filesystem::rename(next, file);
+  EXPECT_EQ(request(port, "GET", "/api/streams", bearer(kToken)).status, 401);
+}
+
 TEST(Tokens, FilesThatCannotBeUsedAreOneClearLine) {
   const TempFolder folder;
   const std::string file = folder / "tokens";
