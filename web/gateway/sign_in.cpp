@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "web/gateway/request_target.h"
+
 namespace relievo {
 namespace {
 
@@ -13,7 +15,8 @@ constexpr std::string_view kForm =
     "<meta name=\"viewport\" content=\"width=device-width\"><h1>Relievo</h1>"
     "<p>Whoever runs this server lets you watch with a token: it is in the link they gave you, or in their "
     "token file.</p>"
-    "<form action=\"/\"><label>Token <input name=\"token\" type=\"password\" required autofocus></label> "
+    "<form action=\"{path}\">{query}<label>Token <input name=\"token\" type=\"password\" required "
+    "autofocus></label> "
     "<button>Watch</button></form></html>";
 
 // Other servers on this host, on other ports, get the same cookies: each has a name of its own.
@@ -33,8 +36,10 @@ std::string_view cookie_value(std::string_view cookies, std::string_view name) {
 }
 
 std::string_view bearer(std::string_view authorization) {
-  constexpr std::string_view kScheme = "Bearer ";
-  return authorization.starts_with(kScheme) ? authorization.substr(kScheme.size()) : std::string_view();
+  constexpr std::string_view kScheme = "bearer ";  // in any case: RFC 9110, 11.1
+  if (!begins_with(authorization, kScheme)) return {};
+  authorization.remove_prefix(kScheme.size());
+  return authorization.substr(std::min(authorization.find_first_not_of(' '), authorization.size()));
 }
 
 /// The token of "/?stream=a&token=T", and the target without it.
@@ -44,9 +49,8 @@ struct TokenInTarget {
 };
 
 TokenInTarget token_in(std::string_view target) {
-  const auto mark = target.find('?');
-  TokenInTarget out{{}, std::string(target.substr(0, mark))};
-  std::string_view query = mark == std::string_view::npos ? std::string_view() : target.substr(mark + 1);
+  TokenInTarget out{{}, std::string(target.substr(0, target.find('?')))};
+  std::string_view query = query_of(target);
   char joint = '?';
   while (!query.empty()) {
     const auto end = query.find('&');
@@ -76,7 +80,56 @@ HttpReply keep_as_cookie(const TokenInTarget& asked, bool tls, std::uint16_t por
   return reply;
 }
 
-HttpReply token_needed(bool is_page) {
+std::string html(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+/// What a form sends along, since it puts a query of its own in place of its action's.
+std::string hidden_inputs(std::string_view target) {
+  std::string out;
+  for (auto query = query_of(target); !query.empty();) {
+    const std::string_view one = query.substr(0, query.find('&'));
+    query.remove_prefix(std::min(one.size() + 1, query.size()));
+    const auto equals = std::min(one.find('='), one.size());
+    const std::string_view value = one.substr(std::min(equals + 1, one.size()));
+    if (equals == 0) continue;
+    out += "<input type=\"hidden\" name=\"" + html(percent_decoded(one.substr(0, equals))) + "\" value=\"" +
+           html(percent_decoded(value)) + "\">";
+  }
+  return out;
+}
+
+/// The form, which leads to what was asked for: `target` without a token.
+std::string form(std::string_view target) {
+  std::string out(kForm);
+  const auto put = [&](std::string_view mark, std::string_view text) {
+    out.replace(out.find(mark), mark.size(), text);
+  };
+  put("{query}", hidden_inputs(target));
+  put("{path}", target.substr(0, target.find('?')));
+  return out;
+}
+
+HttpReply token_needed(bool is_page, std::string_view target) {
   HttpReply reply;
   reply.status = 401;
   reply.refusal = Refusal::kToken;
@@ -87,7 +140,7 @@ HttpReply token_needed(bool is_page) {
     return reply;
   }
   reply.content_type = "text/html; charset=utf-8";
-  reply.fixed_body = kForm;
+  reply.body = form(target);
   reply.headers.emplace_back(
       "Content-Security-Policy",
       "default-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'self'");
@@ -99,13 +152,14 @@ HttpReply token_needed(bool is_page) {
 std::optional<HttpReply> sign_in(const HttpRequest& request, const Tokens& tokens, std::uint16_t port) {
   if (!tokens.needed()) return std::nullopt;
   const TokenInTarget asked = token_in(request.target);
-  const bool is_page = request.target.substr(0, request.target.find('?')) == "/";
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  const bool is_page = path == "/" || path == "/rig";
   if (tokens.accepts(asked.token))
     return is_page ? std::optional(keep_as_cookie(asked, request.tls, port)) : std::nullopt;
   if (tokens.accepts(bearer(request.authorization)) ||
       tokens.accepts(cookie_value(request.cookie, cookie_name(port))))
     return std::nullopt;
-  return token_needed(is_page);
+  return token_needed(is_page, asked.rest);
 }
 
 }  // namespace relievo

@@ -56,6 +56,10 @@ TEST_F(GatewayTokens, AWrongOneIsNone) {
 TEST_F(GatewayTokens, ProgramsSendAHeaderOrAQuery) {
   EXPECT_EQ(request(port, "GET", "/api/streams", bearer(kToken)).status, 200);
   EXPECT_EQ(request(port, "GET", "/api/streams", bearer("another.token_of-16")).status, 200);
+  for (const char* scheme : {"bearer ", "BEARER ", "Bearer   "})
+    EXPECT_EQ(request(port, "GET", "/api/streams", "Authorization: " + (scheme + kToken) + "\r\n").status,
+              200)
+        << scheme;
   EXPECT_EQ(request(port, "GET", "/api/streams?token=" + kToken).status, 200);
   WsClient client(port, "face", bearer(kToken));
   EXPECT_EQ(client.status(), 101);
@@ -118,6 +122,39 @@ TEST_F(GatewayTokens, ABrowserKeepsItAsACookieAndNotInTheAddress) {
   EXPECT_EQ(WsClient(port, "face", header + "Origin: http://evil.example\r\n").status(), 403)
       << "a cookie comes along with whatever page asks";
   EXPECT_EQ(request(port, "GET", "/", "Cookie: x" + header.substr(13)).status, 401);
+}
+
+TEST_F(GatewayTokens, TheRigsPageTakesATokenAsTheViewersDoes) {
+  const auto sent = request(port, "GET", "/rig?token=" + kToken + "&stream=face");
+  ASSERT_EQ(sent.status, 303);
+  EXPECT_EQ(sent.headers.at("location"), "/rig?stream=face");
+  const std::string cookie = sent.headers.at("set-cookie");
+  EXPECT_NE(cookie.find("; Path=/;"), std::string::npos) << "what the page loads needs it, too";
+  EXPECT_EQ(
+      request(port, "GET", "/api/streams", "Cookie: " + cookie.substr(0, cookie.find(';')) + "\r\n").status,
+      200);
+}
+
+TEST_F(GatewayTokens, TheFormLeadsToWhatWasAskedFor) {
+  const auto form = [&](const std::string& target) { return request(port, "GET", target).body; };
+  const auto has = [](const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+  };
+  const std::string viewer = form("/?stream=face&token=wrong&quality=auto");
+  EXPECT_TRUE(has(viewer, "<form action=\"/\">")) << viewer;
+  EXPECT_TRUE(has(viewer, "<input type=\"hidden\" name=\"stream\" value=\"face\">")) << viewer;
+  EXPECT_TRUE(has(viewer, "<input type=\"hidden\" name=\"quality\" value=\"auto\">")) << viewer;
+  EXPECT_FALSE(has(viewer, "wrong")) << "the token is asked for anew";
+  const std::string rig = form("/rig?stream=face");
+  EXPECT_TRUE(has(rig, "<form action=\"/rig\">")) << rig;
+  EXPECT_TRUE(has(rig, "name=\"stream\"")) << rig;
+  for (const char* hostile :
+       {"/?stream=%22%3E%3Cscript%3Ealert(1)%3C/script%3E", "/?stream=\"><script>alert(1)</script>",
+        "/?\"><script>=1", "/?a=%27%3cscript%3e", "/?stream=%", "/?=&&%zz=%0", "/?a"}) {
+    const std::string page = form(hostile);
+    EXPECT_TRUE(has(page, "name=\"token\"")) << hostile;
+    EXPECT_FALSE(has(page, "<script")) << page;
+  }
 }
 
 TEST_F(GatewayTokens, ANewFileCountsAndABrokenOneDoesNot) {
