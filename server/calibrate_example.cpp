@@ -63,6 +63,12 @@ Status run(const Options& options, StopSignal& stop) {
     stripes = *std::move(made);
   }
   const fs::path out = options.out;
+  std::error_code code;
+  if (fs::exists(out / "views", code) && !fs::is_empty(out / "views", code)) {
+    return Error{(out / "views").string() +
+                 " has views of an earlier run, which would be calibrated with these: give a new folder or "
+                 "remove it"};
+  }
   if (const Status made = make_folder(out / "views"); !made) return made;
   if (stripes) {
     const Status written = write_whole_file(out / "views" / "pattern.yaml", to_yaml(*stripes));

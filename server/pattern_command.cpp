@@ -19,6 +19,7 @@
 #include "capture/pattern/slides.h"
 #include "capture/projector/slide_video.h"
 #include "cli/checks.h"
+#include "cli/progress.h"
 #include "cli/size_option.h"
 #include "codec/export.h"
 #include "server/commands.h"
@@ -43,12 +44,18 @@ struct Options {
   bool json = false;
 };
 
-Status write_gray(const Options& options) {
-  if (const Status written = write_gray_slides(options.out, options.size.width, options.size.height);
+Status write_gray(const Options& options, StopSignal& stop) {
+  const std::size_t count = gray_slides(options.size.width, options.size.height).size();
+  Progress progress("pattern", "slides", count);
+  const auto go_on = [&](std::size_t done, std::size_t) {
+    progress.update(done);
+    return !stop.stopped();
+  };
+  if (const Status written = write_gray_slides(options.out, options.size.width, options.size.height, go_on);
       !written) {
     return written;
   }
-  const std::size_t count = gray_slides(options.size.width, options.size.height).size();
+  progress.finish();
   if (options.json) {
     std::puts(nlohmann::json({{"folder", options.out}, {"slides", count}})
                   .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
@@ -136,7 +143,7 @@ Status run(const Options& options, StopSignal& stop) {
     if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;
     return write_video(options, *pattern, stop);
   }
-  if (options.gray) return write_gray(options);
+  if (options.gray) return write_gray(options, stop);
   const auto pattern = pattern_of(options.pattern);
   if (!pattern) return pattern.error();
   if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;

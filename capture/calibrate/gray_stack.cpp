@@ -167,7 +167,8 @@ Result<GrayStack> read_gray_stack(const fs::path& folder, int projector_width, i
   return builder.finish(folder);
 }
 
-Status write_gray_slides(const fs::path& folder, int projector_width, int projector_height) {
+Status write_gray_slides(const fs::path& folder, int projector_width, int projector_height,
+                         const std::function<bool(std::size_t, std::size_t)>& on_slide) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) return Error{"cannot make the folder " + folder.string() + ": " + code.message()};
@@ -175,6 +176,9 @@ Status write_gray_slides(const fs::path& folder, int projector_width, int projec
   for (std::size_t i = 0; i < slides.size(); ++i) {
     char name[32];
     std::snprintf(name, sizeof name, "gray_%02zu.png", i);
+    if (on_slide && !on_slide(i, slides.size()))
+      return Error{"stopped: " + std::to_string(i) + " of " + std::to_string(slides.size()) +
+                   " slides are in " + folder.string()};
     if (Status written =
             write_png(folder / name, draw_gray_slide(slides[i], projector_width, projector_height));
         !written) {

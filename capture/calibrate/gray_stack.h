@@ -24,6 +24,8 @@ Result<GrayStack> read_gray_stack(const std::filesystem::path& folder, int proje
                                   const std::function<bool(std::size_t, std::size_t)>& on_picture = {});
 
 /// Writes every slide to project, NN.png, in the numbered layout. The folder is made where it is missing.
-Status write_gray_slides(const std::filesystem::path& folder, int projector_width, int projector_height);
+/// `on_slide` as `on_picture` above.
+Status write_gray_slides(const std::filesystem::path& folder, int projector_width, int projector_height,
+                         const std::function<bool(std::size_t, std::size_t)>& on_slide = {});
 
 }  // namespace relievo

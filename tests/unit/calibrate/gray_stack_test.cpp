@@ -48,6 +48,15 @@ TEST(GrayStack, OwnSlidesReadBack) {
   expect_identity(read_gray_stack(folder.path(), kWidth, kHeight));
 }
 
+TEST(GrayStack, SlidesStopWhereAsked) {
+  const TempFolder folder;
+  const auto stopped = write_gray_slides(folder.path(), kWidth, kHeight,
+                                         [](std::size_t done, std::size_t) { return done < 3; });
+  ASSERT_FALSE(stopped.ok());
+  EXPECT_NE(stopped.error().message.find("stopped: 3 of "), std::string::npos) << stopped.error().message;
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
+}
+
 TEST(GrayStack, WhiteAndBlackFirstOrLeftOut) {
   const std::size_t count = gray_slides(kWidth, kHeight).size();
   const TempFolder first, without;
