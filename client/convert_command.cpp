@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
 #include "cli/checks.h"
 #include "cli/progress.h"
@@ -19,6 +20,7 @@
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
 #include "idl/cdr.h"
+#include "idl/recorder.h"
 
 namespace relievo {
 namespace {
@@ -71,12 +73,13 @@ class Conversion {
       if (options_.texture)
         if (auto usable = check_texture_codec(*texture_codec_named(*options_.texture)); !usable)
           return usable;
-      const auto info = recorded_.read_info();
-      if (!info)
-        return Error{options_.file + ": frames cannot be coded anew without the stream's description: " +
-                     info.error().message};
-      encoder_.emplace(info->rig, info->pattern);
     }
+    auto infos = recorded_.read_infos();
+    if (!infos) return infos.error();
+    infos_ = *std::move(infos);
+    if (options_.encode() && infos_.empty())
+      return Error{options_.file +
+                   ": frames cannot be coded anew without the stream's description, and it is missing"};
     auto writer = RecordingWriter::create(options_.out, {.sync_ns = -1});
     if (!writer) return writer.error();
     writer_ = *std::move(writer);
@@ -88,8 +91,10 @@ class Conversion {
       if (!channel) return channel.error();
       channels_[topic] = *channel;
     }
-    for (const RecordingAttachment& attachment : recorded_.summary().attachments)
+    for (const RecordingAttachment& attachment : recorded_.summary().attachments) {
+      if (is_description(attachment)) continue;  // comes with the frames that it describes
       if (auto added = writer_->add_attachment(attachment); !added) return added;
+    }
     if (!options_.foxglove) return {};
     auto foxglove = FoxgloveChannels::add_to(*writer_, recorded_.stream());
     if (!foxglove) return foxglove.error();
@@ -99,19 +104,21 @@ class Conversion {
 
   /// `wanted` false: before the range, where only what later frames build on counts.
   Status add(const RawSample& sample, bool wanted) {
-    if (sample.topic != Topic::kFrame) return wanted || needed_later(sample) ? write(sample) : Status();
+    if (sample.topic == Topic::kInfo) return {};  // comes with the frames that it describes
+    if (sample.topic != Topic::kFrame) return wanted ? write(sample) : Status();
     const auto view = read_frame_cdr(sample.cdr);
     if (!wanted) {
       if (view) (void)decoder_.remember(view->data);
-      return encoder_ || !needed_later(sample) ? Status() : copy(sample);
+      return options_.encode() || !needed_later(sample) ? Status() : copy(sample);
     }
-    if (!encoder_ && !foxglove_) return copy(sample);
+    if (!options_.encode() && !foxglove_) return copy(sample);
     const auto frame = view ? decoder_.decode(view->data) : Result<Frame3D>(view.error());
     if (!frame) {
       ++converted_.unreadable;
       return {};
     }
-    if (auto status = encoder_ ? encode(sample, *view, *frame) : copy(sample); !status) return status;
+    if (auto status = options_.encode() ? encode(sample, *view, *frame) : copy(sample); !status)
+      return status;
     if (!foxglove_) return {};
     return foxglove_->write(*writer_, *frame,
                             {sample.receive_time_ns, sample.source_time_ns, view->capture_time_ns});
@@ -121,7 +128,20 @@ class Conversion {
   const Converted& converted() const { return converted_; }
 
  private:
+  /// Where another session begins with this frame: what describes it, and an encoder that knows its rig.
+  Status describe(const RawSample& frame) {
+    const RecordedInfo* info = info_of(frame, infos_);
+    if (info == described_) return {};
+    described_ = info;
+    if (options_.encode()) encoder_.emplace(info->info.rig, info->info.pattern);
+    RawSample sample = info->sample;
+    sample.receive_time_ns = frame.receive_time_ns;
+    if (auto status = attachments_.add_to(*writer_, info->info, sample.cdr, sample.receive_time_ns); !status)
+      return status;
+    return write(sample);
+  }
   Status copy(const RawSample& sample) {
+    if (auto status = describe(sample); !status) return status;
     ++converted_.frames;
     converted_.bytes_before += sample.cdr.size();
     converted_.bytes_after += sample.cdr.size();
@@ -130,6 +150,7 @@ class Conversion {
   Status encode(const RawSample& sample, FrameView view, const Frame3D& frame) {
     const auto before = read_frame_layout(view.data);
     if (!before) return before.error();
+    if (auto status = describe(sample); !status) return status;
     if (before->header.texture != TextureCodec::kNone) texture_ = before->header.texture;
     const EncodeOptions wanted = encode_options(options_, texture_);
     const auto bytes =
@@ -185,7 +206,10 @@ class Conversion {
   RecordedStream& recorded_;
   std::unique_ptr<RecordingWriter> writer_;
   std::map<Topic, std::uint16_t> channels_;
-  std::optional<FrameEncoder> encoder_;
+  std::vector<RecordedInfo> infos_;
+  const RecordedInfo* described_ = nullptr;  // the one that was written last
+  DescriptionAttachments attachments_;
+  std::optional<FrameEncoder> encoder_;  // of its rig
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;
   TextureCodec texture_ = TextureCodec::kNone;  // the last one recorded

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "base/time.h"
 #include "cli/progress.h"
 #include "client/commands.h"
 #include "client/export_formats.h"
@@ -47,20 +48,62 @@ struct Exported {
   bool stopped = false;
 };
 
-Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, RecordedStream& recorded) {
+/// `after_ns`: the recording's start, of the first frame of another camera.
+Error another_camera(std::int64_t after_ns) {
+  char from[48], to[48];
+  std::snprintf(from, sizeof from, "%.9f", seconds(after_ns));
+  std::snprintf(to, sizeof to, "%.9f", seconds(after_ns - 1));
+  return Error{
+      std::string("the camera was calibrated anew within the range, and camera.json describes one: ") +
+      "export each part into a folder of its own, one with --to " + to + ", one with --from " + from};
+}
+
+bool are_equal(const PinholeModel& a, const PinholeModel& b) {
+  return a.width == b.width && a.height == b.height && a.matrix == b.matrix && a.distortion == b.distortion;
+}
+
+/// Of the frames in the range. Fails where their cameras differ; nothing where there is no description.
+Result<std::optional<Rig>> find_rig(RecordedStream& recorded, const TimeRange& range) {
+  const auto infos = recorded.read_infos();
+  if (!infos) return infos.error();
+  const auto differs = [&](const RecordedInfo& info) {
+    return !are_equal(info.info.rig.camera, infos->front().info.rig.camera);
+  };
+  if (std::ranges::none_of(*infos, differs))
+    return infos->empty() ? std::nullopt : std::optional(infos->front().info.rig);
+  if (auto status = recorded.seek(range.from_ns); !status) return status.error();
+  std::optional<Rig> rig;
+  for (;;) {
+    const auto sample = recorded.next();
+    if (!sample) return sample.error();
+    if (!*sample || (*sample)->receive_time_ns > range.to_ns) return rig;
+    if ((*sample)->topic != Topic::kFrame || (*sample)->receive_time_ns < range.from_ns) continue;
+    const Rig& its = info_of(**sample, *infos)->info.rig;
+    if (rig && !are_equal(rig->camera, its.camera))
+      return another_camera((*sample)->receive_time_ns - recorded.summary().start_ns);
+    rig = its;
+  }
+}
+
+Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, RecordedStream& recorded,
+                                                  const TimeRange& range) {
   ExportTarget target{.out = options.out,
                       .rig = {},
                       .depth_unit_m = 1e-3 * options.depth_unit_mm,
                       .reencode = options.reencode,
                       .draco = options.draco};
-  if (const auto info = recorded.read_info()) target.rig = info->rig;
+  if (options.format == "depth") {
+    auto rig = find_rig(recorded, range);
+    if (!rig) return rig.error();
+    target.rig = *std::move(rig);
+  }
   return format_named(options.format).make(target);
 }
 
 Result<Exported> export_frames(const Options& options, RecordedStream& recorded, StopSignal& stop) {
   const auto range = find_range(*options.range, recorded);
   if (!range) return range.error().in(options.file);
-  const auto writer = make_writer(options, recorded);
+  const auto writer = make_writer(options, recorded, *range);
   if (!writer) return writer.error().in(options.file);
   auto frames = RangeFrames::open(recorded, *range);
   if (!frames) return frames.error();

@@ -2,6 +2,7 @@
 #include "client/recorded_stream.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -45,6 +46,13 @@ bool needed_later(const RawSample& sample) {
   const auto view = read_frame_cdr(sample.cdr);
   const auto header = view ? read_frame_header(view->data) : Result<FrameHeader>(view.error());
   return header && header->texture == TextureCodec::kH264;
+}
+
+const RecordedInfo* info_of(const RawSample& frame, std::span<const RecordedInfo> infos) {
+  if (infos.empty()) return nullptr;
+  for (std::size_t i = infos.size(); i-- > 1;)
+    if (infos[i].sample.source_time_ns <= frame.source_time_ns) return &infos[i];
+  return &infos[0];
 }
 
 Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, const std::string& stream) {
@@ -129,9 +137,13 @@ Status RecordedStream::rewind() {
 }
 
 Result<std::vector<std::int64_t>> RecordedStream::frame_times() {
+  return times_of(Topic::kFrame);
+}
+
+Result<std::vector<std::int64_t>> RecordedStream::times_of(Topic topic) {
   std::vector<std::int64_t> out;
   for (std::size_t i = 0; i < topics_.size(); ++i) {
-    if (topics_[i] != Topic::kFrame) continue;
+    if (topics_[i] != topic) continue;
     auto times = reader_->times(static_cast<std::uint16_t>(i));
     if (!times) return times.error();
     out.insert(out.end(), times->begin(), times->end());
@@ -149,15 +161,20 @@ Status RecordedStream::seek(std::int64_t time_ns) {
   return reader_->seek(key_ns.value_or(time_ns));
 }
 
-Result<std::optional<RawSample>> RecordedStream::find_info() {
-  std::optional<RawSample> info;
+std::vector<RawSample> RecordedStream::attached_infos() const {
+  std::vector<RawSample> out;
   for (const RecordingAttachment& attachment : summary().attachments) {
     if (attachment.name != kInfoAttachment) continue;
     const auto read = read_info_cdr(attachment.data);
     if (read && read->stream == stream_)
-      return std::optional(
-          RawSample{Topic::kInfo, stream_, attachment.time_ns, attachment.time_ns, attachment.data});
+      out.push_back({Topic::kInfo, stream_, attachment.time_ns, attachment.time_ns, attachment.data});
   }
+  return out;
+}
+
+Result<std::optional<RawSample>> RecordedStream::find_info() {
+  if (auto attached = attached_infos(); !attached.empty()) return std::optional(std::move(attached.front()));
+  std::optional<RawSample> info;
   const std::uint64_t damaged = damaged_;
   for (int i = 0; i < kInfoWithinSamples && !info; ++i) {
     auto sample = next();
@@ -170,11 +187,39 @@ Result<std::optional<RawSample>> RecordedStream::find_info() {
   return info;
 }
 
-Result<StreamInfo> RecordedStream::read_info() {
-  const auto described = find_info();
-  if (!described) return described.error();
-  if (!*described) return Error{"it is missing"};
-  return read_info_cdr((*described)->cdr);
+/// Those among the messages, found by their times; and where some of them are damaged, those attached.
+Result<std::vector<RawSample>> RecordedStream::info_samples() {
+  const auto times = times_of(Topic::kInfo);
+  if (!times) return times.error();
+  std::vector<RawSample> out;
+  const std::uint64_t damaged = damaged_;
+  for (std::size_t i = 0; i < times->size(); ++i) {
+    if (i > 0 && (*times)[i] == (*times)[i - 1]) continue;
+    if (auto status = reader_->seek((*times)[i]); !status) return status.error();
+    for (;;) {
+      auto sample = next();
+      if (!sample) return sample.error();
+      if (!*sample || (*sample)->receive_time_ns > (*times)[i]) break;
+      if ((*sample)->topic == Topic::kInfo) out.push_back(**std::move(sample));
+    }
+  }
+  damaged_ = damaged;  // they are met again
+  if (times->empty() || out.size() < times->size())
+    std::ranges::move(attached_infos(), std::back_inserter(out));
+  std::ranges::stable_sort(out, {}, &RawSample::receive_time_ns);
+  return out;
+}
+
+Result<std::vector<RecordedInfo>> RecordedStream::read_infos() {
+  auto samples = info_samples();
+  if (!samples) return samples.error();
+  if (auto status = rewind(); !status) return status.error();
+  std::vector<RecordedInfo> out;
+  for (RawSample& sample : *samples) {
+    if (!out.empty() && out.back().sample.cdr == sample.cdr) continue;
+    if (auto info = read_info_cdr(sample.cdr)) out.push_back({std::move(sample), *std::move(info)});
+  }
+  return out;
 }
 
 }  // namespace relievo

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,17 @@ namespace relievo {
 /// Whether frames after this sample may build on it: it is a key frame, or its texture is video; and
 /// descriptions always. What comes before a range that is to be decoded, and is itself not wanted.
 bool needed_later(const RawSample& sample);
+
+/// A description of the stream, as it was received. A server that was started again sends another one.
+struct RecordedInfo {
+  RawSample sample;
+  StreamInfo info;
+};
+
+/// The one that holds for a frame: the last received of those that its server published before it, since
+/// frames may be received before their description; where there is none, the first. Null where `infos` is
+/// empty.
+const RecordedInfo* info_of(const RawSample& frame, std::span<const RecordedInfo> infos);
 
 /// One thread.
 class RecordedStream {
@@ -52,12 +64,16 @@ class RecordedStream {
   /// The first description in the file, attached or among the first samples; rewinds. Nothing where there is
   /// none.
   Result<std::optional<RawSample>> find_info();
-  /// What it says. Fails where it is missing or damaged; rewinds.
-  Result<StreamInfo> read_info();
+  /// All descriptions in the order in which they were received, but those that repeat the one before. Empty
+  /// where none can be read; rewinds.
+  Result<std::vector<RecordedInfo>> read_infos();
 
  private:
   RecordedStream() = default;
   void read_channels();
+  Result<std::vector<std::int64_t>> times_of(Topic topic);
+  Result<std::vector<RawSample>> info_samples();
+  std::vector<RawSample> attached_infos() const;
 
   std::filesystem::path file_;
   std::string stream_;

@@ -56,7 +56,7 @@ std::optional<Rgba> parse_background(const std::string& text) {
               static_cast<std::uint8_t>(rgb & 255), 255};
 }
 
-/// Draws the frames of one stream alike: eye and colours are chosen by the first one.
+/// Draws the frames of one stream alike: colours, and the eye that is not the rig's, are chosen by the first.
 class Camera {
  public:
   explicit Camera(const Options& options) : options_(options) {
@@ -65,12 +65,12 @@ class Camera {
   }
 
   Image8 take(const Frame3D& frame, const std::optional<PinholeModel>& rig) {
-    if (!view_) {
-      const auto& [width, height] = options_.size;
-      view_ = options_.view == "rig" && rig
-                  ? rig_view(*rig, width, height)
-                  : orbit_view(extent_of(frame.surface.positions), options_.orbit, width, height);
-      render_.depth = depth_range_of(frame.surface);
+    const auto& [width, height] = options_.size;
+    if (!view_) render_.depth = depth_range_of(frame.surface);
+    if (options_.view == "rig" && rig) {
+      view_ = rig_view(*rig, width, height);  // which another session may have changed
+    } else if (!view_) {
+      view_ = orbit_view(extent_of(frame.surface.positions), options_.orbit, width, height);
     }
     return render(frame, *view_, render_);
   }
@@ -91,9 +91,9 @@ Result<std::uint64_t> draw_recording(const Options& options, Camera& camera, Sho
   recorded->warn_if_cut();
   const auto range = find_range(*options.range, *recorded);
   if (!range) return range.error().in(options.input);
-  std::optional<PinholeModel> rig;
-  if (const auto info = recorded->read_info()) rig = info->rig.camera;
-  if (options.view == "rig" && !rig)
+  const auto infos = recorded->read_infos();
+  if (!infos) return infos.error();
+  if (options.view == "rig" && infos->empty())
     return Error{options.input + " says nothing of the rig's camera: use --view orbit"};
   auto frames = RangeFrames::open(*recorded, *range);
   if (!frames) return frames.error();
@@ -103,6 +103,8 @@ Result<std::uint64_t> draw_recording(const Options& options, Camera& camera, Sho
     const auto next = frames->next();
     if (!next) return next.error();
     if (!*next) break;
+    const RecordedInfo* const info = info_of((*next)->sample, *infos);
+    const auto rig = info != nullptr ? std::optional(info->info.rig.camera) : std::nullopt;
     if (auto status = output.add((*next)->frame, camera.take((*next)->frame, rig)); !status)
       return status.error();
     progress.update(output.count());

@@ -11,8 +11,11 @@
 namespace relievo {
 namespace {
 
-RecordingAttachment yaml_attachment(const char* name, const std::string& text) {
-  return {name, "application/yaml", utc_now_ns(), Bytes(text.begin(), text.end())};
+constexpr const char* kRigAttachment = "rig.yaml";
+constexpr const char* kPatternAttachment = "pattern.yaml";
+
+Status attach_yaml(RecordingWriter& writer, const char* name, const std::string& text, std::int64_t time_ns) {
+  return writer.add_attachment({name, "application/yaml", time_ns, Bytes(text.begin(), text.end())});
 }
 
 std::uint32_t sequence_of(const RawSample& sample) {
@@ -22,6 +25,27 @@ std::uint32_t sequence_of(const RawSample& sample) {
 }
 
 }  // namespace
+
+Status DescriptionAttachments::add_to(RecordingWriter& writer, const StreamInfo& info, const Bytes& cdr,
+                                      std::int64_t time_ns) {
+  // A server that came back with the same calibration does not make the file longer.
+  if (const std::string yaml = to_yaml(info.rig); yaml != rig_yaml_) {
+    rig_yaml_ = yaml;
+    if (auto status = attach_yaml(writer, kRigAttachment, yaml, time_ns); !status) return status;
+  }
+  if (const std::string yaml = to_yaml(info.pattern); yaml != pattern_yaml_) {
+    pattern_yaml_ = yaml;
+    if (auto status = attach_yaml(writer, kPatternAttachment, yaml, time_ns); !status) return status;
+  }
+  if (cdr == cdr_) return {};
+  cdr_ = cdr;
+  return writer.add_attachment({kInfoAttachment, "application/octet-stream", time_ns, cdr});
+}
+
+bool is_description(const RecordingAttachment& attachment) {
+  return attachment.name == kRigAttachment || attachment.name == kPatternAttachment ||
+         attachment.name == kInfoAttachment;
+}
 
 Recorder::Recorder(Options options)
     : options_(std::move(options)), segments_(options_.file, options_.recording.segments) {}
@@ -128,19 +152,7 @@ void Recorder::add(const RawSample& sample) {
 void Recorder::add_attachments() {
   // raw comes before info, so there are a writer and a sample.
   if (!writer_ || !info_ || !info_sample_ || error_ || limit_reached_) return;
-  // A server that came back with the same calibration does not make the file longer.
-  if (const std::string yaml = to_yaml(info_->rig); yaml != rig_yaml_) {
-    rig_yaml_ = yaml;
-    fail(writer_->add_attachment(yaml_attachment("rig.yaml", yaml)));
-  }
-  if (const std::string yaml = to_yaml(info_->pattern); !error_ && yaml != pattern_yaml_) {
-    pattern_yaml_ = yaml;
-    fail(writer_->add_attachment(yaml_attachment("pattern.yaml", yaml)));
-  }
-  if (!error_ && info_sample_->cdr != info_cdr_) {
-    info_cdr_ = info_sample_->cdr;
-    fail(writer_->add_attachment({kInfoAttachment, "application/octet-stream", utc_now_ns(), info_cdr_}));
-  }
+  fail(attachments_.add_to(*writer_, *info_, info_sample_->cdr, utc_now_ns()));
 }
 
 Status Recorder::open_file() {
@@ -183,9 +195,7 @@ Status Recorder::next_segment(std::int64_t now_ns) {
   if (const Status finished = writer_->finish(); !finished) return finished;
   if (const Status opened = open_file(); !opened) return opened;
   segment_ns_ = now_ns;
-  rig_yaml_.clear();
-  pattern_yaml_.clear();
-  info_cdr_.clear();
+  attachments_ = {};
   if (info_sample_) {
     RawSample info = *info_sample_;
     info.receive_time_ns = now_ns;

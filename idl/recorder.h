@@ -23,6 +23,21 @@ namespace relievo {
 /// only, and frames cannot be shown without it.
 constexpr const char* kInfoAttachment = "stream_info.cdr";
 
+/// Attaches what describes a stream to a recording: calibration, pattern and the StreamInfo itself; of each
+/// only what is not as it was attached last. One thread.
+class DescriptionAttachments {
+ public:
+  /// `cdr`: that `info` was read from.
+  Status add_to(RecordingWriter& writer, const StreamInfo& info, const Bytes& cdr, std::int64_t time_ns);
+
+ private:
+  std::string rig_yaml_, pattern_yaml_;
+  Bytes cdr_;
+};
+
+/// Whether an attachment is one of those.
+bool is_description(const RecordingAttachment& attachment);
+
 /// Fed by a Subscriber's thread, watched by another: every function may be called from any thread. It writes
 /// on the feeding thread; while the disk is slow, samples wait in DDS's own bounded queue, and what that
 /// loses is counted.
@@ -89,8 +104,7 @@ class Recorder {
   std::uint64_t frames_before_ = 0;                  // in the files before it
   std::optional<StreamInfo> info_;                   // as received last,
   std::optional<RawSample> info_sample_;             // and as it came
-  std::string rig_yaml_, pattern_yaml_;              // as attached last
-  Bytes info_cdr_;                                   // as attached last
+  DescriptionAttachments attachments_;               // of the file being written
   std::optional<Error> error_;
   Counts counts_;
   std::int64_t first_frame_ns_ = 0;

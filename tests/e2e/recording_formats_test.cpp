@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
+#include "codec/frame3d_codec.h"
 #include "codec/frame_layout.h"
 #include "codec/texture_codec.h"
 #include "tests/e2e/record_play.h"
@@ -298,6 +300,89 @@ TEST(RecordingFormats, RecordingsThatWereJoinedAreAllReadAndMadeOne) {
       EXPECT_EQ(topic["count"], 21);
     }
   }
+}
+
+/// A recording of two sessions of one server, whose rigs differ: a restart that a recorder goes on over.
+std::filesystem::path record_two_sessions(const TempFolder& folder) {
+  const auto both = folder / "both.mcap";
+  std::ofstream out(both, std::ios::binary);
+  for (const std::string source : {"sim:plane,width=160,height=120,stripes=30",
+                                   "sim:plane,width=192,height=144,stripes=30,baseline=0.8"}) {
+    const std::string part = folder / "part.mcap";
+    std::filesystem::remove(part);
+    const auto served =
+        run({program("relievo-server"), "serve", "--source", source, "--stream", "s", "--web", "none",
+             "--domain", kDomain, "--interface", "lo", "--fast", "--frames", "8", "--record", part});
+    EXPECT_EQ(served.status, 0) << served.err;
+    out << std::ifstream(part, std::ios::binary).rdbuf();
+  }
+  return both;
+}
+
+std::vector<Frame3D> decoded(const std::filesystem::path& file) {
+  std::vector<Frame3D> out;
+  FrameDecoder decoder;
+  for (const Bytes& cdr : recorded_frames(file)) {
+    auto frame = decoder.decode(read_frame_cdr(cdr)->data);
+    EXPECT_TRUE(frame.ok()) << (frame ? "" : frame.error().message);
+    if (frame) out.push_back(*std::move(frame));
+  }
+  return out;
+}
+
+/// Of what two frames have in the same places.
+float largest_error_m(const Frame3D& a, const Frame3D& b) {
+  EXPECT_EQ(a.surface.positions.size(), b.surface.positions.size());
+  float largest = 0;
+  for (std::size_t i = 0; i < std::min(a.surface.positions.size(), b.surface.positions.size()); ++i)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      largest = std::max(largest, std::abs(a.surface.positions[i][axis] - b.surface.positions[i][axis]));
+  return largest;
+}
+
+TEST(RecordingFormats, EachSessionIsConvertedByItsOwnCalibration) {
+  const TempFolder folder;
+  const auto both = record_two_sessions(folder);
+  const auto before = decoded(both);
+  ASSERT_GT(before.size(), 12u);
+  const auto convert = [&](const char* to, std::vector<std::string> more) {
+    more.insert(more.begin(), {program("relievo"), "convert", both, "--out", folder / to});
+    const auto done = run(more);
+    EXPECT_EQ(done.status, 0) << done.err;
+    return decoded(folder / to);
+  };
+  const auto after = convert("grid.mcap", {"--geometry", "grid", "--step-bits", "8"});
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t i = 0; i < after.size(); ++i) EXPECT_LT(largest_error_m(before[i], after[i]), 2e-4F) << i;
+
+  const auto later = std::to_string(before.size() - 3) + ":";
+  EXPECT_EQ(convert("later.mcap", {"--frames", later}).size(), 3u);
+  for (const char* file : {"later.mcap", "grid.mcap"}) {
+    const auto of_second = info(folder / file);
+    EXPECT_EQ(
+        of_second["info"]["rig"]["camera"]["size"],
+        nlohmann::json(file == std::string("later.mcap") ? std::vector{192, 144} : std::vector{160, 120}));
+  }
+}
+
+TEST(RecordingFormats, DepthIsOfOneCamera) {
+  const TempFolder folder;
+  const auto both = record_two_sessions(folder);
+  const auto depth = [&](std::vector<std::string> more) {
+    more.insert(more.begin(),
+                {program("relievo"), "export", both, "--format", "depth", "--out", folder / "d"});
+    return run(more);
+  };
+  const auto refused = depth({});
+  EXPECT_EQ(refused.status, 1);
+  const auto from = refused.err.find("--from ");
+  ASSERT_NE(from, std::string::npos) << refused.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "d"));
+  const auto second =
+      depth({"--from", refused.err.substr(from + 7, refused.err.find('\n', from) - from - 7)});
+  EXPECT_EQ(second.status, 0) << second.err;
+  std::ifstream camera(folder / "d" / "camera.json");
+  EXPECT_EQ(nlohmann::json::parse(camera)["width"], 192);
 }
 
 }  // namespace
