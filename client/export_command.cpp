@@ -192,6 +192,8 @@ Command export_command() {
                 "--draco", "there is no Draco in " + options->format + ": it is of glb and animation");
           if (options->format == "video" && !is_video_name(options->out))
             throw CLI::ValidationError("--out", "a video's name ends in .mp4 or .mkv");
+          if (options->format == "animation" && options->out.extension() != ".glb")
+            throw CLI::ValidationError("--out", "an animation's name ends in .glb");
         });
         app.footer(
             "Examples:\n"

@@ -156,6 +156,8 @@ Command record_command() {
             "generic viewers show, in many times the bytes");
         app.add_flag("--json", options->json, "Print the result as JSON");
         app.final_callback([options] {
+          if (!valid_stream_name(options->stream))
+            throw CLI::ValidationError("stream", "'" + options->stream + "' cannot name a stream");
           if (const auto all = recording_options(*options->recording); !all)
             throw CLI::ValidationError("--keep-size, --keep-for", all.error().message);
         });

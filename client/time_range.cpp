@@ -63,8 +63,13 @@ std::optional<std::int64_t> parse_utc_ns(std::string text) {
   const char* const end = ::strptime(text.c_str(), "%Y-%m-%dT%H:%M:", &parts);
   if (end == nullptr) return std::nullopt;
   const auto second_ns = parse_seconds_ns(end);
+  const int day = parts.tm_mday;
   const std::time_t minute_s = ::timegm(&parts);
-  if (!second_ns || *second_ns >= 61 * kNanosecondsPerSecond || minute_s < 0) return std::nullopt;
+  const bool is_date = parts.tm_mday == day;  // else moved into the next month: February 31
+  constexpr std::int64_t kLast_s = std::numeric_limits<std::int64_t>::max() / kNanosecondsPerSecond - 61;
+  if (!second_ns || *second_ns >= 61 * kNanosecondsPerSecond || !is_date || minute_s < 0 ||
+      minute_s > kLast_s)
+    return std::nullopt;
   return std::int64_t{minute_s} * kNanosecondsPerSecond + *second_ns;
 }
 

@@ -37,6 +37,8 @@ TEST(Client, WrongUsageIsExitTwoAndOneLine) {
       {"streams", "--wait", "soon"},
       {"streams", "--domain", "231"},
       {"record"},
+      {"record", ""},
+      {"record", "no spaces"},
       {"record", "face", "--frames", "0"},
       {"record", "face", "--frames", "-3"},
       {"play"},
@@ -44,6 +46,7 @@ TEST(Client, WrongUsageIsExitTwoAndOneLine) {
       {"play", "a.mcap", "--loop", "--once"},
       {"info"},
       {"export", "a.mcap", "--out", "d", "--format", "stl"},
+      {"export", "a.mcap", "--out", "a.mcap", "--format", "animation"},
       {"web", "--listen"},
       {"web", "--listen", "here"},
   };
@@ -102,7 +105,6 @@ TEST(Client, FailuresAreExitOneAndOneLine) {
       {"record", "face", "--out", text},
       {"record", "face", "--out", folder / "no" / "folder.mcap"},
       {"record", "face", "--out", folder / "new.mcap", "--interface", "no-such-if0"},
-      {"record", "no spaces", "--out", folder / "new.mcap"},
       {"streams", "--interface", "no-such-if0"},
   };
   for (const auto& arguments : failing) {

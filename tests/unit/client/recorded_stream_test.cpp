@@ -100,7 +100,8 @@ TEST_F(RecordedStreamTest, RangesAreTimesOrPositionsOrBoth) {
 TEST(RecordedTime, WhatIsNoTimeIsRefused) {
   for (const char* text :
        {"", "-1", "1e3", "1:2", "nan", "12345678901", "1.0000000001", "2026-01-02", "2026-13-02T00:00:00Z",
-        "2026-01-02T03:04:99Z", "2026-01-02T03:04:05Zulu", "1969-01-01T00:00:00Z"})
+        "2026-01-02T03:04:99Z", "2026-01-02T03:04:05Zulu", "1969-01-01T00:00:00Z", "2026-02-31T00:00:00Z",
+        "2262-04-12T00:00:00Z", "9999-01-01T00:00:00Z"})
     EXPECT_FALSE(parse_recorded_time_ns(text, 0).ok()) << text;
   EXPECT_EQ(*parse_recorded_time_ns("12.5", 7), 12'500'000'007);
 }
