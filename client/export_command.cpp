@@ -126,6 +126,7 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
 Status run(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.file, options.stream);
   if (!recorded) return recorded.error();
+  if (const Status free = recorded->check_output(options.out); !free) return free;
   recorded->warn_if_cut();
   auto exported = export_frames(options, *recorded, stop);
   if (!exported) return exported.error();

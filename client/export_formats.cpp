@@ -22,7 +22,7 @@ class FolderWriter : public ExportWriter {
  public:
   explicit FolderWriter(fs::path folder) : folder_(std::move(folder)) {}
 
-  Status add(const Frame3D& frame, std::span<const std::uint8_t>) final {
+  Status add(const Frame3D& frame, std::span<const std::uint8_t>) override {
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) return Error{"cannot make the folder " + folder_.string() + ": " + error.message()};
@@ -74,12 +74,19 @@ class DepthWriter final : public FolderWriter {
         pinhole_(pinhole_of(camera)),
         unit_m_(target.depth_unit_m) {}
 
+  Status add(const Frame3D& frame, std::span<const std::uint8_t> bytes) override {
+    const Image8& texture = frame.texture;
+    if (!texture.empty() && (texture.width() != camera_.width || texture.height() != camera_.height))
+      return Error{
+          "the texture is not of the camera's size, as of a lower quality, and depth would not lie on it: "
+          "record the stream with --quality full, or export another format"};
+    return FolderWriter::add(frame, bytes);
+  }
+
  private:
   Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) override {
     if (auto status = write_camera_json(folder / "camera.json", pinhole_, unit_m_); !status) return status;
     if (!frame.texture.empty()) {
-      const bool fits = frame.texture.width() == camera_.width && frame.texture.height() == camera_.height;
-      if (!fits) return Error{"the texture is not of the camera's size: depth would not lie on it"};
       const bool is_straight = camera_.distortion == pinhole_.distortion;
       const Image8 shown = is_straight ? Image8() : straightened(frame.texture.view(), camera_);
       if (auto status =

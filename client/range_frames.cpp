@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/range_frames.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "idl/cdr.h"
@@ -51,6 +52,7 @@ Result<std::optional<DecodedFrame>> RangeFrames::next() {
       continue;
     }
     out.frame.between = is_between(*view, ahead_);
+    out.frame.time_ns = rising(out.frame.time_ns, out.sample.receive_time_ns);
     out.data = view->data;
     return std::optional(std::move(out));
   }
@@ -64,6 +66,14 @@ Status RangeFrames::read_ahead() {
     ahead_ = *std::move(sample);
   } while (ahead_ && ahead_->topic != Topic::kFrame);
   return {};
+}
+
+std::int64_t RangeFrames::rising(std::int64_t time_ns, std::int64_t received_ns) {
+  constexpr std::int64_t kLeast_ns = 1'000'000;
+  if (time_ns_ && time_ns + later_ns_ <= *time_ns_)
+    later_ns_ = *time_ns_ + std::max(received_ns - received_ns_, kLeast_ns) - time_ns;
+  received_ns_ = received_ns;
+  return *(time_ns_ = time_ns + later_ns_);
 }
 
 void RangeFrames::leave_out(const Error& problem) {

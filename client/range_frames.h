@@ -38,7 +38,9 @@ class RangeFrames {
   /// `recorded` must outlive it; nobody else reads it meanwhile.
   static Result<RangeFrames> open(RecordedStream& recorded, const TimeRange& range);
 
-  /// The next one that can be decoded; nothing at the end of the range. What cannot is counted.
+  /// The next one that can be decoded; nothing at the end of the range. What cannot is counted. Times rise:
+  /// where a session's begin anew (a server that was started again, a loop), they go on by when frames were
+  /// received.
   Result<std::optional<DecodedFrame>> next();
 
   const LeftOut& left_out() const { return left_out_; }
@@ -47,12 +49,17 @@ class RangeFrames {
   RangeFrames(RecordedStream& recorded, const TimeRange& range) : recorded_(&recorded), range_(range) {}
   Status read_ahead();
   void leave_out(const Error& problem);
+  std::int64_t rising(std::int64_t time_ns, std::int64_t received_ns);
 
   RecordedStream* recorded_;
   TimeRange range_;
   FrameDecoder decoder_;
   std::optional<RawSample> ahead_;  // the next frame
   LeftOut left_out_;
+  // Of the last frame that was given:
+  std::optional<std::int64_t> time_ns_;
+  std::int64_t received_ns_ = 0;
+  std::int64_t later_ns_ = 0;  // that its session's times are put
 };
 
 }  // namespace relievo

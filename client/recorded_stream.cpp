@@ -136,6 +136,12 @@ Status RecordedStream::rewind() {
   return reader_->seek(summary().start_ns);
 }
 
+Status RecordedStream::check_output(const std::filesystem::path& out) const {
+  std::error_code missing;
+  if (!std::filesystem::equivalent(out, file_, missing)) return {};
+  return Error{out.string() + " is the recording itself: give another name"};
+}
+
 Result<std::vector<std::int64_t>> RecordedStream::frame_times() {
   return times_of(Topic::kFrame);
 }

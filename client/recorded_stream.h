@@ -61,6 +61,8 @@ class RecordedStream {
   /// Damaged parts skipped since opening.
   std::uint64_t damaged() const { return damaged_; }
 
+  /// Fails where `out` is the file that is read.
+  Status check_output(const std::filesystem::path& out) const;
   /// The first description in the file, attached or among the first samples; rewinds. Nothing where there is
   /// none.
   Result<std::optional<RawSample>> find_info();

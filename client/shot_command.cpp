@@ -88,6 +88,7 @@ Result<std::uint64_t> draw_recording(const Options& options, Camera& camera, Sho
                                      StopSignal& stop) {
   auto recorded = RecordedStream::open(options.input, options.stream);
   if (!recorded) return recorded.error();
+  if (const Status free = recorded->check_output(options.out); !free) return free.error();
   recorded->warn_if_cut();
   const auto range = find_range(*options.range, *recorded);
   if (!range) return range.error().in(options.input);

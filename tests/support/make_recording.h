@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "codec/frame3d_codec.h"
 #include "codec/recording.h"
@@ -33,12 +34,13 @@ class MadeRecording {
   }
 
   /// Returns whether it decodes without others.
-  bool add(std::uint64_t sequence, std::uint64_t number, std::int64_t time_ns) {
+  bool add(std::uint64_t sequence, std::uint64_t number, std::int64_t time_ns,
+           std::optional<std::int64_t> camera_time_ns = {}) {
     GridScene scene = kScene;
     scene.seed = number + 1;
     Frame3D frame = grid_frame(scene);
     frame.number = number;
-    frame.time_ns = time_ns;
+    frame.time_ns = camera_time_ns.value_or(time_ns);
     const auto data = encoder_.encode(frame, options_);
     EXPECT_TRUE(data.ok());
     EXPECT_TRUE(writer_

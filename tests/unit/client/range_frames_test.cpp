@@ -78,6 +78,26 @@ void damage(const std::filesystem::path& file, std::uint64_t number) {
   FAIL();
 }
 
+// A video or an animation of a recording over a restart: sources that count from their start begin at 0
+// again.
+TEST(RangeFrames, TimesGoOnWhereTheyBeginAnew) {
+  const test::TempFolder folder;
+  test::MadeRecording made(folder / "a.mcap");
+  const std::vector<std::uint64_t> numbers = {0, 1, 2, 0, 1};
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    made.add(numbers[i], numbers[i], kStart_ns + static_cast<std::int64_t>(i) * kStep_ns,
+             static_cast<std::int64_t>(numbers[i]) * 33'000'000);
+  made.finish();
+  auto recorded = RecordedStream::open(folder / "a.mcap", "");
+  auto frames = RangeFrames::open(*recorded, *find_range({}, *recorded));
+  std::vector<std::int64_t> times;
+  for (auto next = frames->next(); next && *next; next = frames->next())
+    times.push_back((*next)->frame.time_ns);
+  ASSERT_EQ(times.size(), numbers.size());
+  EXPECT_EQ(times[3] - times[2], kStep_ns);
+  EXPECT_EQ(times[4] - times[3], times[1] - times[0]);
+}
+
 TEST(RangeFrames, WhatBuildsOnADamagedKeyFrameIsCounted) {
   const test::TempFolder folder;
   const auto file = folder / "a.mcap";
