@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: who uses a keyboard or a screen reader gets at all of the page: each control of each
 // panel has a name, the tabulator reaches them and shows where it is; the sheet lists the keys; times are told since
-// the start and by the day; what was measured is copied.
+// the start and by the day; what was measured is copied; in forced colours it shows what is chosen; and in small windows no
+// part lies over another or is cut off.
 // Run as: node access_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -115,6 +116,54 @@ const checks = {
     assert.equal(cells[0], 'point');
     assert.ok(Math.abs(Number(cells[names.findIndex((n) => /^value/.test(n))]) - value) < 1e-5, `${names}: ${cells}`);
     await page.keyboard.press('Escape');
+  },
+
+  async 'in forced colours it shows what is chosen, and what says something by its colour keeps it'() {
+    feeder.say('start ball');
+    const page = await open('/', { viewport: { width: 1280, height: 760 }, forcedColors: 'active' });
+    await shownPast(page, 2);
+    await page.keyboard.press('n');
+    await page.keyboard.press('7');
+    await page.waitForSelector('#legend canvas');
+    const { chosen, others, kept } = await page.evaluate(() => {
+      const ground = (of) => getComputedStyle(document.querySelector(of)).backgroundColor;
+      const pressed = ['#modes [aria-pressed=true]', '#ways [aria-pressed=true]', '#tool-streams', '.streams [aria-pressed=true]', '#follow'];
+      const swatches = ['#badge i', '#legend canvas', '#legend i'];
+      return {
+        chosen: pressed.map(ground),
+        others: ['#modes [aria-pressed=false]', '#tool-measure'].map(ground),
+        kept: swatches.map((of) => getComputedStyle(document.querySelector(of)).forcedColorAdjust),
+      };
+    });
+    assert.equal(new Set(chosen).size, 1, `${chosen}`);
+    assert.ok(!others.includes(chosen[0]), `${chosen[0]} is that of ${others}, too`);
+    assert.ok(kept.every((adjust) => adjust === 'none'), `${kept}`);
+    await page.close();
+  },
+
+  async 'in small windows no part lies over another or is cut off'() {
+    feeder.say('also a-stream-whose-name-is-as-long-as-a-name-of-a-stream-can-be-here');
+    const streams = ['ball', 'a-stream-whose-name-is-as-long-as-a-name-of-a-stream-can-be-here'];
+    for (const [width, height] of [[360, 640], [650, 700], [700, 500], [740, 360]]) {
+      const page = await open(`/?stream=${streams[width === 700 ? 1 : 0]}`, { viewport: { width, height } });
+      await shownPast(page, 2);
+      await page.keyboard.press('6');
+      await page.keyboard.press('x');
+      await page.waitForSelector('#recording', { state: 'visible' });
+      await page.waitForTimeout(300); // parts follow the header
+      const { cut, over } = await page.evaluate(() => {
+        const box = (e) => e.getBoundingClientRect();
+        const parts = [...document.querySelectorAll('header > *, footer > *, #rail, #legend')].filter((e) => e.getClientRects().length > 0);
+        const name = (e) => e.id || e.tagName;
+        const overlap = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+        return {
+          cut: [...parts, ...document.querySelectorAll('header button')].filter((e) => box(e).right > innerWidth + 0.5 || box(e).bottom > innerHeight + 0.5).map(name),
+          over: parts.flatMap((a, i) => parts.slice(i + 1).filter((b) => overlap(box(a), box(b))).map((b) => `${name(a)}, ${name(b)}`)),
+        };
+      });
+      assert.deepEqual([cut, over], [[], []], `${width}x${height}`);
+      await page.close();
+    }
   },
 
   async 'no error, no request to another host'() {

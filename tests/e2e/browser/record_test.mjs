@@ -150,6 +150,10 @@ const checks = {
     await page.click('#panel-streams li:has-text(".mcap") button:has-text("Show")');
     await inState(page, 'file');
     assert.match(page.url(), /\/\?recording=kept-[^#&]*\.mcap$/);
+    await page.waitForSelector('#panel-streams li.shown:has-text(".mcap") button[aria-pressed="true"]:has-text("Show")');
+    assert.match(await page.title(), /^Relievo · kept-.*\.mcap$/);
+    const isCut = () => document.querySelector('#panel-streams li.shown b').scrollWidth > document.querySelector('#panel-streams li.shown b').clientWidth;
+    assert.equal(await page.evaluate(isCut), false, 'its name is cut off');
     await page.waitForFunction(() => !window.relievo.diagnostics().playback.playing); // at its end
     await page.focus('#view');
     await page.keyboard.press('Home');
@@ -173,10 +177,15 @@ const checks = {
     await shownPast(page, 2);
     const isPressed = (is) =>
       page.waitForFunction((p) => document.querySelector('#tool-record')?.getAttribute('aria-pressed') === p, is);
+    await page.keyboard.press('n');
+    const listed = page.locator('#panel-streams li:has-text(".mcap")');
+    await listed.first().waitFor();
+    const before = await listed.count();
     await order('start');
     await isPressed('true');
     await order('stop');
     await isPressed('false');
+    await eventually('the open list does not have it', async () => (await listed.count()) > before);
     await page.close();
   },
 

@@ -209,6 +209,10 @@ const checks = {
     for (const part of ['position', 'target']) {
       for (const i of [0, 1, 2]) assert.ok(Math.abs(same[part][i] - pose[part][i]) < 1e-3, `${part} ${same[part]}, not ${pose[part]}`);
     }
+    // Pasted into a page that is open.
+    await other.evaluate(() => (location.hash = '#mode=depth&eye=0.6_0.3_0.4&at=0.1_-0.05_-0.9'));
+    await other.waitForFunction(() => window.relievo.diagnostics().mode === 'depth');
+    await other.waitForFunction(() => /eye=0.6_0.3_0.4&at=0.1_-0.05_-0.9/.test(window.relievo.link()));
     await other.close();
   },
 

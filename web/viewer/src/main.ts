@@ -138,6 +138,7 @@ class Viewer {
     listenToCommands(this, this.ui.canvas);
     this.change({});
     this.openAddressed(new URLSearchParams(location.search));
+    window.addEventListener('hashchange', () => this.followLink()); // not of what the page writes itself
     window.setInterval(() => this.refresh(), kRefreshMs);
     this.refresh();
   }
@@ -153,6 +154,20 @@ class Viewer {
       this.chosenByPerson = true;
       void this.openServerFile(recording, this.shared).then(() => (this.chosenByPerson = this.file !== null || this.stream !== null));
     }
+  }
+
+  /** A link to what is shown already, by a person's hand. */
+  private followLink(): void {
+    const { display, pose, moment, places } = (this.shared = readShared(location.hash, this.display));
+    for (const [name, rigid] of places) this.view?.place(name, rigid);
+    this.change(display);
+    const navigator = this.view?.navigator;
+    if (pose !== null && navigator?.isRigView === false) navigator.pose = pose;
+    const playback = this.session.source?.playback;
+    if (moment === null || playback === undefined) return;
+    playback.seek(moment.atMs - (moment.utc ? playback.startMs : 0));
+    if (moment.playing) playback.play();
+    else playback.pause();
   }
 
   /** From now on; kept for the next visit. */
@@ -455,6 +470,7 @@ class Viewer {
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
     this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? [], this.server.arrived && (!offline || facts.refusal !== null));
+    this.streamsPanel?.showRecordings(this.server.streams, this.serverFile);
     const besides = this.companions?.tell() ?? new Map<string, Presentation>();
     this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
     this.qualityControl.show(this.offered);

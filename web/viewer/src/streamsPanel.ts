@@ -39,6 +39,8 @@ export class StreamsPanel {
   private readonly placement: { row: HTMLElement; set(value: Placement): void };
   private readonly note = make('p', { className: 'quiet' }, say.unknownPlaces);
   private readonly rows = new Map<string, Row>();
+  private readonly recordings = new Map<string, Row>(); // by file
+  private recorded = ''; // what the streams' recorders did when the folder was listed
   private readonly thumbnails = new Thumbnails();
   private isOpen = false;
   private readonly aligner: Aligner | null;
@@ -100,6 +102,18 @@ export class StreamsPanel {
     }
   }
 
+  /** Lists those of the folder anew when one begins or ends. `shown`: the file of that which is shown. */
+  showRecordings(streams: readonly ListedStream[], shown: string | null): void {
+    if (!this.isOpen) return;
+    const recorded = streams.map(({ recorder }) => `${recorder?.file} ${recorder?.state} ${recorder?.message}`).join();
+    if (recorded !== this.recorded) void this.listFolder();
+    this.recorded = recorded;
+    for (const [file, { item, show }] of this.recordings) {
+      item.classList.toggle('shown', file === shown);
+      show.setAttribute('aria-pressed', String(file === shown));
+    }
+  }
+
   private showAligning(now: Aligning | null): void {
     this.aligning.hidden = this.buttons.hidden = now === null;
     if (now === null) return;
@@ -134,10 +148,12 @@ export class StreamsPanel {
     const { recordings } = (await response.json()) as { recordings: { file: string; bytes: number }[] };
     this.folderTitle.hidden = recordings.length === 0;
     this.folder.replaceChildren();
+    this.recordings.clear();
     for (const { file, bytes } of recordings) {
       const row = makeRow(file, () => this.events.recording(file));
       setText(row.about, `${(bytes / 1e6).toFixed(1)} MB`);
       this.folder.append(row.item);
+      this.recordings.set(file, row);
       this.thumbnails.ask({ name: file, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
     }
   }

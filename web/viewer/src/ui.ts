@@ -42,9 +42,9 @@ export class Ui {
       this.canvas.focus();
     };
     // Their parts stand above and beside each other where the page is small.
-    const footer = document.querySelector('footer')!;
-    const rail = element('rail');
+    const [header, rail, footer] = this.parts;
     const say = (name: string, size: number): void => document.body.style.setProperty(name, `${size}px`);
+    new ResizeObserver(() => say('--header', header.offsetHeight)).observe(header);
     new ResizeObserver(() => say('--footer', footer.offsetHeight)).observe(footer);
     new ResizeObserver(() => say('--rail', rail.offsetWidth)).observe(rail);
     this.around = new ResizeObserver(() => {
@@ -105,7 +105,8 @@ export class Ui {
     if (chosen !== null && !names.includes(chosen)) names.push(chosen);
     names.sort();
     const key = JSON.stringify([names, chosen]);
-    document.title = chosen === null ? text.product : `${text.product} · ${chosen}`;
+    const shown = chosen ?? source;
+    document.title = shown === '' ? text.product : `${text.product} · ${shown}`;
     setText(element('source'), note === '' ? source : text.file.note(source, note));
     if (key === this.shownStreams) return;
     this.shownStreams = key;
