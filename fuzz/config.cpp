@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (data[0] == 0) {
     ServeConfig config;
     if (!read_config(file.path(), config)) return 0;
-    static_cast<void>(check_config(config).ok());
+    static_cast<void>(find_mistake(config).has_value());
     FUZZ_CHECK(!config.all_streams().empty());
     for (const StreamConfig& stream : config.all_streams()) static_cast<void>(encode_options(stream));
   } else if (const auto tokens = Tokens::load(file.path())) {

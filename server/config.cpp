@@ -2,11 +2,13 @@
 #include "server/config.h"
 
 #include <algorithm>
+#include <regex>
 #include <sstream>
 #include <thread>
 #include <vector>
 
 #include "base/stream.h"
+#include "capture/source/field_source.h"
 #include "cli/listen_address.h"
 #include "cli/quantities.h"
 #include "cli/web_flags.h"
@@ -115,15 +117,45 @@ ValueCheck stream_name() {
 
 namespace {
 
-Status check_stream(const StreamConfig& stream) {
-  if (const std::string wrong = stream_name()(name_of(stream)); !wrong.empty()) return Error{wrong};
-  if (const Status usable = check_texture_codec(stream.texture, stream.texture_encoder); !usable)
-    return usable;
-  if (const auto source = with_scheme(stream.source, stream.scheme); !source) return source.error();
-  if (const Status fits = check_lines(stream); !fits) return fits;
+std::optional<Mistake> mistake(const std::string& setting, const Status& sound) {
+  return sound ? std::nullopt : std::optional(Mistake{setting, sound.error()});
+}
+
+Status check_source_of(const StreamConfig& stream) {
+  const auto source = with_scheme(stream.source, stream.scheme);
+  return source ? check_source(*source) : source.error();
+}
+
+Status check_psnr(const StreamConfig& stream) {
   if (stream.rate.texture_db > 0 && stream.texture == TextureCodec::kPng)
     return Error{"psnr is kept of textures that lose something: leave it out with png"};
-  return check_rig(stream.source, stream.camera);
+  return {};
+}
+
+std::optional<Mistake> find_mistake(const StreamConfig& stream) {
+  if (const std::string wrong = stream_name()(name_of(stream)); !wrong.empty())
+    return Mistake{"source", Error{wrong}};
+  const bool is_named = stream.texture_encoder != VideoEncoderKind::kAuto;
+  const Status codec = check_texture_codec(stream.texture, stream.texture_encoder);
+  if (!codec) return mistake(is_named ? "texture_encoder" : "texture", codec);
+  if (const Status source = check_source_of(stream); !source) return mistake("source", source);
+  if (const Status lines = check_lines(stream); !lines) return mistake("half_lines", lines);
+  if (const Status psnr = check_psnr(stream); !psnr) return mistake("psnr", psnr);
+  return mistake("camera.rig", check_rig(stream.source, stream.camera));
+}
+
+std::optional<Mistake> find_mistake(const RecordingTexts& recording) {
+  const auto sound = recording_options(recording);
+  if (sound) return std::nullopt;
+  return Mistake{recording.keep_size.empty() ? "recording.keep_for" : "recording.keep_size", sound.error()};
+}
+
+std::optional<Mistake> find_mistake(const WebOptions& gateway) {
+  const Status sound = check_web_options(gateway);
+  return mistake(gateway.open              ? "gateway.open"
+                 : gateway.tls_key.empty() ? "gateway.tls_cert"
+                                           : "gateway.tls_key",
+                 sound);
 }
 
 Status check_folder(const ServeConfig& config) {
@@ -137,19 +169,49 @@ Status check_folder(const ServeConfig& config) {
   return {};
 }
 
+/// "give --tls-cert FILE" as a file has it: "give tls_cert".
+std::string in_settings(const std::string& message) {
+  static const std::regex flag(" --([a-z-]+)( [A-Z]+\\b)?");
+  std::string out;
+  auto rest = message.cbegin();
+  for (std::sregex_iterator at(message.begin(), message.end(), flag), end; at != end; ++at) {
+    std::string name = at->str(1);
+    std::replace(name.begin(), name.end(), '-', '_');
+    out.append(rest, (*at)[0].first).append(" " + name);
+    rest = (*at)[0].second;
+  }
+  return out.append(rest, message.cend());
+}
+
 }  // namespace
 
-Status check_config(const ServeConfig& config) {
-  for (const StreamConfig& stream : config.all_streams()) {
-    if (const Status sound = check_stream(stream); !sound)
-      return config.streams.empty() ? sound : sound.error().in("stream " + name_of(stream));
+std::optional<Mistake> find_mistake(const ServeConfig& config) {
+  if (config.streams.empty()) {
+    if (auto found = find_mistake(static_cast<const StreamConfig&>(config))) return found;
   }
-  if (const Status sound = check_web_options(config.gateway); !sound) return sound;
-  if (const auto sound = recording_options(config.recording); !sound) return sound.error();
+  for (std::size_t i = 0; i < config.streams.size(); ++i) {
+    const auto found = find_mistake(config.streams[i]);
+    if (found)
+      return Mistake{"stream." + std::to_string(i) + "." + found->setting,
+                     found->error.in("stream " + name_of(config.streams[i]))};
+  }
+  if (auto found = find_mistake(config.gateway)) return found;
+  if (auto found = find_mistake(config.recording)) return found;
   if (config.web != "none") {
-    if (const auto address = parse_listen_address(config.web); !address) return address.error();
+    if (const auto address = parse_listen_address(config.web); !address)
+      return Mistake{"web", address.error()};
   }
-  return check_folder(config);
+  return mistake("recording.folder", check_folder(config));
+}
+
+Error mistake_in(const std::filesystem::path& file, const SettingLines& lines, const Mistake& mistake) {
+  const std::string& setting = mistake.setting;
+  const std::size_t name = setting.starts_with("stream.") ? setting.find('.', 7) + 1 : 0;
+  auto said = lines.find(setting);
+  if (said == lines.end()) said = lines.find(setting.substr(name));  // for all streams
+  const std::string line = said == lines.end() ? "" : ":" + std::to_string(said->second);
+  return {file.string() + line + ": " + setting.substr(name) + ": " +
+          in_settings(" " + mistake.error.message).substr(1)};
 }
 
 }  // namespace relievo

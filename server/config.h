@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -113,12 +114,23 @@ std::string name_of(const StreamConfig& config);
 /// How its frames are encoded.
 EncodeOptions encode_options(const StreamConfig& config);
 
+/// Where a file says its settings: "threads", "gateway.open"; of the second table [[stream]]
+/// "stream.1.source".
+using SettingLines = std::map<std::string, int>;
+
 /// Sets the fields that `file` names. Errors say file, line and what is wrong: an unknown key, a wrong type,
 /// a value out of range, two streams of one name.
-Status read_config(const std::filesystem::path& file, ServeConfig& config);
+Status read_config(const std::filesystem::path& file, ServeConfig& config, SettingLines* lines = nullptr);
 
-/// Fails where what is said cannot go together, or is not built in. Opens nothing.
-Status check_config(const ServeConfig& config);
+/// What settings that are sound one by one have wrong, in the words of flags.
+struct Mistake {
+  std::string setting;  // as in SettingLines
+  Error error;
+};
+/// What cannot go together, is not built in, or is no source. Opens nothing.
+std::optional<Mistake> find_mistake(const ServeConfig& config);
+/// In the words of the file that had part in it, with its line where the setting is said there.
+Error mistake_in(const std::filesystem::path& file, const SettingLines& lines, const Mistake& mistake);
 
 /// Of --pre-roll: a duration, or 0.
 Result<double> parse_pre_roll_s(const std::string& text);

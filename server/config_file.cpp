@@ -31,7 +31,10 @@ std::string place(const std::filesystem::path& file, const toml::source_region& 
 /// Reads one table, remembering the first thing wrong.
 class Reader {
  public:
-  Reader(const std::filesystem::path& file, const toml::table& table) : file_(file), table_(table) {}
+  /// `lines` are set, those of this table's settings under `prefix` and their names.
+  Reader(const std::filesystem::path& file, const toml::table& table, SettingLines& lines,
+         std::string prefix = {})
+      : file_(file), table_(table), lines_(lines), prefix_(std::move(prefix)) {}
 
   void text(std::string_view key, std::string& out) {
     if (const toml::node* node = take(key)) {
@@ -198,7 +201,7 @@ class Reader {
     if (node == nullptr) return;
     if (node->as_table() == nullptr)
       return refuse(*node, key, "must be a table: write [" + std::string(key) + "]");
-    Reader inner(file_, *node->as_table());
+    Reader inner(file_, *node->as_table(), lines_, prefix_ + std::string(key) + ".");
     read(inner);
     if (const Status done = inner.finish(); !done && !error_) error_ = done.error();
   }
@@ -216,8 +219,10 @@ class Reader {
   void tables(std::string_view key, const Read& read) {
     const toml::node* node = take(key);
     if (node == nullptr) return;
+    int number = 0;
     for (const toml::node& entry : *node->as_array()) {
-      Reader inner(file_, *entry.as_table());
+      Reader inner(file_, *entry.as_table(), lines_,
+                   prefix_ + std::string(key) + "." + std::to_string(number++) + ".");
       read(inner);
       if (const Status done = inner.finish(); !done && !error_) error_ = done.error();
     }
@@ -252,7 +257,9 @@ class Reader {
   }
   const toml::node* take(std::string_view key) {
     known_.push_back(key);
-    return table_.get(key);
+    const toml::node* node = table_.get(key);
+    if (node != nullptr) lines_[prefix_ + std::string(key)] = static_cast<int>(node->source().begin.line);
+    return node;
   }
   void refuse(const toml::node& node, std::string_view key, const std::string& why) {
     if (!error_) error_ = Error{place(file_, node.source()) + std::string(key) + " " + why};
@@ -260,6 +267,8 @@ class Reader {
 
   const std::filesystem::path& file_;
   const toml::table& table_;
+  SettingLines& lines_;
+  const std::string prefix_;
   std::vector<std::string_view> known_;  // string literals
   std::optional<Error> error_;
 };
@@ -363,7 +372,7 @@ void read_gateway(Reader& reader, WebOptions& gateway) {
 
 }  // namespace
 
-Status read_config(const std::filesystem::path& file, ServeConfig& config) {
+Status read_config(const std::filesystem::path& file, ServeConfig& config, SettingLines* lines) {
   const auto text = read_whole_file(file, kLargestConfig);
   if (!text) return text.error().in("the configuration cannot be used");
   toml::table table;
@@ -372,7 +381,8 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config) {
   } catch (const toml::parse_error& error) {
     return Error{place(file, error.source()) + std::string(error.description())};
   }
-  Reader reader(file, table);
+  SettingLines unused;
+  Reader reader(file, table, lines != nullptr ? *lines : unused);
   read_stream(reader, config);
   reader.integer("domain", 0, 230, config.domain);
   reader.text("interface", config.interface);

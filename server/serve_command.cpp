@@ -88,8 +88,9 @@ Status check_flags(const Flags& flags, const ServeConfig& config) {
 /// The file as it is now, and the flags over it.
 Result<ServeConfig> read(const Flags& flags) {
   ServeConfig config;
+  SettingLines lines;
   if (flags.config) {
-    if (const Status done = read_config(*flags.config, config); !done) return done.error();
+    if (const Status done = read_config(*flags.config, config, &lines); !done) return done.error();
   }
   if (const Status meant = check_flags(flags, config); !meant) return meant.error();
   set(flags.interface, config.interface);
@@ -108,7 +109,8 @@ Result<ServeConfig> read(const Flags& flags) {
   config.gateway = merged(*flags.gateway, std::move(config.gateway));
   set_stream(flags, config);
   for (StreamConfig& stream : config.streams) set_stream(flags, stream);
-  if (const Status sound = check_config(config); !sound) return sound.error();
+  if (const auto mistake = find_mistake(config))
+    return flags.config ? mistake_in(*flags.config, lines, *mistake) : mistake->error;
   return config;
 }
 

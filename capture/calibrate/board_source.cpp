@@ -145,23 +145,49 @@ Result<Opened> open(const std::string& spec) {
   return out;
 }
 
+std::string board_name(const std::string& scene) {
+  return scene.size() > 6 ? scene.substr(6) : "chessboard:9x7:25mm";
+}
+
+Result<Board> board_of(const Opened& opened) {
+  const std::string& scene = opened.options.scene;
+  if (scene != "board" && !scene.starts_with("board:"))
+    return Error{opened.info.name + ": no scene \"" + scene + "\"; there is board, or board:BOARD"};
+  auto board = parse_board(board_name(scene));
+  return board ? std::move(board) : board.error().in(opened.info.name);
+}
+
+Status is_sheet(const Opened& opened) {
+  if (opened.options.scene == "sheet") return {};
+  return Error{opened.info.name + ": no scene \"" + opened.options.scene + "\"; there is sheet"};
+}
+
 }  // namespace
+
+Status check_board(const std::string& rest) {
+  const auto opened = open("board" + rest);
+  if (!opened) return opened.error();
+  const auto board = board_of(*opened);
+  return board ? Status() : board.error();
+}
+
+Status check_sheet(const std::string& rest) {
+  const auto opened = open("sheet" + rest);
+  return opened ? is_sheet(*opened) : opened.error();
+}
 
 Result<std::unique_ptr<FieldSource>> open_board(const std::string& rest, const SourceOptions& options) {
   auto opened = open("board" + rest);
   if (!opened) return opened.error();
-  const std::string& scene = opened->options.scene;
-  const std::string wanted = scene.size() > 6 ? scene.substr(6) : "chessboard:9x7:25mm";
-  if (scene != "board" && scene.rfind("board:", 0) != 0)
-    return Error{opened->info.name + ": no scene \"" + scene + "\"; there is board, or board:BOARD"};
-  const auto board = parse_board(wanted);
-  if (!board) return board.error().in(opened->info.name);
+  const auto board = board_of(*opened);
+  if (!board) return board.error();
   const int count = static_cast<int>(
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(opened->options.period) / kPoseFrames));
   auto poses =
       example_poses(opened->info.rig, *board, sim::SceneView{}.distance_m, count, opened->options.seed);
   if (poses.empty()) {
-    return Error{opened->info.name + ": " + wanted + " does not fit before the rig: give a smaller board"};
+    return Error{opened->info.name + ": " + board_name(opened->options.scene) +
+                 " does not fit before the rig: give a smaller board"};
   }
   auto shown = std::make_shared<BoardScene>(opened->options, opened->info.rig, *board, opened->info.pattern,
                                             std::move(poses));
@@ -173,8 +199,7 @@ Result<std::unique_ptr<FieldSource>> open_board(const std::string& rest, const S
 Result<std::unique_ptr<FieldSource>> open_sheet(const std::string& rest, const SourceOptions& options) {
   auto opened = open("sheet" + rest);
   if (!opened) return opened.error();
-  if (opened->options.scene != "sheet")
-    return Error{opened->info.name + ": no scene \"" + opened->options.scene + "\"; there is sheet"};
+  if (const Status known = is_sheet(*opened); !known) return known.error();
   const sim::SimOptions how = opened->options;
   const Rig rig = opened->info.rig;
   const Render render = [how, rig](std::uint64_t index) {

@@ -19,4 +19,8 @@ Result<std::unique_ptr<FieldSource>> open_board(const std::string& rest, const S
 /// complement. `rest` is what follows "sim:sheet".
 Result<std::unique_ptr<FieldSource>> open_sheet(const std::string& rest, const SourceOptions& options);
 
+/// Whether those know all that is said; they are not opened.
+Status check_board(const std::string& rest);
+Status check_sheet(const std::string& rest);
+
 }  // namespace relievo

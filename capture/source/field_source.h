@@ -95,4 +95,8 @@ struct SourceOptions {
 /// and how to mend it.
 Result<std::unique_ptr<FieldSource>> open_source(const std::string& uri, const SourceOptions& options);
 
+/// Fails where the name alone tells that open_source() would: of no known kind, or of a simulated source a
+/// scene, key or value that there is not. Opens, reads and renders nothing.
+Status check_source(const std::string& uri);
+
 }  // namespace relievo

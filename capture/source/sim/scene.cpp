@@ -18,6 +18,12 @@ constexpr SceneKind kScenes[] = {
     {"mesh:", "mesh:FILE", make_mesh_scene},
 };
 
+Result<const SceneKind*> kind_of(const std::string& name) {
+  for (const SceneKind& kind : kScenes)
+    if (kind.name.back() == ':' ? name.starts_with(kind.name) : name == kind.name) return &kind;
+  return Error{"unknown scene \"" + name + "\": give one of " + scene_names()};
+}
+
 }  // namespace
 
 std::string scene_names() {
@@ -27,12 +33,13 @@ std::string scene_names() {
 }
 
 Result<std::shared_ptr<const Scene>> make_scene(const std::string& name) {
-  for (const SceneKind& kind : kScenes) {
-    if (kind.name.back() == ':' ? name.starts_with(kind.name) : name == kind.name) {
-      return kind.make(name.substr(kind.name.size()));
-    }
-  }
-  return Error{"unknown scene \"" + name + "\": give one of " + scene_names()};
+  const auto kind = kind_of(name);
+  return kind ? (*kind)->make(name.substr((*kind)->name.size())) : kind.error();
+}
+
+Status check_scene(const std::string& name) {
+  const auto kind = kind_of(name);
+  return kind ? Status() : kind.error();
 }
 
 }  // namespace relievo::sim

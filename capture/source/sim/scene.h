@@ -34,6 +34,9 @@ class Scene {
 /// FILE.
 Result<std::shared_ptr<const Scene>> make_scene(const std::string& name);
 
+/// Whether there is such a scene; FILE is not looked at.
+Status check_scene(const std::string& name);
+
 /// "plane, object, face, walk, mesh:FILE".
 std::string scene_names();
 

@@ -83,7 +83,21 @@ class Simulator final : public SimSource {
   std::unique_ptr<sim::RenderAhead> frames_;  // last: its threads end first
 };
 
+Result<Pattern> pattern_of(const sim::SimOptions& options) {
+  return make_scheme_pattern(options.scheme, options.base, options.slides, options.first, options.stripes,
+                             options.path);
+}
+
 }  // namespace
+
+Status check_sim(const std::string& spec) {
+  const std::string name = "sim:" + spec;
+  const auto options = sim::parse_sim_options(spec);
+  if (!options) return options.error().in(name);
+  if (const Status known = sim::check_scene(options->scene); !known) return known.error().in(name);
+  const auto pattern = pattern_of(*options);
+  return pattern ? Status() : pattern.error().in(name);
+}
 
 Result<std::unique_ptr<SimSource>> make_sim(const std::string& spec, const SimRun& run) {
   const std::string name = "sim:" + spec;
@@ -91,8 +105,7 @@ Result<std::unique_ptr<SimSource>> make_sim(const std::string& spec, const SimRu
   if (!options) return options.error().in(name);
   Result<std::shared_ptr<const sim::Scene>> scene = sim::make_scene(options->scene);
   if (!scene) return scene.error().in(name);
-  Result<Pattern> pattern = make_scheme_pattern(options->scheme, options->base, options->slides,
-                                                options->first, options->stripes, options->path);
+  Result<Pattern> pattern = pattern_of(*options);
   if (!pattern) return pattern.error().in(name);
 
   SourceInfo info;

@@ -34,4 +34,7 @@ Result<std::unique_ptr<SimSource>> make_sim(const std::string& spec, const SimRu
 /// The row of the source table: sim:SCENE[,key=value...].
 Result<std::unique_ptr<FieldSource>> open_sim(const std::string& spec, const SourceOptions& options);
 
+/// Whether scene, keys and values are such; opens nothing.
+Status check_sim(const std::string& spec);
+
 }  // namespace relievo

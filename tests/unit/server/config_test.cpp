@@ -93,11 +93,12 @@ TEST(Config, ADecoderOrHowItIsChosen) {
   EXPECT_TRUE(served_decoder(chosen.config).auto_pace);
   EXPECT_EQ(served_decoder(chosen.config).decoder, Decoder::kOrdered);
   ServeConfig config = chosen.config;
-  EXPECT_TRUE(check_config(config));
+  EXPECT_FALSE(find_mistake(config));
   config.half_lines = true;
-  const Status both = check_config(config);
-  ASSERT_FALSE(both);
-  EXPECT_NE(both.error().message.find("half_lines"), std::string::npos) << both.error().message;
+  const auto both = find_mistake(config);
+  ASSERT_TRUE(both);
+  EXPECT_EQ(both->setting, "half_lines");
+  EXPECT_NE(both->error.message.find("half_lines"), std::string::npos) << both->error.message;
   EXPECT_TRUE(set_decoder("quick", config));  // as a flag behind the file
   EXPECT_FALSE(served_decoder(config).auto_pace);
   EXPECT_EQ(served_decoder(config).decoder, Decoder::kQuick);
@@ -335,6 +336,67 @@ max_rate = 50
   EXPECT_EQ(gateway.max_clients, 200);
   EXPECT_EQ(gateway.max_per_address, 4);
   EXPECT_EQ(gateway.max_rate, 50);
+}
+
+/// What a file is refused for whose settings are sound one by one.
+std::string mistake_of(const std::string& text) {
+  const test::TempFolder folder;
+  const auto file = folder / "serve.toml";
+  std::ofstream(file) << text;
+  ServeConfig config;
+  SettingLines lines;
+  const Status read = read_config(file, config, &lines);
+  EXPECT_TRUE(read) << read.error().message;
+  const auto mistake = find_mistake(config);
+  return mistake ? mistake_in("serve.toml", lines, *mistake).message : "";
+}
+
+TEST(Config, AMistakenSourceIsToldWithoutOpeningIt) {
+  for (const char* sound : {"sim:face", "sim:walk,stripes=70,drop=50", "sim:mesh:none.ply",
+                            "sim:board:chessboard:9x7:25mm,seed=2", "sim:sheet", "take:none",
+                            "sim:face,period=10000,width=4096,height=4096"})
+    EXPECT_EQ(mistake_of(std::string("source = \"") + sound + "\"\n"), "") << sound;
+  for (const auto& [source, says] :
+       {std::pair("bogus:x", "no known kind"), std::pair("face", "no known kind"),
+        std::pair("sim:nope", "unknown scene \"nope\": give one of plane"),
+        std::pair("sim:face,stripe=70", "unknown key \"stripe\""),
+        std::pair("sim:face,stripes=many", "stripes=many"),
+        std::pair("sim:face,stripes=8192,base=3,slides=2", "sim:face"),
+        std::pair("sim:board:nope", "sim:board:nope"), std::pair("sim:sheets", "there is sheet")}) {
+    const std::string message = mistake_of(std::string("\nsource = \"") + source + "\"\n");
+    EXPECT_TRUE(message.starts_with("serve.toml:2: source: ")) << message;
+    EXPECT_NE(message.find(says), std::string::npos) << message;
+  }
+}
+
+TEST(Config, WhatDoesNotGoTogetherIsToldInTheFilesWords) {
+  struct Case {
+    const char *text, *says;
+  };
+  for (const auto& [text, says] : {
+           Case{"[gateway]\ntls_cert = \"a.pem\"\n",
+                "serve.toml:2: gateway.tls_cert: a certificate needs its key: give tls_cert and tls_key "
+                "together"},
+           Case{"[gateway]\ntoken_file = \"a\"\nopen = true\n",
+                "serve.toml:3: gateway.open: open lets everybody watch, token_file only who has a token"},
+           Case{"decoder = \"auto\"\nhalf_lines = true\n", "serve.toml:2: half_lines: decoder auto"},
+           Case{"psnr = 38\ntexture = \"png\"\n", "serve.toml:1: psnr: psnr is kept"},
+           Case{"[recording]\nkeep_size = \"1GB\"\n",
+                "serve.toml:2: recording.keep_size: keep_size and keep_for remove whole files: give "
+                "split_size"},
+           Case{"scheme = \"one-slide\"\nsource = \"take:a\"\n",
+                "serve.toml:2: source: scheme is for simulated sources"},
+           Case{"source = \"v4l2:a\"\n",
+                "serve.toml: camera.rig: a camera needs its calibrated rig: give rig, "},
+           Case{"half_lines = true\n[[stream]]\nname = \"a\"\n[[stream]]\nname = \"b\"\ndecoder = \"auto\"\n",
+                "serve.toml:1: half_lines: stream b: decoder auto"},
+           Case{"[[stream]]\nname = \"a\"\n[[stream]]\nname = \"b\"\nsource = \"sim:nope\"\n",
+                "serve.toml:5: source: stream b: sim:nope: unknown scene"},
+       }) {
+    const std::string message = mistake_of(text);
+    EXPECT_TRUE(message.starts_with(says)) << message;
+    EXPECT_EQ(message.find(" --"), std::string::npos) << message;
+  }
 }
 
 struct Wrong {
