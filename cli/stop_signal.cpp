@@ -67,15 +67,16 @@ struct StopSignal::State {
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
   bool stopped = false, ending = false;
-  int reloads = 0;            // asked for and not yet done
-  std::mutex callback_mutex;  // held while the callback runs
+  int reloads = 0;                          // asked for and not yet done
+  std::mutex callback_mutex, reload_mutex;  // each held while its callback runs
   std::function<void()> callback, reload;
   std::atomic<bool> takes_hangup = false;
   std::atomic<bool> no_more_signals = false;
   bool ignores_hangup = false;  // as under nohup
   sigset_t old_mask{};
   struct sigaction old_pipe {};
-  std::thread takes_signals, calls;  // two: the third signal must end what hangs in a callback
+  // The third signal must end what hangs in a callback, and a stop overtakes a reload that takes long.
+  std::thread takes_signals, calls, reloads_again;
 
   void take() {
     name_this_thread("signals");
@@ -103,30 +104,28 @@ struct StopSignal::State {
 
   void run() {
     name_this_thread("on-signal");
-    bool called = false;
     std::unique_lock lock(mutex);
-    for (;;) {
-      changed.wait(lock, [&] { return ending || reloads > 0 || (stopped && !called); });
-      if (ending) return;
-      const bool again = reloads > 0;
-      if (again) {
-        --reloads;
-      } else {
-        called = true;
-      }
-      lock.unlock();
-      if (again) {
-        std::lock_guard callback_lock(callback_mutex);
-        if (reload) reload();
-      } else {
-        call();
-      }
-      lock.lock();
-    }
+    changed.wait(lock, [&] { return ending || stopped; });
+    if (ending) return;
+    lock.unlock();
+    call();
   }
   void call() {
     std::lock_guard lock(callback_mutex);
     if (const auto once = std::exchange(callback, nullptr)) once();
+  }
+  void run_reloads() {
+    name_this_thread("on-reload");
+    for (;;) {
+      {
+        std::unique_lock lock(mutex);
+        changed.wait(lock, [&] { return ending || reloads > 0; });
+        if (ending) return;
+        --reloads;
+      }
+      const std::lock_guard lock(reload_mutex);
+      if (reload) reload();
+    }
   }
 };
 
@@ -144,6 +143,7 @@ StopSignal::StopSignal() : state_(new State) {
   set_handler(SIGINT, pass_on);
   set_handler(SIGTERM, pass_on);
   state_->calls = std::thread([s = state_] { s->run(); });
+  state_->reloads_again = std::thread([s = state_] { s->run_reloads(); });
 }
 
 StopSignal::~StopSignal() {
@@ -159,6 +159,7 @@ StopSignal::~StopSignal() {
   }
   state_->changed.notify_all();
   state_->calls.join();
+  state_->reloads_again.join();
   sigaction(SIGPIPE, &state_->old_pipe, nullptr);
   pthread_sigmask(SIG_SETMASK, &state_->old_mask, nullptr);
   g_taken = false;
@@ -194,13 +195,13 @@ void StopSignal::clear_on_stop() {
 }
 
 void StopSignal::on_reload(std::function<void()> callback) {
-  std::lock_guard lock(state_->callback_mutex);
+  std::lock_guard lock(state_->reload_mutex);
   state_->reload = std::move(callback);
   if (!state_->takes_hangup.exchange(true)) set_handler(SIGHUP, pass_on);
 }
 
 void StopSignal::clear_on_reload() {
-  std::lock_guard lock(state_->callback_mutex);
+  std::lock_guard lock(state_->reload_mutex);
   state_->reload = nullptr;
 }
 

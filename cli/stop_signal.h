@@ -31,8 +31,9 @@ class StopSignal {
   void on_stop(std::function<void()> callback);
   void clear_on_stop();
 
-  /// Takes over SIGHUP, which otherwise ends the process, and calls `callback` for each, on the thread of
-  /// on_stop(): stopping waits for it. Once; clear it before what it refers to is destroyed, as on_stop().
+  /// Takes over SIGHUP, which otherwise ends the process, and calls `callback` for each, on another thread of
+  /// its own: on_stop()'s may be called meanwhile. Once; clear it before what it refers to is destroyed, as
+  /// on_stop().
   void on_reload(std::function<void()> callback);
   void clear_on_reload();
 

@@ -268,6 +268,29 @@ TEST(Program, AHangupReadsAgain) {
   EXPECT_EQ(read, 3);
 }
 
+TEST(Program, AStopOvertakesAReload) {
+  std::atomic<bool> reloads = false, ended = false;
+  const auto o = run(one_command([&](int, StopSignal& stop) {
+                       stop.on_reload([&] {
+                         reloads = true;
+                         for (int i = 0; i < 60000 && !ended; ++i) usleep(1000);
+                       });
+                       stop.on_stop([&] { ended = true; });
+                       kill(getpid(), SIGHUP);
+                       for (int i = 0; i < 60000 && !reloads; ++i) usleep(1000);
+                       EXPECT_FALSE(ended);
+                       kill(getpid(), SIGTERM);
+                       for (int i = 0; i < 30000 && !ended; ++i) usleep(1000);
+                       EXPECT_TRUE(ended);
+                       ended = true;
+                       stop.clear_on_reload();
+                       stop.clear_on_stop();
+                       return Status();
+                     }),
+                     {"work"});
+  EXPECT_EQ(o.code, 0) << o.err;
+}
+
 TEST(Progress, LineShowsRateAndTimeLeft) {
   EXPECT_EQ(progress_line("export", "frames", 50, 100, 2, "3 lost"),
             "export  [############            ] 50/100 frames  25.0/s  2 s left  3 lost");
