@@ -17,7 +17,6 @@ Result<ListenAddress> parse_listen_address(const std::string& text) {
   } else if (out.host.find_first_of(":[]") != std::string::npos) {
     return wrong;
   }
-  if (out.host.empty()) out.host = "0.0.0.0";
   const char* end = text.data() + text.size();
   const auto [rest, failed] = std::from_chars(text.data() + colon + 1, end, out.port);
   if (failed != std::errc() || rest != end) return wrong;
@@ -26,7 +25,7 @@ Result<ListenAddress> parse_listen_address(const std::string& text) {
 
 std::string browser_address(const ListenAddress& address, bool https, const std::string& token) {
   std::string host = address.host;
-  if (host == "0.0.0.0") host = "127.0.0.1";
+  if (host.empty() || host == "0.0.0.0") host = "127.0.0.1";
   if (host == "::") host = "::1";
   if (host.find(':') != std::string::npos) host = '[' + host + ']';
   return (https ? "https://" : "http://") + host + ':' + std::to_string(address.port) + '/' +

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/support/socket_client.h"
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
+#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -18,6 +17,10 @@ std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadl
   return std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
 }
 
+bool is_v6(const std::string& address) {
+  return address.find(':') != std::string::npos;
+}
+
 }  // namespace
 
 TcpClient::TcpClient(std::uint16_t port, int receive_buffer_bytes)
@@ -29,7 +32,7 @@ TcpClient::TcpClient(std::uint16_t port, int receive_buffer_bytes)
 }
 
 TcpClient::TcpClient(const std::string& address, std::uint16_t port, std::chrono::milliseconds patience)
-    : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    : fd_(socket(is_v6(address) ? AF_INET6 : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   timeval time{};
   time.tv_sec = std::chrono::duration_cast<std::chrono::seconds>(patience).count();
   time.tv_usec = std::chrono::duration_cast<std::chrono::microseconds>(patience % 1s).count();
@@ -38,12 +41,14 @@ TcpClient::TcpClient(const std::string& address, std::uint16_t port, std::chrono
 }
 
 void TcpClient::connect_to(const std::string& address, std::uint16_t port) {
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_port = htons(port);
-  if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) == 1 &&
-      connect(fd_, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0)
-    return;
+  addrinfo* place = nullptr;
+  addrinfo numbers{};
+  numbers.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
+  numbers.ai_socktype = SOCK_STREAM;
+  const bool known = getaddrinfo(address.c_str(), std::to_string(port).c_str(), &numbers, &place) == 0;
+  const bool connected = known && connect(fd_, place->ai_addr, place->ai_addrlen) == 0;
+  if (known) freeaddrinfo(place);
+  if (connected) return;
   close(fd_);
   fd_ = -1;
 }

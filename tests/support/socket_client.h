@@ -18,7 +18,7 @@ namespace relievo::test {
 class TcpClient {
  public:
   explicit TcpClient(std::uint16_t port, int receive_buffer_bytes = 0);
-  /// To another host's IPv4 address; not connected where it does not answer within that time.
+  /// To another address, in numbers; not connected where it does not answer within that time.
   TcpClient(const std::string& address, std::uint16_t port, std::chrono::milliseconds patience);
   TcpClient(TcpClient&& other) noexcept;
   TcpClient& operator=(TcpClient&&) = delete;

@@ -196,7 +196,7 @@ Status Server::apply(const WebOptions& web) {
   if (!loaded) return loaded.error();
   const bool needs_token = !listener_->loopback() && !web.open && !loaded->tokens.needed();
   if (needs_token && !made_)
-    return Error{"others reach " + options_.host +
+    return Error{"others reach " + (options_.host.empty() ? "every interface" : options_.host) +
                  ": name a token file, or say open, or restart for a token that is made and printed"};
   net::post(io_, [this, web, needs_token, credentials = *std::move(loaded)]() mutable {
     if (needs_token) credentials.tokens = *made_;

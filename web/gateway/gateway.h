@@ -33,8 +33,8 @@ struct SampleFormat {
 };
 
 struct GatewayOptions {
-  std::string host = "127.0.0.1";
-  std::uint16_t port = 8080;  // 0: any free one, see Gateway::port()
+  std::string host = "127.0.0.1";  // empty: every interface, by IPv6 and IPv4
+  std::uint16_t port = 8080;       // 0: any free one, see Gateway::port()
   WebOptions web{};
   std::string empty_hint{};  // what the viewer says while there are no streams
   // A client has to wait for a key frame of the stream; at most once a second a stream, and ten times

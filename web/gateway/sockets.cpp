@@ -193,6 +193,8 @@ class TcpListener : public Listener {
   }
 
  private:
+  ErrorCode listen(const tcp::endpoint& endpoint, bool also_ipv4);
+  ErrorCode listen_everywhere(std::uint16_t port);
   void accept_next();
 
   tcp::acceptor acceptor_;
@@ -204,21 +206,39 @@ class TcpListener : public Listener {
 };
 
 Status TcpListener::listen(const std::string& host, std::uint16_t port) {
-  ErrorCode error;
   const std::string place = host + ":" + std::to_string(port);
-  tcp::resolver resolver(acceptor_.get_executor());
-  const auto found = resolver.resolve(host, std::to_string(port),
-                                      tcp::resolver::passive | tcp::resolver::numeric_service, error);
-  if (error || found.empty()) return Error{"cannot listen on " + place + ": " + explain(error)};
-  const tcp::endpoint endpoint = found.begin()->endpoint();
-  acceptor_.open(endpoint.protocol(), error);
-  if (!error) acceptor_.set_option(net::socket_base::reuse_address(true), error);
-  if (!error) acceptor_.bind(endpoint, error);
-  if (!error) acceptor_.listen(net::socket_base::max_listen_connections, error);
+  ErrorCode error;
+  if (host.empty()) {
+    error = listen_everywhere(port);
+  } else {
+    tcp::resolver resolver(acceptor_.get_executor());
+    const auto found = resolver.resolve(host, std::to_string(port),
+                                        tcp::resolver::passive | tcp::resolver::numeric_service, error);
+    if (error || found.empty()) return Error{"cannot listen on " + place + ": " + explain(error)};
+    error = listen(found.begin()->endpoint(), false);
+  }
   if (!error) port_ = acceptor_.local_endpoint(error).port();
   if (error) return Error{"cannot listen on " + place + ": " + explain(error)};
-  loopback_ = endpoint.address().is_loopback();
+  loopback_ = acceptor_.local_endpoint(error).address().is_loopback();
   return {};
+}
+
+/// By IPv6, which takes IPv4 along, unless this machine has none.
+ErrorCode TcpListener::listen_everywhere(std::uint16_t port) {
+  const ErrorCode error = listen({tcp::v6(), port}, true);
+  if (!error || error == net::error::address_in_use || error == net::error::access_denied) return error;
+  return listen({tcp::v4(), port}, false);
+}
+
+ErrorCode TcpListener::listen(const tcp::endpoint& endpoint, bool also_ipv4) {
+  ErrorCode error;
+  acceptor_.close(error);
+  acceptor_.open(endpoint.protocol(), error);
+  if (!error) acceptor_.set_option(net::socket_base::reuse_address(true), error);
+  if (!error && also_ipv4) acceptor_.set_option(net::ip::v6_only(false), error);
+  if (!error) acceptor_.bind(endpoint, error);
+  if (!error) acceptor_.listen(net::socket_base::max_listen_connections, error);
+  return error;
 }
 
 void TcpListener::accept_next() {

@@ -15,13 +15,19 @@ TEST(ListenAddress, Good) {
     int port;
   };
   for (const Case& c : {Case{"127.0.0.1:8080", "127.0.0.1", 8080}, Case{"[::1]:80", "::1", 80},
-                        Case{":8080", "0.0.0.0", 8080}, Case{"localhost:0", "localhost", 0},
+                        Case{":8080", "", 8080}, Case{"localhost:0", "localhost", 0},
                         Case{"[::]:65535", "::", 65535}, Case{"a-host.example:1", "a-host.example", 1}}) {
     const auto got = parse_listen_address(c.text);
     ASSERT_TRUE(got) << c.text << ": " << got.error().message;
     EXPECT_EQ(got->host, c.host);
     EXPECT_EQ(got->port, c.port);
   }
+}
+
+TEST(ListenAddress, ABrowserOfThisMachineFindsIt) {
+  EXPECT_EQ(browser_address({"", 8080}, false, ""), "http://127.0.0.1:8080/");
+  EXPECT_EQ(browser_address({"0.0.0.0", 80}, true, "t"), "https://127.0.0.1:80/?token=t");
+  EXPECT_EQ(browser_address({"::", 80}, false, ""), "http://[::1]:80/");
 }
 
 TEST(ListenAddress, Wrong) {

@@ -238,6 +238,18 @@ TEST_F(GatewayReach, OnAnAddressOfOthersATokenIsMade) {
   EXPECT_EQ(request(port, "GET", "/api/streams").status, 200);
 }
 
+TEST_F(GatewayReach, EveryInterfaceIsAlsoThatOfIpv6) {
+  start({.host = "", .port = 0, .web = {.open = true, .max_per_address = 1}});
+  TcpClient v4("127.0.0.1", port, kPatience), v6("::1", port, kPatience);
+  ASSERT_TRUE(v4.connected());
+  v4.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(read_response(v4).status, 200);
+  EXPECT_EQ(request(port, "GET", "/healthz").status, 0) << "an address is the same however it is written";
+  if (!v6.connected()) GTEST_SKIP() << "this machine has no IPv6";
+  v6.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(read_response(v6).status, 200);
+}
+
 TEST_F(GatewayReach, PagesOfListedSitesMayWatch) {
   start({.port = 0, .web = {.origins = {"https://viewer.example"}}});
   const std::string listed = "Origin: https://viewer.example\r\n";
