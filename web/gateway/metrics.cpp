@@ -20,9 +20,9 @@ namespace {
 /// Prometheus text format 0.0.4: a family is its HELP and TYPE line, then a line a sample.
 class Exposition {
  public:
-  void family(const char* name, const char* type, const char* help) {
+  void family(const char* name, std::string_view type, const char* help) {
     name_ = name;
-    text_ += std::string("# HELP ") + name + ' ' + help + "\n# TYPE " + name + ' ' + type + '\n';
+    text_ += std::string("# HELP ") + name + ' ' + help + "\n# TYPE " + name + ' ' + std::string(type) + '\n';
   }
   void sample(const std::string& labels, double value) { line("", labels, value); }
   /// `labels` without braces.
@@ -217,10 +217,12 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   per_recording("relievo_recording_room_bytes", "That the disk of recordings on request still takes.",
                 &RecordingState::room_bytes);
 
-  const auto per_status = [&](const char* name, const char* type, const char* help, auto value) {
+  // What a recording says was counted then, and begins anew with each pass.
+  const auto is_counting = [](const StreamSnapshot& s) { return s.status && s.recording.file.empty(); };
+  const auto per_status = [&](const char* name, std::string_view type, const char* help, auto value) {
     out.family(name, type, help);
     for (const auto& s : streams) {
-      if (!s.status) continue;
+      if (!s.status || (type == "counter" && !is_counting(s))) continue;
       out.sample("{stream=" + label(s.info.stream) + "}", static_cast<double>(value(*s.status)));
     }
   };
@@ -243,10 +245,10 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
              "How much coarser than asked for, to keep bit rate, deadline or PSNR; 0 not at all.",
              [](T s) { return s.rate_level; });
 
-  const auto per_rung = [&](const char* name, const char* type, const char* help, auto value) {
+  const auto per_rung = [&](const char* name, std::string_view type, const char* help, auto value) {
     out.family(name, type, help);
     for (const auto& s : streams) {
-      if (!s.status) continue;
+      if (!s.status || (type == "counter" && !is_counting(s))) continue;
       for (const RungStatus& rung : s.status->rungs)
         out.sample(
             "{stream=" + label(s.info.stream) + ",quality=\"" + std::string(to_string(rung.rung)) + "\"}",
@@ -277,7 +279,7 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
 
   out.family("relievo_stream_drops_total", "counter", "Frames the server lost, by place.");
   for (const auto& s : streams) {
-    if (!s.status) continue;
+    if (!is_counting(s)) continue;
     const std::string head = "{stream=" + label(s.info.stream) + ",place=";
     out.sample(head + "\"capture\"}", static_cast<double>(s.status->drops_capture));
     out.sample(head + "\"reconstruct\"}", static_cast<double>(s.status->drops_reconstruct));
@@ -287,7 +289,7 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
   out.family("relievo_stream_filters_total", "counter",
              "What each filter of the reconstruction did: points, pixels or triangles.");
   for (const auto& s : streams) {
-    if (!s.status) continue;
+    if (!is_counting(s)) continue;
     for (const Filter& filter : kFilters) {
       out.sample("{stream=" + label(s.info.stream) + ",filter=\"" + std::string(filter.name) + "\"}",
                  static_cast<double>(s.status->filters.*filter.count));

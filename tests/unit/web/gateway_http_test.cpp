@@ -93,6 +93,26 @@ TEST_F(GatewayHttp, MetricsCount) {
   EXPECT_DOUBLE_EQ(metric("relievo_stream_latency_seconds{stream=\"face\"}"), 0.04);
 }
 
+TEST_F(GatewayHttp, WhatARecordingCountedIsNoCounter) {
+  gateway->announce(make_info());
+  gateway->offer("face", {.file = "/recorded/face.mcap"});
+  ServerStatus status;
+  status.stream = "face";
+  status.frames_captured = 70;
+  status.drops_encode = 7;
+  status.latency_ms = 40;
+  status.rungs = {{.rung = Rung::kReduced, .frames = 5}};
+  gateway->publish(status);
+  for (const char* name : {"relievo_stream_frames_captured_total{stream=\"face\"}",
+                           "relievo_stream_mixed_total{stream=\"face\"}",
+                           "relievo_stream_drops_total{stream=\"face\",place=\"encode\"}",
+                           "relievo_stream_filters_total{stream=\"face\",filter=\"small_component\"}",
+                           "relievo_stream_rung_frames_total{stream=\"face\",quality=\"reduced\"}"})
+    EXPECT_EQ(metric(name), -1) << "it would go back with each pass: " << name;
+  EXPECT_EQ(metric("relievo_gateway_frames_total{stream=\"face\"}"), 0) << "those of this gateway do not";
+  EXPECT_DOUBLE_EQ(metric("relievo_stream_latency_seconds{stream=\"face\"}"), 0.04);
+}
+
 TEST_F(GatewayHttp, LatenciesAreHistograms) {
   gateway->announce(make_info());
   WsClient client(port, "face");
