@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/log.h"
+#include "base/secret_file.h"
 #include "idl/dds_log.h"
 #include "idl/interface.h"
 #include "idl/security.h"
@@ -36,6 +37,12 @@ Status create_domain(dds_domainid_t id, const std::string& config, Entity& out) 
   if (!made) return made.error();
   out = std::move(made).value();
   return {};
+}
+
+void warn_of_open_keys(const std::filesystem::path& folder) {
+  for (const char* secret : {key_files::kPrivate, "authority.key"})
+    if (const auto file = folder / secret; readable_by_all(file))
+      log_warning("every user of this machine can read the secret in " + file.string() + ": chmod 600 it");
 }
 
 }  // namespace
@@ -83,6 +90,7 @@ Result<std::unique_ptr<Domain>> Domain::make(const DomainOptions& options) {
     auto keys = read_keys(*folder);
     if (!keys) return keys.error();
     domain->keys_ = std::move(keys).value();
+    warn_of_open_keys(*folder);
     log_debug("keys of '" + domain->keys_->name + "' in " + folder->string());
   }
   const auto id = static_cast<dds_domainid_t>(options.domain);

@@ -133,6 +133,15 @@ TEST_F(Security, DamagedKeysAreNamed) {
   EXPECT_EQ(streams(folder_ / "nowhere").status, 1);
 }
 
+TEST_F(Security, ASecretThatEverybodyCanReadIsSaid) {
+  const fs::path secret = fs::path(keys_of("viewer")) / "identity.key";
+  EXPECT_THAT(streams(keys_of("viewer")).err, Not(HasSubstr("can read")));
+  fs::permissions(secret, fs::perms::others_read, fs::perm_options::add);
+  EXPECT_THAT(streams(keys_of("viewer")).err,
+              AllOf(HasSubstr("every user of this machine can read the secret in " + secret.string()),
+                    HasSubstr("chmod 600")));
+}
+
 TEST_F(Security, KeysAreMadeWholeAndOnce) {
   const auto again = relievo({"keys", "init", "--keys", authority()});
   EXPECT_EQ(again.status, 1);

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "base/log.h"
+#include "base/secret_file.h"
 #include "base/time.h"
 #include "base/whole_file.h"
 
@@ -73,9 +74,7 @@ Result<Tokens> Tokens::load(const std::filesystem::path& file) {
   auto tokens = read_tokens(file);
   if (!tokens) return tokens.error();
   out.tokens_ = *std::move(tokens);
-  std::error_code ignored;
-  const auto others = std::filesystem::perms::others_read;
-  if ((std::filesystem::status(file, ignored).permissions() & others) != std::filesystem::perms::none)
+  if (readable_by_all(file))
     log_warning("every user of this machine can read the token in " + file.string() + ": chmod 600 it");
   return out;
 }
