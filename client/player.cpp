@@ -16,6 +16,7 @@ namespace {
 
 // A longer pause in a recording (the stream was gone meanwhile) is shortened to this.
 constexpr std::int64_t kLongestPause_ns = 5 * kNanosecondsPerSecond;
+constexpr std::int64_t kShortestPass_ns = 30'000'000;
 
 // For more of a file that is being written, which comes by chunks of half a second.
 constexpr auto kLookAgain = std::chrono::milliseconds(100);
@@ -88,9 +89,15 @@ Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& st
   do {
     if (auto status = recorded.seek(range_of(options, recorded).from_ns); !status) return status;
     const std::int64_t start_ns = steady_now_ns();
-    if (auto status = play_once(recorded, options, stop, publish); !status) return status;
-    // A recording of a single moment must not loop as fast as the machine can.
-    if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + 30'000'000 - steady_now_ns()));
+    bool any = false;
+    const auto counted = [&](const RawSample& sample) {
+      any = true;
+      return publish(sample);
+    };
+    if (auto status = play_once(recorded, options, stop, counted); !status) return status;
+    // A recording of a single moment, or of which nothing is left, must not loop as fast as the machine can.
+    const std::int64_t pass_ns = any ? kShortestPass_ns : kNanosecondsPerSecond;
+    if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + pass_ns - steady_now_ns()));
   } while (options.loop && !stop.stopped());
   return {};
 }

@@ -121,7 +121,8 @@ Result<std::optional<RawSample>> RecordedStream::next() {
     auto message = reader_->next();
     if (!message) {
       ++damaged_;
-      log_warning("skipped a damaged part of the recording: " + message.error().message);
+      if (said_.insert(message.error().message).second)
+        log_warning("skipped a damaged part of the recording: " + message.error().message);
       continue;
     }
     if (!*message) return std::optional<RawSample>();

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -82,6 +83,7 @@ class RecordedStream {
   std::unique_ptr<RecordingReader> reader_;
   std::vector<std::optional<Topic>> topics_;  // of each channel; nothing where it is not of this stream
   std::uint64_t damaged_ = 0;
+  std::set<std::string> said_;  // of damaged parts: each once, however often it is played
 };
 
 }  // namespace relievo

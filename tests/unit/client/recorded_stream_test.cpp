@@ -5,6 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <set>
+#include <sstream>
+#include <thread>
+
 #include "base/time.h"
 #include "client/player.h"
 #include "client/time_range.h"
@@ -120,6 +125,30 @@ TEST_F(RecordedStreamTest, PlayingFromBetweenKeyFramesSendsTheOneBefore) {
   });
   EXPECT_TRUE(done.ok());
   EXPECT_THAT(played, ElementsAre(30, 33, 34, 35, 36));
+}
+
+// Proves: a file that became shorter while it is played in a loop does not fill the log.
+TEST_F(RecordedStreamTest, WhatIsDamagedIsSaidOnceHoweverOftenItIsPlayed) {
+  std::filesystem::resize_file(file_, 100);
+  testing::internal::CaptureStderr();
+  const std::int64_t begin_ns = steady_now_ns();
+  {
+    StopSignal stop;
+    std::thread later([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+      stop.request();
+    });
+    EXPECT_TRUE(play(*stream_, {.loop = true}, stop, [](const RawSample&) { return Status(); }).ok());
+    later.join();
+  }
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_GE(steady_now_ns() - begin_ns, 2'000'000'000);
+  std::set<std::string> lines;
+  std::istringstream in(said);
+  for (std::string line; std::getline(in, line);) EXPECT_TRUE(lines.insert(line).second) << line;
+  EXPECT_FALSE(lines.empty());
+  const std::uint64_t parts = lines.size();
+  EXPECT_LE(stream_->damaged(), 4 * parts) << "a pass a second";
 }
 
 }  // namespace
