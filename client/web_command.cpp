@@ -73,7 +73,7 @@ class LoopedFile {
 
   /// To be called every few tenths of a second, on the thread that made it: offers what there is to read.
   void look() {
-    OfferedRecording offered{.file = file_};
+    OfferedRecording offered{.file = file_, .whole = whole_};
     if (follower_) {
       const auto found = follower_->look();
       const std::int64_t now_ns = steady_now_ns();
@@ -128,6 +128,7 @@ class LoopedFile {
   Gateway& gateway_;
   std::uint64_t sequence_ = 0;
   const std::string name_;
+  const bool whole_ = !recorded_.summary().recovered;
   std::optional<RecordingFollower> follower_;  // of what is, or was, being written
   std::int64_t came_ns_ = steady_now_ns();     // when it was last longer than before
   bool damaged_ = false;

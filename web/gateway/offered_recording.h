@@ -18,6 +18,7 @@ struct OfferedRecording {
   std::shared_ptr<const GrowingRecording> growing{};
   bool has_index = true;  // else it is read as `growing` has it
   bool grows = false;     // more may come
+  bool whole = true;      // else it was cut short: somebody may mend it, or go on in it
 
   /// Whether there is anything to read.
   bool readable() const {

@@ -63,7 +63,7 @@ std::optional<Version> version_of(const OfferedRecording& recording, const struc
   };
   if (auto version = as_of(growing_bytes(if_range, file))) return version;
   if (!recording.has_index) return as_of(recording.growing ? recording.growing->bytes() : 0);
-  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), true};
+  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), recording.whole};
 }
 
 /// A cache may keep it and asks here each time whether it still is the same. One that many share need not,

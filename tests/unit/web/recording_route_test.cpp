@@ -107,6 +107,13 @@ TEST_F(Recordings, ASharedCacheMayKeepWhatIsFinishedAndNeedsNoToken) {
   EXPECT_EQ(own.headers.at("cache-control"), "private, no-cache");
 }
 
+TEST_F(Recordings, WhatWasCutShortIsKeptByNobody) {
+  const OfferedRecording cut{.file = file, .whole = false};
+  gateway->offer("face", cut);
+  EXPECT_EQ(get().headers.at("cache-control"), "no-cache");
+  EXPECT_EQ(get("Range: bytes=0-9\r\n").headers.at("cache-control"), "no-cache");
+}
+
 // A disk that stands still (pread below) keeps who reads from it waiting, and nobody else.
 TEST_F(Recordings, ASlowDiskHoldsNobodyElseUp) {
   stuck_disk.lock();
