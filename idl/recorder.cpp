@@ -80,13 +80,18 @@ Recorder::Counts Recorder::counts() const {
 }
 
 std::filesystem::path Recorder::file() const {
-  const std::lock_guard lock(mutex_);
-  return open_;
+  const std::lock_guard lock(file_mutex_);
+  return file_;
 }
 
 std::shared_ptr<const GrowingRecording> Recorder::growing() const {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(file_mutex_);
   return growing_;
+}
+
+bool Recorder::is_open() const {
+  const std::lock_guard lock(file_mutex_);
+  return open_;
 }
 
 bool Recorder::done() const {
@@ -113,6 +118,8 @@ Status Recorder::finish() {
     const Status finished = writer_->finish();
     if (!error_) fail(finished);
     writer_.reset();
+    const std::lock_guard file_lock(file_mutex_);
+    open_ = false;
   }
   limit_reached_ = true;
   return error_ ? Status(*error_) : Status();
@@ -156,13 +163,13 @@ void Recorder::add_attachments() {
 }
 
 Status Recorder::open_file() {
-  open_ = options_.recording.segments.split() ? segments_.next() : options_.file;
-  growing_.reset();
+  const std::filesystem::path file = options_.recording.segments.split() ? segments_.next() : options_.file;
+  now_writes(file, nullptr);  // before it can be found
   auto writer =
-      RecordingWriter::create(open_, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
+      RecordingWriter::create(file, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
-  growing_ = writer_->growing();
+  now_writes(file, writer_->growing());
   frames_before_ = counts_.frames;
   ++counts_.files;
   for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
@@ -178,6 +185,14 @@ Status Recorder::open_file() {
   if (!foxglove) return foxglove.error();
   foxglove_ = *std::move(foxglove);
   return {};
+}
+
+void Recorder::now_writes(const std::filesystem::path& file,
+                          std::shared_ptr<const GrowingRecording> growing) {
+  const std::lock_guard lock(file_mutex_);
+  file_ = file;
+  growing_ = std::move(growing);
+  open_ = true;
 }
 
 /// At a frame that decodes without those before; where none comes, at twice the limits all the same.
@@ -202,7 +217,7 @@ Status Recorder::next_segment(std::int64_t now_ns) {
     if (const Status written = write(info); !written) return written;
   }
   add_attachments();
-  if (const Status removed = segments_.remove_old(open_); !removed) log_warning(removed.error().message);
+  if (const Status removed = segments_.remove_old(file()); !removed) log_warning(removed.error().message);
   return {};
 }
 

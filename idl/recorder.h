@@ -71,6 +71,8 @@ class Recorder {
   std::filesystem::path file() const;
   /// What is whole of it; null before the first sample.
   std::shared_ptr<const GrowingRecording> growing() const;
+  /// It is not finished. As file() and growing(), this does not wait for the disk.
+  bool is_open() const;
   /// The limit of frames or seconds is reached, or writing has failed.
   bool done() const;
   /// Ok, or why writing has failed.
@@ -85,6 +87,7 @@ class Recorder {
   void add(const RawSample& sample);
   void add_attachments();
   Status open_file();
+  void now_writes(const std::filesystem::path& file, std::shared_ptr<const GrowingRecording> growing);
   bool segment_ends_before(const RawSample& sample) const;
   Status next_segment(std::int64_t now_ns);
   Status write(const RawSample& sample);
@@ -98,17 +101,20 @@ class Recorder {
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
-  std::filesystem::path open_;                       // the file being written
-  std::shared_ptr<const GrowingRecording> growing_;  // of it
-  std::int64_t segment_ns_ = 0;                      // when its first sample was received
-  std::uint64_t frames_before_ = 0;                  // in the files before it
-  std::optional<StreamInfo> info_;                   // as received last,
-  std::optional<RawSample> info_sample_;             // and as it came
-  DescriptionAttachments attachments_;               // of the file being written
+  std::int64_t segment_ns_ = 0;           // when its first sample was received
+  std::uint64_t frames_before_ = 0;       // in the files before it
+  std::optional<StreamInfo> info_;        // as received last,
+  std::optional<RawSample> info_sample_;  // and as it came
+  DescriptionAttachments attachments_;    // of the file being written
   std::optional<Error> error_;
   Counts counts_;
   std::int64_t first_frame_ns_ = 0;
   bool limit_reached_ = false;
+
+  mutable std::mutex file_mutex_;                    // of what follows; held for a moment at a time
+  std::filesystem::path file_;                       // being written
+  std::shared_ptr<const GrowingRecording> growing_;  // of it
+  bool open_ = false;
 };
 
 }  // namespace relievo

@@ -69,6 +69,7 @@ class ThreadedPipeline final : public Pipeline {
       : source_(source),
         sinks_(std::move(sinks)),
         options_(options),
+        label_(options.label.empty() ? "" : options.label + ": "),
         reconstructor_(std::move(reconstructor)),
         pace_{options.reconstruct.decoder, options.reconstruct.line_stride},
         pace_control_(line_count(source.info().rig, 1), source.info().rig.frame_rate),
@@ -197,7 +198,7 @@ class ThreadedPipeline final : public Pipeline {
       if (!next) {
         // An error is logged once the source goes on behind it, or returned where it does not.
         if (errors_in_a_row > 0 && last_error.message != next.error().message)
-          log_warning(last_error.message);
+          log_warning(label_ + last_error.message);
         last_error = next.error();
         if (!info.live) stats_.lost_in_capture(1);  // a camera counts its own
         set_state(StreamState::kStalled, last_error.message);
@@ -205,7 +206,7 @@ class ThreadedPipeline final : public Pipeline {
         continue;
       }
       if (!*next) return errors_in_a_row > 0 && !stopping() ? Status(last_error) : Status();
-      if (errors_in_a_row > 0) log_warning(last_error.message);
+      if (errors_in_a_row > 0) log_warning(label_ + last_error.message);
       errors_in_a_row = 0;
       set_state(StreamState::kRunning, "");
       CapturedFrame frame = *std::move(*next);
@@ -312,7 +313,7 @@ class ThreadedPipeline final : public Pipeline {
     auto made = Reconstructor::create(source_.info().rig, source_.info().pattern, options);
     const Status seen = made ? made->observe(frame) : Status(made.error());
     if (!seen) return fail(seen.error());
-    log_info("decoding: " + to_string(pace) + ", which suits the camera's rate and this machine");
+    log_info(label_ + "decoding: " + to_string(pace) + ", which suits the camera's rate and this machine");
     std::lock_guard lock(mutex_);
     std::swap(reconstructor_, *made);
     pace_ = pace;
@@ -322,7 +323,7 @@ class ThreadedPipeline final : public Pipeline {
   void say_behind(std::uint64_t dropped) {
     drops_.add(dropped);
     if (!drops_.too_many() || std::exchange(said_behind_, true)) return;
-    log_warning("this machine is too slow for all of the camera's frames with " + to_string(pace_) +
+    log_warning(label_ + "this machine is too slow for all of the camera's frames with " + to_string(pace_) +
                 ": serve with --decoder auto or more --threads");
   }
 
@@ -372,7 +373,7 @@ class ThreadedPipeline final : public Pipeline {
         fail(bytes.error());
         continue;
       }
-      if (const std::string notice = encoder_.take_notice(); !notice.empty()) log_warning(notice);
+      if (const std::string notice = encoder_.take_notice(); !notice.empty()) log_warning(label_ + notice);
       stats_.encoded_parts(milliseconds(geometry_ns - begin), milliseconds(steady_now_ns() - geometry_ns));
       const bool is_key = is_key_frame(*bytes);
       if (is_key) key_ns = begin;
@@ -458,7 +459,7 @@ class ThreadedPipeline final : public Pipeline {
     std::lock_guard lock(mutex_);
     step_ = steps.status();
     if (steps.message() == step_message_) return;
-    if (step_message_.empty()) log_warning(steps.message());
+    if (step_message_.empty()) log_warning(label_ + steps.message());
     step_message_ = steps.message();
   }
 
@@ -471,6 +472,7 @@ class ThreadedPipeline final : public Pipeline {
   FieldSource& source_;
   std::vector<FrameSink*> sinks_;
   const PipelineOptions options_;
+  const std::string label_;
   Reconstructor reconstructor_;  // changes with the pace, under the mutex, as pace_
   Pace pace_;
   PaceControl pace_control_;

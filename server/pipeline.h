@@ -51,6 +51,7 @@ class LowerRungs {
 
 struct PipelineOptions {
   std::string stream;
+  std::string label{};    // of its lines in the log, where there are several: "left"
   bool paced = true;      // a source that is not live is played at its own time stamps
   bool lossless = false;  // full queues wait instead of dropping the oldest: for tests and offline work
   std::optional<std::uint64_t> frames;  // end after this many camera frames

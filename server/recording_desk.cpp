@@ -10,15 +10,39 @@ void RecordingDesk::add(const std::string& stream, StreamRecorder& recorder) {
   recorders_[stream] = &recorder;
 }
 
-void RecordingDesk::remove(const std::string& stream) {
+void RecordingDesk::remove(const std::string& stream, const RecordingState& last) {
   const std::lock_guard lock(mutex_);
   recorders_.erase(stream);
+  if (!last.file.empty()) last_[stream] = last;
+}
+
+void RecordingDesk::add(const Recorder& recorder) {
+  const std::lock_guard lock(mutex_);
+  others_.insert(&recorder);
+}
+
+void RecordingDesk::remove(const Recorder& recorder) {
+  const std::lock_guard lock(mutex_);
+  others_.erase(&recorder);
+}
+
+bool RecordingDesk::writes(const Recorder& recorder, const std::string& file) const {
+  const std::filesystem::path now = recorder.file();
+  std::error_code ignored;
+  return now.filename() == file && std::filesystem::equivalent(now, folder_ / file, ignored);
 }
 
 std::optional<RecordingState> RecordingDesk::state(const std::string& stream) const {
   const std::lock_guard lock(mutex_);
   const auto found = recorders_.find(stream);
-  return found == recorders_.end() ? std::nullopt : std::optional(found->second->state());
+  if (found == recorders_.end()) return std::nullopt;
+  const RecordingState now = found->second->state();
+  const auto last = last_.find(stream);
+  if (!now.file.empty() || last == last_.end()) return now;
+  RecordingState state = last->second;
+  state.room_bytes = now.room_bytes;
+  state.pre_roll_s = now.pre_roll_s;
+  return state;
 }
 
 Status RecordingDesk::start(const std::string& stream) {
@@ -36,13 +60,17 @@ Status RecordingDesk::stop(const std::string& stream) {
 bool RecordingDesk::is_open(const std::string& file) const {
   const std::lock_guard lock(mutex_);
   return std::any_of(recorders_.begin(), recorders_.end(),
-                     [&](const auto& one) { return one.second->is_open(file); });
+                     [&](const auto& one) { return one.second->is_open(file); }) ||
+         std::any_of(others_.begin(), others_.end(),
+                     [&](const Recorder* other) { return other->is_open() && writes(*other, file); });
 }
 
 std::shared_ptr<const GrowingRecording> RecordingDesk::growing(const std::string& file) const {
   const std::lock_guard lock(mutex_);
   for (const auto& [stream, recorder] : recorders_)
     if (auto growing = recorder->growing(file)) return growing;
+  for (const Recorder* other : others_)
+    if (writes(*other, file)) return other->growing();
   return nullptr;
 }
 

@@ -7,8 +7,10 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 
+#include "idl/recorder.h"
 #include "idl/stream_recorder.h"
 #include "web/gateway/recording_control.h"
 
@@ -19,9 +21,13 @@ class RecordingDesk final : public RecordingControl {
  public:
   explicit RecordingDesk(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// `recorder` must live until it is removed.
+  /// `recorder` must live until it is removed. What it did last, and what it is to say of that, is told of
+  /// the stream until the next recorder's first recording.
   void add(const std::string& stream, StreamRecorder& recorder);
-  void remove(const std::string& stream);
+  void remove(const std::string& stream, const RecordingState& last);
+  /// One whose files are made without being asked for, in this folder perhaps. Lives until it is removed.
+  void add(const Recorder& recorder);
+  void remove(const Recorder& recorder);
 
   std::optional<RecordingState> state(const std::string& stream) const override;
   Status start(const std::string& stream) override;
@@ -31,9 +37,13 @@ class RecordingDesk final : public RecordingControl {
   std::shared_ptr<const GrowingRecording> growing(const std::string& file) const override;
 
  private:
+  bool writes(const Recorder& recorder, const std::string& file) const;
+
   const std::filesystem::path folder_;
   mutable std::mutex mutex_;
   std::map<std::string, StreamRecorder*> recorders_;
+  std::map<std::string, RecordingState> last_;
+  std::set<const Recorder*> others_;
 };
 
 }  // namespace relievo

@@ -47,7 +47,7 @@ struct Recording {
   std::unique_ptr<Subscriber> subscriber;
 
   Status start(const std::string& file, const std::string& stream, const ServeConfig& config,
-               const Publisher& publisher) {
+               const Publisher& publisher, const std::atomic<bool>& stop) {
     const auto options = recording_options(config.recording);
     if (!options) return options.error();
     // The recorder makes the file with the first sample; that it cannot should be said before.
@@ -57,7 +57,7 @@ struct Recording {
     if (!created) return created.error();
     subscriber = *std::move(created);
     // The first frame should be in the file: wait until reader and writer have found each other.
-    for (int tries = 0; tries < 200 && publisher.matched_readers() == 0; ++tries) {
+    for (int tries = 0; tries < 200 && !stop && publisher.matched_readers() == 0; ++tries) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     return {};
@@ -89,7 +89,7 @@ class OnRequest {
   OnRequest(RecordingDesk& desk, const std::string& stream) : desk_(desk), stream_(stream) {}
   OnRequest(const OnRequest&) = delete;
   OnRequest& operator=(const OnRequest&) = delete;
-  ~OnRequest() { desk_.remove(stream_); }
+  ~OnRequest() { desk_.remove(stream_, last_); }
 
   Status start(const ServeConfig& config) {
     const auto pre_roll_s = parse_pre_roll_s(config.pre_roll);
@@ -104,13 +104,23 @@ class OnRequest {
     desk_.add(stream_, *recorder_);
     return {};
   }
-  void finish(std::uint64_t published) { recorder_->finish(published); }
+  void finish(const std::string& label, std::uint64_t published) {
+    const bool cut = recorder_->state().activity == RecordingActivity::kRecording;
+    recorder_->finish(published);
+    last_ = recorder_->state();
+    if (!cut || last_.activity != RecordingActivity::kOff || last_.file.empty()) return;
+    last_.activity = RecordingActivity::kFailed;  // nobody asked for its end
+    last_.message = "it ended with the stream, which has begun anew since: start another";
+    say(label, "the recording " + last_.file + " ended with the stream, after " +
+                   std::to_string(last_.frames) + " frames");
+  }
 
  private:
   RecordingDesk& desk_;
   const std::string stream_;
   std::optional<StreamRecorder> recorder_;
   std::unique_ptr<Subscriber> subscriber_;
+  RecordingState last_;
 };
 
 PipelineOptions pipeline_options(const StreamConfig& config, const std::string& stream) {
@@ -142,13 +152,15 @@ std::vector<Rung> rungs_of(const StreamConfig& config) {
 
 class RunningStream final : public ServedStream {
  public:
-  RunningStream(const StreamConfig& config, const Surroundings& around)
-      : config_(config),
+  RunningStream(const StreamConfig& config, const Surroundings& around, const std::atomic<bool>& stop)
+      : stop_(stop),
+        config_(config),
         around_(around),
         name_(name_of(config)),
         label_(around.config.streams.empty() ? "" : name_) {}
   ~RunningStream() override {
     if (announced_) around_.gateway->withdraw(name_);
+    if (around_.desk != nullptr && recording_.recorder) around_.desk->remove(*recording_.recorder);
     if (around_.rigs != nullptr) around_.rigs->remove(name_);
     if (around_.stages != nullptr) around_.stages->remove(name_);
     around_.board.forget(name_);
@@ -166,9 +178,11 @@ class RunningStream final : public ServedStream {
   }
 
  private:
+  Error stopped_opening() const { return {name_ + " was stopped while it was opened"}; }
   Status announce(const std::string& uri);
   Status raise_ladder(const PipelineOptions& options);
 
+  const std::atomic<bool>& stop_;  // opening
   const StreamConfig config_;
   const Surroundings around_;
   const std::string name_, label_;
@@ -189,14 +203,17 @@ class RunningStream final : public ServedStream {
 Status RunningStream::open() {
   auto opened = open_stream_source(config_, around_.config.projector);
   if (!opened) return opened.error();
+  if (stop_) return stopped_opening();
   source_ = std::move(opened->source);
   auto seen = upright(source_->info().rig, source_->info().pattern);
   if (!seen) return seen.error();
   seen_ = *std::move(seen);
   if (const Status announced = announce(opened->uri); !announced) return announced;
+  if (stop_) return stopped_opening();
   std::vector<FrameSink*> sinks;
   for (const auto& sink : sinks_) sinks.push_back(sink.get());
   PipelineOptions options = pipeline_options(config_, name_);
+  options.label = label_;
   options.calibrated = opened->calibrated;
   if (around_.rigs != nullptr) {
     const SourceInfo& info = source_->info();
@@ -231,8 +248,10 @@ Status RunningStream::announce(const std::string& uri) {
   if (!publisher) return publisher.error();
   publisher_ = *std::move(publisher);
   if (!config_.record.empty()) {
-    if (const Status started = recording_.start(config_.record, name_, around_.config, *publisher_); !started)
+    if (const Status started = recording_.start(config_.record, name_, around_.config, *publisher_, stop_);
+        !started)
       return started;
+    if (around_.desk != nullptr) around_.desk->add(*recording_.recorder);
   }
   if (around_.desk != nullptr) {
     on_request_.emplace(*around_.desk, name_);
@@ -285,7 +304,7 @@ Status RunningStream::run() {
   const ServerStatus ended = pipeline_->status();
   say_drops(label_, ended);
   say_camera(label_, source_->counts());
-  if (on_request_) on_request_->finish(ended.frames_published);
+  if (on_request_) on_request_->finish(label_, ended.frames_published);
   const Status recorded = recording_.finish(label_, ended.frames_published);
   if (!done || !recorded || stopped_) return done ? recorded : done;
   if (ended.frames_published == 0) {
@@ -303,8 +322,9 @@ DomainOptions domain_options(const ServeConfig& config) {
 }
 
 Result<std::unique_ptr<ServedStream>> ServedStream::open(const StreamConfig& config,
-                                                         const Surroundings& surroundings) {
-  auto stream = std::make_unique<RunningStream>(config, surroundings);
+                                                         const Surroundings& surroundings,
+                                                         const std::atomic<bool>& stop) {
+  auto stream = std::make_unique<RunningStream>(config, surroundings, stop);
   if (const Status opened = stream->open(); !opened) return opened.error();
   return std::unique_ptr<ServedStream>(std::move(stream));
 }

@@ -2,6 +2,7 @@
 // One stream of a server: a source, its pipeline, and all that its frames go to.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -33,9 +34,10 @@ DomainOptions domain_options(const ServeConfig& config);
 /// Opened, run and destroyed on one thread; the other functions are for any.
 class ServedStream {
  public:
-  /// Opens the source and announces the stream on the network.
+  /// Opens the source and announces the stream on the network. Where `stop` is set meanwhile it fails soon.
   static Result<std::unique_ptr<ServedStream>> open(const StreamConfig& config,
-                                                    const Surroundings& surroundings);
+                                                    const Surroundings& surroundings,
+                                                    const std::atomic<bool>& stop);
   /// No longer announced; what is recorded on request is whole.
   virtual ~ServedStream() = default;
 

@@ -59,16 +59,21 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
     it = entries_.erase(it);
   }
   lock.unlock();
-  for (const auto& entry : old) entry->thread.join();  // all have been told, so this takes one's time
+  for (const auto& entry : old) {
+    entry->thread.join();  // all have been told, so this takes one's time
+    if (!entry->result)
+      log_warning("stream " + name_of(entry->config) +
+                  " ended with a failure: " + entry->result.error().message);
+  }
   lock.lock();
+  if (stopping_) wanted.clear();
   for (const auto& [name, config] : wanted) {
     auto& entry = entries_[name] = std::make_unique<Entry>();
     entry->config = *config;
     entry->files = files_of(*config);
     entry->retries = retries_ || was_applied_;
     entry->paused = paused_.count(name) != 0;
-    entry->again = was_applied_;
-    entry->stopping = stopping_;
+    entry->again = entry->tried_before = was_applied_;
     entry->thread = std::thread([this, e = entry.get()] {
       name_this_thread("capture");  // whose stages have threads of their own
       run(*e);
@@ -86,7 +91,8 @@ Status StreamSet::wait() {
            std::all_of(entries_.begin(), entries_.end(), [](const auto& one) { return one.second->ended; });
   });
   for (const auto& [name, entry] : entries_)
-    if (!entry->result) return entry->result;
+    if (!entry->result)
+      return around_.config.streams.empty() ? entry->result : entry->result.error().in("stream " + name);
   return {};
 }
 
@@ -165,24 +171,22 @@ void StreamSet::run(Entry& entry) {
     result = run_once(entry);
     {
       const std::lock_guard lock(mutex_);
-      if (entry.paused && !entry.stopping) continue;
+      if (entry.stopping) break;  // it is not tried again
+      if (entry.paused && result) continue;
       if (result || !entry.retries) break;
     }
     const std::string name = name_of(entry.config);
-    const std::string& why = result.error().message;
+    const std::string why = result.error().message;
+    result = {};
     if (said != why)
       log_warning("stream " + name + ": " + why + "; it is tried again every " +
                   std::to_string(kRetry.count()) + " s");
     said = why;
     around_.board.say(name, "to be tried again: " + why, true);
     if (!wait_to_retry(entry)) break;
-    result = {};
   }
   const std::lock_guard lock(mutex_);
-  if (entry.retries) {
-    around_.board.forget(name_of(entry.config));
-    result = {};
-  }
+  if (entry.retries) around_.board.forget(name_of(entry.config));
   entry.result = result;
   entry.tried = entry.ended = true;
   changed_.notify_all();
@@ -191,7 +195,8 @@ void StreamSet::run(Entry& entry) {
 Status StreamSet::run_once(Entry& entry) {
   StreamConfig config = entry.config;
   if (entry.again && !config.record.empty()) config.record = unused_name(config.record);
-  auto opened = ServedStream::open(config, around_);
+  auto opened = ServedStream::open(config, around_, entry.stopping);
+  const bool comes_later = std::exchange(entry.tried_before, true);
   entry.again = entry.again || opened;
   {
     const std::lock_guard lock(mutex_);
@@ -202,6 +207,9 @@ Status StreamSet::run_once(Entry& entry) {
     if (entry.stopping || entry.paused) return {};
   }
   if (!opened) return opened.error();
+  if (comes_later)
+    log_info((around_.config.streams.empty() ? "" : name_of(config) + ": ") + "streaming from " +
+             config.source);
   const Status done = (*opened)->run();
   const std::lock_guard lock(mutex_);
   entry.stream = nullptr;

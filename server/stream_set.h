@@ -3,6 +3,7 @@
 // are can change while they run.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <map>
 #include <memory>
@@ -23,7 +24,7 @@ namespace relievo {
 class StreamSet final : public StreamPauses {
  public:
   /// `retries`: a stream that could not be opened, or failed, is tried again a few seconds later, and never
-  /// ends with an error. Those of a second apply() always are.
+  /// ends with an error, unless it fails while it is being stopped. Those of a second apply() always are.
   StreamSet(const Surroundings& surroundings, bool retries) : around_(surroundings), retries_(retries) {}
   StreamSet(const StreamSet&) = delete;
   StreamSet& operator=(const StreamSet&) = delete;
@@ -31,7 +32,8 @@ class StreamSet final : public StreamPauses {
   ~StreamSet() override;
 
   /// From now on these run: those that do already, as they are configured and with the same rig and pattern
-  /// in the files that they name, go on untouched; others end, or begin. Returns when those have ended.
+  /// in the files that they name, go on untouched; others end, or begin. Returns when those have ended, whose
+  /// failures are logged. Nothing begins once stop() was called, also meanwhile.
   void apply(const std::vector<StreamConfig>& configs);
   /// Until all have ended. The first failure.
   Status wait();
@@ -52,13 +54,14 @@ class StreamSet final : public StreamPauses {
     StreamConfig config;
     std::string files;  // that it names, as they were when it began
     bool retries = false;
-    bool again = false;  // it ran before: what is recorded goes to another file
+    bool again = false;         // it ran before: what is recorded goes to another file
+    bool tried_before = false;  // or it is of a second apply(): its coming up is logged
     std::thread thread;
-    ServedStream* stream = nullptr;  // while it runs
-    bool stopping = false;
-    bool paused = false;   // to be, or is
-    bool waiting = false;  // it is: nothing of it is open
-    bool tried = false;    // to open it
+    ServedStream* stream = nullptr;      // while it runs
+    std::atomic<bool> stopping = false;  // set under the mutex
+    bool paused = false;                 // to be, or is
+    bool waiting = false;                // it is: nothing of it is open
+    bool tried = false;                  // to open it
     bool opened = false;
     bool ended = false;
     Status result;
@@ -72,7 +75,7 @@ class StreamSet final : public StreamPauses {
 
   const Surroundings around_;
   const bool retries_;
-  mutable std::mutex mutex_;  // of all that follows, but for an entry's first five
+  mutable std::mutex mutex_;  // of all that follows, but for an entry's first six
   mutable std::condition_variable changed_;
   std::map<std::string, std::unique_ptr<Entry>> entries_;
   std::set<std::string>

@@ -173,6 +173,21 @@ TEST_F(RecordingOnRequest, GrowsForWhoPlaysIt) {
   EXPECT_EQ(frames.back() - frames.front() + 1, frames.size()) << "without gaps";
 }
 
+// Proves: what the server records from its start, into the same folder, is no finished file either.
+TEST_F(RecordingOnRequest, WhatIsRecordedFromTheStartGrowsToo) {
+  std::vector<std::string> all = command();
+  all.insert(all.end(), {"--record", out_ / "all.mcap"});
+  WebServer server(all);
+  ASSERT_TRUE(server.goes_on("take", 20)) << server.process().err();
+  ASSERT_TRUE(eventually([&] { return listed(server, "all.mcap")["recording"] == true; }));
+  const Response growing = request(server.port(), "GET", "/recordings/all.mcap");
+  ASSERT_EQ(growing.status, 200);
+  EXPECT_EQ(growing.headers.at("cache-control"), "no-cache");
+  EXPECT_THAT(growing.headers.at("etag"), HasSubstr("growing"));
+  std::ofstream(out_ / "first.mcap", std::ios::binary) << growing.body;
+  EXPECT_FALSE(frames_in(out_ / "first.mcap").empty()) << "it is whole as it was sent";
+}
+
 TEST_F(RecordingOnRequest, IsWholeWhereTheServerIsStopped) {
   WebServer server(command());
   ASSERT_TRUE(server.goes_on("take", 5)) << server.process().err();

@@ -2,6 +2,7 @@
 // One server with several streams: each its own, and what they are changed while they run.
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 #include <mutex>
 
@@ -264,6 +265,65 @@ TEST_F(SeveralStreams, AFileWithAMistakeIsRefusedWhole) {
   EXPECT_TRUE(left.gets(2));
   EXPECT_EQ(left.gaps(), 0U);
   EXPECT_TRUE(server.stream("third").is_null());
+}
+
+TEST_F(SeveralStreams, AMistakenSourceIsRefusedAndTakesNothingDown) {
+  WebServer server(command());
+  const Reader left("left");
+  ASSERT_TRUE(left.gets(2)) << server.process().err();
+  for (const char* source : {"bogus:x", "sim:nope", "sim:face,stripe=70"}) {
+    write(table("right", "two") + "[[stream]]\nname = \"left\"\nsource = \"" + source + "\"\n");
+    ASSERT_TRUE(reloaded(server, "nothing was changed: " + config_.string() + ":10: source: stream left: "))
+        << server.process().err();
+  }
+  EXPECT_TRUE(left.gets(2));
+  EXPECT_EQ(left.starts().size(), 1U);
+  EXPECT_EQ(left.gaps(), 0U);
+}
+
+TEST_F(SeveralStreams, AReloadThatEndsARecordingSaysSo) {
+  fs::create_directory(folder_ / "recorded");
+  const std::string recording = "[recording]\nfolder = \"" + (folder_ / "recorded").string() + "\"\n";
+  write(table("left", "one") + table("right", "two"), recording);
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("right", 2)) << server.process().err();
+  ASSERT_EQ(server.order("right", "start").status, 200);
+  ASSERT_TRUE(eventually([&] { return server.recording("right")["frames"] >= 2; }));
+  const std::string file = server.recording("right")["file"];
+  write(table("left", "one") + table("right", "two", "texture_quality = 50\n"), recording);
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  ASSERT_TRUE(server.goes_on("right", 1)) << server.process().err();
+  const Json state = server.recording("right");
+  EXPECT_EQ(state["state"], "failed") << "nobody asked for its end";
+  EXPECT_EQ(state["file"], file);
+  EXPECT_GE(state["frames"], 2);
+  EXPECT_THAT(state["message"].get<std::string>(), HasSubstr("it ended with the stream"));
+  EXPECT_THAT(server.process().err(), HasSubstr("right: the recording " + file + " ended with the stream"));
+  EXPECT_THAT(server.process().err(), HasSubstr("right: streaming from take:")) << "it comes up anew";
+  ASSERT_EQ(server.order("right", "start").status, 200);
+  EXPECT_NE(server.recording("right")["file"], file);
+  EXPECT_EQ(server.recording("right")["message"], "");
+}
+
+// A limit on the size of files stands for a disk that fills up in the last moment.
+TEST_F(SeveralStreams, AFailureAtTheEndAfterAReloadIsAnErrorAndNoPromise) {
+  const std::string stream = "stream = \"left\"\nsource = \"take:" + (folder_ / "one").string() +
+                             "\"\nrecord = \"" + (folder_ / "left.mcap").string() + "\"\n";
+  write(stream);
+  std::string script = "trap '' XFSZ; exec";
+  for (const std::string& word : command()) script += " '" + word + "'";
+  WebServer server({"/bin/bash", "-c", script});
+  ASSERT_TRUE(server.goes_on("left", 2)) << server.process().err();
+  write(stream + "texture_quality = 50\n");
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  ASSERT_TRUE(server.goes_on("left", 2)) << server.process().err();
+  const rlim_t size = std::max<rlim_t>(fs::file_size(folder_ / "left-2.mcap"), 4096);  // its log is shorter
+  const rlimit no_more{size, size};
+  ASSERT_EQ(prlimit(server.process().pid(), RLIMIT_FSIZE, &no_more, nullptr), 0);
+  server.process().signal(SIGTERM);
+  EXPECT_EQ(server.process().wait(), 1) << server.process().err();
+  EXPECT_EQ(server.process().err().find("tried again"), std::string::npos) << server.process().err();
+  EXPECT_EQ(errors(server.process().err()).size(), 1U) << server.process().err();
 }
 
 // Where one could be read for ever, the thread that takes signals would be the one that waits.
