@@ -42,7 +42,7 @@ cv::Ptr<cv::aruco::CharucoBoard> charuco_of(const Board& board) {
       cv::aruco::getPredefinedDictionary(dictionary_number(board.dictionary).value_or(0)));
 }
 
-constexpr const char* kLength = R"((\d{1,6}\.?\d{0,6}|\.\d{1,6})(mm|cm|m))";
+constexpr const char* kLength = R"((\d{1,6}(?:\.\d{0,6})?|\.\d{1,6})(mm|cm|m))";
 
 double length_m(const std::string& number, const std::string& unit) {
   return std::atof(number.c_str()) * (unit == "mm" ? 0.001 : unit == "cm" ? 0.01 : 1);
