@@ -194,7 +194,7 @@ class Export(unittest.TestCase):
     def test_other_endings_are_refused(self):
         done = subprocess.run([RELIEVO, "export", self.path / "h264.mcap", "--format", "video", "--out",
                                self.path / "a.avi"], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.returncode, 2)
         self.assertIn(".mp4 or .mkv", done.stderr)
 
     def test_animation_shows_one_frame_at_a_time(self):

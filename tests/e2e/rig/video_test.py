@@ -84,7 +84,7 @@ class Video(unittest.TestCase):
         done = run("--out", self.path / "none" / "a.mkv")
         self.assertEqual(done.returncode, 1)
         self.assertIn("cannot be written", done.stderr)
-        self.assertEqual(run("--out", self.path / "a.mkv", "--gray").returncode, 1)
+        self.assertEqual(run("--out", self.path / "a.mkv", "--gray").returncode, 2)
         self.assertEqual(list(self.path.iterdir()), [])
 
     def test_interrupted_leaves_nothing(self):
