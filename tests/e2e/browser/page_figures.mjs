@@ -30,7 +30,7 @@ const kWorkers = ['decoder', 'stage'];
 const kGrowthMB = 2; // a minute, of what is in use after a collection
 
 const browser = await launchChromium(['--js-flags=--expose-gc', '--enable-precise-memory-info']);
-const server = await Server.start(serverPath, ['--source', kSource]);
+const server = await Server.start(serverPath, ['--source', kSource, '--decoder', 'quick']);
 const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
 const ms = (value) => `${value.toFixed(0)} ms`;
 const shownPast = (page, count) =>
