@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/html.h"
 #include "capture/camera_response.h"
 #include "codec/export.h"
 
@@ -53,28 +54,12 @@ std::string format(const char* pattern, Values... values) {
   return out.data();
 }
 
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<') {
-      out += "&lt;";
-    } else if (c == '&') {
-      out += "&amp;";
-    } else if (c == '"') {
-      out += "&quot;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
 std::string file_name(std::uint64_t number, std::string_view stage) {
   return format("%06llu-", static_cast<unsigned long long>(number)) + std::string(stage) + ".png";
 }
 
 std::string row(std::string_view name, const std::string& value) {
-  return "<tr><th>" + escaped(name) + "</th><td>" + value + "</td></tr>\n";
+  return "<tr><th>" + html_escaped(name) + "</th><td>" + value + "</td></tr>\n";
 }
 
 double share(std::size_t part, std::size_t whole) {
@@ -159,8 +144,8 @@ Status EvaluationPictures::add(const CapturedFrame& frame, int slide, const Fram
 Status EvaluationPictures::finish(const std::string& title, const Score& score,
                                   const FilterCounts& filters) const {
   std::string html = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>" +
-                     escaped(title) + "</title><style>" + std::string(kStyle) +
-                     "</style></head><body>\n<h1>" + escaped(title) +
+                     html_escaped(title) + "</title><style>" + std::string(kStyle) +
+                     "</style></head><body>\n<h1>" + html_escaped(title) +
                      "</h1>\n<p>relievo-server evaluate</p>\n" + figures(score);
   html += filter_table(filters, std::max<std::size_t>(1, score.frames)) + "<nav>";
   for (const Page& p : pages_) {
@@ -180,7 +165,7 @@ Status EvaluationPictures::finish(const std::string& title, const Score& score,
     for (const Stage& stage : kStages) {
       const std::string file = file_name(p.number, stage.name);
       html += "<figure><a href=\"" + file + "\"><img loading=\"lazy\" src=\"" + file + "\" alt=\"" +
-              std::string(stage.name) + "\"></a><figcaption>" + escaped(stage.caption) +
+              std::string(stage.name) + "\"></a><figcaption>" + html_escaped(stage.caption) +
               "</figcaption></figure>\n";
     }
     html += "</div>\n";

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/html.h"
 #include "web/gateway/request_target.h"
 
 namespace relievo {
@@ -80,29 +81,6 @@ HttpReply keep_as_cookie(const TokenInTarget& asked, bool tls, std::uint16_t por
   return reply;
 }
 
-std::string html(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 /// What a form sends along, since it puts a query of its own in place of its action's.
 std::string hidden_inputs(std::string_view target) {
   std::string out;
@@ -112,8 +90,8 @@ std::string hidden_inputs(std::string_view target) {
     const auto equals = std::min(one.find('='), one.size());
     const std::string_view value = one.substr(std::min(equals + 1, one.size()));
     if (equals == 0) continue;
-    out += "<input type=\"hidden\" name=\"" + html(percent_decoded(one.substr(0, equals))) + "\" value=\"" +
-           html(percent_decoded(value)) + "\">";
+    out += "<input type=\"hidden\" name=\"" + html_escaped(percent_decoded(one.substr(0, equals))) +
+           "\" value=\"" + html_escaped(percent_decoded(value)) + "\">";
   }
   return out;
 }
