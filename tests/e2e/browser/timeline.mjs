@@ -2,22 +2,30 @@
 // The cursor over the time line, the picture that it shows, and the marks that are drawn on it.
 import { eventually } from './chromium.mjs';
 
+const kAgainMs = 5000; // a picture that a busy machine decodes too late is tried again with the next move
+
 /**
  * Points at the frame of this index, and waits for the picture of it, or of the nearest one before that is
  * kept apart.
  */
 export async function pointAt(page, index) {
-  const place = await page.evaluate((i) => {
-    const { times, first } = window.relievo.diagnostics().playback;
-    const { left, top, width, height } = document.querySelector('#timeline .track').getBoundingClientRect();
-    const inset = 8;
-    const share = (times[i - first] + 1e-3 - times[0]) / (times[times.length - 1] - times[0]);
-    return { x: left + inset + share * (width - 2 * inset) + 0.6, y: top + height / 2 };
-  }, index);
-  await page.mouse.move(place.x - 30, place.y);
-  await page.mouse.move(place.x, place.y);
-  await eventually(`no picture of frame ${index}`, () =>
-    page.evaluate((i) => document.querySelector('.preview canvas')?.dataset.index === String(i), index),
+  let at = -1;
+  let again = 0;
+  const seen = () => page.evaluate(() => ({ ...document.querySelector('.preview canvas')?.dataset }));
+  let last = {};
+  await eventually(
+    () => `no picture of frame ${index} at ${at}, but ${JSON.stringify(last)}`,
+    async () => {
+      const place = await placeOf(page, index); // a live stream's time line grows meanwhile
+      if (Math.abs(place.x - at) > 0.5 || Date.now() > again) {
+        await page.mouse.move(place.x - 30, place.y);
+        await page.mouse.move(place.x, place.y);
+        at = place.x;
+        again = Date.now() + kAgainMs;
+      }
+      last = await seen();
+      return last.index === String(index);
+    },
   );
   return page.evaluate(() => {
     const canvas = document.querySelector('.preview canvas');
@@ -67,3 +75,12 @@ export const marksAt = (page, colour) =>
       return { high, ofColour };
     });
   }, colour);
+
+const placeOf = (page, index) =>
+  page.evaluate((i) => {
+    const { times, first } = window.relievo.diagnostics().playback;
+    const { left, top, width, height } = document.querySelector('#timeline .track').getBoundingClientRect();
+    const inset = 8;
+    const share = (times[i - first] + 1e-3 - times[0]) / (times[times.length - 1] - times[0]);
+    return { x: left + inset + share * (width - 2 * inset) + 0.6, y: top + height / 2 };
+  }, index);

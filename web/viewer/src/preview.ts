@@ -89,16 +89,16 @@ export class Preview {
     const { store, wished } = this;
     if (this.reading || wished === null || store === null) return;
     this.reading = true;
-    const made = await this.read(store, wished).catch(() => ({ bitmap: null, number: -1 })); // damaged: no picture of it
+    const made = await this.read(store, wished).catch(() => null);
     this.reading = false;
     if (store !== this.store) {
-      made.bitmap?.close();
+      made?.bitmap?.close();
     } else {
-      this.kept.set(wished, made);
+      if (made !== null) this.kept.set(wished, made); // else it is damaged, or came too late: the next move tries again
       this.drop();
       if (this.wished === wished) {
         this.wished = null;
-        this.draw(wished, made);
+        this.draw(wished, made ?? { bitmap: null, number: -1 });
       }
     }
     void this.next();
