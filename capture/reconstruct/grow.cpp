@@ -14,9 +14,7 @@ namespace {
 
 constexpr std::array kBeside{-1, 1};  // boundaries
 
-constexpr int kMoves = 4;        // boundaries around that were elsewhere
-constexpr int kCell_px = 4;      // in which motion is told,
-constexpr int kCellsAround = 3;  // and around an edge that moves
+constexpr int kMoves = 4;  // boundaries around that were elsewhere
 
 // Next to a boundary of the line, by the pitch of the lines around or of the line itself.
 constexpr int kPitchLines = 2;
@@ -27,17 +25,9 @@ constexpr float kLinePitch_px = 1.8F;  // and by the line's own
 constexpr float kMostMoved_px = 1.2F;  // farther from where it is expected it is another surface's
 
 // What the frame before and what stands still say.
-constexpr float kStands_px = 0.1F;  // less from one frame to the next, and it stands still,
-constexpr float kSure_px = 0.2F;    // what is less sure of its place is not remembered
-constexpr float kStood_px = 0.3F;   // or, where the field shows it, comes back
-constexpr float kElsewhere = 2.F;   // pitches: it was on what has moved away
-constexpr float kSameLook = 0.12F;  // Backdrop::difference of what is back
-constexpr float kAlike = 0.2F;      // the same, where the step is seen, too
-constexpr float kSameEdge_px = 0.3F;
-constexpr float kRoom_px = 2.F;       // no other edge so near to what comes back
-constexpr float kRestored_px = 0.1F;  // its standard deviation
-constexpr int kStandsLines = 4;       // so far around what comes back it is asked what stands
-constexpr int kLooksEvery = 8;        // lines: it takes time, and what stands still stays
+constexpr float kStood_px = 0.3F;  // less from one frame to the next, and it stands still
+constexpr float kElsewhere = 2.F;  // pitches: it was on what has moved away
+constexpr float kAlike = 0.2F;     // Backdrop::difference of what looks the same where the step is seen, too
 
 // Standard deviations, measured on simulated scenes.
 constexpr float kBetween_px = 0.12F;  // between the lines above and below,
@@ -54,20 +44,6 @@ constexpr unsigned kAbove = 1, kBelow = 2, kLeft = 4, kRight = 8;
 
 bool known(float x) {
   return x == x;
-}
-
-/// The nearest edge, if there is one within kRoom_px.
-std::optional<std::uint32_t> edge_near(const EdgeImage& edges, int line, float column_px) {
-  std::optional<std::uint32_t> out;
-  float nearest = kRoom_px;
-  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-    const float apart = std::fabs(edges.edges[e].column_px - column_px);
-    if (apart > nearest) continue;
-    nearest = apart;
-    out = e;
-  }
-  return out;
 }
 
 }  // namespace
@@ -89,18 +65,16 @@ struct Growth::Neighbours {
 };
 
 Growth::Growth(const std::array<double, 9>& colour_matrix, int boundaries, int lines)
-    : steps_(colour_matrix), backdrop_(boundaries, lines), boundaries_(boundaries), lines_(lines) {
+    : steps_(colour_matrix), uncovered_(boundaries, lines), boundaries_(boundaries), lines_(lines) {
   now_.reset(boundaries, lines, kNoColumn);
   before_ = now_;
 }
 
 void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edges,
                   const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool) {
-  cells_ = width / kCell_px + 1;
-  moving_.resize(static_cast<std::size_t>(lines_ * cells_));
+  moving_.resize(width, lines_);
   tried_.resize(static_cast<std::size_t>(lines_ * boundaries_));
   missed_px_.resize(tried_.size());
-  uncovered_.resize(tried_.size());
   dropped_.resize(tried_.size());
   in_order_.assign(static_cast<std::size_t>(lines_), 0);
   of_lines_.resize(static_cast<std::size_t>(pool.workers()));
@@ -124,13 +98,13 @@ void Growth::fill(int width, const SequenceResult& result, const EdgeImage& edge
   }
   mostly_still_ = 2 * still > decoded;
   measure_pitch();
+  uncovered_.begin(pitch_px_);
 }
 
 void Growth::fill_line(int line, const SequenceResult& result, const EdgeImage& edges, OfLines& out) {
   float* here = now_.line(line);
-  std::uint8_t* moving = moving_.data() + static_cast<std::ptrdiff_t>(line) * cells_;
   std::fill_n(here, boundaries_, kNoColumn);
-  std::fill_n(moving, cells_, std::uint8_t{0});
+  moving_.clear(line);
   std::fill_n(tried_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, std::uint8_t{0});
   std::fill_n(dropped_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, -1);
   std::fill_n(missed_px_.begin() + static_cast<std::ptrdiff_t>(line) * boundaries_, boundaries_, kNoColumn);
@@ -143,11 +117,7 @@ void Growth::fill_line(int line, const SequenceResult& result, const EdgeImage& 
       out.still += result.still[e];
     }
     if (result.doubted[e] >= 0) out.doubted.push_back({line, e});
-    if (result.still[e] != 0) continue;
-    const int cell = static_cast<int>(column) / kCell_px;
-    const int first = std::clamp(cell - kCellsAround, 0, cells_ - 1);
-    const int last = std::clamp(cell + kCellsAround, 0, cells_ - 1);
-    std::fill(moving + first, moving + last + 1, std::uint8_t{1});
+    if (result.still[e] == 0) moving_.add(line, column);
   }
 }
 
@@ -165,81 +135,6 @@ void Growth::measure_pitch() {
     }
   }
   pitch_px_ = count == 0 ? 0 : sum / static_cast<float>(count);
-}
-
-void Growth::remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                           const SequenceResult& result) {
-  const float* before = before_.line(line);
-  for (std::uint32_t e = edges.line_start[static_cast<std::size_t>(line)];
-       e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
-    const int b = result.boundary[e];
-    if (b < 0) continue;
-    const float column = edges.edges[e].column_px;
-    if (edges.edges[e].sigma_px > kSure_px) continue;
-    if (result.still[e] == 0 && !(std::fabs(before[b] - column) < kStands_px)) continue;
-    backdrop_.remember(view, line, b, column);
-  }
-}
-
-/// Whether more boundaries around a place are where they were last seen to stand than a little beside it: a
-/// surface that turns looks the same for a while, and is not where it was.
-bool Growth::stands_around(int line, int boundary, float column_px) const {
-  int stood = 0;
-  int moved = 0;
-  for (int l = std::max(0, line - kStandsLines); l <= std::min(lines_ - 1, line + kStandsLines); ++l) {
-    const float* now = now_.line(l);
-    for (int b = std::max(0, boundary - 1); b <= std::min(boundaries_ - 1, boundary + 1); ++b) {
-      const float was = backdrop_.column_px(l, b);
-      const float since = std::fabs(now[b] - was);
-      if (!(std::fabs(was - column_px) < kElsewhere * pitch_px_ && since < kElsewhere * pitch_px_)) continue;
-      ++(since < kStood_px ? stood : moved);
-    }
-  }
-  return stood >= moved;
-}
-
-/// Of a line, which boundaries are missing and look as they did where they stood: what moved away uncovers
-/// what stood behind it.
-void Growth::find_uncovered(const SlideFieldView& view, int line) {
-  const float* here = now_.line(line);
-  std::uint8_t* uncovered = uncovered_.data() + static_cast<std::ptrdiff_t>(line) * boundaries_;
-  for (int b = 0; b < boundaries_; ++b) {
-    const float column = backdrop_.column_px(line, b);
-    uncovered[b] = !known(here[b]) && known(column) && moves(line, column) &&
-                   backdrop_.difference(view, line, b, column).value_or(1) < kSameLook &&
-                   stands_around(line, b, column);
-  }
-}
-
-/// Puts them back: on an edge of the difference where both fields show it, else where it stood.
-std::size_t Growth::restore_line(int line, const EdgeImage& edges, SequenceResult& result,
-                                 std::vector<RecoveredBoundary>& restored) {
-  float* here = now_.line(line);
-  const std::uint8_t* uncovered = uncovered_.data() + static_cast<std::ptrdiff_t>(line) * boundaries_;
-  std::size_t count = 0;
-  for (int b = 0; b < boundaries_; ++b) {
-    if (uncovered[b] == 0) continue;
-    const float column = backdrop_.column_px(line, b);
-    const std::optional<std::uint32_t> near = edge_near(edges, line, column);
-    if (near && std::fabs(edges.edges[*near].column_px - column) < kSameEdge_px) {
-      if (result.boundary[*near] >= 0) here[result.boundary[*near]] = kNoColumn;
-      result.boundary[*near] = static_cast<std::int16_t>(b);
-      here[b] = edges.edges[*near].column_px;
-    } else if (near && result.boundary[*near] >= 0) {
-      continue;
-    } else {
-      here[b] = column;
-      restored.push_back({line, b, column, kRestored_px, 0});
-    }
-    ++count;
-  }
-  return count;
-}
-
-/// Whether an edge near a place was elsewhere two frames ago.
-bool Growth::moves(int line, float column_px) const {
-  const int cell = static_cast<int>(column_px) / kCell_px;
-  return cell >= 0 && cell < cells_ && moving_[static_cast<std::size_t>(line * cells_ + cell)] != 0;
 }
 
 /// Of a place on a line, for `boundary`, which the line does not have.
@@ -368,7 +263,7 @@ std::optional<Growth::Prediction> Growth::predict_between(int line, int boundary
   const Neighbours near = neighbours(line, boundary, column);
   if (!near.in_order(boundary, column)) return std::nullopt;
   // Where the scene holds still, what is against a boundary is as good as what is for it.
-  if (!both && !moves(line, column)) return std::nullopt;
+  if (!both && !moving_.moves(line, column)) return std::nullopt;
   const float sigma =
       both ? kBetween_px + kLeanShare * std::fabs(places.column_px[1] - places.column_px[0]) : kOneSide_px;
   return Prediction{near.prediction(column, sigma), false};
@@ -383,8 +278,8 @@ bool Growth::fits_before(const SlideFieldView& view, int line, int boundary, con
   if (std::fabs(found.moved_px) > kMostMoved_px) return false;
   const float since = std::fabs(before_.line(line)[boundary] - column);
   const bool stood = since < kStood_px || since > kElsewhere * pitch_px_;
-  if (backdrop_.stands(line, boundary, column)) {
-    const auto difference = backdrop_.difference(view, line, boundary, column);
+  if (backdrop().stands(line, boundary, column)) {
+    const auto difference = backdrop().difference(view, line, boundary, column);
     return difference ? *difference < kAlike : stood;
   }
   if (!beside || stood) return true;
@@ -392,7 +287,7 @@ bool Growth::fits_before(const SlideFieldView& view, int line, int boundary, con
   const float* here = now_.line(line);
   return std::none_of(kBeside.begin(), kBeside.end(), [&](int side) {
     const int next = boundary + side;
-    return next >= 0 && next < boundaries_ && backdrop_.stands(line, next, here[next]);
+    return next >= 0 && next < boundaries_ && backdrop().stands(line, next, here[next]);
   });
 }
 
@@ -437,7 +332,7 @@ Growth::Confirmed Growth::confirm(const SlideFieldView& view, const Doubted& dou
   const int b = result.doubted[e];
   const float here = now_.line(line)[b];
   const float column = edges.edges[e].column_px;
-  if (result.boundary[e] >= 0 || known(here) || !moves(line, column)) return Confirmed::kNo;
+  if (result.boundary[e] >= 0 || known(here) || !moving_.moves(line, column)) return Confirmed::kNo;
   const Neighbours near = neighbours(line, b, column);
   if (!near.in_order(b, column)) return Confirmed::kNo;
   const auto found = steps_.find(view, line, b, near.prediction(column, kDoubted_px));
@@ -494,15 +389,13 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Wor
   fill(view.field.width, result, edges, recovered, pool);
   const int lines = std::min(lines_, view.field.height);
   pool.for_shares(edges.line_start, [&](int begin, int end, int) {
-    for (int line = begin; line < std::min(end, lines); ++line) find_uncovered(view, line);
+    for (int line = begin; line < std::min(end, lines); ++line) uncovered_.find(view, line, now_, moving_);
   });
   pool.for_shares(edges.line_start, [&](int begin, int end, int worker) {
     OfLines& of = of_lines_[static_cast<std::size_t>(worker)];
     for (int line = begin; line < std::min(end, lines); ++line) {
-      // Under one slide, then under the other; all lines at first.
-      if (frame_ < 2 * kLooksEvery || line % kLooksEvery == frame_ / 2 % kLooksEvery)
-        remember_line(view, line, edges, result);
-      of.added += restore_line(line, edges, result, of.restored);
+      uncovered_.remember(view, line, edges, result, before_);
+      of.added += uncovered_.restore(line, edges, now_, result, of.restored);
       drop_line(view, line, edges, result);
       in_order_[static_cast<std::size_t>(line)] = is_in_order(line) ? 1 : 0;
     }
@@ -523,7 +416,6 @@ std::size_t Growth::grow(const SlideFieldView& view, const EdgeImage& edges, Wor
   for (int line = 0; line < lines; ++line) added += grow_line(view, line, edges, result, recovered);
   for (int line = lines - 1; line >= 0; --line) added += grow_line(view, line, edges, result, recovered);
   std::swap(now_, before_);
-  ++frame_;
   return added;
 }
 

@@ -13,13 +13,14 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "capture/reconstruct/backdrop.h"
 #include "capture/reconstruct/column_grid.h"
 #include "capture/reconstruct/edges.h"
 #include "capture/reconstruct/field_step.h"
+#include "capture/reconstruct/moving_cells.h"
 #include "capture/reconstruct/recover.h"
 #include "capture/reconstruct/sequence.h"
 #include "capture/reconstruct/slide_field.h"
+#include "capture/reconstruct/uncovered.h"
 
 namespace relievo {
 
@@ -36,7 +37,7 @@ class Growth {
                    SequenceResult& result, std::vector<RecoveredBoundary>& recovered);
 
   /// What stands still, as far as frames told that so far.
-  const Backdrop& backdrop() const { return backdrop_; }
+  const Backdrop& backdrop() const { return uncovered_.backdrop(); }
 
  private:
   struct Prediction : StepPrediction {
@@ -65,14 +66,7 @@ class Growth {
             const std::vector<RecoveredBoundary>& recovered, WorkerPool& pool);
   void fill_line(int line, const SequenceResult& result, const EdgeImage& edges, OfLines& out);
   void measure_pitch();
-  void remember_line(const SlideFieldView& view, int line, const EdgeImage& edges,
-                     const SequenceResult& result);
-  bool stands_around(int line, int boundary, float column_px) const;
-  void find_uncovered(const SlideFieldView& view, int line);
-  std::size_t restore_line(int line, const EdgeImage& edges, SequenceResult& result,
-                           std::vector<RecoveredBoundary>& restored);
   void drop_line(const SlideFieldView& view, int line, const EdgeImage& edges, SequenceResult& result);
-  bool moves(int line, float column_px) const;
   Neighbours neighbours(int line, int boundary, float column_px);
   std::array<int, 2> known_beside(int line, int boundary);
   bool is_in_order(int line);
@@ -91,20 +85,17 @@ class Growth {
                         std::vector<RecoveredBoundary>& recovered);
 
   StepFinder steps_;
-  Backdrop backdrop_;
+  Uncovered uncovered_;
   int boundaries_, lines_;
-  bool mostly_still_ = false;         // the scene, but for what moves in it
-  float pitch_px_ = 0;                // from one boundary to the next, on average
-  int frame_ = 0;                     // counts
-  int cells_ = 0;                     // of a line
-  std::vector<std::uint8_t> moving_;  // [line][cell]: something moves near
-  std::vector<std::uint8_t> tried_;   // [line][boundary]: what told its place when it was not found there
-  std::vector<float> missed_px_;  // [line][boundary]: beside a boundary of its line it was not found there
-  std::vector<std::int32_t> dropped_;    // [line][boundary]: the edge whose boundary was given up, or -1
-  std::vector<std::uint8_t> in_order_;   // lines whose boundaries are
-  std::vector<std::uint8_t> uncovered_;  // [line][boundary]: find_uncovered()
-  std::vector<Doubted> doubted_;         // that may still be confirmed
-  std::vector<OfLines> of_lines_;        // [worker]
+  bool mostly_still_ = false;  // the scene, but for what moves in it
+  float pitch_px_ = 0;         // from one boundary to the next, on average
+  MovingCells moving_;
+  std::vector<std::uint8_t> tried_;  // [line][boundary]: what told its place when it was not found there
+  std::vector<float> missed_px_;     // [line][boundary]: beside a boundary of its line it was not found there
+  std::vector<std::int32_t> dropped_;   // [line][boundary]: the edge whose boundary was given up, or -1
+  std::vector<std::uint8_t> in_order_;  // lines whose boundaries are
+  std::vector<Doubted> doubted_;        // that may still be confirmed
+  std::vector<OfLines> of_lines_;       // [worker]
   ColumnGrid now_, before_;
 };
 
