@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The built viewer, embedded in the program: the only files the gateway serves, so no path leads elsewhere.
+// The built viewer, embedded in the program: the only files the gateway serves, so no path leads elsewhere;
+// and texts of its own.
 #pragma once
 
 #include <span>
@@ -19,5 +20,8 @@ std::span<const Asset> assets();
 
 /// /api/openapi.json.
 std::string_view openapi_document();
+
+/// The style of the page that asks for a token, which has it in itself: the viewer's files need a token.
+std::string_view sign_in_style();
 
 }  // namespace relievo

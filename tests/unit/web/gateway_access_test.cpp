@@ -157,6 +157,31 @@ TEST_F(GatewayTokens, TheFormLeadsToWhatWasAskedFor) {
   }
 }
 
+TEST_F(GatewayTokens, WhoSendsOneThatIsNotKnownIsToldSo) {
+  const std::string told = "not known";
+  const std::string kept = "Cookie: relievo_token_" + std::to_string(port) + "=made-yesterday-or-so\r\n";
+  EXPECT_EQ(request(port, "GET", "/").body.find(told), std::string::npos);
+  EXPECT_EQ(request(port, "GET", "/?token=").body.find(told), std::string::npos);
+  for (const auto& [target, headers] : {std::pair<std::string, std::string>("/?token=wrong", ""),
+                                        {"/rig?stream=face&token=wrong", ""},
+                                        {"/", kept},
+                                        {"/api/streams?token=wrong", ""},
+                                        {"/api/streams", bearer("wrong")}}) {
+    const auto response = request(port, "GET", target, headers);
+    EXPECT_EQ(response.status, 401) << target;
+    EXPECT_NE(response.body.find(told), std::string::npos) << target << headers << response.body;
+  }
+}
+
+TEST_F(GatewayTokens, SpacesPastedWithOneAreNoneOfIt) {
+  for (const std::string around : {"+", "%20", "%0A"}) {
+    auto sent = request(port, "GET", "/?token=" + around + kToken + around);
+    EXPECT_EQ(sent.status, 303) << around;
+    EXPECT_NE(sent.headers["set-cookie"].find("=" + kToken + ";"), std::string::npos) << around;
+  }
+  EXPECT_EQ(request(port, "GET", "/?token=correct-horse+-battery").status, 401);
+}
+
 TEST_F(GatewayTokens, ANewFileCountsAndABrokenOneDoesNot) {
   const auto status = [&](const std::string& token) {
     return request(port, "GET", "/api/streams", bearer(token)).status;

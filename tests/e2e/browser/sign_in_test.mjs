@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves, in headless Chromium: who has no token is asked for it by a page that looks like the viewer, light and dark, on
+// a phone too; a wrong one is said to be wrong, without being shown or kept; a right one leads to what was asked for.
+// Run as: in_own_domain node sign_in_test.mjs RELIEVO_SERVER [FOLDER for screenshots], in web/viewer. Exit 77: no Chromium
+// here.
+import assert from 'node:assert/strict';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { kPatienceMs, launchChromium } from './chromium.mjs';
+import { runChecks, shownPast } from './feeder.mjs';
+import { Server } from './server.mjs';
+
+const [serverPath, shots] = process.argv.slice(2);
+const kToken = 'a-token-for-this-test';
+const kWrong = 'a-token-that-is-none-here';
+
+const scratch = mkdtempSync(join(tmpdir(), 'relievo-sign-in-'));
+const tokens = join(scratch, 'tokens');
+writeFileSync(tokens, `${kToken}\n`, { mode: 0o600 });
+const server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=5', '--stream', 'object', '--token-file', tokens]);
+const browser = await launchChromium();
+const page = await browser.newPage({ viewport: { width: 1000, height: 640 } });
+page.setDefaultTimeout(kPatienceMs);
+const complaints = [];
+page.on('console', (message) => complaints.push(message.text()));
+
+const kWays = {
+  light: { colorScheme: 'light', width: 1000 },
+  dark: { colorScheme: 'dark', width: 1000 },
+  'light phone': { colorScheme: 'light', width: 360 },
+  'dark phone': { colorScheme: 'dark', width: 360 },
+};
+const screenshot = (name) => shots && page.screenshot({ path: join(shots, `${name.replaceAll(' ', '-')}.png`) });
+
+/** The contrast of an element's letters with what is behind them (WCAG 2). */
+const contrastOf = (selector) =>
+  page.evaluate((of) => {
+    const rgb = (text) => text.match(/[\d.]+/g).map(Number);
+    const luminance = (c) => [0.2126, 0.7152, 0.0722].reduce((sum, w, i) => sum + w * (c[i] / 255 <= 0.04045 ? c[i] / 255 / 12.92 : ((c[i] / 255 + 0.055) / 1.055) ** 2.4), 0);
+    const element = document.querySelector(of);
+    let behind = element;
+    while (rgb(getComputedStyle(behind).backgroundColor)[3] === 0) behind = behind.parentElement;
+    const [a, b] = [getComputedStyle(element).color, getComputedStyle(behind).backgroundColor].map((c) => luminance(rgb(c)));
+    return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+  }, selector);
+
+const checks = {};
+for (const [name, { colorScheme, width }] of Object.entries(kWays)) {
+  checks[`${name}: it asks, and says that a wrong token is not known`] = async () => {
+    await page.emulateMedia({ colorScheme });
+    await page.setViewportSize({ width, height: 640 });
+    await page.goto(server.address);
+    const field = page.getByLabel('Token');
+    const isFocused = () => field.evaluate((e) => document.activeElement === e);
+    assert.equal(await page.locator('[role=alert]').count(), 0);
+    assert.ok(await isFocused());
+    await screenshot(name);
+    await field.fill(kWrong);
+    const [response] = await Promise.all([page.waitForNavigation(), page.keyboard.press('Enter')]);
+    assert.equal(response.status(), 401);
+    assert.match(await page.textContent('[role=alert]'), /^This token is not known/);
+    assert.ok(!(await page.content()).includes(kWrong), 'what was typed is in the page');
+    assert.deepEqual(await page.context().cookies(), []);
+    assert.ok(await isFocused());
+    assert.equal(await field.getAttribute('aria-invalid'), 'true');
+    await screenshot(`${name} wrong`);
+    for (const of of ['h1', 'main > p', '[role=alert]', 'label', 'input', 'button']) {
+      const contrast = await contrastOf(of);
+      assert.ok(contrast >= 4.5, `${of}: ${contrast.toFixed(2)}`);
+    }
+    const { field_px, page_px } = await page.evaluate(() => {
+      const { width: across, height: high } = document.querySelector('input').getBoundingClientRect();
+      return { field_px: [across, high], page_px: document.documentElement.scrollWidth };
+    });
+    assert.ok(page_px <= width, `the page is ${page_px} px wide`);
+    assert.ok(field_px[0] > 200 && field_px[1] >= 36, `the field is ${field_px.join(' x ')} px`);
+  };
+}
+
+checks['its ground is the viewer\'s'] = async () => {
+  for (const [colorScheme, ground] of [['light', 'rgb(223, 228, 234)'], ['dark', 'rgb(12, 15, 19)']]) {
+    await page.emulateMedia({ colorScheme });
+    assert.equal(await page.evaluate(() => getComputedStyle(document.body).backgroundColor), ground);
+  }
+};
+
+checks['a right one leads to what was asked for'] = async () => {
+  await page.goto(`${server.address}/?stream=object&token=${kWrong}`);
+  await page.getByLabel('Token').fill(`${kToken} `);
+  await page.getByRole('button', { name: 'Watch' }).click();
+  await shownPast(page, 1);
+  assert.equal(page.url(), `${server.address}/?stream=object`);
+};
+
+checks['one that was kept, and is not known any more, is asked for anew'] = async () => {
+  writeFileSync(tokens, 'another-token-for-this-test\n');
+  await page.reload();
+  assert.match(await page.textContent('[role=alert]'), /kept is not known here any more/);
+};
+
+checks['nothing that the page has is refused'] = async () => {
+  assert.deepEqual(complaints.filter((text) => /Security Policy|Refused|error/i.test(text) && !/status of 401/.test(text)), []);
+};
+
+let failed = 1;
+try {
+  failed = await runChecks(checks, page);
+} finally {
+  await browser.close();
+  await server.kill();
+  rmSync(scratch, { recursive: true, force: true });
+}
+process.exit(failed === 0 ? 0 : 1);
