@@ -54,6 +54,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   void on_bad_request(ErrorCode error);
   void on_request();
   void upgrade(const HttpReply& granted);
+  void answer(HttpReply content, bool head, unsigned version, bool keep_alive);
   void reply(HttpReply content, bool head, unsigned version, bool keep_alive);
   void send_file(std::uint64_t offset, bool keep_alive);
   void send_part(std::uint64_t offset, std::size_t n, bool keep_alive);
@@ -182,7 +183,19 @@ void HttpSession::on_request() {
   ++host_.counts().requests;
   if (content.websocket) return upgrade(content);
   const bool may_go_on = content.refusal != Refusal::kRate;
-  reply(std::move(content), method == "HEAD", request.version(), may_go_on && request.keep_alive());
+  answer(std::move(content), method == "HEAD", request.version(), may_go_on && request.keep_alive());
+}
+
+void HttpSession::answer(HttpReply content, bool head, unsigned version, bool keep_alive) {
+  if (!content.from_disk) return reply(std::move(content), head, version, keep_alive);
+  const auto made = std::make_shared<HttpReply>();
+  host_.from_disk(
+      [self = shared_from_this(), make = std::move(content.from_disk), made] { *made = make(); },
+      [self = shared_from_this(), made, headers = std::move(content.headers), head, version, keep_alive] {
+        if (self->finished_) return;
+        made->headers.insert(made->headers.end(), headers.begin(), headers.end());
+        self->reply(std::move(*made), head, version, keep_alive);
+      });
 }
 
 void HttpSession::upgrade(const HttpReply& granted) {

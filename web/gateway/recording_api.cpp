@@ -2,11 +2,15 @@
 #include "web/gateway/recording_api.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include "codec/mcap_records.h"
 
 namespace relievo {
 namespace {
@@ -64,8 +68,9 @@ HttpReply order_recording(std::string_view stream, const HttpRequest& request, R
   return done ? state_of(name, *control) : text_reply(409, done.error().message);
 }
 
-HttpReply list_recordings(const RecordingControl* control) {
-  if (control == nullptr) return no_folder();
+namespace {
+
+HttpReply list(const RecordingControl& control) {
   struct Found {
     std::int64_t modified_ns;
     std::string name;
@@ -74,15 +79,16 @@ HttpReply list_recordings(const RecordingControl* control) {
   };
   std::vector<Found> found;
   std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(control->folder(), error)) {
+  for (fs::directory_iterator at(control.folder(), error), end; at != end; at.increment(error)) {
+    const fs::directory_entry& entry = *at;
     const std::string name = entry.path().filename().string();
-    if (entry.symlink_status(error).type() != fs::file_type::regular || !recording_file(name, *control))
+    if (entry.symlink_status(error).type() != fs::file_type::regular || !recording_file(name, control))
       continue;
     // Asked before the file is: what is finished in between has its whole size.
-    const bool recording = control->is_open(name);
+    const bool recording = control.is_open(name);
     std::uint64_t bytes = entry.file_size(error);
     if (recording) {
-      const auto growing = control->growing(name);
+      const auto growing = control.growing(name);
       const std::uint64_t whole = growing ? growing->bytes() : 0;
       if (whole == 0) continue;  // there is nothing to see yet
       bytes = whole + growing->end_at(whole)->size();
@@ -96,9 +102,29 @@ HttpReply list_recordings(const RecordingControl* control) {
   if (found.size() > kMostListed) found.resize(kMostListed);
   Json list = Json::array();
   for (const Found& f : found)
-    list.push_back(
-        {{"file", f.name}, {"bytes", f.bytes}, {"modified_ns", f.modified_ns}, {"recording", f.recording}});
+    list.push_back({{"file", f.name},
+                    {"bytes", f.bytes},
+                    {"modified_ns", f.modified_ns},
+                    {"recording", f.recording},
+                    {"cut", !f.recording && !has_end(control.folder() / f.name)}});
   return json({{"recordings", std::move(list)}});
+}
+
+}  // namespace
+
+HttpReply list_recordings(const RecordingControl* control) {
+  if (control == nullptr) return no_folder();
+  return reply_from_disk([control] { return list(*control); });
+}
+
+bool has_end(const fs::path& file) {
+  std::array<char, mcap::kMagic.size()> end{};
+  std::ifstream in(file, std::ios::binary);
+  // At least one more before it, which the file begins with.
+  return in.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end) && in.tellg() > 0 &&
+         in.read(end.data(), end.size()) &&
+         std::equal(end.begin(), end.end(), mcap::kMagic.begin(),
+                    [](char c, std::uint8_t magic) { return static_cast<std::uint8_t>(c) == magic; });
 }
 
 std::optional<fs::path> recording_file(const std::string& name, const RecordingControl& control) {

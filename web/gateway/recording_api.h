@@ -22,6 +22,10 @@ HttpReply order_recording(std::string_view stream, const HttpRequest& request, R
 /// GET: the files, the newest first, a thousand of them at most; of one that is being written, what is whole.
 HttpReply list_recordings(const RecordingControl* control);
 
+/// Whether an MCAP file ends as its writer ends it: else it was cut short, or is being written. May wait for
+/// the disk.
+bool has_end(const std::filesystem::path& file);
+
 /// The file of that name in the folder, which may not be there; nothing where no recording has such a name.
 std::optional<std::filesystem::path> recording_file(const std::string& name, const RecordingControl& control);
 

@@ -13,7 +13,7 @@
 
 namespace relievo {
 
-/// Called on the gateway's thread, so that every function must return at once.
+/// Called on the gateway's thread, so that every function must return at once; what is const on others, too.
 class RecordingControl {
  public:
   virtual ~RecordingControl() = default;

@@ -101,22 +101,25 @@ std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) c
   return n > 0 ? static_cast<std::size_t>(n) : 0;
 }
 
-HttpReply recording_reply(std::string_view name, const HttpRequest& request, const RouteContext& context) {
-  if (!name.ends_with(kSuffix)) return text_reply(404, "no recording has such a name");
-  auto recording = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
-  int follow = 0;
-  if (!recording && context.recordings != nullptr) {
-    recording = recording_of_folder(std::string(name), *context.recordings);
-    follow = O_NOFOLLOW;  // what somebody links to from there is none of ours
-  }
-  if (!recording) return text_reply(404, "there is no such recording");
-  const int descriptor = open(recording->file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
+namespace {
+
+/// What a request says of a recording, and what holds for it.
+struct Asked {
+  OfferedRecording recording;
+  bool of_folder = false;
+  bool needs_token = false;
+  std::string range, if_range, if_none_match;
+};
+
+HttpReply reply_to(const Asked& asked) {
+  const int follow = asked.of_folder ? O_NOFOLLOW : 0;  // what somebody links to from there is none of ours
+  const int descriptor = open(asked.recording.file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
   struct stat status {};
   if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     if (descriptor >= 0) close(descriptor);
     return text_reply(404, "the recording is gone");
   }
-  const auto version = version_of(*recording, status, request.if_range);
+  const auto version = version_of(asked.recording, status, asked.if_range);
   if (!version) {
     close(descriptor);
     return text_reply(404, "the recording has only just begun: ask again in a second");
@@ -127,13 +130,14 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
   reply.content_type = "application/octet-stream";
   ByteRange range{0, size};
   RangeKind kind = RangeKind::kWhole;
-  if (request.if_range.empty() || request.if_range == etag) kind = parse_range(request.range, size, range);
+  if (asked.if_range.empty() || asked.if_range == etag) kind = parse_range(asked.range, size, range);
   const std::string of = "/" + std::to_string(size);
-  const bool finished = version->finished && kind != RangeKind::kUnsatisfiable;
+  const bool finished = version->finished && kind != RangeKind::kUnsatisfiable &&
+                        (!asked.of_folder || has_end(asked.recording.file));
   reply.headers = {{"Accept-Ranges", "bytes"},
-                   {"Cache-Control", std::string(cache_control(finished, context.tokens.needed()))},
+                   {"Cache-Control", std::string(cache_control(finished, asked.needs_token))},
                    {"ETag", etag}};
-  if (request.if_none_match == etag || kind == RangeKind::kUnsatisfiable) {
+  if (asked.if_none_match == etag || kind == RangeKind::kUnsatisfiable) {
     close(descriptor);
     reply.status = kind == RangeKind::kUnsatisfiable ? 416 : 304;
     if (reply.status == 416) reply.headers.emplace_back("Content-Range", "bytes *" + of);
@@ -146,6 +150,23 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
   }
   reply.file = std::make_shared<const FilePart>(descriptor, version->whole, range);
   return reply;
+}
+
+}  // namespace
+
+HttpReply recording_reply(std::string_view name, const HttpRequest& request, const RouteContext& context) {
+  if (!name.ends_with(kSuffix)) return text_reply(404, "no recording has such a name");
+  auto recording = context.hub.recording_of(std::string(name.substr(0, name.size() - kSuffix.size())));
+  const bool of_folder = !recording && context.recordings != nullptr;
+  if (of_folder) recording = recording_of_folder(std::string(name), *context.recordings);
+  if (!recording) return text_reply(404, "there is no such recording");
+  return reply_from_disk(
+      [asked = Asked{.recording = *std::move(recording),
+                     .of_folder = of_folder,
+                     .needs_token = context.tokens.needed(),
+                     .range = std::string(request.range),
+                     .if_range = std::string(request.if_range),
+                     .if_none_match = std::string(request.if_none_match)}] { return reply_to(asked); });
 }
 
 }  // namespace relievo

@@ -30,6 +30,12 @@ HttpReply json_reply(std::string body) {
   return reply;
 }
 
+HttpReply reply_from_disk(std::function<HttpReply()> make) {
+  HttpReply reply;
+  reply.from_disk = std::move(make);
+  return reply;
+}
+
 bool is_json(const HttpRequest& request) {
   std::string type(request.content_type.substr(0, request.content_type.find(';')));
   while (!type.empty() && type.back() == ' ') type.pop_back();

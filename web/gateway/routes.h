@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -51,6 +52,9 @@ struct HttpReply {
   std::string body;
   std::string_view fixed_body;           // instead of `body`: bytes that live as long as the program
   std::shared_ptr<const FilePart> file;  // instead of both
+  // Makes the reply instead of all that is above, on a thread that may wait for a disk; not called where
+  // empty.
+  std::function<HttpReply()> from_disk;
   std::vector<std::pair<std::string, std::string>> headers;  // in place of, or beside, those of every reply
   std::optional<WsTarget> websocket;                         // no reply: upgrade
   std::optional<Refusal> refusal;                            // to be counted
@@ -61,6 +65,9 @@ struct HttpReply {
 /// A line of text, or a document, that nobody is to keep.
 HttpReply text_reply(int status, std::string line);
 HttpReply json_reply(std::string body);
+
+/// What `make` says: any thread, which may wait for a disk.
+HttpReply reply_from_disk(std::function<HttpReply()> make);
 
 /// "application/json; charset=utf-8" too. Pages of other sites cannot send it without being asked about.
 bool is_json(const HttpRequest& request);

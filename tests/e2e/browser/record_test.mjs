@@ -6,7 +6,7 @@
 // Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdirSync, mkdtempSync, readdirSync, rmSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -172,6 +172,27 @@ const checks = {
     await other.close();
   },
 
+  async 'one that a crash cut short is listed so, and plays as far as it is whole'() {
+    const [whole] = readdirSync(folder);
+    const bytes = readFileSync(join(folder, whole));
+    writeFileSync(join(folder, 'cut.mcap'), bytes.subarray(0, Math.floor(bytes.length * 0.7)));
+    const { frames } = JSON.parse(execFileSync(relievoPath, ['info', '--json', join(folder, 'cut.mcap')], { encoding: 'utf8', stdio: 'pipe' }));
+    const page = await openRecording();
+    await page.click('#tool-streams');
+    const about = (file) => page.textContent(`#panel-streams li:has-text("${file}") small`);
+    await page.waitForSelector('#panel-streams li:has-text("cut.mcap") canvas[data-drawn]');
+    assert.match(await about('cut.mcap'), / MB · cut short$/);
+    assert.match(await about(whole), / MB$/);
+    await page.click('#panel-streams li:has-text("cut.mcap") button:has-text("Show")');
+    await inState(page, 'file');
+    await shownPast(page, 1);
+    const { times } = await playback(page);
+    assert.ok(frames > 0 && times.length === frames, `${times.length} of ${frames} frames`);
+    assert.equal((await look(page)).errors, 0);
+    await page.close();
+    rmSync(join(folder, 'cut.mcap'));
+  },
+
   async 'the button follows what somebody else records'() {
     const page = await openRecording();
     await shownPast(page, 2);
@@ -201,6 +222,7 @@ const checks = {
       return file !== undefined;
     });
     await page.click('#tool-streams');
+    await page.waitForSelector(`#panel-streams li:has-text("${file}") small:has-text("being recorded")`);
     await page.click(`#panel-streams li:has-text("${file}") button:has-text("Show")`);
     await inState(page, 'file');
     const opened = await playback(page);

@@ -199,6 +199,32 @@ TEST_F(RecordingOnRequest, IsWholeWhereTheServerIsStopped) {
   EXPECT_GE(frames_in(out_ / name).size(), 10U);
 }
 
+TEST_F(RecordingOnRequest, WhatAKilledServerLeftIsListedAsCutUntilItIsMended) {
+  std::string name;
+  {
+    WebServer server(command());
+    ASSERT_TRUE(server.goes_on("take", 5)) << server.process().err();
+    ASSERT_EQ(server.order("take", "start").status, 200);
+    ASSERT_TRUE(eventually([&] {
+      name = server.recording("take")["file"];
+      return server.recording("take")["whole_bytes"] > 0 && listed(server, name)["recording"] == true;
+    }));
+    EXPECT_EQ(listed(server, name)["cut"], false);
+    server.process().signal(SIGKILL);
+    EXPECT_EQ(server.process().wait(), 128 + SIGKILL);
+  }
+  WebServer server(command());
+  ASSERT_NE(server.port(), 0) << server.process().err();
+  EXPECT_EQ(listed(server, name)["cut"], true);
+  const Response got = request(server.port(), "GET", "/recordings/" + name);
+  EXPECT_EQ(got.status, 200);
+  EXPECT_EQ(got.headers.at("cache-control"), "no-cache");
+  const Finished mended = run({program("relievo"), "recover", out_ / name, "--out", out_ / "mended.mcap"});
+  EXPECT_EQ(mended.status, 0) << mended.err;
+  EXPECT_EQ(listed(server, "mended.mcap")["cut"], false);
+  EXPECT_FALSE(frames_in(out_ / "mended.mcap").empty());
+}
+
 TEST_F(RecordingOnRequest, OntoAFullDiskFailsAloneAndLiveGoesOn) {
   // A limit on the size of files stands for a full disk: 64 KiB hold a few frames.
   std::string script = "trap '' XFSZ; ulimit -f 64; exec";

@@ -24,19 +24,21 @@ constexpr const char* kFace = "/api/recording/face";
 constexpr const char* kStart = R"({"action":"start"})";
 constexpr const char* kStop = R"({"action":"stop"})";
 
-/// Who records: a stream that is called face is all there is, and its file holds one chunk at once.
+/// Who records: a stream that is called face is all there is, and its file holds one chunk at once. Any
+/// thread.
 class OneStream final : public RecordingControl {
  public:
   explicit OneStream(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   std::optional<RecordingState> state(const std::string& stream) const override {
     if (stream != "face") return std::nullopt;
-    RecordingState state = state_;
     const std::lock_guard lock(mutex_);
+    RecordingState state = state_;
     state.whole_bytes = growing_ ? growing_->bytes() : 0;
     return state;
   }
   Status start(const std::string&) override {
+    const std::lock_guard lock(mutex_);
     if (state_.activity == RecordingActivity::kRecording) return Error{"is recorded already"};
     state_ = {.activity = RecordingActivity::kRecording,
               .file = "face-1.mcap",
@@ -60,9 +62,9 @@ class OneStream final : public RecordingControl {
     return writer_->flush_if_due(messages_);
   }
   Status stop(const std::string&) override {
+    const std::lock_guard lock(mutex_);
     if (state_.activity != RecordingActivity::kRecording) return Error{"is not recorded"};
     state_.activity = RecordingActivity::kOff;
-    const std::lock_guard lock(mutex_);
     return writer_->finish();
   }
   /// As if nothing of it were on the disk.
@@ -72,8 +74,12 @@ class OneStream final : public RecordingControl {
   }
   std::filesystem::path folder() const override { return folder_; }
   /// As if its writer ended it at the very moment at which it is asked for next.
-  void ends_when_asked() { ends_when_asked_ = true; }
+  void ends_when_asked() {
+    const std::lock_guard lock(mutex_);
+    ends_when_asked_ = true;
+  }
   bool is_open(const std::string& file) const override {
+    const std::lock_guard lock(mutex_);
     if (std::exchange(ends_when_asked_, false)) {
       EXPECT_TRUE(const_cast<OneStream*>(this)->stop("face"));
     }
@@ -86,9 +92,9 @@ class OneStream final : public RecordingControl {
 
  private:
   const std::filesystem::path folder_;
-  RecordingState state_;  // of the gateway's thread
+  mutable std::recursive_mutex mutex_;  // of what follows
+  RecordingState state_;
   mutable bool ends_when_asked_ = false;
-  mutable std::mutex mutex_;  // of what follows
   std::unique_ptr<RecordingWriter> writer_;
   std::shared_ptr<const GrowingRecording> growing_;
   std::uint32_t messages_ = 0;
@@ -205,6 +211,33 @@ TEST_F(RecordingApi, WhatIsFinishedWhileItIsListedHasItsWholeSize) {
   EXPECT_EQ(one["recording"], false);
   EXPECT_EQ(one["bytes"], std::filesystem::file_size(folder / "face-1.mcap"));
   EXPECT_EQ(one["bytes"], get().body.size());
+}
+
+TEST_F(RecordingApi, WhatACrashCutShortIsListedSoAndNoCacheKeepsIt) {
+  const auto cut = [&](const std::string& file) {
+    const Json all = list();
+    for (const Json& one : all["recordings"])
+      if (one["file"] == file) return one["cut"];
+    return Json();
+  };
+  const auto kept = [&](const std::string& file) {
+    return request(port, "GET", "/recordings/" + file).headers.at("cache-control");
+  };
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  EXPECT_EQ(cut("face-1.mcap"), false) << "it is being written";
+  ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
+  const std::string content = content_of(folder / "face-1.mcap");
+  EXPECT_EQ(cut("face-1.mcap"), false);
+  EXPECT_EQ(kept("face-1.mcap"), "max-age=0, s-maxage=300");
+  for (const std::size_t bytes : {std::size_t{0}, std::size_t{8}, content.size() / 2, content.size() - 1}) {
+    std::ofstream(folder / "cut.mcap", std::ios::binary) << content.substr(0, bytes);
+    EXPECT_EQ(cut("cut.mcap"), true) << bytes;
+    EXPECT_EQ(kept("cut.mcap"), "no-cache") << bytes;
+    EXPECT_EQ(request(port, "GET", "/recordings/cut.mcap").body, content.substr(0, bytes));
+  }
+  std::ofstream(folder / "cut.mcap", std::ios::binary) << content;
+  EXPECT_EQ(cut("cut.mcap"), false) << "mended";
+  EXPECT_EQ(kept("cut.mcap"), "max-age=0, s-maxage=300");
 }
 
 // Where the chunks end in a recording that has its index: the index, and what says that the data ends, is

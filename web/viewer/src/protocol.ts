@@ -128,6 +128,14 @@ export function offeredRungs(status: StreamStatus | null): Rung[] {
   return kRungs.filter((rung) => rung === 'full' || (status?.rungs ?? []).some(({ quality }) => quality === rung));
 }
 
+/** A file of the server's folder, in /api/recordings. */
+export interface ListedRecording {
+  file: string;
+  bytes: number;
+  recording: boolean; // it grows
+  cut: boolean; // it has no end
+}
+
 export interface ListedStream {
   name: string;
   source: string;

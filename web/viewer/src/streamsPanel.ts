@@ -4,7 +4,7 @@
 import { Aligner, type Aligning } from './aligner';
 import { button, chooser, make, setText } from './dom';
 import { kPlacements, type Placement } from './placement';
-import type { ListedStream } from './protocol';
+import type { ListedRecording, ListedStream } from './protocol';
 import { text } from './strings';
 import { kThumbnail, Thumbnails } from './thumbnails';
 import type { View } from './view';
@@ -145,13 +145,15 @@ export class StreamsPanel {
   private async listFolder(): Promise<void> {
     const response = await fetch(new URL('api/recordings', document.baseURI), { cache: 'no-store' }).catch(() => null);
     if (response?.ok !== true) return;
-    const { recordings } = (await response.json()) as { recordings: { file: string; bytes: number }[] };
+    const { recordings } = (await response.json()) as { recordings: ListedRecording[] };
     this.folderTitle.hidden = recordings.length === 0;
     this.folder.replaceChildren();
     this.recordings.clear();
-    for (const { file, bytes } of recordings) {
+    for (const { file, bytes, recording, cut } of recordings) {
       const row = makeRow(file, () => this.events.recording(file));
-      setText(row.about, `${(bytes / 1e6).toFixed(1)} MB`);
+      const state = recording ? say.beingRecorded : cut ? say.cut : '';
+      setText(row.about, say.withWord(`${(bytes / 1e6).toFixed(1)} MB`, state));
+      if (state === say.cut) row.about.title = say.cutTitle;
       this.folder.append(row.item);
       this.recordings.set(file, row);
       this.thumbnails.ask({ name: file, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
