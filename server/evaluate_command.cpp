@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
 #include "base/log.h"
 #include "base/time.h"
@@ -110,6 +111,36 @@ Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, 
   return judges.judge(frame, truths.slide, at(truths.now, 0), completed ? &*completed : nullptr);
 }
 
+/// What was projected follows from the time stamp, independently of the decoder, so that what that takes for
+/// something else counts as missing. `lead`: frames by which the projector was ahead of the take's first one.
+Exposure shown_in(const CapturedFrame& frame, const SourceInfo& info, std::uint64_t lead) {
+  const long place = std::max(0L, std::lround(seconds(frame.time_ns) * info.rig.frame_rate));
+  return shown(info.pattern, static_cast<std::uint64_t>(place) + lead, 0);
+}
+
+/// The lead under which the most of the first frames are white that look white. 0 under other schemes: which
+/// of two slides came first changes no score.
+Result<std::uint64_t> find_lead(const Options& options) {
+  constexpr int kFrames = 30;  // ten times the three of white-frame
+  auto source = open_source("take:" + options.take, {});
+  if (!source) return source.error();
+  const SourceInfo& info = (*source)->info();
+  if (info.pattern.scheme != Scheme::kWhiteFrame) return std::uint64_t{0};
+  auto reconstructor = Reconstructor::create(info.rig, info.pattern, {.decoder = Decoder::kQuick});
+  if (!reconstructor) return reconstructor.error();
+  std::vector<int> fitting(static_cast<std::size_t>(cycle_frames(info.pattern)));
+  for (int i = 0; i < kFrames; ++i) {
+    auto next = (*source)->next();
+    if (!next) return next.error();
+    if (!*next) break;
+    if (const Status seen = reconstructor->observe(**next); !seen) return seen.error();
+    for (std::size_t lead = 0; lead < fitting.size(); ++lead)
+      fitting[lead] +=
+          (shown_in(**next, info, lead).light == Light::kWhite) == reconstructor->report().white ? 1 : 0;
+  }
+  return static_cast<std::uint64_t>(std::ranges::max_element(fitting) - fitting.begin());
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
@@ -124,6 +155,9 @@ Status run(const Options& options, StopSignal& stop) {
                                               .texture = !options.pictures.empty(),
                                               .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
+
+  const auto lead = find_lead(options);
+  if (!lead) return lead.error();
 
   Judges judges{Scorer(reconstructor->rig(), reconstructor->pattern())};
   if (!options.pictures.empty()) {
@@ -142,10 +176,7 @@ Status run(const Options& options, StopSignal& stop) {
     if (!next) return next.error();  // a score over part of a take would not be comparable
     if (!*next) break;
     const CapturedFrame& frame = **next;
-    // What was projected follows from the time stamp, independently of the decoder.
-    const auto place =
-        static_cast<std::uint64_t>(std::max(0L, std::lround(seconds(frame.time_ns) * info.rig.frame_rate)));
-    const Exposure exposure = shown(info.pattern, place, 0);
+    const Exposure exposure = shown_in(frame, info, *lead);
     const bool decodable =
         exposure.light == Light::kSlide &&
         (info.pattern.slides == 1 || (previous_slide && *previous_slide != exposure.slide));

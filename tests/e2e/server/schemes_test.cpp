@@ -74,6 +74,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"white_field_bottom", ",field_order=bottom", "white-field", 15, 15, 9, 200},
                       Case{"white_frame", "", "white-frame", 5, 5, 3, 150},
                       Case{"white_frame_progressive", ",scan=progressive", "white-frame", 5, 5, 3, 150},
+                      Case{"white_frame_a_frame_ahead", ",phase=2", "white-frame", 5, 5, 3, 150},
+                      Case{"white_frame_two_frames_ahead", ",phase=4", "white-frame", 5, 5, 3, 150},
                       Case{"white_frame_upside_down", ",roll=-179", "white-frame", 5, 5, 3, 150},
                       Case{"one_slide", "", "one-slide", 8, 9, 9, 150},
                       Case{"one_slide_bottom", ",field_order=bottom", "one-slide", 8, 9, 9, 150}),
