@@ -13,6 +13,7 @@
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "client/commands.h"
+#include "client/input.h"
 #include "client/options.h"
 #include "client/recorded_stream.h"
 #include "codec/frame3d_codec.h"
@@ -291,32 +292,31 @@ Status describe_live(const Options& options, StopSignal& stop) {
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  std::error_code ignored;
-  if (std::filesystem::exists(options.what, ignored)) return describe_file(options, stop);
-  if (!valid_stream_name(options.what) || options.what.ends_with(".mcap")) {
-    return Error{"there is no file " + options.what};
-  }
-  return describe_live(options, stop);
+  const auto file = is_file(options.what);
+  if (!file) return file.error();
+  return *file ? describe_file(options, stop) : describe_live(options, stop);
 }
 
 }  // namespace
 
 Command info_command() {
-  return {"info", "Describe a recording or a live stream", [](CLI::App& app) {
-            auto options = std::make_shared<Options>();
-            options->domain = add_domain_options(app);
-            app.add_option("what", options->what, "A recording's file or a live stream's name")
-                ->type_name("FILE|STREAM")
-                ->required();
-            app.add_option("--stream", options->stream, "Which stream, where the file holds several")
-                ->type_name("NAME");
-            app.add_option("--wait", options->wait_s, "How long to watch a live stream, seconds")
-                ->check(number(0.1, 3600))
-                ->capture_default_str();
-            app.add_flag("--json", options->json, "Print JSON");
-            app.footer("Examples:\n  relievo info face.mcap --json\n  relievo info face --wait 10");
-            return [options](StopSignal& stop) { return run(*options, stop); };
-          }};
+  return {
+      "info", "Describe a recording or a live stream", [](CLI::App& app) {
+        auto options = std::make_shared<Options>();
+        options->domain = add_domain_options(app);
+        app.add_option("what", options->what, "A recording's file or a live stream's name")
+            ->type_name("FILE|STREAM")
+            ->required();
+        app.add_option("--stream", options->stream, "Which stream, where the file holds several")
+            ->type_name("NAME");
+        app.add_option("--wait", options->wait_s, "How long to watch a live stream, seconds")
+            ->check(number(0.1, 3600))
+            ->capture_default_str();
+        app.add_flag("--json", options->json, "Print JSON");
+        app.final_callback([options, &app] { check_given(app, options->what, {.of_files = {"--stream"}}); });
+        app.footer("Examples:\n  relievo info face.mcap --json\n  relievo info face --wait 10");
+        return [options](StopSignal& stop) { return run(*options, stop); };
+      }};
 }
 
 }  // namespace relievo

@@ -17,6 +17,7 @@
 #include "cli/progress.h"
 #include "cli/size_option.h"
 #include "client/commands.h"
+#include "client/input.h"
 #include "client/options.h"
 #include "client/range_frames.h"
 #include "client/recorded_stream.h"
@@ -183,10 +184,8 @@ Status draw_live(const Options& options, Camera& camera, ShotOutput& output, Sto
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  std::error_code ignored;
-  const bool file = std::filesystem::exists(options.input, ignored);
-  if (!file && (!valid_stream_name(options.input) || options.input.ends_with(".mcap")))
-    return Error{"there is no file " + options.input};
+  const auto file = is_file(options.input);
+  if (!file) return file.error();
   const auto made = ShotOutput::create(options.out);
   if (!made) return made.error();
   ShotOutput& output = **made;
@@ -194,7 +193,7 @@ Status run(const Options& options, StopSignal& stop) {
     return Error{"a video has no transparency: give another --background, or a folder of pictures"};
   Camera camera(options);
   std::uint64_t left_out = 0;
-  if (file) {
+  if (*file) {
     const auto drawn = draw_recording(options, camera, output, stop);
     if (!drawn) return drawn.error();
     left_out = *drawn;
@@ -275,6 +274,10 @@ Command shot_command() {
             ->check(number(0, 1e9))
             ->capture_default_str();
         app.add_flag("--json", o->json, "Print the result as JSON");
+        app.final_callback([o, &app] {
+          check_given(app, o->input,
+                      {.of_files = {"--stream", "--from", "--to", "--frames"}, .of_streams = {"--seconds"}});
+        });
         app.footer(
             "Examples:\n  relievo shot face --out face.png\n"
             "  relievo shot face.mcap --from 3 --mode shaded --azimuth -30 --out face.png\n"

@@ -15,6 +15,7 @@
 #include "cli/service_manager.h"
 #include "cli/web_flags.h"
 #include "client/commands.h"
+#include "client/input.h"
 #include "client/options.h"
 #include "client/player.h"
 #include "client/recorded_stream.h"
@@ -144,15 +145,14 @@ Result<Inputs> sort_inputs(const std::vector<std::string>& names) {
   Inputs inputs;
   std::set<std::string> streams;
   for (const std::string& name : names) {
-    std::error_code ignored;
+    const auto file = is_file(name);
+    if (!file) return file.error();
     std::string stream = name;
-    if (std::filesystem::exists(name, ignored)) {
+    if (*file) {
       auto recorded = RecordedStream::open(name, "");
       if (!recorded) return recorded.error();
       stream = recorded->stream();
       inputs.files.emplace_back(name, std::move(*recorded));
-    } else if (!valid_stream_name(name) || name.ends_with(".mcap")) {
-      return Error{"there is no file " + name};
     } else {
       inputs.live.push_back(name);
     }

@@ -45,6 +45,7 @@ TEST(Client, WrongUsageIsExitTwoAndOneLine) {
       {"play", "a.mcap", "--speed", "0"},
       {"play", "a.mcap", "--loop", "--once"},
       {"info"},
+      {"info", "face", "--stream", "other"},
       {"export", "a.mcap", "--out", "d", "--format", "stl"},
       {"export", "a.mcap", "--out", "a.mcap", "--format", "animation"},
       {"web", "--listen"},
@@ -156,13 +157,15 @@ TEST(Client, StreamsListsWhatIsLive) {
   EXPECT_EQ(table.err, "");
 }
 
-TEST(Client, InfoDescribesALiveStream) {
+TEST(Client, InfoDescribesALiveStreamAlsoBesideAFolderOfItsName) {
+  const test::TempFolder folder;
+  std::filesystem::create_directory(folder / "watched");
   test::Process server({program("test_publisher"), "watched", kDomain, "5000", "50", "100000"});
   ASSERT_TRUE(server.wait_for_text("live")) << server.err();
   nlohmann::json json;
   ASSERT_TRUE(test::eventually([&] {
-    const auto info = test::run(
-        relievo({"info", "watched", "--json", "--wait", "1", "--domain", kDomain, "--interface", "lo"}));
+    const auto info = test::run({"/usr/bin/env", "-C", folder.path(), program("relievo"), "info", "watched",
+                                 "--json", "--wait", "1", "--domain", kDomain, "--interface", "lo"});
     json = info.status == 0 ? nlohmann::json::parse(info.out) : nlohmann::json();
     return info.status == 0 && json["frames"] > 10;
   })) << json;

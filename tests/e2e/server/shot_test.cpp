@@ -95,6 +95,25 @@ TEST_F(Shot, ALiveStreamIsDrawnToo) {
   EXPECT_EQ(cv::imread(in("live.png")).size(), cv::Size(320, 240));
 }
 
+TEST_F(Shot, WhatIsOfTheOtherKindOfInputIsWrongUsage) {
+  const auto refused = [&](const std::string& input, const std::vector<std::string>& options) {
+    std::vector<std::string> command{
+        program("relievo").string(),  "shot",        input, "--out", in("refused.png"), "--domain",
+        std::to_string(own_domain()), "--interface", "lo"};
+    command.insert(command.end(), options.begin(), options.end());
+    const Finished done = run(command);
+    EXPECT_EQ(done.status, 2) << options.front() << done.err;
+    EXPECT_EQ(lines(done.err).size(), 1U) << done.err;
+    EXPECT_THAT(done.err, HasSubstr(options.front() + ": "));
+  };
+  refused("alive", {"--from", "3"});
+  refused("alive", {"--to", "3"});
+  refused("alive", {"--frames", "0:1"});
+  refused("alive", {"--stream", "other"});
+  refused(file(), {"--seconds", "3"});
+  EXPECT_FALSE(std::filesystem::exists(in("refused.png")));
+}
+
 TEST_F(Shot, WhoStopsItIsToldHowMuchIsThere) {
   Process serving(serve("sim:face", {"--stream", "endless"}));
   ASSERT_TRUE(serving.wait_for_text("stream endless"));

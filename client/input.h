@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// What FILE|STREAM names, for verbs that take either.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace CLI {
+class App;
+}
+
+namespace relievo {
+
+/// Whether it is a file, else a live stream. A folder is no recording: where a stream may be called so, it is
+/// the stream. Fails where it can be neither.
+Result<bool> is_file(const std::string& input);
+
+/// Options that say nothing of the other kind of input.
+struct OptionsOfInputs {
+  std::vector<std::string> of_files, of_streams;
+};
+/// For CLI::App::final_callback: one that was given for the other kind is wrong usage, not to be ignored.
+void check_given(const CLI::App& app, const std::string& input, const OptionsOfInputs& options);
+
+}  // namespace relievo

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Proves: of what may be a file and a live stream, a folder hides no stream, and no stream a file.
+#include "client/input.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/temp_folder.h"
+
+namespace relievo {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Input, FilesAreFilesAndFoldersHideNoStream) {
+  const test::TempFolder folder;
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path());
+  fs::create_directory("face");
+  fs::create_directory("face.mcap");
+  std::ofstream("recorded") << "";
+  std::ofstream("face/a.mcap") << "";
+  const auto says = [](const std::string& input) {
+    const auto file = is_file(input);
+    return !file ? "neither" : *file ? "file" : "stream";
+  };
+  EXPECT_STREQ(says("face"), "stream");
+  EXPECT_STREQ(says("nothing-here"), "stream");
+  EXPECT_STREQ(says("recorded"), "file");
+  EXPECT_STREQ(says("./recorded"), "file");
+  EXPECT_STREQ(says("face/a.mcap"), "file");
+  EXPECT_STREQ(says("./face"), "file") << "which then is no recording";
+  EXPECT_STREQ(says("face.mcap"), "file") << "likewise";
+  for (const char* none : {"none.mcap", "face/none", "no stream", ""})
+    EXPECT_STREQ(says(none), "neither") << none;
+  fs::current_path(before);
+}
+
+}  // namespace
+}  // namespace relievo
