@@ -71,7 +71,7 @@ ServedDecoder served_decoder(const StreamConfig& config) {
 
 Status check_lines(const StreamConfig& config) {
   if (served_decoder(config).auto_pace && config.half_lines)
-    return Error{"decoder auto leaves out lines where it has to: leave out half_lines, or name a decoder"};
+    return Error{"decoder auto leaves out lines where it has to: leave this out, or name a decoder"};
   return {};
 }
 

@@ -275,8 +275,10 @@ Command serve_command() {
         add_rig_flags(app, f->camera);
         add_camera_flags(app, f->camera);
         app.final_callback([f] {
-          if (f->decoder == "auto" && f->half_lines)
-            throw CLI::ValidationError("--half-lines", "--decoder auto leaves out lines where it has to");
+          StreamConfig given;
+          set_stream(*f, given);
+          if (const Status lines = check_lines(given); !lines)
+            throw CLI::ValidationError("--half-lines", lines.error().message);
         });
         app.footer(
             "Examples:\n"

@@ -28,6 +28,7 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
       {"serve", "--web", "8080"},
       {"serve", "--web", "127.0.0.1:99999"},
       {"serve", "--stream", "two words"},
+      {"serve", "--decoder", "auto", "--half-lines"},
       {"calibrate"},
       {"reconstruct"},
       {"reconstruct", "take"},

@@ -98,7 +98,7 @@ TEST(Config, ADecoderOrHowItIsChosen) {
   const auto both = find_mistake(config);
   ASSERT_TRUE(both);
   EXPECT_EQ(both->setting, "half_lines");
-  EXPECT_NE(both->error.message.find("half_lines"), std::string::npos) << both->error.message;
+  EXPECT_NE(both->error.message.find("name a decoder"), std::string::npos) << both->error.message;
   EXPECT_TRUE(set_decoder("quick", config));  // as a flag behind the file
   EXPECT_FALSE(served_decoder(config).auto_pace);
   EXPECT_EQ(served_decoder(config).decoder, Decoder::kQuick);
