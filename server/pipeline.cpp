@@ -14,9 +14,8 @@
 #include "base/log.h"
 #include "base/thread_name.h"
 #include "base/time.h"
-#include "capture/reconstruct/detection_lines.h"
 #include "codec/decodable_frames.h"
-#include "server/pace.h"
+#include "server/paced_reconstructor.h"
 #include "server/slides_seen.h"
 #include "server/stats.h"
 #include "server/step_watch.h"
@@ -33,7 +32,6 @@ constexpr std::int64_t kMaxLate_ns =
 constexpr int kMaxSourceErrors = 30;  // in a row: a second of a camera that delivers nothing
 constexpr double kSilentFrames = 10;  // times a frame's without one: the source has stalled
 constexpr std::int64_t kSilentAtLeast_ns = kNanosecondsPerSecond;
-constexpr double kSaidBehind_s = 2;  // of frames that may be dropped before the log says so
 constexpr std::int64_t kLookInterval_ns = kNanosecondsPerSecond;  // between pictures whose error is measured
 constexpr std::uint64_t kFramesForASurface = 30;                  // far more than any schedule needs
 constexpr std::uint64_t kMixedForASurface =
@@ -70,16 +68,13 @@ class ThreadedPipeline final : public Pipeline {
         sinks_(std::move(sinks)),
         options_(options),
         label_(options.label.empty() ? "" : options.label + ": "),
-        reconstructor_(std::move(reconstructor)),
-        pace_{options.reconstruct.decoder, options.reconstruct.line_stride},
-        pace_control_(line_count(source.info().rig, 1), source.info().rig.frame_rate),
-        drops_(kSaidBehind_s * source.info().rig.frame_rate),
-        encoder_(reconstructor_.rig(), reconstructor_.pattern()),
+        paced_(source.info(), {label_, options.reconstruct, options.auto_pace}, std::move(reconstructor)),
+        encoder_(paced_.now().rig(), paced_.now().pattern()),
         volume_(options.encode.volume) {}
 
   Status run() override {
     if (options_.rungs != nullptr)
-      options_.rungs->give_back_to([this](Frame3D&& used) { recycle(std::move(used)); });
+      options_.rungs->give_back_to([this](Frame3D&& used) { paced_.recycle(std::move(used)); });
     std::thread reconstruct([this] { reconstruct_stage(); });
     std::thread encode([this] { encode_stage(); });
     std::thread publish([this] { publish_stage(); });
@@ -111,7 +106,7 @@ class ThreadedPipeline final : public Pipeline {
   ServerStatus status() const override {
     ServerStatus s = stats_.snapshot(utc_now_ns());
     s.stream = options_.stream;
-    s.drops_reconstruct = to_reconstruct_.drops() + observed_;
+    s.drops_reconstruct = dropped();
     s.drops_encode = to_encode_.drops();
     s.drops_publish = to_publish_.drops() + undecodable_;
     if (options_.rungs != nullptr) s.rungs = options_.rungs->status();
@@ -128,11 +123,9 @@ class ThreadedPipeline final : public Pipeline {
 
   StageTimes stages() const override {
     StageTimes times = stats_.stages();
-    {
-      std::lock_guard lock(mutex_);
-      times.decoder = decoder_name(pace_.decoder);
-      times.line_stride = pace_.line_stride;
-    }
+    const Pace pace = paced_.pace();
+    times.decoder = decoder_name(pace.decoder);
+    times.line_stride = pace.line_stride;
     times.waiting_reconstruct = to_reconstruct_.size();
     times.waiting_encode = to_encode_.size();
     times.waiting_publish = to_publish_.size();
@@ -154,6 +147,9 @@ class ThreadedPipeline final : public Pipeline {
     std::lock_guard lock(mutex_);
     return failure_ ? Status(*failure_) : captured;
   }
+
+  /// Frames, for want of time to reconstruct them.
+  std::uint64_t dropped() const { return to_reconstruct_.drops() + observed_; }
 
   bool stopping() const {
     std::lock_guard lock(mutex_);
@@ -245,8 +241,8 @@ class ThreadedPipeline final : public Pipeline {
       auto [item, next] = to_reconstruct_.pop_with_next_if(not_alone);
       if (!item) break;
       if (next) {
-        if (auto seen = reconstructor_.observe(item->frame); !seen) fail(seen.error());
-        steps.add(item->frame.time_ns, reconstructor_.report().step);
+        if (auto seen = paced_.now().observe(item->frame); !seen) fail(seen.error());
+        steps.add(item->frame.time_ns, paced_.now().report().step);
         slides.add(item->number, item->frame.time_ns);
         previous = item->number;
         ++observed_;
@@ -254,7 +250,7 @@ class ThreadedPipeline final : public Pipeline {
       }
       slides.add(item->number, item->frame.time_ns);
       const std::int64_t begin = steady_now_ns();
-      auto result = reconstructor_.add(item->frame);
+      auto result = paced_.now().add(item->frame);
       if (!result) {
         fail(result.error());
         continue;
@@ -263,10 +259,10 @@ class ThreadedPipeline final : public Pipeline {
       // source has counted it, or a take starts again.
       const auto pass = source_.info().frames;
       const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
-      steps.add(item->frame.time_ns, reconstructor_.report().step);
+      steps.add(item->frame.time_ns, paced_.now().report().step);
       say_step(steps);
       if (!*result) offer(item->frame, nullptr, steps);
-      if (reconstructor_.report().step.mixed) {
+      if (paced_.now().report().step.mixed) {
         stats_.lost_in_capture(1);
         // A projector that drifts comes round; a source that can be played again is given up in the end.
         if (!any_surface && options_.calibrated && !source_.info().live &&
@@ -276,7 +272,7 @@ class ThreadedPipeline final : public Pipeline {
         continue;
       }
       const bool consecutive = previous && item->number == *previous + 1 && !starts_again;
-      if (reconstructor_.report().same_slide && consecutive) stats_.lost_in_capture(1);
+      if (paced_.now().report().same_slide && consecutive) stats_.lost_in_capture(1);
       previous = item->number;
       if (!*result) {
         // A take that is looped would go on so for ever.
@@ -288,57 +284,24 @@ class ThreadedPipeline final : public Pipeline {
       }
       any_surface = true;
       const double ms = milliseconds(steady_now_ns() - begin);
-      for (std::optional<Frame3D> made = *std::move(result); made; made = reconstructor_.next()) {
-        stats_.reconstructed(ms, reconstructor_.report().filters);
+      for (std::optional<Frame3D> made = *std::move(result); made; made = paced_.now().next()) {
+        stats_.reconstructed(ms, paced_.now().report().filters);
         if (!made->between) offer(item->frame, &made->surface, steps);
         const std::int64_t later_ns = made->time_ns - item->frame.time_ns;  // below 0: of a field before
         push(to_encode_,
-             Reconstructed{*std::move(made), item->capture_time_ns + later_ns, pace_.line_stride});
+             Reconstructed{*std::move(made), item->capture_time_ns + later_ns, paced_.pace().line_stride});
       }
-      keep_pace(item->frame, milliseconds(steady_now_ns() - begin));
+      const double all_ms = milliseconds(steady_now_ns() - begin);
+      if (const Status paced = paced_.took(item->frame, all_ms, dropped()); !paced) fail(paced.error());
     }
-  }
-
-  /// After a frame that took this thread `ms`.
-  void keep_pace(const CapturedFrame& frame, double ms) {
-    const std::uint64_t dropped = to_reconstruct_.drops() + observed_;
-    const std::uint64_t since = dropped - std::exchange(dropped_, dropped);
-    if (!options_.auto_pace) return say_behind(since);
-    pace_control_.add(steady_now_ns(), ms, since);
-    const Pace pace = pace_control_.now();
-    if (pace == pace_) return;
-    ReconstructOptions options = options_.reconstruct;
-    options.decoder = pace.decoder;
-    options.line_stride = pace.line_stride;
-    auto made = Reconstructor::create(source_.info().rig, source_.info().pattern, options);
-    const Status seen = made ? made->observe(frame) : Status(made.error());
-    if (!seen) return fail(seen.error());
-    log_info(label_ + "decoding: " + to_string(pace) + ", which suits the camera's rate and this machine");
-    std::lock_guard lock(mutex_);
-    std::swap(reconstructor_, *made);
-    pace_ = pace;
-  }
-
-  /// Logged once, where frames are dropped for more than a moment.
-  void say_behind(std::uint64_t dropped) {
-    drops_.add(dropped);
-    if (!drops_.too_many() || std::exchange(said_behind_, true)) return;
-    log_warning(label_ + "this machine is too slow for all of the camera's frames with " + to_string(pace_) +
-                ": serve with --decoder auto or more --threads");
-  }
-
-  /// Of any thread.
-  void recycle(Frame3D&& used) {
-    std::lock_guard lock(mutex_);
-    reconstructor_.recycle(std::move(used));
   }
 
   /// To somebody who looks at single frames: a copy, where one was asked for.
   void offer(const CapturedFrame& captured, const Surface* surface, const StepWatch& steps) {
     if (options_.tap == nullptr || !options_.tap->wants(surface != nullptr)) return;
-    const CapturedFrame* decoded = reconstructor_.decoded();
+    const CapturedFrame* decoded = paced_.now().decoded();
     TappedFrame out{.captured = captured.clone(),
-                    .report = reconstructor_.report(),
+                    .report = paced_.now().report(),
                     .step = steps.status(),
                     .step_advice = steps.message()};
     if (decoded != nullptr) out.decoded = decoded->clone();
@@ -397,7 +360,7 @@ class ThreadedPipeline final : public Pipeline {
       if (options_.rungs != nullptr && options_.rungs->wanted())
         options_.rungs->take(std::move(item->frame), item->capture_time_ns, item->line_stride);
       else
-        recycle(std::move(item->frame));
+        paced_.recycle(std::move(item->frame));
     }
   }
 
@@ -473,12 +436,7 @@ class ThreadedPipeline final : public Pipeline {
   std::vector<FrameSink*> sinks_;
   const PipelineOptions options_;
   const std::string label_;
-  Reconstructor reconstructor_;  // changes with the pace, under the mutex, as pace_
-  Pace pace_;
-  PaceControl pace_control_;
-  DropWatch drops_;            // where the pace is not chosen here
-  std::uint64_t dropped_ = 0;  // when one of the two was told last
-  bool said_behind_ = false;
+  PacedReconstructor paced_;
   FrameEncoder encoder_;
   WorkingVolume volume_;
   std::atomic<bool> key_wanted_{false};
