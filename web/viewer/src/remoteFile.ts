@@ -41,6 +41,7 @@ export class RemoteFile implements Bytes {
       head = await fetch(url, first);
     }
     if (head.status === 404) throw new Error('it is not there (HTTP 404)');
+    if (head.status === 416) throw new Error('it is empty: what recorded it ended before the first frame');
     const { size, etag } = versionOf(head);
     return new RemoteFile(url, size, etag, fetch);
   }

@@ -101,5 +101,7 @@ describe('RemoteFile', () => {
   it('is not opened where the server gives no parts', async () => {
     await expect(RemoteFile.open(url, async () => new Response('all of it', { status: 200 }))).rejects.toThrow('HTTP 200');
     await expect(RemoteFile.open(url, async () => new Response('', { status: 404 }))).rejects.toThrow('it is not there (HTTP 404)');
+    const empty = new Response('', { status: 416, headers: { 'content-range': 'bytes */0', etag: '"1"' } });
+    await expect(RemoteFile.open(url, async () => empty)).rejects.toThrow('it is empty');
   });
 });
