@@ -49,15 +49,6 @@ void set_handler(int signal_number, void (*handler)(int), struct sigaction* old 
   sigaction(signal_number, &action, old);
 }
 
-/// As if nobody had taken the signal over.
-void end_by(int signal_number) {
-  sigset_t only;
-  sigemptyset(&only);
-  sigaddset(&only, signal_number);
-  raise(signal_number);
-  pthread_sigmask(SIG_UNBLOCK, &only, nullptr);
-}
-
 }  // namespace
 
 // A handler interrupts whichever thread the kernel picks, where next to nothing may be done, and the thread
@@ -70,7 +61,7 @@ struct StopSignal::State {
   int reloads = 0;                          // asked for and not yet done
   std::mutex callback_mutex, reload_mutex;  // each held while its callback runs
   std::function<void()> callback, reload;
-  std::atomic<bool> takes_hangup = false;
+  std::atomic<bool> reads_again = false;  // at SIGHUP
   std::atomic<bool> no_more_signals = false;
   bool ignores_hangup = false;  // as under nohup
   sigset_t old_mask{};
@@ -85,14 +76,12 @@ struct StopSignal::State {
       int number = 0;
       if (sigwait(&signals, &number) != 0) continue;
       if (no_more_signals) return;
-      if (number == SIGHUP && !takes_hangup) {
-        if (!ignores_hangup) end_by(number);
-        continue;
-      }
-      if (number != SIGHUP && ++stops >= kSignalsUntilExit) _exit(128 + number);
+      const bool is_reload = number == SIGHUP && reads_again;
+      if (number == SIGHUP && !is_reload && ignores_hangup) continue;
+      if (!is_reload && ++stops >= kSignalsUntilExit) _exit(128 + number);
       {
         std::lock_guard lock(mutex);
-        if (number == SIGHUP) {
+        if (is_reload) {
           ++reloads;
         } else {
           stopped = true;
@@ -142,14 +131,18 @@ StopSignal::StopSignal() : state_(new State) {
   g_taker = state_->takes_signals.native_handle();
   set_handler(SIGINT, pass_on);
   set_handler(SIGTERM, pass_on);
+  if (!state_->ignores_hangup) set_handler(SIGHUP, pass_on);
   state_->calls = std::thread([s = state_] { s->run(); });
-  state_->reloads_again = std::thread([s = state_] { s->run_reloads(); });
 }
 
 StopSignal::~StopSignal() {
   set_handler(SIGINT, come_late);
   set_handler(SIGTERM, come_late);
-  if (state_->takes_hangup) set_handler(SIGHUP, SIG_IGN);
+  if (state_->reads_again) {
+    set_handler(SIGHUP, SIG_IGN);
+  } else if (!state_->ignores_hangup) {
+    set_handler(SIGHUP, come_late);
+  }
   state_->no_more_signals = true;
   pthread_kill(state_->takes_signals.native_handle(), SIGTERM);
   state_->takes_signals.join();
@@ -159,7 +152,7 @@ StopSignal::~StopSignal() {
   }
   state_->changed.notify_all();
   state_->calls.join();
-  state_->reloads_again.join();
+  if (state_->reloads_again.joinable()) state_->reloads_again.join();
   sigaction(SIGPIPE, &state_->old_pipe, nullptr);
   pthread_sigmask(SIG_SETMASK, &state_->old_mask, nullptr);
   g_taken = false;
@@ -197,7 +190,9 @@ void StopSignal::clear_on_stop() {
 void StopSignal::on_reload(std::function<void()> callback) {
   std::lock_guard lock(state_->reload_mutex);
   state_->reload = std::move(callback);
-  if (!state_->takes_hangup.exchange(true)) set_handler(SIGHUP, pass_on);
+  if (state_->reads_again.exchange(true)) return;
+  set_handler(SIGHUP, pass_on);
+  state_->reloads_again = std::thread([s = state_] { s->run_reloads(); });
 }
 
 void StopSignal::clear_on_reload() {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C and SIGTERM as a flag, a wait and a callback, so that a command ends with nothing lost; SIGHUP as a
-// callback, for commands that read their configuration again.
+// Ctrl-C, SIGTERM and the terminal's end (SIGHUP) as a flag, a wait and a callback, so that a command ends
+// with nothing lost; SIGHUP as a callback of its own for commands that read their configuration again.
 #pragma once
 
 #include <chrono>
@@ -8,10 +8,11 @@
 
 namespace relievo {
 
-/// Takes over SIGINT and SIGTERM and ignores SIGPIPE for its life; one a process, made by run_program before
-/// any other thread: all block them, and children until they unblock them. The third signal ends the process
-/// at once, for a command that hangs while stopping; one that comes after its life changes nothing, but the
-/// third ends the process, too. Every function may be called from any thread.
+/// Takes over SIGINT, SIGTERM and SIGHUP, this but where it is ignored as under nohup, and ignores SIGPIPE
+/// for its life; one a process, made by run_program before any other thread: all block them, and children
+/// until they unblock them. The third signal ends the process at once, for a command that hangs while
+/// stopping; one that comes after its life changes nothing, but the third ends the process, too. Every
+/// function may be called from any thread.
 class StopSignal {
  public:
   StopSignal();
@@ -31,9 +32,9 @@ class StopSignal {
   void on_stop(std::function<void()> callback);
   void clear_on_stop();
 
-  /// Takes over SIGHUP, which otherwise ends the process, and calls `callback` for each, on another thread of
-  /// its own: on_stop()'s may be called meanwhile. Once; clear it before what it refers to is destroyed, as
-  /// on_stop().
+  /// From now on SIGHUP, also where it was ignored, calls `callback` instead of stopping, once for each and
+  /// on another thread of its own: on_stop()'s may be called meanwhile. Once; clear it before what it refers
+  /// to is destroyed, as on_stop().
   void on_reload(std::function<void()> callback);
   void clear_on_reload();
 

@@ -204,8 +204,8 @@ TEST_P(ServerSignal, EndsSimulateWithNothingHalfWritten) {
   EXPECT_EQ(names_in(folder_.path()), std::set<std::string>{"take"});
 }
 
-INSTANTIATE_TEST_SUITE_P(Signals, ServerSignal, ::testing::Values(SIGINT, SIGTERM),
-                         [](const auto& number) { return number.param == SIGINT ? "INT" : "TERM"; });
+INSTANTIATE_TEST_SUITE_P(Signals, ServerSignal, ::testing::Values(SIGINT, SIGTERM, SIGHUP),
+                         [](const auto& number) { return std::string(sigabbrev_np(number.param)); });
 
 }  // namespace
 }  // namespace relievo::test

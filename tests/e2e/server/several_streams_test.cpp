@@ -60,12 +60,13 @@ class Reader {
   std::unique_ptr<Subscriber> subscriber_;
 };
 
-/// Whether SIGHUP would not end it.
+/// Whether SIGHUP would not end it: it has the thread that reads its configuration again.
 bool takes_hangup(const Process& process) {
-  std::istringstream status(read_text("/proc/" + std::to_string(process.pid()) + "/status"));
-  std::string name, mask;
-  while (status >> name && name != "SigCgt:") continue;
-  return status >> mask && (std::stoul(mask, nullptr, 16) >> (SIGHUP - 1) & 1) != 0;
+  std::error_code ended;
+  for (const auto& thread :
+       std::filesystem::directory_iterator("/proc/" + std::to_string(process.pid()) + "/task", ended))
+    if (read_text(thread.path() / "comm") == "on-reload\n") return true;
+  return false;
 }
 
 /// Two takes of 5 frames a second: a reader on a busy machine has time.

@@ -236,20 +236,22 @@ TEST(Program, ASignalThatComesAfterTheCommandChangesNothing) {
   EXPECT_EXIT(signal_after_the_end(3), testing::ExitedWithCode(128 + SIGINT), "");
 }
 
-void hang_up(bool ignored) {
+void hang_up(bool ignored, bool terminated) {
   signal(SIGHUP, ignored ? SIG_IGN : SIG_DFL);
-  _exit(exit_code(one_command([](int, StopSignal& stop) {
+  _exit(exit_code(one_command([&](int, StopSignal& stop) {
                     kill(getpid(), SIGHUP);
-                    kill(getpid(), SIGTERM);  // comes behind it
-                    stop.wait();
-                    return Status();
+                    if (terminated) kill(getpid(), SIGTERM);  // comes behind it
+                    const bool stopped = stop.wait_for(std::chrono::seconds(terminated || !ignored ? 60 : 1));
+                    return stopped ? Status() : Error{"went on"};
                   }),
                   {"work"}));
 }
 
-TEST(Program, AHangupEndsWhatReadsNothingAgain) {
-  EXPECT_EXIT(hang_up(false), testing::KilledBySignal(SIGHUP), "");
-  EXPECT_EXIT(hang_up(true), testing::ExitedWithCode(0), "");  // under nohup
+// As when its terminal is closed: what it has written so far is not to be left half done.
+TEST(Program, AHangupStopsWhatReadsNothingAgain) {
+  EXPECT_EXIT(hang_up(false, false), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(hang_up(true, false), testing::ExitedWithCode(1), "went on");  // under nohup
+  EXPECT_EXIT(hang_up(true, true), testing::ExitedWithCode(0), "");
 }
 
 TEST(Program, AHangupReadsAgain) {
