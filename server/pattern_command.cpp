@@ -44,8 +44,23 @@ struct Options {
   bool json = false;
 };
 
+/// Whoever projects a folder projects all of its pictures. Those in `names` are replaced.
+Status refuse_other_pictures(const fs::path& folder, const std::vector<std::string>& names) {
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() != ".png" || std::ranges::find(names, name) != names.end()) continue;
+    return Error{folder.string() + " has other pictures (" + name +
+                 "), which would be projected with these: give a new folder or remove it"};
+  }
+  return {};
+}
+
 Status write_gray(const Options& options, StopSignal& stop) {
   const std::size_t count = gray_slides(options.size.width, options.size.height).size();
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) names.push_back(gray_slide_name(i));
+  if (const Status alone = refuse_other_pictures(options.out, names); !alone) return alone;
   Progress progress("pattern", "slides", count);
   const auto go_on = [&](std::size_t done, std::size_t) {
     progress.update(done);
@@ -71,10 +86,13 @@ Status write_gray(const Options& options, StopSignal& stop) {
 /// For calibration: the slides along columns, then along rows.
 Status write_both_axes(const Options& options, const Pattern& pattern) {
   const Scan scan = options.interlaced ? Scan::kInterlaced : Scan::kProgressive;
+  std::vector<std::string> names = stripe_view_names(pattern.slides, scan);
+  for (std::string& name : names) name += ".png";
+  if (auto s = refuse_other_pictures(options.out, names); !s) return s;
   if (auto s = write_stripe_slides(options.out, pattern, options.size.width, options.size.height, scan); !s)
     return s;
   if (auto s = write_whole_file(fs::path(options.out) / "pattern.yaml", to_yaml(pattern)); !s) return s;
-  const std::size_t count = stripe_view_names(pattern.slides, scan).size();
+  const std::size_t count = names.size();
   const int rows = row_pattern(pattern, options.size.width, options.size.height).stripes();
   if (options.json) {
     const nlohmann::json json = {
@@ -95,6 +113,20 @@ std::string field_name(const Exposure& exposure) {
   if (exposure.light == Light::kWhite) return "white.png";
   return "slide" + std::to_string(exposure.slide + 1) +
          (exposure.light == Light::kComplement ? "_complement.png" : ".png");
+}
+
+/// The pictures in the order of projection: a name a field, or a frame.
+std::vector<std::string> names_in_order(const Options& options, const Pattern& pattern) {
+  std::vector<std::string> out;
+  for (int frame = 0; frame < cycle_frames(pattern); ++frame) {
+    if (options.interlaced) {
+      out.push_back("frame" + std::to_string(frame + 1) + ".png");
+      continue;
+    }
+    for (const int half : {0, 1})
+      out.push_back(field_name(shown(pattern, static_cast<std::uint64_t>(frame), half)));
+  }
+  return out;
 }
 
 /// Beside FILE.mkv, FILE.pattern.yaml, so that what was played is known.
@@ -149,26 +181,21 @@ Status run(const Options& options, StopSignal& stop) {
   if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;
   if (const Status made = make_folder(options.out); !made) return made;
   if (options.both_axes) return write_both_axes(options, *pattern);
+  const std::vector<std::string> order = names_in_order(options, *pattern);
+  if (const Status alone = refuse_other_pictures(options.out, order); !alone) return alone;
   std::vector<std::string> files;
-  std::vector<std::string> order;  // of projection: a file a field, or a frame
-  const auto write = [&](const std::string& name, const Image8& picture) {
-    files.push_back(name);
-    return write_png(fs::path(options.out) / name, picture.view());
-  };
   const auto [width, height] = options.size;
   const FieldOrder first = options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
-  for (int frame = 0; frame < cycle_frames(*pattern); ++frame) {
-    if (options.interlaced) {
-      order.push_back("frame" + std::to_string(frame + 1) + ".png");
-      if (auto s = write(order.back(), draw_interlaced(*pattern, frame, first, width, height)); !s) return s;
-      continue;
-    }
-    for (const int half : {0, 1}) {
-      const Exposure exposure = shown(*pattern, static_cast<std::uint64_t>(frame), half);
-      order.push_back(field_name(exposure));
-      if (std::count(order.begin(), order.end(), order.back()) > 1) continue;  // white again
-      if (auto s = write(order.back(), draw_field(*pattern, exposure, width, height)); !s) return s;
-    }
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const int frame = static_cast<int>(options.interlaced ? i : i / 2);
+    if (std::ranges::find(files, order[i]) != files.end()) continue;  // white again
+    files.push_back(order[i]);
+    const Image8 picture =
+        options.interlaced
+            ? draw_interlaced(*pattern, frame, first, width, height)
+            : draw_field(*pattern, shown(*pattern, static_cast<std::uint64_t>(frame), i % 2 == 1), width,
+                         height);
+    if (auto s = write_png(fs::path(options.out) / order[i], picture.view()); !s) return s;
   }
   const std::string yaml = to_yaml(*pattern);
   files.emplace_back("pattern.yaml");
@@ -201,9 +228,10 @@ Command pattern_command() {
       "pattern", "Write the slides to project as pictures or video, with their pattern.yaml",
       [](CLI::App& app) {
         auto o = std::make_shared<Options>();
-        app.add_option(
-               "--out", o->out,
-               "Folder, made where it is missing, or video FILE.mkv: lossless (FFV1), to be played in a loop")
+        app.add_option("--out", o->out,
+                       "Folder without other pictures, made where it is missing, or video FILE.mkv: lossless "
+                       "(FFV1), to be "
+                       "played in a loop")
             ->type_name("DIR|FILE.mkv")
             ->required();
         auto* file = add_pattern_options(app, o->pattern);

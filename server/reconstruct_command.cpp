@@ -5,12 +5,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "base/log.h"
 #include "base/time.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
+#include "capture/source/take_files.h"
 #include "cli/progress.h"
 #include "codec/export.h"
 #include "server/commands.h"
@@ -22,6 +26,8 @@ namespace relievo {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::string_view kTake = "take:";
 
 struct Options {
   std::string take;
@@ -108,17 +114,59 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
 }
 
 /// NNNNNN is the frame of the take that completed it; the surface half way from the frame before has its own.
-std::string ply_name(const Frame3D& frame) {
+std::string ply_name(std::uint64_t number, bool between) {
   char name[40];
-  std::snprintf(name, sizeof name, "%06llu%s.ply", static_cast<unsigned long long>(frame.number),
-                frame.between ? "_between" : "");
+  std::snprintf(name, sizeof name, "%06llu%s.ply", static_cast<unsigned long long>(number),
+                between ? "_between" : "");
   return name;
+}
+
+/// The frame that a file was written for; nothing where ply_name() gives no such name.
+std::optional<std::uint64_t> number_of(const fs::path& file) {
+  const std::string name = file.filename().string();
+  unsigned long long number = 0;
+  if (std::sscanf(name.c_str(), "%llu", &number) != 1) return std::nullopt;
+  for (const bool between : {false, true})
+    if (name == ply_name(number, between)) return number;
+  return std::nullopt;
+}
+
+/// Of all frames that the source gives.
+Result<std::set<std::uint64_t>> numbers_of(const std::string& uri, const SourceInfo& info) {
+  std::set<std::uint64_t> out;
+  if (!uri.starts_with(kTake)) {
+    for (std::uint64_t n = 0; n < info.frames.value_or(0); ++n) out.insert(n);
+    return out;
+  }
+  const auto stamps = read_timestamps(fs::path(uri.substr(kTake.size())) / "timestamps.csv");
+  if (!stamps) return stamps.error();
+  for (const TakeStamp& stamp : *stamps) out.insert(stamp.frame);
+  return out;
+}
+
+/// Removes the surfaces of an earlier run, so that the folder holds one run's. Refuses those that cannot be
+/// of the same frames.
+Status remove_earlier(const fs::path& folder, const std::set<std::uint64_t>& numbers) {
+  std::vector<fs::path> earlier;
+  std::error_code failed;
+  for (const auto& entry : fs::directory_iterator(folder, failed)) {
+    const auto number = number_of(entry.path());
+    if (!number) continue;
+    if (!numbers.contains(*number)) {
+      return Error{folder.string() + " has surfaces of other frames (" + entry.path().filename().string() +
+                   "), which would be mixed with these: give a new folder or remove it"};
+    }
+    earlier.push_back(entry.path());
+  }
+  for (const fs::path& file : earlier) fs::remove(file, failed);  // what cannot be is told when it is written
+  return {};
 }
 
 Status run(const Options& options, StopSignal& stop) {
   // A bare folder is a take; anything else open_source knows is welcome too.
-  const bool is_uri = options.take.starts_with("take:") || options.take.starts_with("sim:");
-  auto source = open_source(is_uri ? options.take : "take:" + options.take, {});
+  const bool is_uri = options.take.starts_with(kTake) || options.take.starts_with("sim:");
+  const std::string uri = is_uri ? options.take : std::string(kTake) + options.take;
+  auto source = open_source(uri, {});
   if (!source) return source.error();
   auto reconstructor = Reconstructor::create((*source)->info().rig, (*source)->info().pattern,
                                              {.decoder = options.decoder,
@@ -129,6 +177,9 @@ Status run(const Options& options, StopSignal& stop) {
   std::error_code failed;
   const bool made = fs::create_directories(options.out, failed);
   if (failed) return Error{"cannot make the folder " + options.out + ": " + failed.message()};
+  const auto numbers = numbers_of(uri, (*source)->info());
+  if (!numbers) return numbers.error();
+  if (const Status removed = remove_earlier(options.out, *numbers); !removed) return removed;
 
   StepWatch steps((*source)->info().rig.frame_rate);
   Totals totals;
@@ -158,8 +209,9 @@ Status run(const Options& options, StopSignal& stop) {
     for (std::optional<Frame3D> surface = *std::move(frame); surface; surface = reconstructor->next()) {
       ++totals.reconstructed;
       totals.vertices += surface->surface.positions.size();
-      if (const Status written = write_ply(fs::path(options.out) / ply_name(*surface), surface->surface,
-                                           surface->texture.view());
+      if (const Status written =
+              write_ply(fs::path(options.out) / ply_name(surface->number, surface->between), surface->surface,
+                        surface->texture.view());
           !written)
         return written.error();
       reconstructor->recycle(*std::move(surface));
@@ -198,7 +250,9 @@ Command reconstruct_command() {
       "reconstruct", "Reconstruct a take: one PLY a frame", [](CLI::App& app) {
         auto options = std::make_shared<Options>();
         app.add_option("take", options->take, "Take folder")->type_name("TAKE")->required();
-        app.add_option("-o,--out", options->out, "Folder for NNNNNN.ply, made where it is missing")
+        app.add_option(
+               "-o,--out", options->out,
+               "Folder for NNNNNN.ply, made where it is missing; those of the same frames are replaced")
             ->type_name("DIR")
             ->required();
         app.add_option("--threads", options->threads, "Threads; any number gives the same result")

@@ -167,6 +167,12 @@ Result<GrayStack> read_gray_stack(const fs::path& folder, int projector_width, i
   return builder.finish(folder);
 }
 
+std::string gray_slide_name(std::size_t number) {
+  char name[32];
+  std::snprintf(name, sizeof name, "gray_%02zu.png", number);
+  return name;
+}
+
 Status write_gray_slides(const fs::path& folder, int projector_width, int projector_height,
                          const std::function<bool(std::size_t, std::size_t)>& on_slide) {
   std::error_code code;
@@ -174,13 +180,11 @@ Status write_gray_slides(const fs::path& folder, int projector_width, int projec
   if (code) return Error{"cannot make the folder " + folder.string() + ": " + code.message()};
   const auto slides = gray_slides(projector_width, projector_height);
   for (std::size_t i = 0; i < slides.size(); ++i) {
-    char name[32];
-    std::snprintf(name, sizeof name, "gray_%02zu.png", i);
     if (on_slide && !on_slide(i, slides.size()))
       return Error{"stopped: " + std::to_string(i) + " of " + std::to_string(slides.size()) +
                    " slides are in " + folder.string()};
-    if (Status written =
-            write_png(folder / name, draw_gray_slide(slides[i], projector_width, projector_height));
+    if (Status written = write_png(folder / gray_slide_name(i),
+                                   draw_gray_slide(slides[i], projector_width, projector_height));
         !written) {
       return written;
     }

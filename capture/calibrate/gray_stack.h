@@ -9,6 +9,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 
 #include "base/result.h"
 #include "capture/pattern/gray_decode.h"
@@ -23,8 +24,11 @@ Result<GrayStack> read_gray_stack(const std::filesystem::path& folder, int proje
                                   int projector_height,
                                   const std::function<bool(std::size_t, std::size_t)>& on_picture = {});
 
-/// Writes every slide to project, NN.png, in the numbered layout. The folder is made where it is missing.
-/// `on_slide` as `on_picture` above.
+/// The picture of slide `number` of gray_slides(), in the numbered layout.
+std::string gray_slide_name(std::size_t number);
+
+/// Writes every slide to project, named so. The folder is made where it is missing. `on_slide` as
+/// `on_picture` above.
 Status write_gray_slides(const std::filesystem::path& folder, int projector_width, int projector_height,
                          const std::function<bool(std::size_t, std::size_t)>& on_slide = {});
 

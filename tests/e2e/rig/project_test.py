@@ -33,7 +33,7 @@ class Project(ScreenTest):
         return child.returncode, out, err
 
     def slides(self, *options):
-        folder = self.folder / "slides"
+        folder = self.folder / "-".join(["slides", *options])
         done = subprocess.run([SERVER, "pattern", "--out", folder, "--size", f"{WIDTH}x{HEIGHT}", "--json", *options],
                               capture_output=True, text=True, check=True)
         return [cv2.imread(str(folder / name))[:, :, ::-1] for name in json.loads(done.stdout)["order"]]

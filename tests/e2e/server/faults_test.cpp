@@ -173,6 +173,46 @@ TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   EXPECT_EQ(read_text(out_), "mine\n");
 }
 
+TEST_F(ServerFault, SurfacesOfAnEarlierRunAreNotMixedWithTheNewOnes) {
+  const auto reconstruct = [&] {
+    return run(server({"reconstruct", take_.string(), "--out", out_.string()}));
+  };
+  ASSERT_EQ(reconstruct().status, 0);
+  std::ofstream(out_ / "notes.txt") << "mine\n";
+  // Of the same frames, one of which gives no surface now.
+  fs::resize_file(take_ / "frames" / "000003.png", 200);
+  EXPECT_EQ(reconstruct().status, 1);
+  EXPECT_FALSE(names_in(out_).contains("000003.ply"));
+  EXPECT_EQ(names_in(out_).size(), 10U + 1U);
+  // Of frames that the take does not have.
+  ASSERT_TRUE(write_striped_take(striped_scene(), take_, 6));
+  const std::set<std::string> before = names_in(out_);
+  expect_one_error(reconstruct(), "has surfaces of other frames");
+  EXPECT_EQ(names_in(out_), before);
+  const fs::path sim = folder_ / "sim";
+  const std::vector<std::string> simulated =
+      server({"reconstruct", "sim:plane,width=96,height=64,stripes=20", "--out", sim.string()});
+  fs::create_directory(sim);
+  std::ofstream(sim / "000080_between.ply");  // a period has 80 frames
+  expect_one_error(run(simulated), "000080_between.ply");
+}
+
+TEST_F(ServerFault, SlidesOfAnEarlierPatternAreNotProjectedWithTheNewOnes) {
+  const auto pattern = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> command{"pattern", "--size", "128x96",     "--stripes",
+                                     "32",      "--out",  out_.string()};
+    command.insert(command.end(), more.begin(), more.end());
+    return run(server(command));
+  };
+  ASSERT_EQ(pattern({"--scheme", "white-frame"}).status, 0);
+  EXPECT_EQ(pattern({"--scheme", "white-frame"}).status, 0);
+  const std::set<std::string> before = names_in(out_);
+  for (const std::vector<std::string>& other :
+       {std::vector<std::string>{}, {"--interlaced"}, {"--both-axes"}, {"--gray"}})
+    expect_one_error(pattern(other), "has other pictures");
+  EXPECT_EQ(names_in(out_), before);
+}
+
 TEST_F(ServerFault, NoRoomForTheReconstruction) {
   // A limit on the size of files stands for a full disk: writing fails in the middle of one.
   std::string script = "trap '' XFSZ; ulimit -f 8; exec";
