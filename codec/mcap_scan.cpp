@@ -71,6 +71,15 @@ std::optional<Contents> read_index(const File& file) {
   return contents;
 }
 
+/// Of a file whose first bytes are wrong: it may never have been a recording.
+Result<std::vector<Contents>> walk_damaged_start(const File& file) {
+  auto found = walk_records(file, ReadChunks::kAll);
+  if (found && std::ranges::all_of(*found, [](const Contents& c) { return c.chunks.empty(); }))
+    return Error{file.name() + " is not a recording: it does not start as an MCAP file does, nor is a part " +
+                 "of one in it"};
+  return found;
+}
+
 }  // namespace
 
 /// The first one of an id counts; the specification has all of an id equal.
@@ -121,8 +130,11 @@ Result<std::vector<Contents>> read_contents(const File& file, ReadContents how) 
   const std::uint64_t start_bytes = std::min<std::uint64_t>(file.size(), kMagic.size());
   const auto magic = file.read(0, start_bytes);
   if (!magic) return magic.error();
-  if (!std::equal(magic->begin(), magic->end(), kMagic.begin()))
-    return Error{file.name() + " is not a recording: it does not start as an MCAP file does"};
+  if (!std::equal(magic->begin(), magic->end(), kMagic.begin())) {
+    if (how == ReadContents::kByWalking) return walk_damaged_start(file);
+    return Error{file.name() + " is not a recording: it does not start as an MCAP file does; where it was " +
+                 "one, `relievo recover` may find what is whole"};
+  }
   if (file.size() < kMagic.size()) {
     Contents nothing;
     nothing.recovered = true;

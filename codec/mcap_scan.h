@@ -67,8 +67,8 @@ enum class ReadContents {
 };
 
 /// Of each recording in the file: one, or more where others were put behind it (`cat a b`); their places are
-/// the file's, their ids their own. Fails where the file is no MCAP file or cannot be read; a file cut short
-/// gives what is whole.
+/// the file's, their ids their own. Fails where the file is no MCAP file, which kByIndex tells by its first
+/// bytes alone, or cannot be read; a file cut short gives what is whole.
 Result<std::vector<Contents>> read_contents(const File& file, ReadContents how);
 
 /// A chunk's records, checked against its CRC. Errors name no file or place: the caller knows both.

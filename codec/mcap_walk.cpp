@@ -32,7 +32,7 @@ class Walk {
   Walk(const File& file, ReadChunks which) : file_(file), which_(which), effort_left_(4 * file.size()) {}
 
   Result<std::vector<Contents>> run() {
-    std::uint64_t at = kMagic.size();
+    std::uint64_t at = skip_magic();
     while (at < file_.size()) {
       const auto record = ended_ ? std::nullopt : extent(at);
       loose_messages_ = loose_messages_ || (record && record->op == Op::kMessage);
@@ -69,6 +69,16 @@ class Walk {
     if (static_cast<int>(out.op) == 0) return std::nullopt;  // zeros that a power loss left
     if (out.length > file_.size() - out.content()) return std::nullopt;
     return out;
+  }
+
+  /// The file's first bytes, where they or what follows them is as it should be. Returns where that is.
+  std::uint64_t skip_magic() {
+    const auto magic = file_.read(0, kMagic.size());
+    if (magic && std::ranges::equal(*magic, kMagic)) return kMagic.size();
+    const auto header = magic ? extent(kMagic.size()) : std::nullopt;
+    if (!header || header->op != Op::kHeader || !goes_on_at(header->end())) return 0;
+    contents_.gaps.push_back({0, kMagic.size()});
+    return kMagic.size();
   }
 
   /// Of a recording whose footer ends at `at`: where it ends itself.

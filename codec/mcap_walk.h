@@ -14,10 +14,10 @@ enum class ReadChunks {
   kWhereNeeded,  // those whose message indexes, right behind them, do not say what is in them: quick
 };
 
-/// Where bytes are no records, looks for the next chunk or attachment whose CRC is right, or the next
-/// recording of a file that was joined of several, and goes on there; what was passed over is in `gaps`. A
-/// chunk whose own bytes are wrong is listed (whoever reads it meets the error) where what follows it shows
-/// that its length is right.
+/// Where bytes are no records, the file's first ones among them, looks for the next chunk or attachment whose
+/// CRC is right, or the next recording of a file that was joined of several, and goes on there; what was
+/// passed over is in `gaps`. A chunk whose own bytes are wrong is listed (whoever reads it meets the error)
+/// where what follows it shows that its length is right.
 Result<std::vector<Contents>> walk_records(const File& file, ReadChunks which);
 
 }  // namespace relievo::mcap

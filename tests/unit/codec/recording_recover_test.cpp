@@ -236,6 +236,30 @@ TEST_F(RecordingRecover, ACrashAfterDamageLosesTheLastChunkAndTheDamagedOne) {
   EXPECT_EQ(recovered_from(folder_, bytes), wanted);
 }
 
+TEST_F(RecordingRecover, AFileThatDoesNotStartAsOneLosesNothing) {
+  for (std::size_t damaged = 1; damaged <= mcap::kMagic.size(); ++damaged) {
+    Bytes bytes = whole_;
+    std::fill_n(bytes.begin(), damaged, std::uint8_t{0});
+    RecoveredRecording report;
+    EXPECT_EQ(recovered_from(folder_, bytes, &report), all_but(-1, -1)) << damaged;
+    EXPECT_EQ(report.lost_bytes, mcap::kMagic.size());
+    EXPECT_EQ(report.attachments, 2u);
+    // Missing, with what is behind them.
+    bytes.erase(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(2 * damaged));
+    EXPECT_EQ(recovered_from(folder_, bytes), all_but(-1, -1)) << damaged;
+  }
+  const auto opened = RecordingReader::open(folder_ / "bad.mcap");
+  ASSERT_FALSE(opened.ok());
+  EXPECT_NE(opened.error().message.find("`relievo recover`"), std::string::npos) << opened.error().message;
+}
+
+TEST_F(RecordingRecover, AFileThatNeverWasOneIsRefusedAsSuch) {
+  write_file(folder_ / "bad.mcap", Bytes(3000, 'x'));
+  const auto done = recover_recording(folder_ / "bad.mcap", folder_ / "copy.mcap", always);
+  ASSERT_FALSE(done.ok());
+  EXPECT_NE(done.error().message.find("is not a recording"), std::string::npos) << done.error().message;
+}
+
 /// Any one byte: never more than one chunk is lost, never anything wrong is kept.
 TEST_F(RecordingRecover, AnyByteCostsOneChunkAtMost) {
   for (std::size_t at = chunk_extent(whole_, 0).first; at < whole_.size(); ++at) {
