@@ -70,24 +70,36 @@ Status watch(const Options& options, Recorder& recorder, StopSignal& stop) {
   return {};
 }
 
-void report(const Options& options, const Recorder::Counts& counts) {
+void report(const Options& options, const Recorder& recorder) {
+  const Recorder::Counts counts = recorder.counts();
+  const std::vector<std::filesystem::path> files = recorder.files();
+  const std::uint64_t removed = counts.files - files.size();
   if (options.json) {
-    const nlohmann::json j = {{"file", counts.bytes > 0 ? options.file : ""},
+    std::vector<std::string> paths;
+    for (const auto& file : files) paths.push_back(file.string());
+    const nlohmann::json j = {{"file", recorder.file().string()},
                               {"stream", options.stream},
-                              {"files", counts.files},
+                              {"files", files.size()},
+                              {"paths", paths},
+                              {"removed_files", removed},
                               {"frames", counts.frames},
                               {"lost", counts.lost},
                               {"bytes", counts.bytes},
                               {"duration_s", counts.duration_s}};
     std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-  } else if (counts.bytes == 0) {
+  } else if (files.empty()) {
     std::puts("nothing was received; no file was written");
   } else {
-    const std::string files =
-        counts.files > 1 ? " (" + std::to_string(counts.files) + " files)" : std::string();
-    std::printf("%s%s: %llu frames in %s, %s, %llu lost\n", options.file.c_str(), files.c_str(),
+    std::string name = files.front().string();
+    if (files.size() > 1)
+      name += " to " + files.back().filename().string() + " (" + std::to_string(files.size()) + " files)";
+    std::printf("%s: %llu frames in %s, %s, %llu lost\n", name.c_str(),
                 static_cast<unsigned long long>(counts.frames), duration_text(counts.duration_s).c_str(),
                 bytes_text(counts.bytes).c_str(), static_cast<unsigned long long>(counts.lost));
+    if (removed > 0)
+      std::printf(
+          "of these, what was in the first %llu files was removed, as --keep-size and --keep-for say\n",
+          static_cast<unsigned long long>(removed));
   }
 }
 
@@ -122,7 +134,7 @@ Status run(Options options, StopSignal& stop) {
                 " frames were lost before they could be recorded: the network or the "
                 "disk was too slow");
   }
-  report(options, counts);
+  report(options, recorder);
   return {};
 }
 

@@ -79,6 +79,11 @@ Recorder::Counts Recorder::counts() const {
   return counts_;
 }
 
+std::vector<std::filesystem::path> Recorder::files() const {
+  const std::lock_guard lock(mutex_);
+  return files_;
+}
+
 std::filesystem::path Recorder::file() const {
   const std::lock_guard lock(file_mutex_);
   return file_;
@@ -172,6 +177,7 @@ Status Recorder::open_file() {
   now_writes(file, writer_->growing());
   frames_before_ = counts_.frames;
   ++counts_.files;
+  files_.push_back(file);
   for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
     const TopicType& type = topic_type(topic);
     auto channel =
@@ -218,6 +224,8 @@ Status Recorder::next_segment(std::int64_t now_ns) {
   }
   add_attachments();
   if (const Status removed = segments_.remove_old(file()); !removed) log_warning(removed.error().message);
+  std::error_code ignored;
+  std::erase_if(files_, [&](const std::filesystem::path& f) { return !std::filesystem::exists(f, ignored); });
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/recording_options.h"
 #include "base/result.h"
@@ -56,7 +57,7 @@ class Recorder {
     std::uint64_t lost = 0;    // on the way here
     std::uint64_t missed = 0;  // that could not be written, or came after that
     std::uint64_t bytes = 0;   // of samples
-    std::uint64_t files = 0;   // begun
+    std::uint64_t files = 0;   // begun, those that `keep` removed among them
     double duration_s = 0;     // first to last frame
     bool live = false;         // the stream is there now
   };
@@ -67,6 +68,8 @@ class Recorder {
   Subscriber::Callbacks callbacks();
 
   Counts counts() const;
+  /// Those that were begun and are there still: `keep` removes old ones. In order.
+  std::vector<std::filesystem::path> files() const;
   /// The file that is being written, or was last; empty before the first sample.
   std::filesystem::path file() const;
   /// What is whole of it; null before the first sample.
@@ -101,11 +104,12 @@ class Recorder {
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
-  std::int64_t segment_ns_ = 0;           // when its first sample was received
-  std::uint64_t frames_before_ = 0;       // in the files before it
-  std::optional<StreamInfo> info_;        // as received last,
-  std::optional<RawSample> info_sample_;  // and as it came
-  DescriptionAttachments attachments_;    // of the file being written
+  std::int64_t segment_ns_ = 0;               // when its first sample was received
+  std::uint64_t frames_before_ = 0;           // in the files before it
+  std::vector<std::filesystem::path> files_;  // as files()
+  std::optional<StreamInfo> info_;            // as received last,
+  std::optional<RawSample> info_sample_;      // and as it came
+  DescriptionAttachments attachments_;        // of the file being written
   std::optional<Error> error_;
   Counts counts_;
   std::int64_t first_frame_ns_ = 0;

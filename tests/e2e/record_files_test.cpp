@@ -56,6 +56,10 @@ TEST(RecordFiles, EachSegmentStandsAloneAndNothingIsLostBetweenThem) {
     const std::vector<fs::path> files = files_in(folder.path());
     ASSERT_EQ(files.size(), before + static_cast<std::size_t>(added)) << "the second run goes on counting";
     before = files.size();
+    EXPECT_EQ(result["paths"].get<std::vector<fs::path>>(),
+              std::vector<fs::path>(files.end() - added, files.end()));
+    EXPECT_EQ(result["file"], files.back().string());
+    EXPECT_EQ(result["removed_files"], 0);
     std::vector<std::uint64_t> sequence;
     for (auto file = files.end() - added; file != files.end(); ++file) {
       EXPECT_TRUE(fs::file_size(*file) >= 60'000u || file + 1 == files.end());
@@ -122,8 +126,12 @@ TEST(RecordFiles, OldSegmentsGo) {
   const auto done = run(record(
       {"--out", folder / "face.mcap", "--split-size", "100kB", "--keep-size", "700kB", "--frames", "100"}));
   ASSERT_EQ(done.status, 0) << done.err;
-  const int written = nlohmann::json::parse(done.out)["files"];
+  const auto result = nlohmann::json::parse(done.out);
   const std::vector<fs::path> files = files_in(folder.path());
+  EXPECT_EQ(result["paths"].get<std::vector<fs::path>>(), files) << "none that went";
+  EXPECT_EQ(result["files"], files.size());
+  EXPECT_GE(result["removed_files"], 1);
+  const int written = result["files"].get<int>() + result["removed_files"].get<int>();
   char last[32];
   std::snprintf(last, sizeof last, "face_%06d.mcap", written - 1);
   EXPECT_EQ(files.back().filename(), last);
