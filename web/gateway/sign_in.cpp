@@ -15,7 +15,8 @@
 namespace relievo {
 namespace {
 
-// The mark is the viewer's (web/viewer/index.html).
+// The mark is the viewer's (web/viewer/index.html). A form without an action is sent to the page's own
+// address, and what that has behind '#', the view of a link, stays there.
 constexpr std::string_view kPage = R"html(<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -27,7 +28,7 @@ constexpr std::string_view kPage = R"html(<!doctype html>
 <path d="M4 20h4c5 0 4-7 8-7s3 7 8 7h4"/><path d="M4 26h3c6 0 5-9 9-9s3 9 9 9h3"/></svg>Relievo</h1>
 <p>Whoever runs this server lets you watch with a token: it is in the link they gave you, behind <code>token=</code>,
 or in their token file.</p>
-<form action="{path}">{query}
+<form>{query}
 {refusal}<label for="token">Token</label>
 <input id="token" name="token" type="password" autocomplete="current-password" required autofocus{described}>
 <button>Watch</button>
@@ -145,7 +146,6 @@ std::string page(std::string_view target, Unknown unknown) {
   put("{described}", refused ? R"( aria-invalid="true" aria-describedby="refusal")" : "");
   put("{refusal}",
       refused ? R"(<p id="refusal" role="alert">)" + std::string(refusal(unknown)) + "</p>\n" : "");
-  put("{path}", target.substr(0, target.find('?')));
   put("{query}", hidden_inputs(target));  // the last one: it is what was sent, and may have such marks
   return out;
 }

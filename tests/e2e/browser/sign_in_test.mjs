@@ -85,17 +85,22 @@ checks['its ground is the viewer\'s'] = async () => {
   }
 };
 
-checks['a right one leads to what was asked for'] = async () => {
-  await page.goto(`${server.address}/?stream=object&token=${kWrong}`);
+checks['a right one leads to what was asked for, in the view of the link'] = async () => {
+  await page.goto(`${server.address}/?stream=object&token=${kWrong}#mode=normals`);
   await page.getByLabel('Token').fill(`${kToken} `);
   await page.getByRole('button', { name: 'Watch' }).click();
   await shownPast(page, 1);
-  assert.equal(page.url(), `${server.address}/?stream=object`);
+  assert.match(page.url(), /\/\?stream=object(#mode=normals)?$/); // the page may write its own
+  assert.equal(await page.evaluate(() => window.relievo.diagnostics().mode), 'normals');
 };
 
-checks['one that was kept, and is not known any more, is asked for anew'] = async () => {
+checks['one that was kept, and is not known any more, is asked for anew, also in the page of the rig'] = async () => {
+  await page.goto(`${server.address}/rig?stream=object`);
+  await page.waitForFunction(() => document.querySelector('#picture').width > 4);
   writeFileSync(tokens, 'another-token-for-this-test\n');
-  await page.reload();
+  await page.waitForSelector('input[name=token]');
+  assert.match(await page.textContent('[role=alert]'), /kept is not known here any more/);
+  await page.goto(server.address);
   assert.match(await page.textContent('[role=alert]'), /kept is not known here any more/);
 };
 

@@ -58,6 +58,7 @@ export async function streamNames(): Promise<string[]> {
 
 export async function ask(path: string, init: RequestInit = {}): Promise<Response> {
   const response = await fetch(address(path), { cache: 'no-store', signal: AbortSignal.timeout(5000), ...init });
+  if (response.status === 401) location.reload(); // the page that the server answers with asks for a token
   if (!response.ok) throw new Refused((await response.text()).trim() || `HTTP ${response.status}`);
   return response;
 }
