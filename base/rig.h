@@ -62,7 +62,7 @@ struct Rig {
   double camera_gamma = 1;
   // How good its calibration found it; 0: not said.
   double stereo_rms_px = 0;  // what the board's corners are off by in either picture
-  double scale_error = 0;    // what sizes are wrong by, relative, RMS over the places of the board
+  double scale_error = 0;    // what sizes and depths are wrong by, relative, where the board was
   // In a frame that it shares with other rigs, as whoever set them up has measured it; none: not said.
   std::optional<CameraPose> world_from_camera;
 };

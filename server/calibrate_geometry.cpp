@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/compare_rigs.h"
+#include "capture/calibrate/coverage.h"
 #include "capture/calibrate/geometry.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
@@ -91,6 +92,7 @@ void print(const Geometry& g, const std::optional<RigDifference>& d, const std::
     std::printf(
         "           its centre is above or below its picture, as projectors that throw upwards have it\n");
   }
+  std::printf("depth      at %.2f m is known to +- %.2f mm\n", g.distance_m, 1000 * g.depth_sigma_m);
   const auto& t = g.projector_from_camera_translation;
   std::printf("baseline   %.1f mm\n", 1000 * std::hypot(t[0], t[1], t[2]));
   if (d) {
@@ -104,6 +106,20 @@ void print(const Geometry& g, const std::optional<RigDifference>& d, const std::
                 1000 * d->depth_rms_m, 1000 * d->depth_mean_m);
   }
   std::printf("written    %s\n", out.c_str());
+}
+
+/// Where views are too few or too alike, all figures of how well they fit are good.
+void warn_of_depth(const Geometry& g, const MeasuredViews& measured, const PinholeModel& projector) {
+  if (g.depth_sigma_m <= kGoodDepthSigma * g.distance_m) return;
+  Coverage coverage(measured.camera, projector);
+  for (const MeasuredView& view : measured.views)
+    if (!view.corners.empty()) coverage.add(view);
+  const std::string missing = coverage.missing();
+  char text[96];
+  std::snprintf(text, sizeof text,
+                "at %.2f m this rig's depths are known to +- %.1f mm only: take more views", g.distance_m,
+                1000 * g.depth_sigma_m);
+  log_warning(text + (missing.empty() ? "" : "; still missing: " + missing));
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -154,6 +170,7 @@ Status run(const Options& options, StopSignal& stop) {
   projector.height = code.projector.height;
   const auto geometry = calibrate_geometry(measured->views, measured->camera, projector, {});
   if (!geometry) return geometry.error();
+  warn_of_depth(*geometry, *measured, projector);
 
   Rig rig = before.whole.value_or(Rig{});
   rig.scan = before.scan.value_or(options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive);

@@ -64,6 +64,7 @@ std::string geometry_report(const Geometry& g) {
   nlohmann::json json = {{"stereo_rms_px", g.stereo_rms},
                          {"stereo_rms_all_corners_px", g.stereo_rms_all},
                          {"distance_m", g.distance_m},
+                         {"depth_sigma_mm", 1000 * g.depth_sigma_m},
                          {"camera_rms_px", g.camera_rms},
                          {"projector_rms_px", g.projector_rms},
                          {"plane_rms_mm", 1000 * g.plane_rms_m},

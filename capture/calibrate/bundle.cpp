@@ -228,6 +228,11 @@ class Adjuster {
     }
   }
 
+  Devices devices(const Eigen::VectorXd& x) const {
+    return {lens_of(problem_.camera, x.data()), lens_of(problem_.projector, x.data() + kLens),
+            pose_at(x.data() + 2 * kLens)};
+  }
+
   Result<BundleResult> result(int rounds) const {
     Eigen::MatrixXd normal;
     Eigen::VectorXd gradient;
@@ -239,12 +244,12 @@ class Adjuster {
       out.sigma_px[i] = std::sqrt(std::max(0.0, covariance(k, k)));
       out.sigma_px[4 + i] = std::sqrt(std::max(0.0, covariance(kLens + k, kLens + k)));
     }
-    out.camera = lens_of(problem_.camera, x_.data());
-    out.projector = lens_of(problem_.projector, x_.data() + kLens);
+    static_cast<Devices&>(out) = devices(x_);
     if (!(out.camera.fx() > 0 && out.camera.fy() > 0 && out.projector.fx() > 0 && out.projector.fy() > 0)) {
       return degenerate();
     }
-    out.projector_from_camera = pose_at(x_.data() + 2 * kLens);
+    const Eigen::MatrixXd directions = covariance.topLeftCorner(kShared, kShared).llt().matrixL();
+    for (int k = 0; k < kShared; ++k) out.deviations.push_back(devices(x_.head(kShared) + directions.col(k)));
     for (std::size_t v = 0; v < problem_.views.size(); ++v) {
       out.camera_from_board.push_back(pose_at(x_.data() + offset(v)));
     }

@@ -47,10 +47,17 @@ struct BundlePriors {
   double projector_tangential = 0.002;
 };
 
-struct BundleResult {
+/// Both lenses and the pose between them.
+struct Devices {
   PinholeModel camera, projector;
   Pose projector_from_camera{};
+};
+
+struct BundleResult : Devices {
   std::vector<Pose> camera_from_board;
+  /// The devices moved by one standard deviation in directions that are independent of each other: what
+  /// follows from the devices has the root of the sum of the squares of what these change of it.
+  std::vector<Devices> deviations;
   /// Standard deviations from the data and the priors, pixels: fx fy cx cy of camera, then of projector.
   std::array<double, 8> sigma_px{};
   double cost = 0;  // comparable between starts of one problem with the same priors

@@ -7,6 +7,7 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
+#include "capture/calibrate/compare_rigs.h"
 #include "capture/calibrate/plane_check.h"
 
 namespace relievo {
@@ -29,6 +30,26 @@ double squared(Vec2d v) {
 
 Vec2d minus(Vec2d a, Vec2d b) {
   return {a[0] - b[0], a[1] - b[1]};
+}
+
+Rig rig_of(const Devices& devices) {
+  Rig rig;
+  rig.camera = devices.camera;
+  rig.projector = devices.projector;
+  rig.projector_from_camera_rotation = rotation_matrix(devices.projector_from_camera);
+  for (std::size_t i = 0; i < 3; ++i)
+    rig.projector_from_camera_translation[i] = devices.projector_from_camera[3 + i];
+  return rig;
+}
+
+double depth_sigma(const BundleResult& fit, double distance_m) {
+  double squares = 0;
+  for (const Devices& moved : fit.deviations) {
+    const auto difference = compare_rigs(rig_of(moved), rig_of(fit), distance_m);
+    squares += difference ? difference->depth_rms_m * difference->depth_rms_m
+                          : std::numeric_limits<double>::infinity();
+  }
+  return std::sqrt(squares);
 }
 
 /// A view on its way through the calibration.
@@ -318,6 +339,7 @@ class Calibration {
     g.stereo_rms_all =
         std::sqrt((camera + projector + left_out) / (2 * (n + static_cast<double>(corners_left_out))));
     g.distance_m = median(std::move(depths));
+    g.depth_sigma_m = depth_sigma(fit, g.distance_m);
     const PlaneCheck all = together(planes);
     g.plane_rms_m = all.plane_rms_m;
     g.square_error_m = all.length_rms_m;
@@ -326,12 +348,20 @@ class Calibration {
   }
 
   Result<Geometry> fitting(Geometry geometry) const {
-    if (geometry.stereo_rms <= options_.most_rms_px) return geometry;
-    char rms[32];
-    std::snprintf(rms, sizeof rms, "%.1f", geometry.stereo_rms);
-    return Error{std::string("no rig fits the views: the best leaves a stereo RMS of ") + rms +
-                 " px; are the projector's size and the pattern those that were projected, unmirrored, and "
-                 "did nothing but the board move?"};
+    char figure[32];
+    if (geometry.stereo_rms > options_.most_rms_px) {
+      std::snprintf(figure, sizeof figure, "%.1f", geometry.stereo_rms);
+      return Error{std::string("no rig fits the views: the best leaves a stereo RMS of ") + figure +
+                   " px; are the projector's size and the pattern those that were projected, unmirrored, and "
+                   "did nothing but the board move?"};
+    }
+    if (!(geometry.depth_sigma_m <= options_.most_depth_sigma * geometry.distance_m)) {
+      std::snprintf(figure, sizeof figure, "%.2g", 100 * geometry.depth_sigma_m / geometry.distance_m);
+      return Error{std::string("the views tell depths to ") + figure +
+                   " % only: take more, with the board tilted in different directions and in all parts of "
+                   "the picture"};
+    }
+    return geometry;
   }
 
   PinholeModel camera_size_, projector_size_;
@@ -357,7 +387,7 @@ Rig with_geometry(Rig rig, const Geometry& geometry) {
   rig.projector_from_camera_rotation = geometry.projector_from_camera_rotation;
   rig.projector_from_camera_translation = geometry.projector_from_camera_translation;
   rig.stereo_rms_px = geometry.stereo_rms;
-  rig.scale_error = geometry.scale_error;
+  rig.scale_error = std::hypot(geometry.scale_error, geometry.depth_sigma_m / geometry.distance_m);
   return rig;
 }
 

@@ -25,7 +25,8 @@ struct GeometryOptions {
   double bad_corner = 5;
   double bad_corner_px = 1;
   std::size_t min_views = 3;
-  double most_rms_px = 5;  // stereo RMS of a rig that can be used
+  double most_rms_px = 5;          // stereo RMS of a rig that can be used,
+  double most_depth_sigma = 0.02;  // and depth_sigma_m of its distance_m
 };
 
 /// Pixels, but for the plane. An RMS is over distances in the picture, as cv::stereoCalibrate reports it.
@@ -55,6 +56,9 @@ struct Geometry {
   double camera_rms = 0, projector_rms = 0, stereo_rms = 0;
   double stereo_rms_all = 0;  // with the corners that were left out of used views
   double distance_m = 0;      // median depth of the corners
+  /// Standard deviation of a depth at that distance, from those of lenses and pose, RMS over the camera's
+  /// picture where the projector reaches. Infinite where the views leave it open.
+  double depth_sigma_m = 0;
   double plane_rms_m = 0;
   double square_error_m = 0;              // RMS of the distances between neighbouring triangulated corners
   double scale_error = 0;                 // RMS over the views of the board's size, relative
@@ -62,12 +66,17 @@ struct Geometry {
   std::vector<CornerResidual> residuals;  // of used corners
 };
 
+/// The most of depth_sigma_m, as a share of distance_m, of a rig that is calibrated well: 1 mm a metre. Eight
+/// views that differ have less than half of it, three may have more.
+inline constexpr double kGoodDepthSigma = 1e-3;
+
 /// Sizes are pixels of the two devices. Fails where fewer than `min_views` views can be used, or they do not
 /// determine the rig or fit none; the error says which views and why.
 Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, const PinholeModel& camera_size,
                                     const PinholeModel& projector_size, const GeometryOptions& options);
 
-/// `rig` with the devices, their pose and the quality that were found.
+/// `rig` with the devices, their pose and the quality that were found: its scale_error is of the board's size
+/// and of depths.
 Rig with_geometry(Rig rig, const Geometry& geometry);
 
 /// Residuals as arrows, 200 times as long, over the camera's picture (left) and the projector's (right). RGB.

@@ -55,8 +55,9 @@ TEST(CalibrationExample, FromNothingToAReconstruction) {
   const auto written = read_rig(rig);
   ASSERT_TRUE(written.ok()) << written.error().message;
   EXPECT_EQ(written->stereo_rms_px, geometry.at("stereo_rms_px").get<double>());
-  EXPECT_EQ(written->scale_error, geometry.at("scale_error").get<double>());
-  EXPECT_GT(written->scale_error, 0);
+  EXPECT_GT(written->scale_error, geometry.at("scale_error").get<double>());
+  EXPECT_LT(geometry.at("compare").at("depth_rms_mm").get<double>(),
+            2 * geometry.at("depth_sigma_mm").get<double>());
   EXPECT_LT(written->scale_error, 0.001);
 
   // A take of the same rig, reconstructed with what was just calibrated instead of the truth.

@@ -110,6 +110,34 @@ TEST(Geometry, IdealCornersGiveTheRigBackWithinItsOwnSigmas) {
   EXPECT_LT(compare_rigs(rig_of(*geometry), rig, 1.0)->depth_rms_m, 0.0004);
 }
 
+// Few views fit a wrong rig as well as the right one: what they leave open is told by itself.
+TEST(Geometry, HowWellDepthsAreKnownIsTold) {
+  const Rig rig = truth();
+  const auto many = calibrate(rig, ideal_views(rig, 12, 0.05));
+  ASSERT_TRUE(many.ok()) << many.error().message;
+  EXPECT_LT(many->depth_sigma_m, kGoodDepthSigma * many->distance_m);
+  double squares = 0;
+  const std::vector<MeasuredView> views = ideal_views(rig, 12, 0.05);
+  for (std::size_t first = 0; first < 12; first += 3) {
+    const auto few = calibrate(rig, {views.begin() + static_cast<std::ptrdiff_t>(first),
+                                     views.begin() + static_cast<std::ptrdiff_t>(first) + 3});
+    ASSERT_TRUE(few.ok()) << few.error().message;
+    EXPECT_GT(few->depth_sigma_m, 1.5 * many->depth_sigma_m) << first;
+    const double off = compare_rigs(rig_of(*few), rig, few->distance_m)->depth_rms_m;
+    EXPECT_LT(off, 3 * few->depth_sigma_m) << first;
+    squares += (off / few->depth_sigma_m) * (off / few->depth_sigma_m);
+  }
+  EXPECT_GT(std::sqrt(squares / 4), 0.2);
+}
+
+TEST(Geometry, EightTimesTheSamePoseIsNoCalibration) {
+  const Rig rig = truth();
+  const std::vector<MeasuredView> views(8, ideal_views(rig, 1, 0.05).front());
+  const auto geometry = calibrate(rig, views);
+  ASSERT_FALSE(geometry.ok()) << geometry->depth_sigma_m << " m, " << geometry->stereo_rms << " px";
+  EXPECT_THAT(geometry.error().message, HasSubstr("tilted in different directions"));
+}
+
 TEST(Geometry, ABoardThatLooksTooLargeIsAScaleError) {
   const Rig rig = truth();
   const auto geometry = calibrate(rig, ideal_views(rig, 12, 0.05));
@@ -136,7 +164,9 @@ TEST(Geometry, WhatItFoundGoesIntoTheRig) {
   const Rig found = with_geometry(rig, *geometry);
   EXPECT_EQ(found.camera.matrix, geometry->camera.matrix);
   EXPECT_EQ(found.stereo_rms_px, geometry->stereo_rms);
-  EXPECT_EQ(found.scale_error, geometry->scale_error);
+  EXPECT_GT(found.scale_error, geometry->scale_error);
+  EXPECT_EQ(found.scale_error,
+            std::hypot(geometry->scale_error, geometry->depth_sigma_m / geometry->distance_m));
   EXPECT_EQ(found.colour_matrix, rig.colour_matrix);
 }
 

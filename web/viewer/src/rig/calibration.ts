@@ -17,6 +17,7 @@ export interface GeometryResult {
   square_error_mm: number;
   baseline_mm: number;
   distance_m: number;
+  depth_sigma_mm: number;
   views: { name: string; used: boolean; stereo_rms_px?: number; why?: string }[];
 }
 

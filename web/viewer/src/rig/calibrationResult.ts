@@ -8,6 +8,7 @@ import { text } from './strings';
 const say = text.calibration.result;
 const kResidualMost = 12; // of 255: more is stray light, or a curved response (docs/CALIBRATION.md)
 const kStereoMost_px = 0.5;
+const kDepthMost = 1; // mm a metre
 
 function figures(rows: readonly (readonly [key: string, name: string, value: string, bad?: boolean])[]): HTMLElement {
   const list = make('dl', { className: 'figures' });
@@ -46,15 +47,17 @@ function colours(result: ColourResult): HTMLElement[] {
 }
 
 function geometry(result: GeometryResult): HTMLElement[] {
-  const good = result.stereo_rms_px <= kStereoMost_px;
+  const fits = result.stereo_rms_px <= kStereoMost_px;
+  const isKnown = result.depth_sigma_mm <= kDepthMost * result.distance_m;
   const views = result.views.map(({ name, used, stereo_rms_px, why }) => {
     const value = make('td', { className: used ? '' : 'bad' }, used ? `${stereo_rms_px!.toFixed(3)} px` : why ?? '');
     return make('tr', {}, make('th', { scope: 'row' }, name), value);
   });
   return [
-    make('p', { className: good ? 'used' : 'bad' }, good ? say.good : say.stereoHigh),
+    make('p', { className: fits && isKnown ? 'used' : 'bad' }, !fits ? say.stereoHigh : isKnown ? say.good : say.depthOpen),
     figures([
-      ['stereo', say.stereo, `${result.stereo_rms_px.toFixed(3)} px`, !good],
+      ['stereo', say.stereo, `${result.stereo_rms_px.toFixed(3)} px`, !fits],
+      ['depth', say.depth, `± ${result.depth_sigma_mm.toFixed(1)} mm`, !isKnown],
       ['plane', say.plane, `${result.plane_rms_mm.toFixed(2)} mm`],
       ['squares', say.squares, `${result.square_error_mm.toFixed(2)} mm`],
       ['baseline', say.baseline, `${result.baseline_mm.toFixed(1)} mm`],
