@@ -7,6 +7,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <vector>
 
 #include "base/log.h"
 #include "base/time.h"
@@ -179,19 +180,18 @@ void print_json(const nlohmann::json& j) {
 Status describe_file(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.what, options.stream);
   if (!recorded) return recorded.error();
-  auto described = recorded->find_info();
-  if (!described) return described.error();
+  const auto infos = recorded->read_infos();
+  if (!infos) return infos.error();
   FrameTotals totals;
-  std::optional<StreamInfo> info;
-  if (*described) {
-    if (auto read = read_info_cdr((*described)->cdr)) info = std::move(*read);
-  }
+  std::vector<std::uint64_t> session_frames(infos->size());
   Progress progress("read", "frames", recorded->frames());
   while (!stop.stopped()) {
     auto sample = recorded->next();
     if (!sample) return sample.error();
     if (!*sample) break;
     if ((*sample)->topic != Topic::kFrame) continue;
+    if (const RecordedInfo* session = info_of(**sample, *infos))
+      ++session_frames[static_cast<std::size_t>(session - infos->data())];
     const auto frame = read_frame_cdr((*sample)->cdr);
     if (!frame) {
       ++totals.unreadable;
@@ -221,14 +221,27 @@ Status describe_file(const Options& options, StopSignal& stop) {
     j["damaged_parts"] = recorded->damaged() + summary.damage.size();
     j["attachments"] = nlohmann::json::array();
     for (const auto& attachment : summary.attachments) j["attachments"].push_back(attachment.name);
-    if (info) j["info"] = info_json(*info);
+    if (!infos->empty()) j["info"] = info_json(infos->front().info);
+    j["sessions"] = nlohmann::json::array();
+    for (std::size_t i = 0; i < infos->size(); ++i) {
+      nlohmann::json session = info_json((*infos)[i].info);
+      session["start_s"] = seconds((*infos)[i].sample.receive_time_ns - summary.start_ns);
+      session["frames"] = session_frames[i];
+      j["sessions"].push_back(std::move(session));
+    }
     print_json(j);
     return {};
   }
   std::printf("file        %s, %s\n", options.what.c_str(), bytes_text(file_bytes).c_str());
   std::printf("stream      %s, recorded %s, %s\n", recorded->stream().c_str(),
               utc_text(summary.start_ns).c_str(), duration_text(duration_s).c_str());
-  if (info) print_info(*info);
+  for (std::size_t i = 0; i < infos->size(); ++i) {
+    if (infos->size() > 1)
+      std::printf("session %-3zu from %.3f s on, %llu frames\n", i + 1,
+                  seconds((*infos)[i].sample.receive_time_ns - summary.start_ns),
+                  static_cast<unsigned long long>(session_frames[i]));
+    print_info((*infos)[i].info);
+  }
   print_frames(totals);
   if (summary.recordings > 1)
     std::printf(

@@ -51,8 +51,8 @@ Status run(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.file, options.stream);
   if (!recorded) return recorded.error();
   if (!options.play.follow) recorded->warn_if_cut();
-  auto info = recorded->find_info();
-  if (!info) return info.error();
+  const auto infos = recorded->read_infos();
+  if (!infos) return infos.error();
   const auto range = find_range(*options.range, *recorded);
   if (!range) return range.error().in(options.file);
   PlayOptions play_options = options.play;
@@ -60,9 +60,10 @@ Status run(const Options& options, StopSignal& stop) {
   auto publisher = RawPublisher::create(*options.domain, recorded->stream());
   if (!publisher) return publisher.error();
   Bytes current_info;
-  if (*info) {
-    if (auto status = (*publisher)->publish(**info); !status) return status;
-    current_info = (*info)->cdr;
+  // Before there are readers: what the first frame needs.
+  if (const RecordedInfo* info = info_at(range->from_ns, *infos)) {
+    if (auto status = (*publisher)->publish(info->sample); !status) return status;
+    current_info = info->sample.cdr;
   } else {
     log_warning(options.file + " holds no description of its stream: viewers will lack its calibration");
   }

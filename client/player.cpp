@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "base/time.h"
 #include "idl/cdr.h"
@@ -42,14 +43,49 @@ RawSample restamped(RawSample sample, std::int64_t due_utc_ns, double speed) {
   return sample;
 }
 
+/// Publishes samples with, before each frame, the description that holds for it where that changes: wherever
+/// in the recording it was received.
+class Described {
+ public:
+  Described(std::vector<RecordedInfo> infos, const std::function<Status(const RawSample&)>& publish)
+      : infos_(std::move(infos)), publish_(publish) {}
+
+  Status publish(const RawSample& sample) {
+    if (sample.topic == Topic::kInfo) return add(sample);
+    if (sample.topic == Topic::kFrame) {
+      const RecordedInfo* info = info_of(sample, infos_);
+      if (info && info->sample.cdr != current_) {
+        current_ = info->sample.cdr;
+        if (auto status = publish_(info->sample); !status) return status;
+      }
+    }
+    return publish_(sample);
+  }
+
+ private:
+  /// Of a file that is being written.
+  Status add(const RawSample& sample) {
+    if (!infos_.empty() && sample.receive_time_ns <= infos_.back().sample.receive_time_ns) return {};
+    auto info = read_info_cdr(sample.cdr);
+    if (!info) return publish_(sample);
+    infos_.push_back({sample, *std::move(info)});
+    return {};
+  }
+
+  std::vector<RecordedInfo> infos_;
+  Bytes current_;
+  const std::function<Status(const RawSample&)>& publish_;
+};
+
 Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
-                 const std::function<Status(const RawSample&)>& publish) {
+                 Described& described) {
   const TimeRange range = range_of(options, recorded);
   std::int64_t due_ns = steady_now_ns();
   const std::int64_t utc_from_steady_ns = utc_now_ns() - due_ns;
   const auto give = [&](RawSample sample) {
-    return publish(options.restamp ? restamped(std::move(sample), due_ns + utc_from_steady_ns, options.speed)
-                                   : std::move(sample));
+    return described.publish(options.restamp
+                                 ? restamped(std::move(sample), due_ns + utc_from_steady_ns, options.speed)
+                                 : std::move(sample));
   };
   std::optional<std::int64_t> last_ns;
   std::int64_t came_ns = steady_now_ns();
@@ -86,15 +122,19 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
 
 Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
             const std::function<Status(const RawSample&)>& publish) {
+  auto infos = recorded.read_infos();
+  if (!infos) return infos.error();
+  bool any = false;
+  const std::function<Status(const RawSample&)> counted = [&](const RawSample& sample) {
+    any = true;
+    return publish(sample);
+  };
+  Described described(*std::move(infos), counted);
   do {
     if (auto status = recorded.seek(range_of(options, recorded).from_ns); !status) return status;
     const std::int64_t start_ns = steady_now_ns();
-    bool any = false;
-    const auto counted = [&](const RawSample& sample) {
-      any = true;
-      return publish(sample);
-    };
-    if (auto status = play_once(recorded, options, stop, counted); !status) return status;
+    any = false;
+    if (auto status = play_once(recorded, options, stop, described); !status) return status;
     // A recording of a single moment, or of which nothing is left, must not loop as fast as the machine can.
     const std::int64_t pass_ns = any ? kShortestPass_ns : kNanosecondsPerSecond;
     if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + pass_ns - steady_now_ns()));

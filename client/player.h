@@ -26,7 +26,8 @@ struct PlayOptions {
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or
 /// until stopped. An error of `publish` ends it. Where the range starts between key frames, what it
-/// builds on comes first, at once. One thread.
+/// builds on comes first, at once. Before a frame comes the stream's description that holds for it
+/// (info_of()), where that is not the one that was published last. One thread.
 Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& stop,
             const std::function<Status(const RawSample&)>& publish);
 

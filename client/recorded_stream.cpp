@@ -55,6 +55,13 @@ const RecordedInfo* info_of(const RawSample& frame, std::span<const RecordedInfo
   return &infos[0];
 }
 
+const RecordedInfo* info_at(std::int64_t time_ns, std::span<const RecordedInfo> infos) {
+  if (infos.empty()) return nullptr;
+  for (std::size_t i = infos.size(); i-- > 1;)
+    if (infos[i].sample.receive_time_ns <= time_ns) return &infos[i];
+  return &infos[0];
+}
+
 Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, const std::string& stream) {
   auto reader = RecordingReader::open(file);
   if (!reader) return reader.error();

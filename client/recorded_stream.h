@@ -32,6 +32,9 @@ struct RecordedInfo {
 /// empty.
 const RecordedInfo* info_of(const RawSample& frame, std::span<const RecordedInfo> infos);
 
+/// The last that was received until this time; where there is none, the first. Null where `infos` is empty.
+const RecordedInfo* info_at(std::int64_t time_ns, std::span<const RecordedInfo> infos);
+
 /// One thread.
 class RecordedStream {
  public:

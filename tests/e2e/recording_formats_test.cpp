@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <mutex>
 
 #include "codec/frame3d_codec.h"
 #include "codec/frame_layout.h"
 #include "codec/texture_codec.h"
+#include "idl/transport.h"
 #include "tests/e2e/record_play.h"
 #include "tests/support/temp_folder.h"
 
@@ -363,6 +365,53 @@ TEST(RecordingFormats, EachSessionIsConvertedByItsOwnCalibration) {
         of_second["info"]["rig"]["camera"]["size"],
         nlohmann::json(file == std::string("later.mcap") ? std::vector{192, 144} : std::vector{160, 120}));
   }
+}
+
+TEST(RecordingFormats, InfoDescribesEachSession) {
+  const TempFolder folder;
+  const auto both = record_two_sessions(folder);
+  const auto said = info(both);
+  ASSERT_EQ(said["sessions"].size(), 2u) << said;
+  EXPECT_EQ(said["sessions"][0]["rig"], said["info"]["rig"]);
+  EXPECT_EQ(said["sessions"][0]["rig"]["camera"]["size"], nlohmann::json({160, 120}));
+  EXPECT_EQ(said["sessions"][1]["rig"]["camera"]["size"], nlohmann::json({192, 144}));
+  EXPECT_EQ(said["sessions"][0]["start_s"], 0.0);
+  EXPECT_GT(said["sessions"][1]["start_s"], 0.0);
+  EXPECT_EQ(said["sessions"][0]["frames"].get<int>() + said["sessions"][1]["frames"].get<int>(),
+            said["frames"]);
+  EXPECT_GE(said["sessions"][1]["frames"], 6);
+  const auto text = run({program("relievo"), "info", both});
+  for (const char* part : {"session 1   from 0.000 s on, ", "session 2   from ", "160 x 120", "192 x 144"})
+    EXPECT_THAT(text.out, HasSubstr(part));
+}
+
+TEST(RecordingFormats, WhatIsPlayedIsDescribedAsItsSessionWas) {
+  const TempFolder folder;
+  const auto both = record_two_sessions(folder);
+  const auto count = info(both)["frames"].get<std::size_t>();
+  const auto widths_played = [&](const std::vector<std::string>& more) {
+    std::vector<int> widths;
+    std::mutex mutex;
+    {
+      Subscriber::Callbacks callbacks;
+      callbacks.info = [&](const StreamInfo& played) {
+        const std::lock_guard lock(mutex);
+        const int width = played.rig.camera.width;
+        if (widths.empty() || widths.back() != width) widths.push_back(width);
+      };
+      callbacks.frame = [](const std::string&, const FrameMessage&) {};  // what is waited for
+      const auto subscriber = Subscriber::create({own_domain(), "lo"}, "s", callbacks);
+      EXPECT_TRUE(subscriber.ok());
+      std::vector<std::string> words{"play", both, "--wait-readers", "1"};
+      words.insert(words.end(), more.begin(), more.end());
+      const auto done = run(on_loopback(words));
+      EXPECT_EQ(done.status, 0) << done.err;
+    }
+    return widths;
+  };
+  EXPECT_EQ(widths_played({}), (std::vector{160, 192}));
+  EXPECT_EQ(widths_played({"--frames", std::to_string(count - 3) + ":"}), std::vector{192})
+      << "the first session's is of another camera";
 }
 
 TEST(RecordingFormats, TheRecordingIsNotWrittenOver) {
