@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/whole_file.h"
+#include "capture/png_check.h"
 
 namespace relievo {
 namespace {
@@ -33,6 +34,8 @@ class Numbers {
   Bytes file_;
   bool little_endian_;
 };
+
+constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n";
 
 bool begins_with(Bytes file, std::string_view magic) {
   return file.size() >= magic.size() && std::memcmp(file.data(), magic.data(), magic.size()) == 0;
@@ -121,7 +124,7 @@ std::uint64_t tiff_pixels(Bytes file, bool little_endian) {
 
 std::optional<std::uint64_t> declared_pixels(Bytes file) {
   std::uint64_t found = 0;
-  if (begins_with(file, "\x89PNG\r\n\x1a\n")) {
+  if (begins_with(file, kPng)) {
     found = png_pixels(file);
   } else if (begins_with(file, "\xFF\xD8\xFF")) {
     found = jpeg_pixels(file);
@@ -145,6 +148,9 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
   if (!declared) return Error{name + " cannot be read as a picture: it is no PNG, JPEG, BMP, PNM or TIFF"};
   if (*declared > kMostPicturePixels || *declared > kMostPicturePixelsPerByte * file.size())
     return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
+  if (begins_with(file, kPng)) {
+    if (const auto whole = check_png(file); !whole) return Error{name + " " + whole.error().message};
+  }
   try {
     const cv::Mat bgr = cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())),
                                      cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);

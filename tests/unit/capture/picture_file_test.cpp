@@ -69,6 +69,21 @@ TEST_F(PictureFile, LosslessFormatsKeepEveryPixel) {
   }
 }
 
+/// And the decoder, which prints lines of its own, does not see it.
+TEST_F(PictureFile, ADamagedPngIsRefusedInOneLine) {
+  const Bytes whole = encoded(".png");
+  Bytes damaged = whole;
+  damaged[whole.size() / 2] ^= 0x10;
+  testing::internal::CaptureStderr();
+  const auto changed = read(damaged);
+  const auto cut = read({whole.begin(), whole.end() - 20});
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(changed.ok());
+  EXPECT_THAT(changed.error().message, HasSubstr("is damaged: wrong checksum"));
+  ASSERT_FALSE(cut.ok());
+  EXPECT_THAT(cut.error().message, HasSubstr("is cut short"));
+}
+
 /// A file of each format that says it has 65,500 x 65,500 pixels: 13 GB.
 TEST_F(PictureFile, WhatIsTooLargeToBeTrueIsRefused) {
   const auto put = [](Bytes file, std::size_t at, std::initializer_list<std::uint8_t> bytes) {
