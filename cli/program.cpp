@@ -73,6 +73,16 @@ std::string what_is_wrong(const CLI::ParseError& e, const CLI::App& app) {
   return left.empty() ? "which command?" : "there is no command '" + left.front() + "'";
 }
 
+/// A script's variable that was not set: what an option would take for not given.
+void refuse_empty_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& value : option->results())
+      if (value.empty())
+        throw CLI::ValidationError(option->get_name(), "its value is empty: give one, or leave it out");
+  }
+  for (const CLI::App* given : app.get_subcommands()) refuse_empty_values(*given);
+}
+
 // Results that could not be written (a full disk, a closed pipe) are a failure, not silence.
 int flush_results(const std::string& name, int code) {
   std::cout.flush();
@@ -106,6 +116,7 @@ int parse_and_run(const std::string& name, const std::string& description,
   }
   try {
     app.parse(argc, argv);
+    refuse_empty_values(app);
   } catch (const CLI::CallForVersion&) {
     std::printf("%s %s\n", name.c_str(), RELIEVO_VERSION);
     return flush_results(name, kExitDone);

@@ -35,6 +35,10 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
       {"reconstruct", "--out", "folder"},
       {"evaluate"},
       {"evaluate", "take", "--skip", "-1"},
+      {"evaluate", "take", "--pictures", ""},
+      {"evaluate", ""},
+      {"serve", "--source", "sim:plane", "--record", ""},
+      {"simulate", "--scene", "plane", "--scheme", "", "--out", "folder"},
       {"simulate", "--frames", "5"},
       {"simulate", "--scene", "plane", "--frames", "-1", "--out", "folder"},
   };
