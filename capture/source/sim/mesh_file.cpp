@@ -255,6 +255,15 @@ MeshFile read_obj(const std::string& content, const std::filesystem::path& folde
   return mesh;
 }
 
+/// False of corners in one place or on one line.
+bool has_area(const MeshFile& mesh, const std::array<std::uint32_t, 3>& triangle) {
+  constexpr float kLeastSine = 1e-6F;  // of the angle at its first corner
+  const auto [a, b, c] = triangle;
+  const Vec3 ab = mesh.positions[b] - mesh.positions[a];
+  const Vec3 ac = mesh.positions[c] - mesh.positions[a];
+  return length(cross(ab, ac)) > kLeastSine * length(ab) * length(ac);
+}
+
 void check(const MeshFile& mesh) {
   if (mesh.triangles.empty()) throw Bad{"has no triangle"};
   if (mesh.triangles.size() > kMost) throw Bad{"has too many triangles"};
@@ -267,6 +276,8 @@ void check(const MeshFile& mesh) {
       if (v >= mesh.positions.size()) throw Bad{"has a face with an impossible vertex"};
     }
   }
+  if (std::ranges::none_of(mesh.triangles, [&](const auto& t) { return has_area(mesh, t); }))
+    throw Bad{"has no triangle with an area: the corners of each are in one place or on one line"};
 }
 
 }  // namespace

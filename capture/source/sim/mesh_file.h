@@ -24,7 +24,8 @@ struct MeshFile {
 };
 
 /// By the name's extension. Polygons are cut into fans. Errors name the file and what is wrong with it;
-/// indices in what is returned are valid, positions finite, and there is a triangle.
+/// indices in what is returned are valid, positions finite, and there is a triangle
+/// with an area.
 Result<MeshFile> read_mesh(const std::filesystem::path& file);
 
 }  // namespace relievo::sim

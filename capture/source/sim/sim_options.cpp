@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/source/sim/sim_options.h"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -109,13 +111,29 @@ Status set(SimOptions& options, const std::string& name, const std::string& valu
   return Error{"unknown key \"" + name + "\": give one of " + key_names()};
 }
 
+/// Where the scene's name ends: at the first comma, of a mesh at the first behind its file's extension, since
+/// a file's name may have some.
+std::size_t end_of_scene(const std::string& spec) {
+  if (spec.starts_with("mesh:")) {
+    for (std::size_t at = spec.find('.'); at != std::string::npos; at = spec.find('.', at + 1)) {
+      std::string extension = spec.substr(at, 5);
+      std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+      for (const char* known : {".ply", ".obj"}) {
+        if (extension == known) return std::string::npos;
+        if (extension == std::string(known) + ',') return at + 4;
+      }
+    }
+  }
+  return spec.find(',');
+}
+
 }  // namespace
 
 Result<SimOptions> parse_sim_options(const std::string& spec) {
   SimOptions options;
   bool slides_given = false;
   bool period_given = false;
-  std::size_t at = spec.find(',');
+  std::size_t at = end_of_scene(spec);
   options.scene = spec.substr(0, at);
   while (at != std::string::npos) {
     const std::size_t end = spec.find(',', at + 1);

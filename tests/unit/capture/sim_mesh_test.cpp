@@ -92,6 +92,8 @@ TEST(MeshFile, RefusesWhatIsNone) {
       {changed(good, "float x", "quad x"), "unknown type quad"},
       {changed(ascii_quad(), "4 0 1 2 3", "4 0 1 2 9"), "impossible vertex"},
       {changed(ascii_quad(), "4 0 1 2 3", "2 0 1"), "has no triangle"},
+      {changed(ascii_quad(), "4 0 1 2 3", "4 1 1 1 1"), "no triangle with an area"},
+      {changed(ascii_quad(), "3 3 0 0 255 0\n-3 3", "9 -3 0 0 255 0\n30 -3"), "no triangle with an area"},
       {changed(ascii_quad(), "-3 -3 0 255", "-3 nan 0 255"), "no number"},
       {changed(ascii_quad(), "-3 -3 0 255", "-3 x 0 255"), "no number"},
   };
@@ -125,6 +127,21 @@ TEST(MeshScene, AFlatMeshIsSeenAtItsDepthInItsColours) {
   EXPECT_GT(white(45, 80, 1), white(45, 80, 0));
   EXPECT_LT(white(75, 80, 1), white(75, 80, 0));
   EXPECT_LT(white(60, 80, 2), 25);
+}
+
+TEST(MeshScene, AFileMayHaveCommasInItsName) {
+  test::TempFolder folder;
+  for (const char* name : {"a,b.ply", "a.b,period=3,.PLY"}) {
+    const std::string file = (folder.path() / name).string();
+    test::write_text(file, ascii_quad());
+    for (const char* keys : {"", ",frames=1,width=96,height=64,stripes=20"}) {
+      const auto source = make_sim("mesh:" + file + keys, {});
+      EXPECT_TRUE(source) << (source ? "" : source.error().message);
+    }
+    EXPECT_THAT(make_sim("mesh:" + file + ",frame=1", {}).error().message,
+                HasSubstr("unknown key \"frame\""));
+  }
+  EXPECT_THAT(make_sim("mesh:none,frames=1", {}).error().message, HasSubstr("none is no mesh"));
 }
 
 }  // namespace
