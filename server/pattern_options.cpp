@@ -6,14 +6,21 @@
 #include "capture/pattern/bcsl.h"
 #include "capture/pattern/repeating.h"
 #include "capture/rig_file.h"
+#include "cli/checks.h"
 
 namespace relievo {
+namespace {
+
+constexpr int kMostSlides = 2;  // that are decoded (Reconstructor::create())
+
+}  // namespace
 
 CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& o) {
   auto* file = app.add_option("--pattern", o.file, "An existing pattern.yaml instead of a new pattern");
   for (auto* option :
        {app.add_option("--base", o.base, "Colours: 3 to 6"),
-        app.add_option("--slides", o.slides, "Slides shown in turn: 1 or 2 decode; one-slide has 1"),
+        app.add_option("--slides", o.slides, "Slides shown in turn: 1 or 2; one-slide has 1")
+            ->check(whole_number(1, kMostSlides)),
         app.add_option("--path", o.path,
                        "Which path through the code: clear, whose boundaries flip many channels, or paper, "
                        "the published one; one-slide has its own")
@@ -31,7 +38,13 @@ CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& o) {
 }
 
 Result<Pattern> pattern_of(const PatternOptions& options) {
-  if (!options.file.empty()) return read_pattern(options.file);
+  if (!options.file.empty()) {
+    auto pattern = read_pattern(options.file);
+    if (pattern && pattern->slides > kMostSlides)
+      return Error{options.file + " has " + std::to_string(pattern->slides) +
+                   " slides, and two frames in a row decode one or two: use a pattern with slides: 2"};
+    return pattern;
+  }
   return make_scheme_pattern(scheme_named(options.scheme).value_or(Scheme::kComplementary), options.base,
                              options.slides, options.first, options.stripes,
                              code_path_named(options.path).value_or(CodePath::kClear));

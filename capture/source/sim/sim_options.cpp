@@ -29,7 +29,7 @@ constexpr Key kKeys[] = {
     {"projector_width", &SimOptions::projector_width, 32, 8192, "projector pixels"},
     {"projector_height", &SimOptions::projector_height, 32, 8192, "projector pixels"},
     {"base", &SimOptions::base, 3, 6, "colours of the code"},
-    {"slides", &SimOptions::slides, 1, 6, "slides projected in turn"},
+    {"slides", &SimOptions::slides, 1, 2, "slides projected in turn: more are not decoded"},
     {"stripes", &SimOptions::stripes, 2, 8192, "stripes across the projector"},
     {"first", &SimOptions::first, 0, 1e9, "first stripe within the code's path"},
     {"phase", &SimOptions::phase, 0, 14, "fields by which the projector is ahead of the camera"},
@@ -54,7 +54,7 @@ constexpr Key kKeys[] = {
 };
 
 constexpr double kLeastBaseline = 0.01;
-constexpr int kWhiteFramePeriod = 84;  // of cycles of 2, 3, 4, 6 or 7 frames
+constexpr int kWhiteFramePeriod = 84;  // of cycles of 2 or 3 frames
 
 std::string text(double value) {
   char out[32];

@@ -131,6 +131,16 @@ class Formulas(unittest.TestCase):
                 repeats += [j - i for i in range(len(pairs)) for j in range(i + 1, len(pairs)) if pairs[i] == pairs[j]]
             self.assertEqual(round(apart), min(repeats))
 
+    def test_more_slides_than_are_decoded(self):
+        self.assertEqual(run("plan", "--slides", "3").returncode, 2)
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "pattern.yaml"
+            file.write_text('%YAML:1.0\n---\nbase: 6\nslides: 3\nsequence: [ 0, 43, 86 ]\n'
+                            'palette: [ "100", "010", "001", "011", "101", "110" ]\n')
+            done = run("plan", "--pattern", file)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("one or two", done.stderr)
+
     def test_refusals(self):
         for arguments, text in ((["--near", "2"], "in order"), (["--near", "0.05"], "no view in common"),
                                 (["--stripes", "2000"], "stripes")):

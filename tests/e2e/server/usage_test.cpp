@@ -39,6 +39,8 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
       {"evaluate", ""},
       {"serve", "--source", "sim:plane", "--record", ""},
       {"simulate", "--scene", "plane", "--scheme", "", "--out", "folder"},
+      {"plan", "--slides", "3"},
+      {"pattern", "--slides", "0", "--out", "folder"},
       {"simulate", "--frames", "5"},
       {"simulate", "--scene", "plane", "--frames", "-1", "--out", "folder"},
   };

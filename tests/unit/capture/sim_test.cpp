@@ -96,6 +96,7 @@ TEST(SimOptions, EveryRefusalSaysWhatIsValid) {
   const std::pair<const char*, const char*> refusals[] = {
       {"cave", "unknown scene \"cave\": give one of plane, object, face, walk, mesh:FILE"},
       {"", "unknown scene"},
+      {"face,slides=3", "slides=3: give a whole number 1 to 2"},
       {"face,loud=1", "unknown key \"loud\": give one of scan, width"},
       {"face,noise", "\"noise\" is no key=value"},
       {"face,noise=much", "noise=much: give a number 0 to 100"},
