@@ -59,7 +59,6 @@ Status run(const Options& options, StopSignal& stop) {
   if (options.code == "stripes") {
     auto made = make_pattern(spec->base, spec->slides, spec->first, spec->stripes, spec->path);
     if (!made) return made.error();
-    if (made->slides > 2) return Error{"stripes on 1 or 2 slides calibrate: give slides=1 or slides=2"};
     stripes = *std::move(made);
   }
   const fs::path out = options.out;
