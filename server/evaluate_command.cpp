@@ -71,9 +71,8 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
   print_filters(filters, s.frames);
 }
 
-/// Of a frame under `slide`.
+/// Of a frame.
 struct Truths {
-  int slide;
   bool decodable;        // it should give a surface
   const ImageF& before;  // the frame's before, empty where it is not known
   const ImageF& now;
@@ -97,18 +96,19 @@ struct Judges {
 /// the times of its second pictures.
 Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, Reconstructor& reconstructor,
                   const Truths& truths, Judges& judges) {
+  const int slide = reconstructor.report().slide;
   const bool interlaced = frame.scan == Scan::kInterlaced;
   const auto at = [&](const ImageF& truth, int half) {
     return interlaced ? truth_of_field(truth, half) : truth.clone();
   };
   if (completed && completed->between) {
     if (interlaced && !truths.before.empty()) {
-      if (auto s = judges.judge(frame, 0, at(truths.before, 1), &*completed); !s) return s;
+      if (auto s = judges.judge(frame, slide, at(truths.before, 1), &*completed); !s) return s;
     }
     completed = reconstructor.next();
   }
   if (!completed && !truths.decodable) return {};
-  return judges.judge(frame, truths.slide, at(truths.now, 0), completed ? &*completed : nullptr);
+  return judges.judge(frame, slide, at(truths.now, 0), completed ? &*completed : nullptr);
 }
 
 /// What was projected follows from the time stamp, independently of the decoder, so that what that takes for
@@ -197,10 +197,10 @@ Status run(const Options& options, StopSignal& stop) {
     filters += reconstructor->report().filters;
     Status judged;
     if (info.pattern.scheme == Scheme::kWhiteField) {
-      judged = judge_both(frame, std::move(*result), *reconstructor,
-                          {exposure.slide, decodable, previous_truth, *truth}, judges);
+      judged =
+          judge_both(frame, std::move(*result), *reconstructor, {decodable, previous_truth, *truth}, judges);
     } else if (decodable) {
-      judged = judges.judge(frame, exposure.slide, *truth, *result ? &**result : nullptr);
+      judged = judges.judge(frame, reconstructor->report().slide, *truth, *result ? &**result : nullptr);
     }
     if (!judged) return judged.error();
     previous_truth = *std::move(truth);

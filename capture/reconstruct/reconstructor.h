@@ -42,6 +42,7 @@ struct ReconstructReport {
   double detect_ms = 0, match_ms = 0, triangulate_ms = 0, surface_ms = 0, texture_ms = 0;
   std::size_t boundaries = 0;  // detected in this frame
   std::size_t matched = 0;     // of which decoded with the frame before
+  int slide = 0;               // as which the frame was decoded, from 0
   FilterCounts filters;        // what each filter did
   StepReport step;             // of projector and camera; a frame of mixed exposures is dropped
   bool white = false;          // this frame was white and gave texture alone (scheme white-frame)

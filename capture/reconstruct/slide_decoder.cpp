@@ -128,6 +128,8 @@ struct SlideDecoder::State {
   SequenceResult result, other_result;
   std::vector<RecoveredBoundary> recovered;
 
+  /// That `newer` shows, as it was matched last.
+  int slide() const { return pattern.slides == 1 || order == SlideOrder::kNewerIsFirst ? 0 : 1; }
   bool shows_same_slide() const;
   bool match_paper(SlideOrder tried, Match& out);
   SequenceContext context(SlideOrder tried) const;
@@ -351,10 +353,12 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   s.expected = view.expected;
   if (s.quick) {
     s.match_quickly(s.order, pool);
+    report.slide = s.slide();
     s.decode_quickly(pair, pool, report, out);
     return true;
   }
   s.match_in_order(s.order, pool);
+  report.slide = s.slide();
   if (s.paper) {
     report.matched = s.match.valid;
     report.filters.duplicate = s.fill(pool, out);
@@ -397,10 +401,9 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   if (s.pattern.scheme != Scheme::kWhiteField)
     s.instant.adjust({pair.time_ns, s.newer.difference.motion}, s.result, s.edges, s.recovered, pool);
   s.moving.find(s.newer.difference.width, s.result, s.edges);
-  const bool first_slide = s.pattern.slides == 1 || s.order == SlideOrder::kNewerIsFirst;
   const SlideFieldView field{
-      rows.slide(),        s.sequence.shown_colours(s.order), &s.newer.difference.motion,
-      first_slide ? 0 : 1, s.newer.difference.noise,          &s.moving,
+      rows.slide(),       s.sequence.shown_colours(s.order), &s.newer.difference.motion,
+      s.slide(),          s.newer.difference.noise,          &s.moving,
       s.refiner.ambient()};
   s.field_placer.place(field, s.result, pool, s.edges);
   const std::size_t grown = s.growth.grow(field, s.edges, pool, s.result, s.recovered);

@@ -40,7 +40,7 @@ class SlideDecoder {
 
   /// Decodes the frame observed last, which is `view.pair`, into `out`, a grid of the pattern's boundaries
   /// and the rig's lines whose points are left as they are; false while the other slide was not seen. Sets
-  /// report.matched and .filters.
+  /// report.slide, .matched and .filters.
   bool decode(const SlideView& view, WorkerPool& pool, ReconstructReport& report, DecodedGrid& out);
 
   /// Of the frame that decode() was called for last, if it did: where things move, and the colours left and

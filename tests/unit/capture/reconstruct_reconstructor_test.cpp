@@ -126,6 +126,7 @@ TEST_P(ReconstructorTest, EitherSlideMayComeFirst) {
     add(reconstructor, draw_frame(scene, 0, first));
     const auto frame = add(reconstructor, draw_frame(scene, 1, 1 - first));
     ASSERT_TRUE(frame);
+    EXPECT_EQ(reconstructor.report().slide, 1 - first);
     expect_the_plane(scene, *frame);
   }
 }
