@@ -4,10 +4,10 @@
 #include <string>
 
 #include "base/whole_file.h"
-#include "client/frame_names.h"
 #include "client/picture_video.h"
 #include "codec/export.h"
 #include "codec/frame_layout.h"
+#include "codec/frame_names.h"
 #include "codec/texture_codec.h"
 #include "codec/video_file.h"
 

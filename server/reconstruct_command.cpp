@@ -17,6 +17,7 @@
 #include "capture/source/take_files.h"
 #include "cli/progress.h"
 #include "codec/export.h"
+#include "codec/frame_names.h"
 #include "server/commands.h"
 #include "server/options.h"
 #include "server/stats.h"
@@ -113,12 +114,9 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
   if (t.reconstructed > 0) print_filters(t.filters, t.reconstructed);
 }
 
-/// NNNNNN is the frame of the take that completed it; the surface half way from the frame before has its own.
+/// Its number is that of the take's frame that completed the surface.
 std::string ply_name(std::uint64_t number, bool between) {
-  char name[40];
-  std::snprintf(name, sizeof name, "%06llu%s.ply", static_cast<unsigned long long>(number),
-                between ? "_between" : "");
-  return name;
+  return frame_name(number, between) + ".ply";
 }
 
 /// The frame that a file was written for; nothing where ply_name() gives no such name.

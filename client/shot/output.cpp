@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <utility>
 
-#include "client/frame_names.h"
 #include "client/picture_video.h"
 #include "codec/export.h"
+#include "codec/frame_names.h"
 
 namespace relievo {
 namespace {

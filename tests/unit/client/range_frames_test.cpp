@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/frame_names.h"
+#include "codec/frame_names.h"
 #include "tests/support/make_recording.h"
 #include "tests/support/replace_in.h"
 #include "tests/support/temp_folder.h"

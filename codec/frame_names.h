@@ -11,10 +11,13 @@
 
 namespace relievo {
 
+/// "000012", or "000012_between" for the surface half way from the frame before.
+std::string frame_name(std::uint64_t number, bool between);
+
 /// A name of its own for each frame of a folder, after the camera's frame. One thread.
 class FrameNames {
  public:
-  /// "000012", or "000012_between"; where the same was asked for before, as after a restart of the server,
+  /// frame_name(); where the same was asked for before, as after a restart of the server,
   /// whose numbers start again: "000012-2" and so on.
   std::string name(const Frame3D& frame);
 
