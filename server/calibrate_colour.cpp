@@ -98,7 +98,15 @@ void print(const ColourCalibration& c, const std::string& out) {
   std::printf("residual   %.2f of 255 (RMS)\nwritten    %s\n", c.residual, out.c_str());
 }
 
-void warn_of_weak_colours(const ColourCalibration& c) {
+void warn(const ColourCalibration& c) {
+  if (c.residual > kMostResidual) {
+    char residual[16];
+    std::snprintf(residual, sizeof residual, "%.0f", c.residual);
+    log_warning(std::string("the colours are far off, by ") + residual +
+                " of 255 (RMS), where a few are usual: is each picture named by its colour, is there other "
+                "light, or does "
+                "the camera change its exposure by itself?");
+  }
   for (const ColourReport& r : c.colours) {
     if (!is_palette(r.colour) || r.weakest_difference > kDetectionThreshold) continue;
     log_warning(
@@ -139,7 +147,7 @@ Status run(const Options& options, StopSignal& stop) {
   } else {
     print(*calibration, out);
   }
-  warn_of_weak_colours(*calibration);
+  warn(*calibration);
   return {};
 }
 

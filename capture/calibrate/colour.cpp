@@ -224,6 +224,66 @@ double gamma_of(const std::vector<Response>& responses) {
   return out;
 }
 
+/// How well captures add up, at the gamma that is given or told by them.
+struct Sum {
+  double residual = std::numeric_limits<double>::infinity();  // where they determine nothing
+  double own = 0;  // how much each channel of the camera counts for the projector's own: M's diagonal
+};
+
+Sum sum_of(const std::vector<Response>& responses, const std::optional<double>& gamma) {
+  const std::vector<Response> light = in_light(responses, gamma ? *gamma : gamma_of(responses));
+  const auto m = solve(light);
+  return m ? Sum{residual_of(*m, light), m->trace()} : Sum{};
+}
+
+/// The colour that a capture shows by what the others do.
+Primary shown_by(const Response& capture, const std::vector<Response>& others,
+                 const std::optional<double>& known_gamma) {
+  const double gamma = known_gamma ? *known_gamma : gamma_of(others);
+  const auto m = solve(in_light(others, gamma));
+  if (!m) return capture.colour;
+  const Eigen::Vector3d estimated = *m * in_light({capture}, gamma).front().mean;
+  Primary out = 0;
+  for (int c = 0; c < 3; ++c) out = static_cast<Primary>(out | (estimated[c] > 127.5) << c);
+  return out;
+}
+
+/// Where captures do not add up: whether they do without one of them, which shows another colour then, or
+/// with two names exchanged.
+Status check_names(const std::vector<Response>& each, double residual, const std::optional<double>& gamma) {
+  constexpr std::size_t kLeastColours = 6;  // with black: fewer leave nothing over to tell by
+  const double good = std::min(kMostResidual, residual / 3);
+  const std::vector<Response> captured = average(each);
+  if (residual <= kMostResidual || captured.size() < kLeastColours) return {};
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    std::vector<Response> others = each;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    others = average(others);
+    if (others.size() + 1 < kLeastColours || sum_of(others, gamma).residual > good) continue;
+    const Primary seen = shown_by(each[i], others, gamma);
+    if (seen == each[i].colour) continue;
+    return Error{each[i].name + " shows " + primary_name(seen) +
+                 ", by what the other captures show: name it so, or take it again"};
+  }
+  // Two primaries exchanged add up as their two complements do, with the camera's channels exchanged, too.
+  Sum best;
+  std::string swapped;
+  for (std::size_t a = 0; a < captured.size(); ++a) {
+    for (std::size_t b = a + 1; b < captured.size(); ++b) {
+      std::vector<Response> exchanged = captured;
+      std::swap(exchanged[a].colour, exchanged[b].colour);
+      const Sum sum = sum_of(exchanged, gamma);
+      if (sum.residual > good || (!swapped.empty() && sum.own <= best.own)) continue;
+      best = sum;
+      swapped = primary_name(captured[a].colour) + " and " + primary_name(captured[b].colour);
+    }
+  }
+  if (swapped.empty()) return {};
+  return Error{"the pictures of " + swapped + " seem to be swapped: as they are colours miss by " +
+               whole(residual) + " of 255, with the two names exchanged by " + whole(best.residual) +
+               "; exchange them, or take both again"};
+}
+
 /// What the difference of a colour and its complement leaves for detection (5.2).
 void weigh_detection(const Eigen::Matrix3d& m, const std::vector<Response>& responses, double brightest,
                      const Response& r, ColourReport& report) {
@@ -271,6 +331,9 @@ Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& cap
   const Eigen::Matrix3d& m = *matrix;
 
   ColourCalibration out;
+  out.residual = residual_of(m, responses);
+  if (const Status named = check_names(each, out.residual, options.camera_gamma); !named)
+    return named.error();
   out.camera.gamma = gamma;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.camera.matrix.data()) = m;
   out.target = target->box;
@@ -291,7 +354,6 @@ Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& cap
     if (r.colour != kBlack && r.colour != kWhite) weigh_detection(m, responses, brightest, r, report);
     out.colours.push_back(report);
   }
-  out.residual = residual_of(m, responses);
   out.noise = std::sqrt(noise / (3.0 * static_cast<double>(responses.size())));
   return out;
 }

@@ -63,9 +63,14 @@ struct ColourCalibration {
 /// |D| below which the paper's decoder ignores a channel (5.2.2), of 255.
 inline constexpr double kDetectionThreshold = 20;
 
+/// A residual over this says that something is wrong with the captures, of 255; web/viewer's rig page has the
+/// same figure.
+inline constexpr double kMostResidual = 12;
+
 /// Needs black, white and colours enough to determine M (three independent ones); several captures of one
 /// colour are averaged. Fails, naming the picture and what to change, where one is saturated, under-exposed,
-/// lit by something else, or where no target is found.
+/// lit by something else, of another colour than it is named by (where six colours or more are there to
+/// tell), or where no target is found.
 Result<ColourCalibration> calibrate_colour(const std::vector<ColourCapture>& captures,
                                            const ColourOptions& options);
 

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "base/whole_file.h"
 #include "capture/rig_file.h"
 #include "tests/support/process.h"
 #include "tests/support/temp_folder.h"
@@ -97,6 +98,30 @@ TEST(CalibrationExample, ACurvedCameraIsStraightened) {
   EXPECT_EQ(as_is.at("camera_gamma"), 1);
   EXPECT_GT(as_is.at("residual").get<double>(), 10);
   EXPECT_NE(server({"calibrate", "colour", out + "/colours", "--gamma", "0.45", "--out", rig}).status, 0);
+}
+
+// What was calibrated before outlasts captures that cannot be right; those that may be are warned of.
+TEST(CalibrationExample, SwappedCapturesReplaceNoColours) {
+  const TempFolder folder;
+  const std::string out = (folder / "example").string(), rig = (folder / "rig.yaml").string();
+  report({"calibrate", "example", "--out", out, "--views", "3", "--json"});
+  report({"calibrate", "colour", out + "/colours", "--out", rig, "--json"});
+  const auto before = read_whole_file(rig, 10000);
+  ASSERT_TRUE(before.ok()) << before.error().message;
+  const auto exchange = [&](const std::string& a, const std::string& b) {
+    fs::rename(out + "/colours/" + a, out + "/kept.png");
+    fs::rename(out + "/colours/" + b, out + "/colours/" + a);
+    fs::rename(out + "/kept.png", out + "/colours/" + b);
+  };
+  exchange("100.png", "011.png");
+  const Finished swapped = server({"calibrate", "colour", out + "/colours", "--update", rig});
+  EXPECT_EQ(swapped.status, 1);
+  EXPECT_THAT(swapped.err, HasSubstr("the pictures of 100 and 011 seem to be swapped"));
+  EXPECT_EQ(read_whole_file(rig, 10000).value(), *before);
+  exchange("010.png", "011.png");  // all three in turn: too much to say which
+  const Finished turned = server({"calibrate", "colour", out + "/colours", "--out", rig});
+  EXPECT_EQ(turned.status, 0) << turned.err;
+  EXPECT_THAT(turned.err, HasSubstr("the colours are far off"));
 }
 
 TEST(CalibrationExample, CharucoBoardUnderGrayCode) {

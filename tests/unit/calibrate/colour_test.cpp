@@ -91,18 +91,21 @@ TEST(ColourCalibration, ComplementsMayBeMissing) {
 
 TEST(ColourCalibration, AWeakChannelShowsInTheMargin) {
   auto captures = all();
-  for (ColourCapture& c :
-       captures) {  // a projector whose blue hardly shines in cyan and its red leaks into it
+  for (ColourCapture& c : captures) {  // a projector whose blue shines less in cyan
     if (c.colour != 6) continue;
-    c.picture = capture(2).picture.clone();  // green where cyan was asked for
+    const Image8 green = capture(2).picture.clone();
+    for (std::size_t i = 0; i < green.size(); ++i)
+      c.picture.data()[i] =
+          static_cast<std::uint8_t>((4 * int{c.picture.data()[i]} + 3 * int{green.data()[i]}) / 7);
   }
   const auto result = calibrate_colour(captures, {});
-  ASSERT_TRUE(result.ok());
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_GT(result->residual, kMostResidual);  // to be warned of
   const auto at = std::find_if(result->colours.begin(), result->colours.end(),
                                [](const ColourReport& r) { return r.colour == 6; });
-  EXPECT_LT(at->weakest_difference, 120);
+  EXPECT_LT(at->weakest_difference, 200);
   EXPECT_EQ(at->weakest_channel, 2);
-  EXPECT_GT(at->residual, 50);
+  EXPECT_GT(at->residual, 30);
 }
 
 TEST(ColourCalibration, ACurvedResponseIsToldByLightThatDoesNotAddUp) {
@@ -141,6 +144,37 @@ TEST(ColourCalibration, RefusesUnderExposure) {
   captures[4].picture = capture(0).picture.clone();
   EXPECT_THAT(refusal(captures),
               HasSubstr("001.png is under-exposed: the target is hardly brighter than under black"));
+}
+
+TEST(ColourCalibration, RefusesTwoPicturesWithEachOthersNames) {
+  const auto swapped = [](Primary a, Primary b) {
+    auto captures = all();
+    std::swap(captures[a].picture, captures[b].picture);
+    return refusal(captures);
+  };
+  for (Primary a = 1; a < 7; ++a)
+    for (Primary b = a + 1; b < 7; ++b)
+      EXPECT_THAT(swapped(a, b), HasSubstr("the pictures of " + primary_name(a) + " and " + primary_name(b) +
+                                           " seem to be swapped"));
+}
+
+TEST(ColourCalibration, RefusesAPictureOfAnotherColour) {
+  auto captures = all();
+  captures[6].picture = captures[2].picture.clone();
+  EXPECT_THAT(refusal(captures), HasSubstr("011.png shows 010, by what the other captures show"));
+  captures = all();
+  captures.push_back({"100_2.png", 1, captures[3].picture.clone()});
+  EXPECT_THAT(refusal(captures), HasSubstr("100_2.png shows 110, by what the other captures show"));
+}
+
+// Five captures hardly say which is wrong: they are taken as they are, with a residual to be warned of.
+TEST(ColourCalibration, WhichOfFewCapturesIsWrongIsNotGuessed) {
+  std::vector<ColourCapture> few;
+  for (const Primary colour : {0, 1, 2, 4, 7}) few.push_back(capture(colour));
+  few[1].picture = capture(3).picture.clone();
+  const auto result = calibrate_colour(few, {});
+  ASSERT_TRUE(result.ok()) << result.error().message;
+  EXPECT_GT(result->residual, kMostResidual);
 }
 
 TEST(ColourCalibration, RefusesAmbientLight) {
