@@ -18,6 +18,7 @@
 #include "bench/report.h"
 #include "bench/suites.h"
 #include "bench/usage.h"
+#include "cli/checks.h"
 #include "codec/texture_codec.h"
 #include "idl/transport.h"
 #include "server/config.h"
@@ -378,7 +379,7 @@ Command chain_suite() {
                 ->check(CLI::Range(0, 64))
                 ->capture_default_str();
             app.add_option("--seconds", options->seconds, "How long")
-                ->check(CLI::Range(0.1, 86400.0))
+                ->check(number(0.1, 86400))
                 ->capture_default_str();
             app.add_option("--frames", options->frames, "Camera frames, instead of --seconds")
                 ->check(CLI::PositiveNumber);

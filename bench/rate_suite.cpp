@@ -11,6 +11,7 @@
 #include "bench/options.h"
 #include "bench/report.h"
 #include "bench/suites.h"
+#include "cli/checks.h"
 #include "codec/frame3d_codec.h"
 #include "codec/geometry_profile.h"
 #include "codec/texture_codec.h"
@@ -195,7 +196,7 @@ Command rate_suite() {
             app.add_option("--deadline", options->deadlines_ms,
                            "Milliseconds in which frames are to be encoded, several too: how they are kept, "
                            "instead of levels")
-                ->check(CLI::PositiveNumber)
+                ->check(number(0.001))
                 ->type_name("MS");
             add_repeat_options(app, options->repeats, 2);
             add_json_option(app, options->json);

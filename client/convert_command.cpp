@@ -295,7 +295,7 @@ Command convert_command() {
             ->type_name("NAME");
         app.add_option("--bound", options->bound_px,
                        "Of visual: how far a vertex may be off in the camera's picture, pixels (default 0.5)")
-            ->check(CLI::Range(0.01, 8.0))
+            ->check(number(0.01, 8))
             ->type_name("PX");
         app.add_option("--step-bits", options->step_bits,
                        "Of grid, metric and draco-grid: steps of 1/2^N pixel (default 6)")

@@ -10,6 +10,7 @@
 
 #include "base/log.h"
 #include "base/time.h"
+#include "cli/checks.h"
 #include "cli/progress.h"
 #include "client/commands.h"
 #include "client/export_formats.h"
@@ -176,7 +177,7 @@ Command export_command() {
             ->check(CLI::IsMember(names))
             ->capture_default_str();
         app.add_option("--depth-unit", options->depth_unit_mm, "Of depth: millimetres a step; 65,535 fit")
-            ->check(CLI::Range(0.001, 100.0))
+            ->check(number(0.001, 100))
             ->type_name("MM")
             ->capture_default_str();
         app.add_flag("--reencode", options->reencode, "Of video: code it anew even where it could be copied");

@@ -12,6 +12,7 @@
 #include "capture/calibrate/rig_part.h"
 #include "capture/camera_response.h"
 #include "capture/picture_file.h"
+#include "cli/checks.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
 #include "server/calibration_report.h"
@@ -171,7 +172,7 @@ std::function<Status(StopSignal&)> define_calibrate_colour(CLI::App& app) {
   add_live_projector_options(app, *source, o->projector);
   app.add_option("--gamma", o->gamma,
                  "The camera's, 1: its values are light (default: that with which the captures add up)")
-      ->check(CLI::Range(1., CameraResponse::kMostGamma));
+      ->check(number(1, CameraResponse::kMostGamma));
   app.add_option("--roi", o->roi, "The target, where it should not be looked for: X,Y,WIDTH,HEIGHT")
       ->delimiter(',')
       ->expected(4);

@@ -17,6 +17,7 @@
 #include "capture/calibrate/rig_part.h"
 #include "capture/rig_file.h"
 #include "capture/upright.h"
+#include "cli/checks.h"
 #include "cli/size_option.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
@@ -234,7 +235,7 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       ->check(CLI::IsMember({"interlaced", "progressive"}))
       ->capture_default_str();
   app.add_option("--frame-rate", o->frame_rate, "Frames a second, for a new rig.yaml")
-      ->check(CLI::Range(0.001, 10000.0))
+      ->check(number(0.001, 10000))
       ->capture_default_str();
   app.add_option("--pictures", o->pictures, "Folder for residuals.png");
   app.add_option("--compare", o->compare,

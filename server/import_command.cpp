@@ -14,6 +14,7 @@
 #include "capture/calibrate/ray_pairs.h"
 #include "capture/calibrate/rig_import.h"
 #include "capture/source/npy.h"
+#include "cli/checks.h"
 #include "cli/progress.h"
 #include "cli/size_option.h"
 #include "server/commands.h"
@@ -187,7 +188,7 @@ void define_gray(CLI::App& app, const std::shared_ptr<Options>& o) {
                      "rig.yaml, or the result of sltk or procam-calibration: also makes points");
   app.add_option("--max-gap", o->max_gap_mm,
                  "Leave out points whose two rays miss each other by more, mm; 0: none")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number(0))
       ->capture_default_str();
   app.add_option("--compare", o->compare, "PLY cloud: report the distance of each point to its nearest point")
       ->needs(calibration);

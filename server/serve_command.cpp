@@ -225,12 +225,12 @@ Command serve_command() {
                        "Keep the time from a frame's surface to its being published below so many "
                        "milliseconds, in the same way")
             ->type_name("MS")
-            ->check(CLI::Range(kLeastDeadline_ms, kMostDeadline_ms));
+            ->check(number(kLeastDeadline_ms, kMostDeadline_ms));
         app.add_option("--psnr", f->texture_db,
                        "Keep the texture this good, decibels: no finer than that needs, as fine as "
                        "--texture-quality (then 95 unless given). --bitrate and --deadline go before it")
             ->type_name("DB")
-            ->check(CLI::Range(kLeastTexture_db, kMostTexture_db));
+            ->check(number(kLeastTexture_db, kMostTexture_db));
         app.add_option(
                "--geometry", f->geometry,
                "How the surface is sent: grid (default: as measured, for relievo's own receivers), "
@@ -249,7 +249,7 @@ Command serve_command() {
             ->type_name("N");
         app.add_option("--bound", f->bound_px,
                        "Of visual: how far a vertex may be off in the camera's picture, pixels (default 0.5)")
-            ->check(CLI::Range(kLeastBound_px, kMostBound_px))
+            ->check(number(kLeastBound_px, kMostBound_px))
             ->type_name("PX");
         app.add_option("--key-interval", f->key_interval,
                        "Of grids and h264: every Nth frame decodes alone, the others need frames before "

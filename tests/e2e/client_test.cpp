@@ -48,6 +48,8 @@ TEST(Client, WrongUsageIsExitTwoAndOneLine) {
       {"info", "face", "--stream", "other"},
       {"export", "a.mcap", "--out", "d", "--format", "stl"},
       {"export", "a.mcap", "--out", "a.mcap", "--format", "animation"},
+      {"export", "a.mcap", "--out", "d", "--format", "depth", "--depth-unit", "nan"},
+      {"convert", "a.mcap", "--out", "b.mcap", "--geometry", "visual", "--bound", "nan"},
       {"web", "--listen"},
       {"web", "--listen", "here"},
   };

@@ -205,6 +205,18 @@ TEST(CalibrationExample, WrongUsageExitsTwo) {
   EXPECT_EQ(server({"calibrate", "colour", "somewhere"}).status, 2);  // neither --out nor --update
   EXPECT_EQ(server({"import", "gray", "somewhere", "--out", "o", "--projector", "12"}).status, 2);
   EXPECT_EQ(server({"import", "gray", "somewhere", "--out", "o", "--compare", "c.ply"}).status, 2);
+  for (const std::string no_number : {"nan", "-1", "inf"}) {
+    const Finished gamma = server({"calibrate", "colour", "c", "--out", "o", "--gamma", no_number});
+    const Finished rate = server({"calibrate", "geometry", "v", "--board", "chessboard:9x7:25mm",
+                                  "--projector", "1024x768", "--out", "o", "--frame-rate", no_number});
+    const Finished gap =
+        server({"import", "gray", "f", "--out", "o", "--projector", "64x48", "--max-gap", no_number});
+    for (const Finished& done : {gamma, rate, gap}) {
+      EXPECT_EQ(done.status, 2) << done.err;
+      EXPECT_THAT(done.err, HasSubstr("'" + no_number + "' is no number"));
+      EXPECT_LT(done.err.size(), 200u) << done.err;
+    }
+  }
   EXPECT_EQ(server({"calibrate", "geometry", "--help"}).status, 0);
 }
 
