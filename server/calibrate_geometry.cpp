@@ -138,6 +138,9 @@ Status run(const Options& options, StopSignal& stop) {
     if (!read) return read.error();
     reference = *read;
   }
+  if (!options.pictures.empty()) {
+    if (const Status made = make_folder(options.pictures); !made) return made;
+  }
   const std::string out = options.out.empty() ? options.update : options.out;
   ViewCode code{.stripes = {}, .projector = options.projector};
   code.colours = before.colours.value_or(CameraColours{});
@@ -178,10 +181,7 @@ Status run(const Options& options, StopSignal& stop) {
   rig.frame_rate = before.frame_rate.value_or(options.frame_rate);
   set_colours(code.colours, rig);
   rig = with_geometry(rig, *geometry);
-  if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
-  if (const auto seen = upright(rig, {}); !seen) log_warning(seen.error().message);
   if (!options.pictures.empty()) {
-    if (const Status made = make_folder(options.pictures); !made) return made;
     const Status drawn = write_png(fs::path(options.pictures) / "residuals.png", draw_residuals(*geometry));
     if (!drawn) return drawn;
   }
@@ -191,6 +191,9 @@ Status run(const Options& options, StopSignal& stop) {
     if (!compared) return compared.error().in(options.compare);
     difference = *compared;
   }
+  // Last: what fails before it leaves the rig of before.
+  if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
+  if (const auto seen = upright(rig, {}); !seen) log_warning(seen.error().message);
   if (options.json) {
     print_json(*geometry, difference, out);
   } else {

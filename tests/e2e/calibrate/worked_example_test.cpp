@@ -124,6 +124,31 @@ TEST(CalibrationExample, SwappedCapturesReplaceNoColours) {
   EXPECT_THAT(turned.err, HasSubstr("the colours are far off"));
 }
 
+TEST(CalibrationExample, WhatFailsBesidesTheRigLeavesTheRigOfBefore) {
+  const TempFolder folder;
+  const std::string out = (folder / "example").string(), rig = (folder / "rig.yaml").string();
+  report({"calibrate", "example", "--out", out, "--views", "3", "--json"});
+  fs::copy_file(out + "/truth.yaml", rig);
+  const auto before = read_whole_file(rig, 10000);
+  ASSERT_TRUE(before.ok()) << before.error().message;
+  auto other = read_rig(rig);
+  ASSERT_TRUE(other.ok()) << other.error().message;
+  other->camera.width *= 2;
+  const std::string wider = (folder / "wider.yaml").string(), no_folder = out + "/truth.yaml/pictures";
+  ASSERT_TRUE(write_whole_file(wider, to_yaml(*other)).ok());
+  fs::create_directories(folder / "taken/residuals.png");  // a folder of the picture's name
+  const auto refused = [&](const std::string& flag, const std::string& value, const std::string& words) {
+    const Finished done = server({"calibrate", "geometry", out + "/views", "--board", "chessboard:9x7:25mm",
+                                  "--projector", "1024x768", "--update", rig, flag, value});
+    EXPECT_EQ(done.status, 1) << done.err;
+    EXPECT_THAT(done.err, HasSubstr(words));
+    EXPECT_EQ(read_whole_file(rig, 10000).value(), *before) << flag << " " << value;
+  };
+  refused("--pictures", no_folder, "cannot make the folder");
+  refused("--pictures", (folder / "taken").string(), "residuals.png");
+  refused("--compare", wider, "differ in size");
+}
+
 TEST(CalibrationExample, CharucoBoardUnderGrayCode) {
   const TempFolder folder;
   const std::string out = (folder / "example").string(), rig = (folder / "rig.yaml").string();
