@@ -37,12 +37,12 @@ struct Options {
   bool json = false;
 };
 
-/// In millimetres.
-struct Spread {
+/// Of distances, in millimetres.
+struct Quantiles {
   double median = 0, p90 = 0;
 };
 
-Spread spread_of(std::vector<float> metres) {
+Quantiles quantiles_of(std::vector<float> metres) {
   const auto at = [&](double share) {
     if (metres.empty()) return 0.0;
     const auto nth =
@@ -57,9 +57,9 @@ struct Report {
   std::size_t lit = 0, decoded = 0, uncertain = 0, lone = 0;
   std::optional<std::size_t> points;
   std::size_t apart = 0;
-  Spread gap;
+  Quantiles gap;
   std::optional<std::size_t> reference_points;
-  Spread nearest;
+  Quantiles nearest;
 };
 
 void print(const Report& r, const Options& options) {
@@ -106,31 +106,48 @@ Result<PointCloud> read_reference(const std::string& file, const std::string& un
   return cloud;
 }
 
-Status triangulate(const Options& options, const Rig& rig, const GrayMaps& maps, const Image8& picture,
-                   Report& report) {
+/// Clouds of which one is in another unit have no distances worth a figure.
+Status check_units(const PointCloud& cloud, const PointCloud& reference, const Options& options) {
+  constexpr float kOther = 100;
+  const float own = spread_of(cloud.positions), other = spread_of(reference.positions);
+  if (own == 0 || other == 0 || (other > own / kOther && other < own * kOther)) return {};
+  char times[32];
+  std::snprintf(times, sizeof times, "%.0f", double{std::max(own / other, other / own)});
+  return Error{options.compare + " is " + times + " times " + (other < own ? "smaller" : "larger") +
+               " than what these pictures show: --compare-unit " +
+               (options.compare_unit == "mm" ? "m" : "mm") + "?"};
+}
+
+Result<DensePoints> triangulate(const Options& options, const Rig& rig, const GrayMaps& maps,
+                                const Image8& picture, Report& report) {
   if (rig.camera.width != picture.width() || rig.camera.height != picture.height()) {
     return Error{options.calibration + " is of a camera of " + std::to_string(rig.camera.width) + "x" +
                  std::to_string(rig.camera.height) + ", the pictures are " + std::to_string(picture.width()) +
                  "x" + std::to_string(picture.height())};
   }
-  const DensePoints dense =
-      triangulate_maps(rig, maps.columns, maps.rows, picture, options.max_gap_mm / 1000);
+  DensePoints dense = triangulate_maps(rig, maps.columns, maps.rows, picture, options.max_gap_mm / 1000);
   if (dense.cloud.positions.empty()) {
     return Error{"no ray of the camera meets its projector ray: does " + options.calibration +
                  " belong to these pictures?"};
   }
   report.points = dense.cloud.positions.size();
   report.apart = dense.apart;
-  report.gap = spread_of(dense.gap_m);
-  const fs::path out = options.out;
-  if (const Status s = write_ply_points(out / "points.ply", dense.cloud); !s) return s;
-  if (const Status s = write_whole_file(out / "rig.yaml", to_yaml(rig)); !s) return s;
-  if (options.compare.empty()) return {};
-  auto reference = read_reference(options.compare, options.compare_unit);
-  if (!reference) return reference.error();
-  report.reference_points = reference->positions.size();
-  report.nearest = spread_of(nearest_distances(dense.cloud.positions, reference->positions));
-  return {};
+  report.gap = quantiles_of(dense.gap_m);
+  return dense;
+}
+
+/// Results from pictures of which some are not what they should be look like results.
+void warn_of_pictures(const GrayStack& stack, const GrayMaps& maps, const Options& options) {
+  const std::vector<GraySlide> flat = flat_bits(stack, options.decode);
+  for (const GraySlide& slide : flat) {
+    log_warning("the pictures of " + to_string(slide) +
+                " and of its inverse hardly differ: is one a copy of the other, or are they out of focus?");
+  }
+  if (!flat.empty() || 10 * maps.decoded >= maps.lit) return;
+  log_warning(
+      "only " + std::to_string(maps.decoded) + " of " + std::to_string(maps.lit) +
+      " lit pixels could be decoded: are the pictures in the order of projection, --projector right, and did "
+      "nothing move?");
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -140,6 +157,12 @@ Status run(const Options& options, StopSignal& stop) {
     if (!imported) return imported.error();
     rig = *imported;
     log_info(options.calibration + ": a calibration of " + rig->format);
+  }
+  std::optional<PointCloud> reference;
+  if (!options.compare.empty()) {
+    auto read = read_reference(options.compare, options.compare_unit);
+    if (!read) return read.error();
+    reference = *std::move(read);
   }
   const Size projector = rig ? Size{rig->rig.projector.width, rig->rig.projector.height} : options.projector;
   if (projector.width == 0)
@@ -163,14 +186,27 @@ Status run(const Options& options, StopSignal& stop) {
                  " pixels are lit by the projector; check the pictures' order, or lower --min-contrast"};
   }
   if (stop.stopped()) return {};
+  warn_of_pictures(*stack, *maps, options);
+  Report report{.lit = maps->lit, .decoded = maps->decoded, .uncertain = maps->uncertain, .lone = maps->lone};
+  std::optional<DensePoints> dense;
+  if (rig) {
+    auto points = triangulate(options, rig->rig, *maps, stack->picture, report);
+    if (!points) return points.error();
+    dense = *std::move(points);
+  }
+  if (reference) {
+    if (const Status same = check_units(dense->cloud, *reference, options); !same) return same;
+    report.reference_points = reference->positions.size();
+    report.nearest = quantiles_of(nearest_distances(dense->cloud.positions, reference->positions));
+  }
   if (const Status made = make_folder(options.out); !made) return made;
   const fs::path out = options.out;
-  Report report{.lit = maps->lit, .decoded = maps->decoded, .uncertain = maps->uncertain, .lone = maps->lone};
   if (const Status s = write_npy(out / "columns.npy", maps->columns); !s) return s;
   if (const Status s = write_npy(out / "rows.npy", maps->rows); !s) return s;
   if (const Status s = write_png(out / "picture.png", stack->picture); !s) return s;
   if (rig) {
-    if (const Status done = triangulate(options, rig->rig, *maps, stack->picture, report); !done) return done;
+    if (const Status s = write_ply_points(out / "points.ply", dense->cloud); !s) return s;
+    if (const Status s = write_whole_file(out / "rig.yaml", to_yaml(rig->rig)); !s) return s;
   }
   print(report, options);
   return {};

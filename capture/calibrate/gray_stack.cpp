@@ -167,6 +167,33 @@ Result<GrayStack> read_gray_stack(const fs::path& folder, int projector_width, i
   return builder.finish(folder);
 }
 
+std::vector<GraySlide> flat_bits(const GrayStack& stack, const GrayDecodeOptions& options) {
+  const auto change = [](const GrayPair& pair, std::size_t i) {
+    return std::abs(int{pair.lit.data()[i]} - int{pair.inverse.data()[i]});
+  };
+  std::vector<int> contrast(static_cast<std::size_t>(stack.width()) *
+                            static_cast<std::size_t>(stack.height()));
+  for (const auto* pairs : {&stack.columns, &stack.rows})
+    for (const GrayPair& pair : *pairs)
+      for (std::size_t i = 0; i < contrast.size(); ++i) contrast[i] = std::max(contrast[i], change(pair, i));
+  std::vector<GraySlide> out;
+  for (const GrayAxis axis : {GrayAxis::kColumns, GrayAxis::kRows}) {
+    const auto& pairs = axis == GrayAxis::kColumns ? stack.columns : stack.rows;
+    for (std::size_t bit = 0; bit < pairs.size(); ++bit) {
+      std::size_t lit = 0, flat = 0;
+      for (std::size_t i = 0; i < contrast.size(); ++i) {
+        if (contrast[i] < options.min_contrast) continue;
+        ++lit;
+        flat +=
+            change(pairs[bit], i) < std::max<double>(options.min_difference, options.min_share * contrast[i]);
+      }
+      if (lit > 0 && 10 * flat > 9 * lit)
+        out.push_back({GraySlide::Kind::kBit, axis, static_cast<int>(bit), false});
+    }
+  }
+  return out;
+}
+
 std::string gray_slide_name(std::size_t number) {
   char name[32];
   std::snprintf(name, sizeof name, "gray_%02zu.png", number);

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "capture/pattern/gray_decode.h"
@@ -23,6 +24,10 @@ namespace relievo {
 Result<GrayStack> read_gray_stack(const std::filesystem::path& folder, int projector_width,
                                   int projector_height,
                                   const std::function<bool(std::size_t, std::size_t)>& on_picture = {});
+
+/// Bits whose picture and inverse differ by less than decode_gray() asks for at nine of ten lit pixels: one
+/// is a copy of the other, or of the wrong slide, or they are out of focus.
+std::vector<GraySlide> flat_bits(const GrayStack& stack, const GrayDecodeOptions& options);
 
 /// The picture of slide `number` of gray_slides(), in the numbered layout.
 std::string gray_slide_name(std::size_t number);

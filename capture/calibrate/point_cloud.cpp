@@ -142,11 +142,20 @@ class Tree {
   explicit Tree(const std::vector<Vec3f>& points) : points_(points), order_(points.size()) {
     std::iota(order_.begin(), order_.end(), 0u);
     build(0, order_.size(), 0);
+    for (const Vec3f& p : points) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        least_[axis] = std::min(least_[axis], p[axis]);
+        most_[axis] = std::max(most_[axis], p[axis]);
+      }
+    }
   }
 
   float nearest_squared(const Vec3f& query) const {
     float best = std::numeric_limits<float>::infinity();
-    search(0, order_.size(), 0, query, best);
+    Vec3f off{};  // to the box around all: without it a query from afar would see no part as too far
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      off[axis] = std::max({0.0f, least_[axis] - query[axis], query[axis] - most_[axis]});
+    search(0, order_.size(), 0, query, off, best);
     return best;
   }
 
@@ -161,26 +170,39 @@ class Tree {
     build(middle + 1, end, (axis + 1) % 3);
   }
 
-  void search(std::size_t begin, std::size_t end, std::size_t axis, const Vec3f& query, float& best) const {
+  static float squared(const Vec3f& v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+
+  /// `off`: from the query to the box in which the range lies, along each axis.
+  void search(std::size_t begin, std::size_t end, std::size_t axis, const Vec3f& query, const Vec3f& off,
+              float& best) const {
     if (begin >= end) return;
     const std::size_t middle = (begin + end) / 2;
     const Vec3f& p = points_[order_[middle]];
-    const float dx = p[0] - query[0], dy = p[1] - query[1], dz = p[2] - query[2];
-    best = std::min(best, dx * dx + dy * dy + dz * dz);
+    best = std::min(best, squared({p[0] - query[0], p[1] - query[1], p[2] - query[2]}));
     const float beyond = query[axis] - p[axis];
     const std::size_t next = (axis + 1) % 3;
+    Vec3f beyond_off = off;
+    beyond_off[axis] = std::max(off[axis], std::fabs(beyond));
     if (beyond < 0) {
-      search(begin, middle, next, query, best);
-      if (beyond * beyond < best) search(middle + 1, end, next, query, best);
+      search(begin, middle, next, query, off, best);
+      if (squared(beyond_off) < best) search(middle + 1, end, next, query, beyond_off, best);
     } else {
-      search(middle + 1, end, next, query, best);
-      if (beyond * beyond < best) search(begin, middle, next, query, best);
+      search(middle + 1, end, next, query, off, best);
+      if (squared(beyond_off) < best) search(begin, middle, next, query, beyond_off, best);
     }
   }
 
   const std::vector<Vec3f>& points_;
   std::vector<std::uint32_t> order_;
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+  Vec3f least_{kFar, kFar, kFar}, most_{-kFar, -kFar, -kFar};
 };
+
+float median(std::vector<float> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 }  // namespace
 
@@ -206,6 +228,17 @@ Status write_ply_points(const fs::path& file, const PointCloud& cloud) {
     out.append(bytes, coloured ? 15 : 12);
   }
   return write_whole_file(file, out);
+}
+
+float spread_of(const std::vector<Vec3f>& points) {
+  if (points.empty()) return 0;
+  std::vector<float> along(points.size()), away(points.size(), 0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::transform(points.begin(), points.end(), along.begin(), [&](const Vec3f& p) { return p[axis]; });
+    const float middle = median(along);
+    for (std::size_t i = 0; i < points.size(); ++i) away[i] = std::hypot(away[i], along[i] - middle);
+  }
+  return median(std::move(away));
 }
 
 std::vector<float> nearest_distances(const std::vector<Vec3f>& points, const std::vector<Vec3f>& reference) {

@@ -24,6 +24,9 @@ Result<PointCloud> read_ply_points(const std::filesystem::path& file);
 /// Binary little endian; written whole or not at all. The error names the file.
 Status write_ply_points(const std::filesystem::path& file, const PointCloud& cloud);
 
+/// How far points lie from their middle, median; 0 of none.
+float spread_of(const std::vector<Vec3f>& points);
+
 /// For each point of `points` the distance to the nearest of `reference`; infinite where `reference` is
 /// empty. Exact.
 std::vector<float> nearest_distances(const std::vector<Vec3f>& points, const std::vector<Vec3f>& reference);

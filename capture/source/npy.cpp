@@ -7,6 +7,8 @@
 #include <fstream>
 #include <string>
 
+#include "base/whole_file.h"
+
 namespace relievo {
 namespace {
 
@@ -56,16 +58,13 @@ Status write_npy(const std::filesystem::path& file, const ImageF& image) {
                        std::to_string(image.height()) + ", " + std::to_string(image.width()) + "), }";
   header.append(64 - (kPreamble + header.size() + 1) % 64, ' ');  // data aligned to 64 bytes
   header += '\n';
-  std::ofstream out(file, std::ios::binary);
-  out.write(kMagic, 8);
-  out.put(static_cast<char>(header.size() & 255));
-  out.put(static_cast<char>(header.size() >> 8));
-  out << header;
-  out.write(reinterpret_cast<const char*>(image.data()),
-            static_cast<std::streamsize>(image.size() * sizeof(float)));
-  out.close();
-  if (!out) return Error{file.string() + " cannot be written: is the disk full?"};
-  return {};
+  std::string out(kMagic, 8);
+  out.reserve(kPreamble + header.size() + image.size() * sizeof(float));
+  out += static_cast<char>(header.size() & 255);
+  out += static_cast<char>(header.size() >> 8);
+  out += header;
+  out.append(reinterpret_cast<const char*>(image.data()), image.size() * sizeof(float));
+  return write_whole_file(file, out);
 }
 
 }  // namespace relievo

@@ -12,7 +12,7 @@ namespace relievo {
 /// One channel, height x width. The error names the file.
 Result<ImageF> read_npy(const std::filesystem::path& file);
 
-/// One channel. The error names the file.
+/// One channel; written whole or not at all. The error names the file.
 Status write_npy(const std::filesystem::path& file, const ImageF& image);
 
 }  // namespace relievo

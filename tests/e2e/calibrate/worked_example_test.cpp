@@ -204,6 +204,49 @@ TEST(CalibrationExample, GraySlidesAreImportedBack) {
   EXPECT_TRUE(fs::exists(folder / "maps/columns.npy"));
 }
 
+TEST(CalibrationExample, PicturesThatAreNotWhatTheyShouldBeAreWarnedOf) {
+  const TempFolder folder;
+  const fs::path slides = folder / "slides", turned = folder / "turned";
+  report({"pattern", "--gray", "--size", "128x96", "--out", slides.string(), "--json"});
+  const auto warnings = [&](const fs::path& pictures) {
+    const Finished done = server(
+        {"import", "gray", pictures.string(), "--projector", "128x96", "--out", (folder / "maps").string()});
+    EXPECT_EQ(done.status, 0) << done.err;
+    return done.err;
+  };
+  fs::create_directories(turned);
+  for (int i = 0; i < 28; ++i)  // without white and black
+    fs::copy_file(slides / (std::string(i < 10 ? "gray_0" : "gray_") + std::to_string(i) + ".png"),
+                  turned / (std::to_string(27 - i) + ".png"));
+  EXPECT_EQ(warnings(slides), "");
+  EXPECT_THAT(warnings(turned), HasSubstr("are the pictures in the order of projection"));
+  fs::copy_file(slides / "gray_02.png", slides / "gray_03.png", fs::copy_options::overwrite_existing);
+  EXPECT_THAT(warnings(slides), HasSubstr("the pictures of column bit 5 and of its inverse hardly differ"));
+}
+
+TEST(CalibrationExample, CloudsToCompareAreOfTheSameUnit) {
+  const TempFolder folder;
+  const std::string out = (folder / "example").string(), maps = (folder / "maps").string();
+  report({"calibrate", "example", "--out", out, "--views", "3", "--code", "gray", "--json"});
+  std::vector<std::string> import{
+      "import", "gray",     out + "/views/view_00", "--calibration", out + "/truth.yaml", "--out", maps,
+      "--json", "--compare"};
+  const auto refused = [&](const std::string& cloud, const std::string& words) {
+    std::vector<std::string> arguments = import;
+    arguments.push_back(cloud);
+    const Finished done = server(arguments);
+    EXPECT_EQ(done.status, 1) << done.err;
+    EXPECT_THAT(done.err, HasSubstr(words));
+  };
+  refused(out + "/truth.yaml", "it is no PLY file");
+  EXPECT_FALSE(fs::exists(maps));
+  report({import.begin(), import.end() - 1});
+  refused(maps + "/points.ply",
+          "points.ply is 1000 times smaller than what these pictures show: --compare-unit m?");
+  import.insert(import.end(), {maps + "/points.ply", "--compare-unit", "m"});
+  EXPECT_EQ(report(import).at("compare").at("nearest_mm").at("median"), 0);
+}
+
 TEST(CalibrationExample, RefusalsAreOneLineAndExitOne) {
   const TempFolder folder;
   const auto refused = [](const std::vector<std::string>& arguments, const std::string& words) {

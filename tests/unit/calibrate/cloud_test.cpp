@@ -38,6 +38,29 @@ TEST(PointCloud, NearestDistancesAreThoseOfASearchThroughAll) {
   EXPECT_TRUE(std::isinf(nearest_distances(points, {}).front()));
 }
 
+// Queries from afar could not tell parts of the cloud that are too far, and looked at all of it: hours for
+// these.
+TEST(PointCloud, CloudsFarApartTakeNoLonger) {
+  constexpr std::size_t kMany = 200000;
+  const auto reference = scatter(5, kMany);
+  auto points = scatter(4, kMany);
+  for (Vec3f& p : points) p = {1000 * p[0], 1000 * p[1], 1000 * p[2]};
+  const auto nearest = nearest_distances(points, reference);
+  for (std::size_t i = 0; i < kMany; i += kMany / 20) {
+    float best = std::numeric_limits<float>::infinity();
+    for (const Vec3f& r : reference) {
+      best = std::min(best, std::hypot(points[i][0] - r[0], points[i][1] - r[1], points[i][2] - r[2]));
+    }
+    ASSERT_NEAR(nearest[i] / best, 1, 1e-6f);
+  }
+}
+
+TEST(PointCloud, SpreadIsTheMedianDistanceFromTheMiddle) {
+  EXPECT_EQ(spread_of({}), 0);
+  EXPECT_EQ(spread_of({{5, 5, 5}}), 0);
+  EXPECT_EQ(spread_of({{1, 0, 7}, {2, 0, 7}, {3, 0, 7}, {4, 0, 7}, {1000, 0, 7}}), 1);
+}
+
 TEST(PointCloud, PlyRoundTripAndAscii) {
   const TempFolder folder;
   PointCloud cloud{scatter(3, 50), {}};

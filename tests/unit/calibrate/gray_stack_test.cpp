@@ -97,6 +97,21 @@ TEST(GrayStack, ErrorsSayWhatIsMissing) {
               HasSubstr("has no picture of column bit 0, inverse"));
 }
 
+TEST(GrayStack, APictureCopiedOverItsInverseIsNamed) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_gray_slides(folder.path(), kWidth, kHeight).ok());
+  const auto whole = read_gray_stack(folder.path(), kWidth, kHeight);
+  ASSERT_TRUE(whole.ok()) << whole.error().message;
+  EXPECT_TRUE(flat_bits(*whole, {}).empty());
+  std::filesystem::copy_file(folder / "gray_14.png", folder / "gray_15.png",
+                             std::filesystem::copy_options::overwrite_existing);
+  const auto copied = read_gray_stack(folder.path(), kWidth, kHeight);
+  ASSERT_TRUE(copied.ok()) << copied.error().message;
+  const auto flat = flat_bits(*copied, {});
+  ASSERT_EQ(flat.size(), 1u);
+  EXPECT_EQ(to_string(flat[0]), "row bit 4");
+}
+
 TEST(GrayStack, DamagedAndOddPictures) {
   const TempFolder folder;
   ASSERT_TRUE(write_gray_slides(folder.path(), kWidth, kHeight).ok());

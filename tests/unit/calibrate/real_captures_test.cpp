@@ -66,6 +66,7 @@ TEST(RealCaptures, ShellWithItsPublishedCalibration) {
   const auto stack = read_gray_stack(folder / "scan_0020", 1280, 800);
   ASSERT_TRUE(stack.ok()) << stack.error().message;
   WorkerPool pool(2);
+  EXPECT_TRUE(flat_bits(*stack, {}).empty());
   const auto maps = decode_gray(*stack, {}, pool);
   ASSERT_TRUE(maps.ok()) << maps.error().message;
   const DensePoints dense = triangulate_maps(rig->rig, maps->columns, maps->rows, stack->picture, 0);

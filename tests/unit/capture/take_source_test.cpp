@@ -4,9 +4,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <csignal>
 
 #include "capture/source/npy.h"
 #include "small_take.h"
@@ -236,6 +240,24 @@ TEST(Npy, ReadsBackAndRefusesOtherFiles) {
   test::write_text(file, other);
   EXPECT_FALSE(read_npy(file));
   EXPECT_FALSE(read_npy(folder.path() / "none.npy"));
+}
+
+/// A limit on the file's size stands in for a full disk.
+TEST(Npy, AFullDiskLeavesWhatWasThere) {
+  test::TempFolder folder;
+  const auto file = folder.path() / "a.npy";
+  test::write_text(file, "of before");
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit size{1000, 1000};
+    setrlimit(RLIMIT_FSIZE, &size);
+    _exit(write_npy(file, ImageF(40, 30, 1)).ok() ? 1 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(test::read_text(file), "of before");
 }
 
 TEST(SharedTakes, OpenAsTheyAre) {
