@@ -69,9 +69,9 @@ Status run(const Options& options) {
 
 std::function<Status(StopSignal&)> define_calibrate_board(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--board", o->board,
-                 "chessboard:COLUMNSxROWS:SIDE (inner corners) or "
-                 "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY] (squares)")
+  add_board_option(app, o->board,
+                   "chessboard:COLUMNSxROWS:SIDE (inner corners) or "
+                   "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY] (squares)")
       ->required();
   app.add_option("-o,--out", o->out, "The PNG to write")->required();
   app.add_option("--dpi", o->dpi, "Dots an inch")->check(CLI::Range(20, 2400))->capture_default_str();

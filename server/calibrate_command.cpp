@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 
+#include "capture/calibrate/board.h"
 #include "server/calibrate_commands.h"
 #include "server/commands.h"
 
 namespace relievo {
+
+CLI::Option* add_board_option(CLI::App& app, std::string& board, const std::string& help) {
+  return app.add_option("--board", board, help)->check([](const std::string& text) {
+    const auto parsed = parse_board(text);
+    return parsed ? std::string() : parsed.error().message;
+  });
+}
 
 Command calibrate_command() {
   return {"calibrate", "Calibrate the rig from captures: writes rig.yaml", [](CLI::App& app) {

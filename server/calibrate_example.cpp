@@ -129,7 +129,7 @@ std::function<Status(StopSignal&)> define_calibrate_example(CLI::App& app) {
   app.add_option("-o,--out", o->out, "Folder for views/, colours/ and truth.yaml")->required();
   app.add_option("--rig", o->spec, "Whose rig, as for sim: sources: SCENE[,key=value...]")
       ->capture_default_str();
-  app.add_option("--board", o->board, "The board, as calibrate geometry has it")->capture_default_str();
+  add_board_option(app, o->board, "The board, as calibrate geometry has it")->capture_default_str();
   app.add_option("--code", o->code, "What is projected on the board")
       ->check(CLI::IsMember({"stripes", "gray"}))
       ->capture_default_str();

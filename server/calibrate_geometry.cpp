@@ -209,10 +209,10 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
   app.add_option("views", o->views,
                  "Folder of views, each a folder of pictures of the board under the pattern")
       ->required();
-  app.add_option(
-         "--board", o->board,
-         "chessboard:COLUMNSxROWS:SIDE, inner corners and a square's side, e.g. chessboard:9x7:75mm; or "
-         "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY], squares, e.g. charuco:10x8:30mm:22mm:5X5_100")
+  add_board_option(
+      app, o->board,
+      "chessboard:COLUMNSxROWS:SIDE, inner corners and a square's side, e.g. chessboard:9x7:75mm; or "
+      "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY], squares, e.g. charuco:10x8:30mm:22mm:5X5_100")
       ->required();
   app.add_option(
       "--pattern", o->pattern,

@@ -165,8 +165,6 @@ Status run(const Options& options, StopSignal& stop) {
     reference = *std::move(read);
   }
   const Size projector = rig ? Size{rig->rig.projector.width, rig->rig.projector.height} : options.projector;
-  if (projector.width == 0)
-    return Error{"say the projector's size with --projector WxH, or give --calibration FILE"};
 
   Progress progress("import", "pictures",
                     2 * static_cast<std::uint64_t>(gray_bits(projector.width) + gray_bits(projector.height)));
@@ -218,7 +216,8 @@ void define_gray(CLI::App& app, const std::shared_ptr<Options>& o) {
       ->required();
   app.add_option("-o,--out", o->out, "Folder for columns.npy, rows.npy, picture.png, points.ply, rig.yaml")
       ->required();
-  add_size_option(app, "--projector", o->projector, "The projector's size in pixels");
+  auto* projector = add_size_option(app, "--projector", o->projector,
+                                    "The projector's size in pixels, unless --calibration knows it");
   auto* calibration =
       app.add_option("--calibration", o->calibration,
                      "rig.yaml, or the result of sltk or procam-calibration: also makes points");
@@ -242,6 +241,9 @@ void define_gray(CLI::App& app, const std::shared_ptr<Options>& o) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   app.add_flag("--json", o->json, "Print the summary as JSON");
+  app.final_callback([projector, calibration] {
+    if (projector->empty() && calibration->empty()) throw CLI::RequiredError("--projector or --calibration");
+  });
 }
 
 }  // namespace

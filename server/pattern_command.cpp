@@ -263,6 +263,7 @@ Command pattern_command() {
             ->capture_default_str();
         app.add_flag("--json", o->json, "Print the result as JSON");
         app.final_callback([o] {
+          if (!o->gray) check_pattern_options(o->pattern);
           if (is_video(*o) && (o->gray || o->both_axes))
             throw CLI::ValidationError("--out", "Gray code and --both-axes are pictures: give a folder");
         });

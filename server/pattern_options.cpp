@@ -50,6 +50,11 @@ Result<Pattern> pattern_of(const PatternOptions& options) {
                              code_path_named(options.path).value_or(CodePath::kClear));
 }
 
+void check_pattern_options(const PatternOptions& options) {
+  if (!options.file.empty()) return;
+  if (const auto pattern = pattern_of(options); !pattern) throw CLI::ValidationError(pattern.error().message);
+}
+
 Status fits_projector(const Pattern& pattern, int projector_width) {
   if (pattern.stripes() <= projector_width) return {};
   return Error{std::to_string(pattern.stripes()) + " stripes do not fit " + std::to_string(projector_width) +

@@ -31,6 +31,9 @@ CLI::Option* add_pattern_options(CLI::App& app, PatternOptions& options);
 /// The pattern asked for. Fails where the file or the code does not exist.
 Result<Pattern> pattern_of(const PatternOptions& options);
 
+/// Throws the CLI::ValidationError of options that ask for a code that there is not; files are read later.
+void check_pattern_options(const PatternOptions& options);
+
 /// Fails where the stripes do not fit the projector's columns.
 Status fits_projector(const Pattern& pattern, int projector_width);
 

@@ -248,6 +248,7 @@ Command plan_command() {
             add_rig_options(app, *o);
             add_condition_options(app, *o);
             add_pattern_options(app, o->pattern);
+            app.final_callback([o] { check_pattern_options(o->pattern); });
             app.add_flag("--json", o->json, "Print the result as JSON, in metres and pixels");
             app.footer(
                 "Example:\n  relievo-server plan --camera 1280x720 --scan progressive --rate 60 --lens-mm 12 "

@@ -67,21 +67,36 @@ Status list(const Options& options) {
   return {};
 }
 
-/// "white", "black", "slide1", "slide1_complement" and so on, as `pattern` names its files.
-std::optional<Image8> still_picture(const std::string& name, const Pattern& pattern,
-                                    const DisplayMode& mode) {
-  if (name == "white" || name == "black") {
-    Image8 out(mode.width, mode.height, 3);
-    std::fill_n(out.data(), out.size(), static_cast<std::uint8_t>(name == "white" ? 255 : 0));
-    return out;
-  }
+/// A picture that --still can show. The names of slides are those that `pattern` gives its files.
+struct Still {
+  std::optional<int> slide;  // none: one colour
+  bool complement = false;   // or black, not white
+};
+
+Result<Still> still_named(const std::string& name, const Pattern& pattern) {
+  if (name == "white" || name == "black") return Still{std::nullopt, name == "black"};
   for (int slide = 0; slide < pattern.slides; ++slide) {
     for (const bool complement : {false, true}) {
       if (name == "slide" + std::to_string(slide + 1) + (complement ? "_complement" : ""))
-        return draw_slide(pattern, slide, complement, mode.width, mode.height);
+        return Still{slide, complement};
     }
   }
-  return std::nullopt;
+  return Error{"there is no picture " + name + ": give white, black, slide1, ..."};
+}
+
+Image8 draw(const Still& still, const Pattern& pattern, const DisplayMode& mode) {
+  if (still.slide) return draw_slide(pattern, *still.slide, still.complement, mode.width, mode.height);
+  Image8 out(mode.width, mode.height, 3);
+  std::fill_n(out.data(), out.size(), static_cast<std::uint8_t>(still.complement ? 0 : 255));
+  return out;
+}
+
+/// Wrong usage, as far as it shows before files are read and a window opens.
+void check(const Options& options) {
+  check_pattern_options(options.pattern);
+  if (options.still.empty() || !options.pattern.file.empty()) return;
+  if (const auto still = still_named(options.still, *pattern_of(options.pattern)); !still)
+    throw CLI::ValidationError("--still", still.error().message);
 }
 
 /// What a calibration needs; empty for the pattern's own slides.
@@ -116,6 +131,12 @@ Status report(const ShowReport& shown, const Options& options, const DisplayOutp
 Status project(const Options& options, StopSignal& stop) {
   auto pattern = pattern_of(options.pattern);
   if (!pattern) return pattern.error();
+  std::optional<Still> still;
+  if (!options.still.empty()) {
+    auto named = still_named(options.still, *pattern);
+    if (!named) return named.error();
+    still = *named;
+  }
   DisplayChoice choice{options.output, options.size.width, options.size.height, options.refresh_hz};
   ShowOptions show;
   show.interlaced = options.interlaced;
@@ -135,11 +156,7 @@ Status project(const Options& options, StopSignal& stop) {
   log_info("projecting on " + output.name + ", " + std::to_string(output.mode.width) + "x" +
            std::to_string(output.mode.height) + "; Escape or Ctrl-C ends");
   const auto stopped = [&stop] { return stop.stopped(); };
-  if (!options.still.empty()) {
-    auto picture = still_picture(options.still, *pattern, output.mode);
-    if (!picture) return Error{"there is no picture " + options.still + ": give white, black, slide1, ..."};
-    return show_still(**display, *std::move(picture), stopped);
-  }
+  if (still) return show_still(**display, draw(*still, *pattern, output.mode), stopped);
   const auto cycle = cycle_of(options.cycle, *pattern, output.mode);
   if (!cycle) return cycle.error();
   Progress progress("project", "pictures", options.pictures.value_or(0));
@@ -190,18 +207,22 @@ Command project_command() {
             ->type_name("top|bottom")
             ->capture_default_str()
             ->needs(interlaced);
-        app.add_option("--pictures", o->pictures, "End after so many (default: never)")
-            ->check(whole_number(1));
-        app.add_option("--cycle", o->cycle,
-                       "Show what a calibration needs in turn: colours (black, red, green and blue, each "
-                       "before its complement) or stripes (along columns and along rows)")
-            ->check(CLI::IsMember({"colours", "stripes"}))
-            ->type_name("NAME");
+        auto* pictures = app.add_option("--pictures", o->pictures, "End after so many (default: never)")
+                             ->check(whole_number(1));
+        auto* cycle =
+            app.add_option("--cycle", o->cycle,
+                           "Show what a calibration needs in turn: colours (black, red, green and blue, each "
+                           "before its complement) or stripes (along columns and along rows)")
+                ->check(CLI::IsMember({"colours", "stripes"}))
+                ->type_name("NAME");
         app.add_option("--still", o->still,
                        "Show one picture all the time, to aim and focus: white, black, slide1, "
                        "slide1_complement, ...")
-            ->type_name("NAME");
+            ->type_name("NAME")
+            ->excludes(pictures)
+            ->excludes(cycle);
         app.add_flag("--json", o->json, "Print the report as JSON");
+        app.final_callback([o] { check(*o); });
         app.footer(
             "Examples:\n"
             "  relievo-server project --list\n"

@@ -92,11 +92,19 @@ class Project(ScreenTest):
                         self.folder / "take"], capture_output=True, check=True)
         rig.write_text((self.folder / "take" / "rig.yaml").read_text())
         for arguments, text in ((["--rig", rig], "has no mode 1024x768"), (["--output", "HDMI-7"], "no output HDMI-7"),
-                                (["--stripes", "500"], "do not fit"), (["--still", "slide9"], "no picture slide9")):
+                                (["--stripes", "500"], "do not fit")):
             code, out, err = self.run_to_end(*arguments)
             self.assertEqual((code, out), (1, ""), err)
             self.assertIn(text, err)
             self.assertEqual(len([line for line in err.splitlines() if "projecting on" not in line]), 1, err)
+
+    def test_wrong_usage_opens_no_window(self):
+        for arguments, text in ((["--still", "slide9"], "no picture slide9"), (["--base", "7"], "a base of 3 to 6"),
+                                (["--still", "white", "--pictures", "3"], "--pictures excludes --still"),
+                                (["--cycle", "colours", "--still", "white"], "--cycle excludes --still")):
+            code, out, err = self.run_to_end(*arguments)
+            self.assertEqual((code, out, len(err.splitlines())), (2, "", 1), err)
+            self.assertIn(text, err)
 
     def test_no_desktop(self):
         environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
