@@ -123,6 +123,16 @@ void warn_of_depth(const Geometry& g, const MeasuredViews& measured, const Pinho
   log_warning(text + (missing.empty() ? "" : "; still missing: " + missing));
 }
 
+/// A pattern laid over another size than was projected fits where it can be read, and is far off elsewhere.
+void warn_of_size(const Geometry& g) {
+  if (g.stereo_rms_all <= GeometryOptions{}.most_rms_px) return;
+  char rms[32];
+  std::snprintf(rms, sizeof rms, "%.1f", g.stereo_rms_all);
+  log_warning(std::string("the corners left out are far off, ") + rms +
+              " px RMS with them: was the projector's size " + std::to_string(g.projector.width) + "x" +
+              std::to_string(g.projector.height) + ", and the pattern the one that is given?");
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto board = parse_board(options.board);
   if (!board) return board.error();
@@ -199,6 +209,7 @@ Status run(const Options& options, StopSignal& stop) {
   } else {
     print(*geometry, difference, out);
   }
+  warn_of_size(*geometry);
   return {};
 }
 

@@ -26,6 +26,8 @@ Result<std::vector<fs::path>> views_in(const std::string& folder) {
     if (it->is_directory(ignored)) out.push_back(it->path());
   }
   if (code) return Error{"cannot read the folder " + folder + ": " + code.message()};
+  if (fs::is_directory(fs::path(folder) / "views", code))
+    return Error{folder + " holds a folder of views: give " + (fs::path(folder) / "views").string()};
   std::sort(out.begin(), out.end());
   if (out.empty())
     return Error{folder + " has no folders: a calibration needs several views, a folder of pictures each"};
@@ -36,6 +38,26 @@ struct OneView {
   MeasuredView view;
   int width = 0, height = 0;  // 0 where it could not be read
 };
+
+/// The size of most views' pictures; of two as frequent ones the first.
+Size usual_size(const std::vector<OneView>& views) {
+  const auto same = [&](const OneView& one) {
+    return std::ranges::count_if(
+        views, [&](const OneView& v) { return v.width == one.width && v.height == one.height; });
+  };
+  Size out;
+  std::ptrdiff_t most = 0;
+  for (const OneView& one : views) {
+    if (one.width == 0 || same(one) <= most) continue;
+    most = same(one);
+    out = {one.width, one.height};
+  }
+  return out;
+}
+
+std::string text_of(Size size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
 
 OneView measure_one(const fs::path& folder, const ViewCode& code, const Board& board, WorkerPool& pool,
                     StopSignal& stop) {
@@ -67,23 +89,26 @@ Result<MeasuredViews> measure_views(const std::string& folder, const ViewCode& c
                                     int threads, StopSignal& stop) {
   auto folders = views_in(folder);
   if (!folders) return folders.error();
-  MeasuredViews out;
+  std::vector<OneView> views;
   WorkerPool pool(threads);
   Progress progress("calibrate", "views", folders->size());
   for (const fs::path& path : *folders) {
     OneView one = measure_one(path, code, board, pool, stop);
     if (stop.stopped()) return Error{"stopped"};
-    if (one.width != 0 && out.camera.width != 0 &&
-        (out.camera.width != one.width || out.camera.height != one.height)) {
-      return Error{path.string() + " has pictures of another size than the views before it"};
-    }
-    if (one.width != 0) {
-      out.camera.width = one.width;
-      out.camera.height = one.height;
-    }
     if (!one.view.refused.empty()) log_warning("view " + one.view.name + " is left out: " + one.view.refused);
+    views.push_back(std::move(one));
+    progress.update(views.size());
+  }
+  const Size size = usual_size(views);
+  MeasuredViews out;
+  out.camera.width = size.width;
+  out.camera.height = size.height;
+  for (OneView& one : views) {
+    if (one.view.refused.empty() && (one.width != size.width || one.height != size.height)) {
+      one.view.refused = "its pictures are " + text_of({one.width, one.height}) + ", others " + text_of(size);
+      log_warning("view " + one.view.name + " is left out: " + one.view.refused);
+    }
     out.views.push_back(std::move(one.view));
-    progress.update(out.views.size());
   }
   if (out.camera.width == 0)
     return Error{"no view of " + folder + " can be used: " + out.views.front().refused};

@@ -222,7 +222,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (totals.unreadable > 0) {
     return Error{std::to_string(totals.unreadable) + " of " + std::to_string(totals.frames) +
                  " frames could not be read (the last: " + last_error.message +
-                 "); the others are reconstructed"};
+                 (totals.reconstructed > 0 ? "); the others are reconstructed" : ")")};
   }
   if (totals.reconstructed == 0 && !stop.stopped()) {
     if (steps.status().mixed > 0) return Error{"no frame could be reconstructed: " + steps.advice()};

@@ -143,7 +143,10 @@ class Calibration {
     for (const MeasuredView& view : views) {
       ViewReport report{.name = view.name, .used = view.refused.empty(), .why = view.refused};
       report.corners = view.corners.size();
-      if (report.used) working_.push_back({out_.reports.size(), {view.corners, {}}, {}});
+      if (report.used) {
+        fitted_.push_back(out_.reports.size());
+        working_.push_back({out_.reports.size(), {view.corners, {}}, {}});
+      }
       out_.reports.push_back(report);
     }
   }
@@ -206,7 +209,8 @@ class Calibration {
   Status check_count() const {
     if (working_.size() >= options_.min_views) return {};
     std::string why;
-    for (const ViewReport& r : out_.reports) {
+    for (std::size_t i : fitted_) {
+      const ViewReport& r = out_.reports[i];
       if (!r.used) why += (why.empty() ? ": " : "; ") + r.name + " (" + r.why + ")";
     }
     return Error{std::to_string(working_.size()) + " of " + std::to_string(out_.reports.size()) +
@@ -366,6 +370,7 @@ class Calibration {
 
   PinholeModel camera_size_, projector_size_;
   const GeometryOptions& options_;
+  std::vector<std::size_t> fitted_;  // of the reports: views that measuring did not refuse
   std::vector<Working> working_;
   Geometry out_;
 };

@@ -71,7 +71,7 @@ struct Geometry {
 inline constexpr double kGoodDepthSigma = 1e-3;
 
 /// Sizes are pixels of the two devices. Fails where fewer than `min_views` views can be used, or they do not
-/// determine the rig or fit none; the error says which views and why.
+/// determine the rig or fit none; the error says which views that measuring did not refuse, and why.
 Result<Geometry> calibrate_geometry(const std::vector<MeasuredView>& views, const PinholeModel& camera_size,
                                     const PinholeModel& projector_size, const GeometryOptions& options);
 

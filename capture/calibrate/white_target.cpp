@@ -84,6 +84,10 @@ Result<WhiteTarget> find_white_target(const std::vector<ColourCapture>& captures
   WhiteTarget out;
   out.mask.assign(mask.data, mask.data + mask.total());
   out.pixels = static_cast<std::size_t>(std::count(out.mask.begin(), out.mask.end(), 1));
+  if (out.pixels < kMinPixels && roi) {
+    return Error{"the region given has " + std::to_string(out.pixels) + " pixels, " +
+                 std::to_string(kMinPixels) + " are needed: give a larger one"};
+  }
   if (out.pixels < kMinPixels) {
     return Error{"no white target is found: " + std::to_string(out.pixels) +
                  " pixels are lit by the projector, " + std::to_string(kMinPixels) +

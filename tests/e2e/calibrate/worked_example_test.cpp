@@ -204,6 +204,41 @@ TEST(CalibrationExample, GraySlidesAreImportedBack) {
   EXPECT_TRUE(fs::exists(folder / "maps/columns.npy"));
 }
 
+TEST(CalibrationExample, ViewsThatDoNotBelongAreNamedAndASizeThatCannotBeIsWarnedOf) {
+  const TempFolder folder;
+  const std::string out = (folder / "example").string(), other = (folder / "other").string();
+  report({"calibrate", "example", "--out", out, "--views", "5", "--json"});
+  report({"calibrate", "example", "--out", other, "--views", "3", "--rig", "object,width=320,height=240",
+          "--json"});
+  const auto calibrate = [&](const std::string& views, const std::string& projector) {
+    return server({"calibrate", "geometry", views, "--board", "chessboard:9x7:25mm", "--projector", projector,
+                   "--out", (folder / "rig.yaml").string()});
+  };
+  const Finished parent = calibrate(out, "1024x768");
+  EXPECT_EQ(parent.status, 1);
+  EXPECT_THAT(parent.err, HasSubstr("holds a folder of views: give " + out + "/views"));
+
+  const Finished wrong_size = calibrate(out + "/views", "1280x720");
+  EXPECT_EQ(wrong_size.status, 0) << wrong_size.err;
+  EXPECT_THAT(wrong_size.err, HasSubstr("was the projector's size 1280x720"));
+
+  fs::copy(other + "/views/view_00", out + "/views/a_smaller_one", fs::copy_options::recursive);
+  const Finished mixed = calibrate(out + "/views", "1024x768");
+  EXPECT_EQ(mixed.status, 0) << mixed.err;
+  EXPECT_THAT(mixed.err,
+              HasSubstr("view a_smaller_one is left out: its pictures are 320x240, others 640x480"));
+  EXPECT_THAT(mixed.err, testing::Not(HasSubstr("projector's size")));
+
+  for (int i = 0; i < 5; ++i) {
+    const fs::path view = out + "/views/view_0" + std::to_string(i);
+    for (const auto& file : fs::directory_iterator(view))  // nothing but light
+      fs::copy_file(out + "/colours/111.png", file.path(), fs::copy_options::overwrite_existing);
+  }
+  const Finished none = calibrate(out + "/views", "1024x768");
+  EXPECT_EQ(none.status, 1);
+  EXPECT_EQ(none.err.find("view_03"), none.err.rfind("view_03")) << none.err;
+}
+
 TEST(CalibrationExample, PicturesThatAreNotWhatTheyShouldBeAreWarnedOf) {
   const TempFolder folder;
   const fs::path slides = folder / "slides", turned = folder / "turned";
@@ -281,6 +316,8 @@ TEST(CalibrationExample, WrongUsageExitsTwo) {
           "is no board such as chessboard:9x7:75mm");
   wrong({"pattern", "--out", "o", "--stripes", "1"}, "at least 2 stripes");
   wrong({"pattern", "--out", "o", "--base", "7"}, "use a base of 3 to 6");
+  for (const std::string out : {"slides.mp4", "slides.png"})
+    wrong({"pattern", "--out", out}, "a video's name that ends in .mkv");
   wrong({"plan", "--base", "7"}, "use a base of 3 to 6");
   wrong({"project", "--base", "7"}, "use a base of 3 to 6");
   wrong({"project", "--still", "foo"}, "there is no picture foo");

@@ -203,6 +203,8 @@ TEST(ColourCalibration, RefusesWhereThereIsNoTarget) {
   constexpr int kMost = std::numeric_limits<int>::max();
   for (const Roi& roi : {Roi{kMost - 7, 0, 50, 50}, Roi{0, kMost - 7, 50, 50}, Roi{1, 1, kMost, kMost}})
     EXPECT_THAT(refusal(all(), {.roi = roi}), HasSubstr("not inside the pictures of 120x90"));
+  EXPECT_THAT(refusal(all(), {.roi = Roi{40, 30, 1, 1}}),
+              HasSubstr("the region given has 1 pixels, 200 are needed"));
   EXPECT_EQ(refusal(all(), {.roi = Roi{40, 30, 40, 30}}), "accepted");
 }
 
