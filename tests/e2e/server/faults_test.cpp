@@ -118,10 +118,20 @@ TEST_F(ServerFault, ACorruptPictureIsNamedAndTheOthersAreReconstructed) {
   ASSERT_EQ(errors(done.err).size(), 1U) << done.err;
   EXPECT_NE(errors(done.err)[0].find("1 of 12 frames could not be read"), std::string::npos) << done.err;
   EXPECT_NE(errors(done.err)[0].find("000003.png"), std::string::npos) << done.err;
+  EXPECT_NE(errors(done.err)[0].find("the others are reconstructed"), std::string::npos) << done.err;
   EXPECT_EQ(names_in(out_).size(), 10U);  // not the first, not the torn one
   EXPECT_FALSE(names_in(out_).contains("000003.ply"));
   // A score over part of a take would not be comparable.
   expect_one_error(run(server({"evaluate", take_.string()})), "000003.png");
+}
+
+TEST_F(ServerFault, WhereNoPictureCanBeReadThereAreNoOthers) {
+  for (const std::string& name : names_in(take_ / "frames")) fs::resize_file(take_ / "frames" / name, 200);
+  const Finished done = run(server({"reconstruct", take_.string(), "--out", out_.string()}));
+  EXPECT_EQ(done.status, 1);
+  ASSERT_EQ(errors(done.err).size(), 1U) << done.err;
+  EXPECT_NE(errors(done.err)[0].find("frames could not be read"), std::string::npos) << done.err;
+  EXPECT_EQ(errors(done.err)[0].find("the others"), std::string::npos) << done.err;
 }
 
 TEST_F(ServerFault, ATakeRemovedMidRun) {
