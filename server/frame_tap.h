@@ -21,6 +21,7 @@ struct TappedFrame {
   ReconstructReport report;
   StepStatus step;
   std::string step_advice;  // empty where projector and camera are in step
+  bool calibrated = true;   // false: the rig is a guess
 };
 
 /// Called on the pipeline's reconstructing thread: both must return at once.

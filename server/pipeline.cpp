@@ -303,7 +303,8 @@ class ThreadedPipeline final : public Pipeline {
     TappedFrame out{.captured = captured.clone(),
                     .report = paced_.now().report(),
                     .step = steps.status(),
-                    .step_advice = steps.message()};
+                    .step_advice = steps.message(),
+                    .calibrated = options_.calibrated};
     if (decoded != nullptr) out.decoded = decoded->clone();
     if (surface != nullptr) out.grid = surface->grid;
     options_.tap->put(std::move(out));

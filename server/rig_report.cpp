@@ -2,9 +2,12 @@
 #include "server/rig_report.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "capture/calibrate/colour.h"
 
@@ -83,10 +86,43 @@ Json step_json(const StepStatus& step) {
   return out;
 }
 
+/// As the page's table names it.
+std::string colour_name(Primary colour) {
+  static constexpr std::array<const char*, 8> kNames = {"black", "red",     "green", "yellow",
+                                                        "blue",  "magenta", "cyan",  "white"};
+  return kNames[colour & 7];
+}
+
+std::string sentence(std::string words) {
+  words.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(words.front())));
+  if (words.back() != '.' && words.back() != '?') words += '.';
+  return words;
+}
+
+void advise_on_stripes(const RigCheck& check, std::vector<std::string>& out) {
+  if (check.coverage() < kCoverageLeast)
+    out.push_back("stripes are decoded on " + percent(check.coverage()) +
+                  " of where their light arrives: focus both lenses, or project fewer stripes");
+  std::string weak;
+  for (const ColourMargin& m : check.margins)
+    if (m.stripes > 0 && m.low < kMarginNeeded) weak += (weak.empty() ? "" : ", ") + colour_name(m.colour);
+  if (!weak.empty())
+    out.push_back("hardly told: " + weak + "; calibrate the colours, or keep other light away");
+  if (order_share(check) > kOrderMost)
+    out.push_back(
+        percent(order_share(check)) +
+        " of neighbouring boundaries do not fit together: stripes are too fine, out of focus, or not of "
+        "this pattern");
+}
+
 }  // namespace
 
 std::vector<std::string> rig_advice(const TappedFrame& frame, const RigCheck& check) {
   std::vector<std::string> out;
+  if (!frame.calibrated)
+    out.emplace_back(
+        "the rig is not calibrated: its shapes are guesses until it is; set the exposure, then calibrate the "
+        "colours, and after them the geometry");
   if (check.exposure.clipped > kClippedMost) {
     out.push_back(percent(check.exposure.clipped) +
                   " of the picture is clipped: expose shorter, lower the camera's gain or close its iris");
@@ -95,26 +131,13 @@ std::vector<std::string> rig_advice(const TappedFrame& frame, const RigCheck& ch
                   " of 255 only: expose longer, raise the gain or open the iris");
   }
   if (!frame.step_advice.empty()) out.push_back(frame.step_advice);
-  if (!frame.decoded) return out;
-  if (lit_share(check) < kLitLeast) {
-    out.push_back(
+  if (frame.decoded && lit_share(check) < kLitLeast) {
+    out.emplace_back(
         "no stripes arrive: is the projector on, does it show the pattern, and does the camera see where?");
-    return out;
+  } else if (frame.decoded && frame.calibrated) {
+    advise_on_stripes(check, out);  // a guess says nothing of focus and colours
   }
-  if (check.coverage() < kCoverageLeast)
-    out.push_back("stripes are decoded on " + percent(check.coverage()) +
-                  " of where their light arrives: focus both lenses, or project fewer stripes");
-  std::string weak;
-  for (const ColourMargin& m : check.margins)
-    if (m.stripes > 0 && m.low < kMarginNeeded) weak += (weak.empty() ? "" : ", ") + primary_name(m.colour);
-  if (!weak.empty())
-    out.push_back("hard to tell: " + weak +
-                  "; calibrate the colours (relievo-server calibrate colour), or keep other light away");
-  if (order_share(check) > kOrderMost)
-    out.push_back(
-        percent(order_share(check)) +
-        " of neighbouring boundaries do not fit together: stripes are too fine, out of focus, or not of "
-        "this pattern");
+  for (std::string& line : out) line = sentence(std::move(line));
   return out;
 }
 

@@ -16,7 +16,7 @@ namespace relievo {
 std::string rig_report(const std::string& stream, const TappedFrame& frame, const RigCheck& check,
                        const RigView& made, const Rig& rig);
 
-/// What is wrong and how to mend it, the worst first; empty where nothing is.
+/// What is wrong and how to mend it, in sentences, the worst first; empty where nothing is.
 std::vector<std::string> rig_advice(const TappedFrame& frame, const RigCheck& check);
 
 }  // namespace relievo

@@ -62,6 +62,22 @@ async function choose(page, kind) {
   await reaches(page, 'watching');
 }
 
+/** Over its picture, with the way to the page of the rig; null: nothing. */
+async function viewerSays(server, words) {
+  const page = await open(server.address);
+  await page.goto(`${server.address}/?stream=rig`);
+  await page.waitForSelector('body[data-state=live]', kLong);
+  if (words === null) await page.waitForSelector('#notice', { state: 'hidden' });
+  else {
+    await page.waitForSelector('#notice:not([hidden])');
+    assert.match(await page.textContent('#notice'), words);
+    await shot(page, 'viewer');
+    await page.click('#notice a');
+    await page.waitForURL(/\/rig\?stream=rig/);
+  }
+  await page.context().close();
+}
+
 async function withRig(options, use, environment, stream = 'rig') {
   const folder = mkdtempSync(join(tmpdir(), 'relievo-calibrate-'));
   const rig = join(folder, 'rig.yaml');
@@ -116,6 +132,10 @@ const checks = {
           await eventually('it is not said that the rig is not calibrated', async () =>
             /not calibrated/.test((await streams(server))[0]?.status?.message ?? ''),
           );
+          await page.waitForFunction(() => /not calibrated/.test(document.querySelector('#advice')?.textContent));
+          assert.doesNotMatch(await page.textContent('#advice'), /focus/);
+          await shot(page, 'guessed');
+          await viewerSays(server, /not calibrated/);
           await choose(page, 'colour');
           assert.match(await page.textContent('#calibration-next'), /white sheet/);
           assert.equal(await page.isVisible('#pictures'), false, 'what the stream shows is paused');
@@ -157,6 +177,8 @@ const checks = {
           });
           await eventually('the projector stays on', () => screen.seen().coloured < 0.1);
           await page.waitForFunction(() => document.body.dataset.state === 'live' && document.querySelector('#picture').dataset.shows === 'camera');
+          await viewerSays(server, null);
+          assert.doesNotMatch(await page.textContent('#advice'), /not calibrated/);
           const { truth, own } = evaluated(folder, rig);
           console.log(`  completeness ${own.completeness} (truth's rig: ${truth.completeness}), median ${own.median_um_per_m ?? ''}`);
           assert.ok(own.completeness > truth.completeness - 0.02, JSON.stringify(own));

@@ -14,13 +14,14 @@ import { LiveSource } from './liveSource';
 import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
-import type { DecodedFrame } from './messages';
+import type { DecodedFrame, Notice } from './messages';
 import { rigPlace } from './placement';
 import { wantedQuality, writtenOf, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
 import { address, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
+import { sentence } from './sentence';
 import { Session } from './session';
 import { isOver, present, type Presentation } from './state';
 import { text } from './strings';
@@ -72,6 +73,7 @@ class Viewer {
   private serverFile: string | null = null; // the same where it is one of the server's
   private fileProblem: { name: string; why: string; overPicture: boolean } | null = null; // the card stays where it was shown first
   private presentation: Presentation | null = null;
+  private notice: Notice | null = null; // of the frame that is shown
 
   constructor() {
     this.ui = new Ui({
@@ -420,7 +422,8 @@ class Viewer {
   private show(frame: DecodedFrame): void {
     if (this.view === null) return;
     this.view.show(frame);
-    this.ui.showNotice(frame.notice);
+    this.notice = frame.notice;
+    this.showNotice();
     const pose = this.posed ? null : (this.shared?.pose ?? null);
     this.posed = true;
     if (pose !== null && !this.view.navigator.isRigView) this.view.navigator.pose = pose;
@@ -447,6 +450,12 @@ class Viewer {
     return listed?.camera === true ? listed.name : null;
   }
 
+  // What frames are like, else what the server says of the stream.
+  private showNotice(): void {
+    if (this.notice !== null) this.ui.showNotice(text.notices[this.notice], null);
+    else this.ui.showNotice(this.presentation?.note ?? '', this.liveCamera);
+  }
+
   private showDisplay(): void {
     this.legend.show(this.display.mode, this.view?.depthRange ?? null);
     this.displayPanel.show(this.display, this.view?.navigator.rigCamera !== null);
@@ -469,6 +478,7 @@ class Viewer {
       this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: overPicture };
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
+    this.showNotice();
     this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? [], this.server.arrived && (!offline || facts.refusal !== null));
     this.streamsPanel?.showRecordings(this.server.streams, this.serverFile);
     const besides = this.companions?.tell() ?? new Map<string, Presentation>();
@@ -512,7 +522,5 @@ const isMissing = (told: Presentation): boolean => isOver(told) || told.state ==
 const called = (name: string, told: Presentation): string => text.streams.withWord(name, isMissing(told) ? told.label : '');
 const besidesText = (besides: ReadonlyMap<string, Presentation>): string =>
   [...besides].flatMap(([name, told]) => (isMissing(told) ? [called(name, told)] : [])).join(', ');
-
-const sentence = (words: string): string => `${words.charAt(0).toUpperCase()}${words.slice(1)}.`;
 
 report(new Viewer());

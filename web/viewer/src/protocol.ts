@@ -153,6 +153,9 @@ export interface ListedStream {
   camera?: boolean;
 }
 
+/** The page that shows what a stream's camera sees. */
+export const rigPage = (stream: string): string => `rig?stream=${encodeURIComponent(stream)}`;
+
 /** What GET and POST /api/recording/STREAM answer. */
 export interface ServerRecording {
   state: 'off' | 'recording' | 'failed';

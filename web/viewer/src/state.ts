@@ -43,6 +43,7 @@ export interface Presentation {
   title: string; // of the card over the picture; empty: none
   text: string;
   hint: string; // a command to type
+  note: string; // a line over the picture, which is shown all the same; empty: none
   dim: boolean; // the picture is not of now
 }
 
@@ -60,6 +61,7 @@ export function present(facts: Facts): Presentation {
     title: '',
     text: '',
     hint: '',
+    note: '',
     dim: false,
     ...rest,
   });
@@ -106,7 +108,7 @@ export function present(facts: Facts): Presentation {
     const since = silent ? say.silent(Math.floor(facts.quietMs / 1000)) : '';
     return make('stalled', say.stalled[0], { title: say.stalled[1], text: since + (facts.serverMessage || say.comesBack), dim: true });
   }
-  return make('live', say.live);
+  return make('live', say.live, { note: facts.serverMessage });
 }
 
 /** Nothing comes of it any more, as far as is known. */

@@ -4,7 +4,7 @@
 import { Aligner, type Aligning } from './aligner';
 import { button, chooser, make, setText } from './dom';
 import { kPlacements, type Placement } from './placement';
-import type { ListedRecording, ListedStream } from './protocol';
+import { rigPage, type ListedRecording, type ListedStream } from './protocol';
 import { text } from './strings';
 import { kThumbnail, Thumbnails } from './thumbnails';
 import type { View } from './view';
@@ -168,7 +168,7 @@ function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | n
   picture.setAttribute('aria-label', say.picture(name));
   const about = make('small', { className: 'quiet' });
   const show = button(say.show, say.showTitle(name), choose);
-  const rig = make('a', { href: `rig?stream=${encodeURIComponent(name)}`, title: say.rigTitle, hidden: true }, say.rig);
+  const rig = make('a', { href: rigPage(name), title: say.rigTitle, hidden: true }, say.rig);
   const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]), ...(place === null ? [] : [place]), rig);
   const item = make('li', {}, picture, make('div', {}, make('b', { title: name }, name), about, buttons));
   return { item, picture, about, show, rig, beside, place, pictureAt: -Infinity };

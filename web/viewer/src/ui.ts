@@ -2,8 +2,7 @@
 // The page around the picture: badge, card, list of streams, statistics line.
 import { element, setText } from './dom';
 import { kClear, withPanel, type Insets } from './insets';
-import type { Notice } from './messages';
-import type { ListedStream } from './protocol';
+import { rigPage, type ListedStream } from './protocol';
 import type { Presentation } from './state';
 import { text } from './strings';
 
@@ -93,11 +92,14 @@ export class Ui {
     element('spinner').hidden = dismissible; // what is said is said: nothing is waited for
   }
 
-  /** A line over the picture, which stays visible; null: none. */
-  showNotice(notice: Notice | null): void {
-    const line = element('notice');
-    line.hidden = notice === null;
-    if (notice !== null) setText(line, text.notices[notice]);
+  /** A line over the picture, which stays visible; empty: none. `rig`: the stream whose page mends it. */
+  showNotice(what: string, rig: string | null): void {
+    element('notice').hidden = what === '';
+    if (what === '') return;
+    setText(element('notice-text'), what);
+    const link = element<HTMLAnchorElement>('notice-rig');
+    link.hidden = rig === null;
+    if (rig !== null) link.href = rigPage(rig);
   }
 
   showStreams(streams: readonly ListedStream[], chosen: string | null, source: string, note: string): void {

@@ -53,6 +53,13 @@ describe('present', () => {
     expect(present({ ...live, serverState: 'stalled', serverMessage: 'No signal.' }).text).toContain('No signal.');
   });
 
+  it('says of a live stream what its server has to say', () => {
+    const guessed = 'The rig is not calibrated: its shapes are guesses until it is.';
+    expect(present({ ...live, serverMessage: guessed })).toMatchObject({ state: 'live', title: '', note: guessed });
+    expect(present({ ...live, serverMessage: guessed, shifted: 'paused' }).note).toBe(''); // it is of now
+    expect(present(live).note).toBe('');
+  });
+
   it('says why it was refused', () => {
     expect(present({ ...live, connected: false, retryInS: 3, refusal: 'places' })).toMatchObject({ label: 'Full', title: 'All places are taken' });
     expect(present({ ...live, connected: false, refusal: 'name' }).title).toBe('No stream can have this name');
