@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "capture/calibrate/board.h"
+#include "server/keep_rig.h"
 
 namespace relievo {
 namespace {
@@ -16,6 +17,7 @@ Status may_calibrate(const StreamConfig& config, const ProjectorConfig& projecto
     return Error{config.source + " has no camera of its own: calibrate with relievo-server calibrate"};
   if (config.camera.rig.empty())
     return Error{"the server does not say where the result goes: start it with --rig FILE"};
+  if (const Status may = can_keep_rig(config.camera.rig); !may) return may;
   if (!simulated && projector.output.empty())
     return Error{"this server drives no projector: start it with --projector NAME"};
   if (order.kind != "geometry") return {};

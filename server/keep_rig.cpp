@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/keep_rig.h"
 
+#include <unistd.h>
+
+#include <cerrno>
+
 #include "base/time.h"
 #include "base/whole_file.h"
 
@@ -20,6 +24,23 @@ fs::path name_of_old(const fs::path& file, std::int64_t utc_ns) {
 }
 
 }  // namespace
+
+Status can_keep_rig(const fs::path& file) {
+  std::error_code ignored;
+  const auto cannot = [&](const std::string& why) {
+    return Error{"the result could not be written to " + file.string() + ": " + why +
+                 ", or start the server with another --rig FILE"};
+  };
+  if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored))
+    return cannot("it is no file: take it away");
+  const fs::path folder =
+      fs::weakly_canonical(fs::absolute(file), ignored).parent_path();  // where a link leads
+  if (!fs::is_directory(folder, ignored)) return cannot("make the folder " + folder.string());
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    return cannot("let the server write in the folder " + folder.string() + " (" + write_failure(errno) +
+                  ")");
+  return {};
+}
 
 Result<std::string> keep_rig(const fs::path& file, std::string_view text, const Pattern& pattern,
                              std::int64_t utc_ns) {

@@ -12,6 +12,9 @@
 
 namespace relievo {
 
+/// Whether keep_rig() could write this file, as far as that can be said before; if not, how to mend it.
+Status can_keep_rig(const std::filesystem::path& file);
+
 /// Writes `text` to `file`, whole or not at all; what was there stays beside it under a name with the time,
 /// which is returned (empty: there was nothing). `pattern`, which its stripes are of, is written beside it
 /// where none is. On failure the old file is as it was.

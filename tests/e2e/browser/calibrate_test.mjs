@@ -249,13 +249,18 @@ const checks = {
       assert.equal((await fetch(`${server.address}/api/calibration/sound.jpg`)).status, 400);
       assert.equal((await fetch(`${server.address}/api/calibration/camera.jpg`)).status, 503);
     });
-    const server = await Server.start(serverPath, ['--source', kSource, '--stream', 'rig']);
-    try {
-      const refused = await order(server, start);
-      assert.equal(refused.status, 409);
-      assert.match(await refused.text(), /--rig FILE/);
-    } finally {
-      await server.kill();
+    for (const [options, says] of [
+      [[], /--rig FILE/],
+      [['--rig', '/nowhere/of/ours/rig.yaml'], /make the folder \/nowhere\/of\/ours/],
+    ]) {
+      const server = await Server.start(serverPath, ['--source', kSource, '--stream', 'rig', ...options]);
+      try {
+        const refused = await order(server, start);
+        assert.equal(refused.status, 409);
+        assert.match(await refused.text(), says);
+      } finally {
+        await server.kill();
+      }
     }
   },
 

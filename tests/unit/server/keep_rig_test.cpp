@@ -3,6 +3,7 @@
 #include "server/keep_rig.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <sstream>
@@ -31,6 +32,23 @@ class KeepRig : public testing::Test {
   const fs::path file_ = folder_ / "rig.yaml";
   const Pattern pattern_ = striped_scene().pattern;
 };
+
+TEST_F(KeepRig, WhatCannotBeWrittenIsSaidBefore) {
+  EXPECT_TRUE(can_keep_rig(file_));
+  EXPECT_TRUE(can_keep_rig("rig.yaml")) << "in the folder where the server runs";
+  const Status missing = can_keep_rig(folder_ / "none" / "rig.yaml");
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().message.find("make the folder " + (folder_ / "none").string()), std::string::npos)
+      << missing.error().message;
+  const Status no_file = can_keep_rig(folder_.path());
+  ASSERT_FALSE(no_file);
+  EXPECT_NE(no_file.error().message.find("it is no file"), std::string::npos) << no_file.error().message;
+  if (::geteuid() == 0) return;  // may write everywhere
+  fs::permissions(folder_.path(), fs::perms::owner_read | fs::perms::owner_exec);
+  const Status closed = can_keep_rig(file_);
+  ASSERT_FALSE(closed);
+  EXPECT_NE(closed.error().message.find("let the server write"), std::string::npos) << closed.error().message;
+}
 
 TEST_F(KeepRig, TheFirstOneHasItsPatternBesideIt) {
   const auto old = keep_rig(file_, "first", pattern_, kNow_ns);
