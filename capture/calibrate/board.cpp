@@ -52,7 +52,7 @@ Result<Board> parse_charuco(const std::string& text) {
   static const std::regex pattern(std::string(R"(charuco:(\d{1,3})[xX](\d{1,3}):)") + kLength + ":" +
                                   kLength + "(:[A-Za-z0-9_]{1,32})?");
   std::smatch match;
-  if (!std::regex_match(text, match, pattern)) return Error{text + kUsage};
+  if (!std::regex_match(text, match, pattern)) return Error{"'" + text + "'" + kUsage};
   Board board{std::stoi(match[1]) - 1, std::stoi(match[2]) - 1, length_m(match[3], match[4]),
               length_m(match[5], match[6]), "DICT_4X4_50"};
   if (match[7].matched) board.dictionary = match[7].str().substr(1);
@@ -147,7 +147,7 @@ Result<Board> parse_board(const std::string& text) {
   if (text.rfind("charuco", 0) == 0) return parse_charuco(text);
   static const std::regex pattern(std::string(R"(chessboard:(\d{1,3})[xX](\d{1,3}):)") + kLength);
   std::smatch match;
-  if (!std::regex_match(text, match, pattern)) return Error{text + kUsage};
+  if (!std::regex_match(text, match, pattern)) return Error{"'" + text + "'" + kUsage};
   Board board{std::stoi(match[1]), std::stoi(match[2]), length_m(match[3], match[4])};
   if (board.columns < 3 || board.rows < 3) return Error{text + ": at least 3 x 3 inner corners are needed"};
   if (!(board.square_m > 0)) return Error{text + ": a square's side must be above 0"};

@@ -186,8 +186,7 @@ Result<std::unique_ptr<FieldSource>> open_board(const std::string& rest, const S
   auto poses =
       example_poses(opened->info.rig, *board, sim::SceneView{}.distance_m, count, opened->options.seed);
   if (poses.empty()) {
-    return Error{opened->info.name + ": " + board_name(opened->options.scene) +
-                 " does not fit before the rig: give a smaller board"};
+    return Error{board_name(opened->options.scene) + " does not fit before the rig: give a smaller board"};
   }
   auto shown = std::make_shared<BoardScene>(opened->options, opened->info.rig, *board, opened->info.pattern,
                                             std::move(poses));

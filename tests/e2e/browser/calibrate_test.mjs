@@ -224,10 +224,16 @@ const checks = {
       await goesOn(server);
 
       await page.selectOption('#calibration select', 'geometry');
-      await page.fill('#calibration-board', 'a plank');
-      await page.click('#calibration button:has-text("Start")');
-      await page.waitForSelector('#calibration-message.bad');
-      assert.match(await page.textContent('#calibration-message'), /chessboard/);
+      for (const [board, says] of [
+        ['a plank', /^'a plank' is no board such as chessboard/],
+        ['', /^'' is no board such as chessboard/],
+        ['chessboard:9x7:9000mm', /^Chessboard:9x7:9000mm does not fit before the rig: give a smaller board\.$/],
+      ]) {
+        await page.fill('#calibration-board', board);
+        await page.click('#calibration button:has-text("Start")');
+        await page.waitForFunction((wanted) => new RegExp(wanted).test(document.querySelector('#calibration-message.bad')?.textContent), says.source);
+        await reaches(page, 'off');
+      }
       assert.equal((await state(server)).state, 'off');
       assert.deepEqual(readdirSync(folder), []);
       await page.context().close();
