@@ -211,6 +211,7 @@ void CalibrationSession::draw_coverage(const CalibrationTask& task) {
   auto picture = jpeg_of(*drawn);
   const std::lock_guard lock(mutex_);
   state_.coverage = std::move(picture);
+  state_.tilts = task.tilts();
 }
 
 /// Whether it may go on.

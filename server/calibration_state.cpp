@@ -46,7 +46,8 @@ std::string to_json(const CalibrationState& s) {
                  {"result", s.result.empty() ? Json() : Json::parse(s.result, nullptr, false)},
                  {"file", s.file},
                  {"file_before", s.old},
-                 {"coverage", s.coverage != nullptr}};
+                 {"coverage", s.coverage != nullptr},
+                 {"tilts", s.tilts}};
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -33,6 +33,7 @@ struct CalibrationState {
   bool can_solve = false;
   bool enough = false;
   std::vector<TakenView> views;
+  std::vector<std::string> tilts;                 // sides of the board that were farther away in a view
   std::string result;                             // JSON, as CalibrationResult::report; empty: none yet
   std::string file, old;                          // written, and what was there before; empty: none
   std::shared_ptr<const Bytes> camera, coverage;  // JPEG

@@ -146,7 +146,8 @@ class BoardTask final : public CalibrationTask {
     rig = with_geometry(rig, *geometry);
     return CalibrationResult{to_yaml(rig), geometry_report(*geometry)};
   }
-  std::optional<Image8> coverage() const override { return coverage_.draw(); }
+  std::optional<Image8> coverage() const override { return coverage_.draw_seen(); }
+  std::vector<std::string> tilts() const override { return coverage_.tilts(); }
 
  private:
   static std::string light_advice(double clipped) {

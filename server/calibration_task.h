@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -48,6 +49,8 @@ class CalibrationTask {
   virtual Result<CalibrationResult> solve() = 0;
   /// RGB: what was seen, and where something is missing; nothing where that is not told by a picture.
   virtual std::optional<Image8> coverage() const { return std::nullopt; }
+  /// As Coverage::tilts().
+  virtual std::vector<std::string> tilts() const { return {}; }
 };
 
 /// "chessboard:9x7:25mm": as `calibrate geometry --board`. `before`: what the rig.yaml said so far. Fails

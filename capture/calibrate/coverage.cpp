@@ -105,6 +105,14 @@ std::string Coverage::missing() const {
   return out;
 }
 
+std::vector<std::string> Coverage::tilts() const {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < tilts_.size(); ++i) {
+    if (tilts_[i]) out.emplace_back(kSides[i]);
+  }
+  return out;
+}
+
 double Coverage::last_width() const {
   if (added_.empty() || added_.back().empty()) return 1;
   const auto [left, right] = std::minmax_element(

@@ -32,8 +32,13 @@ class Coverage {
   /// that its upper side is farther away by some 25 degrees"; empty where nothing is missing.
   std::string next() const;
 
+  /// The sides that were farther away in a view, of left, right, upper and lower.
+  std::vector<std::string> tilts() const;
+
   /// RGB, camera left, projector right: where corners were seen, the last view's boldly; parts of the
-  /// camera's picture without any are red; below, the four tilts, those still missing in red.
+  /// camera's picture without any are red. For who writes beside it what it shows.
+  Image8 draw_seen() const;
+  /// The same with words; below, the four tilts, those still missing in red.
   Image8 draw() const;
 
  private:

@@ -47,9 +47,9 @@ void draw_tilt(cv::Mat& onto, cv::Point centre, std::size_t side, bool seen) {
 
 }  // namespace
 
-Image8 Coverage::draw() const {
+Image8 Coverage::draw_seen() const {
   const int left = panel_width(camera_), right = panel_width(projector_);
-  Image8 out(left + kGap + right, kHeight + kFooter, 3);
+  Image8 out(left + kGap + right, kHeight, 3);
   cv::Mat whole(out.height(), out.width(), CV_8UC3, out.data());
   whole.setTo(kBack);
 
@@ -61,12 +61,21 @@ Image8 Coverage::draw() const {
     camera(cell).setTo(cells_[static_cast<std::size_t>(i)] ? kSeen : kMissing);
   }
   draw_corners(camera, added_, false, double(kHeight) / camera_.height);
-  write(camera, "camera: red parts have not seen the board", {12, 24});
 
   cv::Mat projector = whole(cv::Rect(left + kGap, 0, right, kHeight));
   projector.setTo(cv::Scalar(44, 44, 52));
   draw_corners(projector, added_, true, double(kHeight) / projector_.height);
-  write(projector, "projector", {12, 24});
+  return out;
+}
+
+Image8 Coverage::draw() const {
+  Image8 seen = draw_seen();
+  Image8 out(seen.width(), kHeight + kFooter, 3);
+  cv::Mat whole(out.height(), out.width(), CV_8UC3, out.data());
+  whole.setTo(kBack);
+  cv::Mat(kHeight, seen.width(), CV_8UC3, seen.data()).copyTo(whole.rowRange(0, kHeight));
+  write(whole, "camera: red parts have not seen the board", {12, 24});
+  write(whole, "projector", {panel_width(camera_) + kGap + 12, 24});
 
   static const std::array<const char*, 4> kSides = {"left", "right", "upper", "lower"};
   for (std::size_t side = 0; side < 4; ++side) {

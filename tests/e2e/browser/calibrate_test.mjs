@@ -378,6 +378,11 @@ const checks = {
         assert.ok(wide <= 0, `${wide} px beside the screen`);
         const { bottom } = await page.locator('#calibration [data-action=take]').evaluate((b) => b.getBoundingClientRect());
         assert.ok(bottom <= 844, 'the button is below the screen');
+        await page.waitForSelector('#tilts [data-side=lower]');
+        const small = await page.$$eval('#seen :is(span, figcaption, li)', (words) => words.map((w) => parseFloat(getComputedStyle(w).fontSize)).filter((px) => px < 12));
+        assert.deepEqual(small, [], 'words that cannot be read');
+        const { seen } = await page.evaluate(() => ({ seen: getComputedStyle(document.querySelector('#coverage')).filter }));
+        assert.equal(seen !== 'none', colorScheme === 'light', 'the picture is dark on a light page');
         await shot(page, `phone-${colorScheme}`);
         await press(page, 'cancel');
         await reaches(page, 'off');

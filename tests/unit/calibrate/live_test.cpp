@@ -188,5 +188,22 @@ TEST(Coverage, ThePictureLosesItsRedWhereCornersWereSeen) {
                                 720 * truth().projector.width / truth().projector.height);
 }
 
+TEST(Coverage, APageGetsThePictureWithoutWordsAndTheTiltsBesideIt) {
+  const auto written = [](const Image8& picture) {  // nothing else is as light
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < picture.size(); i += 3)
+      count += *std::min_element(picture.data() + i, picture.data() + i + 3) > 175;
+    return count;
+  };
+  Coverage coverage(truth().camera, truth().projector);
+  EXPECT_TRUE(coverage.tilts().empty());
+  coverage.add(turned_board(0, 0.4, 0));
+  EXPECT_EQ(coverage.tilts().size(), 1u);
+  const Image8 seen = coverage.draw_seen();
+  EXPECT_EQ(seen.height(), 720);
+  EXPECT_EQ(written(seen), 0u);
+  EXPECT_GT(written(coverage.draw()), 100u);
+}
+
 }  // namespace
 }  // namespace relievo

@@ -2,6 +2,8 @@
 // What the server says of a calibration, and orders to it: /api/calibration (docs/WEB.md).
 import { ask } from './look';
 
+export const kSides = ['left', 'right', 'upper', 'lower'] as const;
+export type Side = (typeof kSides)[number];
 export type Kind = 'colour' | 'geometry';
 export type Action = 'take' | 'automatic' | 'manual' | 'calculate' | 'more' | 'keep' | 'cancel';
 
@@ -40,6 +42,7 @@ export interface Calibration {
   file: string;
   file_before: string;
   coverage: boolean;
+  tilts: Side[];
 }
 
 export const isGeometry = (result: ColourResult | GeometryResult): result is GeometryResult => 'stereo_rms_px' in result;

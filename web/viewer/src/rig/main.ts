@@ -8,7 +8,8 @@ import { button, element, make, setText } from '../dom';
 import { calibrationPicture, type Calibration } from './calibration';
 import { CalibrationCard } from './calibrationCard';
 import { AdviceCard, ExposureCard, MarginsCard, StepCard, StripesCard } from './cards';
-
+import { CoverageFigure } from './coverage';
+import { draw } from './draw';
 import { kPictures, lookAt, pictureOf, Refused, streamNames, type PictureName } from './look';
 import { ProjectorCard } from './projector';
 import { text } from './strings';
@@ -16,18 +17,10 @@ import { text } from './strings';
 const kEveryMs = 200;
 const kAgainMs = 1500; // after a failure
 
-/** Shows the picture, and ends it. */
-function draw(canvas: HTMLCanvasElement, bitmap: ImageBitmap): void {
-  if (canvas.width !== bitmap.width) canvas.width = bitmap.width;
-  if (canvas.height !== bitmap.height) canvas.height = bitmap.height;
-  canvas.getContext('2d')!.drawImage(bitmap, 0, 0);
-  bitmap.close();
-}
-
 class RigPage {
   private readonly streams = element<HTMLSelectElement>('stream');
   private readonly canvas = element<HTMLCanvasElement>('picture');
-  private readonly coverage = element<HTMLCanvasElement>('coverage');
+  private readonly coverage = new CoverageFigure();
   private readonly buttons = new Map<PictureName, HTMLButtonElement>();
   private readonly calibration = new CalibrationCard(
     () => this.stream,
@@ -56,7 +49,6 @@ class RigPage {
       this.calibration.root,
       new ProjectorCard(() => this.stream).root,
     );
-    setText(element('coverage-caption'), text.calibration.coverage);
     this.choose(this.picture);
     this.say(text.state.connecting, 'waiting');
     void this.run();
@@ -112,8 +104,7 @@ class RigPage {
     this.say(text.calibration.state(of.stream), 'live');
     if (of.state === 'pausing') return kEveryMs;
     this.draw(await calibrationPicture('camera'), 'calibration');
-    if (of.coverage) draw(this.coverage, await calibrationPicture('coverage'));
-    element('seen').hidden = !of.coverage;
+    await this.coverage.show(of);
     return kEveryMs;
   }
 
@@ -121,7 +112,7 @@ class RigPage {
     const on = this.calibration.underWay !== null;
     document.body.classList.toggle('calibrating', on);
     setText(element('caption'), on ? text.calibration.caption : text.pictures[this.picture][1]);
-    if (!on) element('seen').hidden = true;
+    if (!on) this.coverage.hide();
     this.streams.disabled = on;
     if (!on) this.away = this.stream;
     this.streams.dataset['listed'] = ''; // the stream was away

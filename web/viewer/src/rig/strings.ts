@@ -76,7 +76,11 @@ export const text = {
   calibration: {
     title: 'Calibration',
     caption: 'What the camera sees, without the pattern',
-    coverage: 'Where corners were seen by camera and projector; red: not yet. Below, how the board was tilted',
+    coverage: 'Where corners were seen; red: not yet. How the board was tilted:',
+    camera: 'Camera',
+    projector: 'Projector',
+    sides: { left: 'Left', right: 'Right', upper: 'Upper', lower: 'Lower' },
+    tilt: (side: string, seen: boolean) => `${side} side away${seen ? '' : ': not yet'}`,
     state: (stream: string) => `Calibrating ${stream}`,
     what: 'Calibrate',
     kinds: { colour: 'Colours', geometry: 'Geometry' },
