@@ -48,6 +48,8 @@ const press = (page, action) => page.click(`#calibration [data-action=${action}]
 const kLong = { timeout: kLongPatienceMs }; // it detects, calculates and scores
 const reaches = (page, phase) =>
   page.waitForFunction((wanted) => document.querySelector('#calibration').dataset.state === wanted, phase, kLong);
+/** The action of the button that has the keyboard, or the element's id. */
+const held = (page) => page.evaluate(() => document.activeElement.dataset.action ?? document.activeElement.id);
 const goesOn = (server, name) =>
   eventually('the stream does not go on', async () => (await streams(server, name))[0]?.frames > 0);
 const shot = async (page, name) => {
@@ -200,12 +202,54 @@ const checks = {
         await reaches(page, 'solved');
         await press(page, action);
         await reaches(page, action === 'keep' ? 'off' : 'watching');
+        assert.equal(await held(page), action === 'keep' ? 'calibration-message' : 'take');
+        if (action === 'keep') assert.match(await page.textContent('#calibration-result h3'), /colours, kept/);
       }
       const old = readdirSync(folder).filter((name) => name.startsWith('rig.before-'));
       assert.equal(old.length, 1);
       assert.match(readFileSync(join(folder, old[0]), 'utf8'), /colour_matrix/);
       assert.ok(existsSync(rig) && existsSync(join(folder, 'pattern.yaml')));
       await page.context().close();
+    });
+  },
+
+  async 'a server that goes away in the middle is missed, and one that was started again has lost it'() {
+    await withRig(['--source', kSource], async (server, _, rig) => {
+      const page = await open(server.address);
+      await choose(page, 'colour');
+      await page.reload();
+      await reaches(page, 'watching');
+      await page.waitForFunction(() => document.querySelector('#stream').value === 'rig');
+      await press(page, 'take');
+      await reaches(page, 'solved');
+      assert.equal(await held(page), 'keep');
+      await server.kill();
+      await page.waitForSelector('#calibration[inert]');
+      assert.match(await page.textContent('#calibration-message'), /does not answer/);
+      await page.waitForFunction(() => document.body.dataset.state === 'bad');
+      await shot(page, 'away');
+      const asked = await page.evaluate(async () => {
+        performance.clearResourceTimings();
+        await new Promise((resolve) => setTimeout(resolve, 3000));
+        return performance.getEntriesByType('resource').length;
+      });
+      assert.ok(asked <= 8, `asked ${asked} times in 3 s`); // of the calibration, the projector and for streams
+      complaints.length = 0; // of the server that is not there
+      const again = await Server.run(serverPath, ['serve', '--stream', 'rig', '--rig', rig, '--source', kSource, '--web', new URL(server.address).host]);
+      try {
+        await reaches(page, 'off');
+        assert.match(await page.textContent('#calibration-message'), /was restarted: the calibration was lost/);
+        assert.equal(await page.isVisible('#calibration[inert]'), false);
+        await page.waitForFunction(() => document.body.dataset.state === 'live');
+        assert.match(await page.textContent('#calibration-message'), /was restarted/, 'said for a moment alone');
+        await shot(page, 'restarted');
+        await choose(page, 'colour');
+        assert.equal(await page.isVisible('#calibration-message'), false);
+        complaints.length = 0;
+        await page.context().close();
+      } finally {
+        await again.kill();
+      }
     });
   },
 

@@ -2,6 +2,7 @@
 // Goes with a person through a calibration: what to do, a button that takes a view, what became of each, the
 // result.
 import { button, chooser, make, setText, toggle } from '../dom';
+import { sentence } from '../sentence';
 import { BoardField } from './boardField';
 import {
   calibrationNow,
@@ -22,7 +23,7 @@ const kEveryWhileUnderWayMs = 250;
 
 export class CalibrationCard {
   private readonly next = make('p', { className: 'next', id: 'calibration-next' });
-  private readonly message = make('p', { id: 'calibration-message' });
+  private readonly message = make('p', { id: 'calibration-message', tabIndex: -1 });
   private readonly views = make('ol', { className: 'views', id: 'calibration-views' });
   private readonly result = make('div', { id: 'calibration-result' });
   private kind: Kind = 'colour';
@@ -69,6 +70,8 @@ export class CalibrationCard {
   private told: Calibration | null = null;
   private shownViews = '';
   private shownResult = '';
+  private restarted = false; // a server in the middle of a calibration, which is lost
+  private focused: HTMLElement | null = null; // before the server went away
 
   /** `changed` is called when a calibration begins or ends. */
   constructor(
@@ -82,6 +85,11 @@ export class CalibrationCard {
     this.root.hidden = true;
     this.showKind();
     void this.follow();
+  }
+
+  /** No server answers. */
+  get away(): boolean {
+    return this.root.inert;
   }
 
   /** The calibration that is under way. */
@@ -104,10 +112,29 @@ export class CalibrationCard {
   // Also while the page is hidden: who stands at the rig may look at something else, and what nobody asks
   // about is given up.
   private async follow(): Promise<void> {
-    await calibrationNow()
-      .then((told) => this.tell(told))
-      .catch(() => undefined); // the page says that the server is away
-    window.setTimeout(() => void this.follow(), this.underWay === null ? kEveryMs : kEveryWhileUnderWayMs);
+    try {
+      this.tell(await calibrationNow());
+    } catch (error) {
+      if (!(error instanceof Refused)) this.showAway(true);
+    }
+    window.setTimeout(() => void this.follow(), this.underWay === null || this.away ? kEveryMs : kEveryWhileUnderWayMs);
+  }
+
+  // What is shown is of before, and no button does anything.
+  private showAway(away: boolean): void {
+    if (away === this.away) return;
+    if (away) this.focused = this.focusWithin;
+    this.root.inert = away;
+    setText(this.message, text.state.lost);
+    this.message.hidden = false;
+    this.message.classList.add('bad');
+    if (!away && this.told !== null) this.tellMessage(this.told);
+    if (!away) this.focused?.focus();
+  }
+
+  private get focusWithin(): HTMLElement | null {
+    const { activeElement } = document;
+    return activeElement instanceof HTMLElement && this.root.contains(activeElement) ? activeElement : null;
   }
 
   private start(): Promise<void> {
@@ -122,15 +149,19 @@ export class CalibrationCard {
     try {
       this.tell(await asked);
     } catch (error) {
-      setText(this.message, error instanceof Refused ? error.message : text.state.lost);
+      setText(this.message, error instanceof Refused ? sentence(error.message) : text.state.lost);
       this.message.hidden = false;
       this.message.classList.add('bad');
     }
   }
 
   private tell(told: Calibration): void {
+    this.showAway(false);
     const was = this.underWay !== null;
     const before = this.told;
+    const held = this.focusWithin;
+    // A server that knows of none was started since.
+    this.restarted = told.stream === '' && (was || this.restarted);
     this.told = told;
     const on = this.underWay !== null;
     this.root.hidden = !on && this.stream() === null; // there is nothing to calibrate yet
@@ -144,14 +175,24 @@ export class CalibrationCard {
     this.tellButtons(told);
     this.tellViews(told);
     if (was !== on) this.changed();
+    if (before?.state !== told.state) this.moveFocus(told, before, held);
+  }
+
+  // Whoever has no mouse stays with what is to be done next.
+  private moveFocus(told: Calibration, before: Calibration | null, held: HTMLElement | null): void {
     if (told.state === 'watching' && before?.state === 'pausing') this.buttons.take.focus();
-    if (told.state === 'solved' && before?.state !== 'solved') this.buttons.keep.focus();
+    else if (told.state === 'solved') this.buttons.keep.focus();
+    else if (held !== null && this.controls.contains(held)) {
+      if (told.state === 'off') this.message.focus();
+      else if (told.state === 'watching') this.buttons.take.focus({ preventScroll: true });
+    }
   }
 
   private tellMessage(told: Calibration): void {
-    setText(this.message, told.message);
-    this.message.hidden = told.message === '';
-    this.message.classList.toggle('bad', told.message !== '' && (told.failed || this.underWay !== null));
+    const message = this.restarted ? say.restarted : sentence(told.message);
+    setText(this.message, message);
+    this.message.hidden = message === '';
+    this.message.classList.toggle('bad', message !== '' && (told.failed || this.restarted || this.underWay !== null));
   }
 
   private tellRest(told: Calibration): void {
@@ -165,8 +206,10 @@ export class CalibrationCard {
     const { take, calculate, keep, more } = this.buttons;
     const watching = told.state === 'watching' || told.state === 'busy';
     const geometry = told.kind === 'geometry';
+    const waited = take.disabled;
     take.hidden = !watching;
     take.disabled = told.state !== 'watching' || told.armed;
+    if (waited && !take.disabled && document.activeElement === document.body) take.focus({ preventScroll: true }); // it lost it
     take.classList.toggle('first', !told.enough);
     calculate.hidden = !watching || !geometry;
     calculate.disabled = told.state !== 'watching' || !told.can_calculate;
@@ -191,9 +234,10 @@ export class CalibrationCard {
         }),
       );
     }
-    const result = JSON.stringify(told.result);
+    const title = told.kind === '' ? '' : say.resultOf(say.kinds[told.kind], told.state === 'off' ? told.file !== '' : null);
+    const result = JSON.stringify([told.result, title]);
     if (result === this.shownResult) return;
     this.shownResult = result;
-    this.result.replaceChildren(...(told.result === null ? [] : resultOf(told.result)));
+    this.result.replaceChildren(...(told.result === null ? [] : [make('h3', {}, title), ...resultOf(told.result)]));
   }
 }

@@ -101,6 +101,10 @@ class RigPage {
   }
 
   private async watchCalibration(of: Calibration): Promise<number> {
+    if (this.calibration.away) {
+      this.say(text.state.lost, 'bad');
+      return kAgainMs;
+    }
     this.say(text.calibration.state(of.stream), 'live');
     if (of.state === 'pausing') return kEveryMs;
     this.draw(await calibrationPicture('camera'), 'calibration');
@@ -109,7 +113,13 @@ class RigPage {
   }
 
   private calibrationChanged(): void {
-    const on = this.calibration.underWay !== null;
+    const { underWay } = this.calibration;
+    const on = underWay !== null;
+    if (on && this.streams.value !== underWay.stream) {
+      this.stream = underWay.stream; // that is what is seen now; it is not listed meanwhile
+      this.streams.replaceChildren(make('option', { value: this.stream }, this.stream));
+      this.remember();
+    }
     document.body.classList.toggle('calibrating', on);
     setText(element('caption'), on ? text.calibration.caption : text.pictures[this.picture][1]);
     if (!on) this.coverage.hide();
@@ -122,6 +132,7 @@ class RigPage {
   private async findStream(): Promise<boolean> {
     if (this.streams.dataset['listed'] === '1') return true;
     const names = await streamNames();
+    if (this.calibration.underWay !== null) return false; // has begun meanwhile
     const away = this.away !== null && !names.includes(this.away);
     if (away) names.push(this.away!); // it comes back after its calibration
     this.streams.replaceChildren(...names.map((name) => make('option', { value: name }, name)));

@@ -107,6 +107,9 @@ export const text = {
     automatic: 'Take each pose that is held still',
     rest: (seen: number, of: number) => (seen < of ? `Moving: ${seen} of ${of} slides at rest` : 'At rest'),
     waits: (seen: number, of: number) => `Hold still: ${seen} of ${of} slides at rest`,
+    restarted: 'The server was restarted: the calibration was lost, start again.',
+    resultOf: (what: string, kept: boolean | null) =>
+      kept === null ? what : `The last calibration: ${what.toLowerCase()}, ${kept ? 'kept' : 'not kept'}`,
     used: 'taken',
     notUsed: 'not used',
     result: {
