@@ -239,6 +239,8 @@ const checks = {
       try {
         await reaches(page, 'off');
         assert.match(await page.textContent('#calibration-message'), /was restarted: the calibration was lost/);
+        const { top } = await page.locator('#calibration-message').evaluate((message) => message.getBoundingClientRect());
+        assert.ok(top > 0 && top < 780, `it is said at ${top} px, out of sight`);
         assert.equal(await page.isVisible('#calibration[inert]'), false);
         await page.waitForFunction(() => document.body.dataset.state === 'live');
         assert.match(await page.textContent('#calibration-message'), /was restarted/, 'said for a moment alone');

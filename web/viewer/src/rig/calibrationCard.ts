@@ -176,6 +176,7 @@ export class CalibrationCard {
     this.tellViews(told);
     if (was !== on) this.changed();
     if (before?.state !== told.state) this.moveFocus(told, before, held);
+    if (was && this.restarted) this.message.scrollIntoView({ block: 'center' }); // other cards are above it again
   }
 
   // Whoever has no mouse stays with what is to be done next.
