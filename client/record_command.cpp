@@ -45,12 +45,14 @@ std::string lost_note(std::uint64_t lost) {
 }
 
 // Until the recorder is done, the stream stays away too long, or somebody stops us.
-Status watch(const Options& options, Recorder& recorder, StopSignal& stop) {
+Status watch(const Options& options, Recorder& recorder, Subscriber& subscriber, StopSignal& stop) {
   Progress progress("record", "frames", options.frames);
   std::int64_t last_live_ns = steady_now_ns();
   bool said_waiting = false;
   while (!recorder.done() && !stop.wait_for(kTick)) {
-    recorder.tick(utc_now_ns());
+    const std::int64_t utc_ns = utc_now_ns();
+    recorder.tick(utc_ns);
+    if (recorder.wants_key_frame(utc_ns)) subscriber.request_key_frame(options.stream);
     const Recorder::Counts counts = recorder.counts();
     const std::int64_t now_ns = steady_now_ns();
     if (counts.live) last_live_ns = now_ns;
@@ -118,7 +120,7 @@ Status run(Options options, StopSignal& stop) {
   auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks(),
                                        rung_named(options.quality).value_or(Rung::kFull));
   if (!subscriber) return subscriber.error();
-  const Status watched = watch(options, recorder, stop);
+  const Status watched = watch(options, recorder, **subscriber, stop);
   subscriber->reset();
   const Status finished = recorder.finish();
   const Recorder::Counts counts = recorder.counts();

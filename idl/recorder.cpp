@@ -11,6 +11,9 @@
 namespace relievo {
 namespace {
 
+constexpr std::int64_t kAskAgain_ns = kNanosecondsPerSecond;
+constexpr std::int64_t kKeyFrameTime_ns = 10 * kNanosecondsPerSecond;  // in which one that is asked for comes
+
 constexpr const char* kRigAttachment = "rig.yaml";
 constexpr const char* kPatternAttachment = "pattern.yaml";
 
@@ -117,6 +120,14 @@ void Recorder::tick(std::int64_t now_ns) {
   }
 }
 
+bool Recorder::wants_key_frame(std::int64_t now_ns) {
+  const std::lock_guard lock(mutex_);
+  if (!full_ns_ || limit_reached_ || error_) return false;
+  if (asked_ns_ && std::abs(now_ns - *asked_ns_) < kAskAgain_ns) return false;
+  asked_ns_ = now_ns;
+  return true;
+}
+
 Status Recorder::finish() {
   std::lock_guard lock(mutex_);
   if (writer_) {
@@ -140,7 +151,6 @@ void Recorder::add(const RawSample& sample) {
     return;
   }
   if (!writer_) {
-    segment_ns_ = sample.receive_time_ns;
     fail(open_file());
   } else if (is_frame && segment_ends_before(sample)) {
     fail(next_segment(sample.receive_time_ns));
@@ -156,6 +166,7 @@ void Recorder::add(const RawSample& sample) {
   counts_.live = true;
   if (!is_frame) return;
   if (first_frame_ns_ == 0) first_frame_ns_ = sample.receive_time_ns;
+  if (counts_.frames == frames_before_) segment_ns_ = sample.receive_time_ns;
   ++counts_.frames;
   counts_.duration_s = seconds(sample.receive_time_ns - first_frame_ns_);
   limit_reached_ = options_.max_frames > 0 && counts_.frames >= options_.max_frames;
@@ -201,21 +212,28 @@ void Recorder::now_writes(const std::filesystem::path& file,
   open_ = true;
 }
 
-/// At a frame that decodes without those before; where none comes, at twice the limits all the same.
-bool Recorder::segment_ends_before(const RawSample& sample) const {
-  if (!options_.recording.segments.split()) return false;
+/// At a frame that decodes without those before. Where none comes although it was asked for, the file goes
+/// on: up to what may be kept of all files, since otherwise it would fill the disk.
+bool Recorder::segment_ends_before(const RawSample& frame) {
+  if (!options_.recording.segments.split() || counts_.frames == frames_before_) return false;
+  const std::int64_t now_ns = frame.receive_time_ns;
   const std::uint64_t bytes = writer_->size();
-  const double duration_s =
-      std::abs(seconds(sample.receive_time_ns - segment_ns_));  // the clock may be set back
-  return segments_.is_full(bytes, duration_s) &&
-         (holds_key_frame(sample.cdr) || segments_.is_full(bytes / 2, duration_s / 2));
+  const double duration_s = std::abs(seconds(now_ns - segment_ns_));  // the clock may be set back
+  if (!full_ns_ && !segments_.is_full(bytes, duration_s)) return false;
+  if (holds_key_frame(frame.cdr)) return true;
+  if (!full_ns_) full_ns_ = now_ns;
+  if (std::abs(now_ns - *full_ns_) < kKeyFrameTime_ns) return false;
+  if (!std::exchange(said_waiting_, true))
+    log_warning("stream '" + options_.stream + "' sends no frame that decodes alone: the recording's files " +
+                "become longer than asked for");
+  return segments_.is_all_kept(bytes, duration_s);
 }
 
 /// Each file can be read without the others: it begins with the stream's description.
 Status Recorder::next_segment(std::int64_t now_ns) {
   if (const Status finished = writer_->finish(); !finished) return finished;
   if (const Status opened = open_file(); !opened) return opened;
-  segment_ns_ = now_ns;
+  full_ns_.reset();
   attachments_ = {};
   if (info_sample_) {
     RawSample info = *info_sample_;

@@ -82,6 +82,9 @@ class Recorder {
   Status status() const;
   /// To be called about ten times a second: bounds what a crash loses while no samples come.
   void tick(std::int64_t now_ns);
+  /// Whether the stream's server is to be asked for a key frame: a file is full, and ends before the next
+  /// one. To be called as often; true once a second.
+  bool wants_key_frame(std::int64_t now_ns);
   /// Completes the file. The first error of all there were; ok where nothing was ever received, and then
   /// there is no file.
   Status finish();
@@ -91,7 +94,7 @@ class Recorder {
   void add_attachments();
   Status open_file();
   void now_writes(const std::filesystem::path& file, std::shared_ptr<const GrowingRecording> growing);
-  bool segment_ends_before(const RawSample& sample) const;
+  bool segment_ends_before(const RawSample& frame);
   Status next_segment(std::int64_t now_ns);
   Status write(const RawSample& sample);
   Status write_for_viewers(const RawSample& frame);
@@ -104,7 +107,10 @@ class Recorder {
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
-  std::int64_t segment_ns_ = 0;               // when its first sample was received
+  std::int64_t segment_ns_ = 0;           // when its first frame was received
+  std::optional<std::int64_t> full_ns_;   // since when it waits for a key frame to end before
+  std::optional<std::int64_t> asked_ns_;  // when one was last asked for
+  bool said_waiting_ = false;
   std::uint64_t frames_before_ = 0;           // in the files before it
   std::vector<std::filesystem::path> files_;  // as files()
   std::optional<StreamInfo> info_;            // as received last,

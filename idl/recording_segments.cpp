@@ -55,6 +55,11 @@ bool RecordingSegments::is_full(std::uint64_t bytes, double duration_s) const {
          (options_.split_s > 0 && duration_s >= options_.split_s);
 }
 
+bool RecordingSegments::is_all_kept(std::uint64_t bytes, double duration_s) const {
+  return (options_.keep_bytes > 0 && bytes >= options_.keep_bytes) ||
+         (options_.keep_s > 0 && duration_s >= options_.keep_s);
+}
+
 Status RecordingSegments::remove_old(const fs::path& open) const {
   if (!options_.keep()) return {};
   std::vector<fs::path> files = there();

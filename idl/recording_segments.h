@@ -21,8 +21,10 @@ class RecordingSegments {
 
   /// The one after the last that is there.
   std::filesystem::path next() const;
-  /// True where a segment of this size and length is to end.
+  /// True where a segment of this size and length is to end, before the next frame that decodes alone.
   bool is_full(std::uint64_t bytes, double duration_s) const;
+  /// True where one of this size and length leaves no room for others.
+  bool is_all_kept(std::uint64_t bytes, double duration_s) const;
   /// Removes what `keep_bytes` and `keep_s` no longer allow, oldest first, never `open`. Fails, after having
   /// gone on, where a file could not be removed.
   Status remove_old(const std::filesystem::path& open) const;

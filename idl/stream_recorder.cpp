@@ -192,7 +192,9 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   std::filesystem::path file;
   std::shared_ptr<const GrowingRecording> growing;
   if (recorder_) {
-    recorder_->tick(utc_now_ns());
+    const std::int64_t now_ns = utc_now_ns();
+    recorder_->tick(now_ns);
+    if (options_.key_frame_wanted && recorder_->wants_key_frame(now_ns)) options_.key_frame_wanted();
     written = recorder_->status();
     if (is_last && written) written = recorder_->finish();
     counts = recorder_->counts();

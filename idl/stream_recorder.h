@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -33,6 +34,7 @@ class StreamRecorder {
     double pre_roll_s = 0;
     std::uint64_t keep_bytes = kPreRollBytes;
     RecordingOptions recording{};  // `keep` is of one recording's files: no wish removes another one's
+    std::function<void()> key_frame_wanted{};  // by a file that is to end; on a thread of the recorder's
   };
   explicit StreamRecorder(Options options);
   StreamRecorder(const StreamRecorder&) = delete;

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -91,13 +92,16 @@ class OnRequest {
   OnRequest& operator=(const OnRequest&) = delete;
   ~OnRequest() { desk_.remove(stream_, last_); }
 
-  Status start(const ServeConfig& config) {
+  Status start(const ServeConfig& config, std::function<void()> key_frame_wanted) {
     const auto pre_roll_s = parse_pre_roll_s(config.pre_roll);
     if (!pre_roll_s) return pre_roll_s.error();
     const auto options = recording_options(config.recording);
     if (!options) return options.error();
-    recorder_.emplace(StreamRecorder::Options{
-        .folder = desk_.folder(), .stream = stream_, .pre_roll_s = *pre_roll_s, .recording = *options});
+    recorder_.emplace(StreamRecorder::Options{.folder = desk_.folder(),
+                                              .stream = stream_,
+                                              .pre_roll_s = *pre_roll_s,
+                                              .recording = *options,
+                                              .key_frame_wanted = std::move(key_frame_wanted)});
     auto created = Subscriber::create(domain_options(config), stream_, recorder_->callbacks());
     if (!created) return created.error();
     subscriber_ = *std::move(created);
@@ -243,8 +247,8 @@ Status RunningStream::announce(const std::string& uri) {
   info.started_ns = utc_now_ns();
   info.rig = seen_.rig;
   info.pattern = seen_.pattern;
-  auto publisher = Publisher::create(domain_options(around_.config), info,
-                                     [wishes = &around_.wishes, name = name_] { wishes->wish(name); });
+  const auto wish = [wishes = &around_.wishes, name = name_] { wishes->wish(name); };
+  auto publisher = Publisher::create(domain_options(around_.config), info, wish);
   if (!publisher) return publisher.error();
   publisher_ = *std::move(publisher);
   if (!config_.record.empty()) {
@@ -255,7 +259,7 @@ Status RunningStream::announce(const std::string& uri) {
   }
   if (around_.desk != nullptr) {
     on_request_.emplace(*around_.desk, name_);
-    if (const Status started = on_request_->start(around_.config); !started) return started;
+    if (const Status started = on_request_->start(around_.config, wish); !started) return started;
   }
   sinks_.push_back(make_dds_sink(*publisher_));
   if (around_.gateway != nullptr) {
@@ -263,7 +267,7 @@ Status RunningStream::announce(const std::string& uri) {
     announced_ = true;
     sinks_.push_back(make_gateway_sink(*around_.gateway, name_));
   }
-  if (recording_.recorder) sinks_.push_back(make_recorder_sink(*recording_.recorder));
+  if (recording_.recorder) sinks_.push_back(make_recorder_sink(*recording_.recorder, wish));
   sinks_.push_back(make_service_sink(around_.board, name_));
   return {};
 }

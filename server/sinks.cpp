@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/sinks.h"
 
+#include <utility>
+
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/service_manager.h"
@@ -37,13 +39,16 @@ class GatewaySink final : public FrameSink {
 
 class RecorderSink final : public FrameSink {
  public:
-  explicit RecorderSink(Recorder& recorder) : recorder_(recorder) {}
+  RecorderSink(Recorder& recorder, std::function<void()> key_frame_wanted)
+      : recorder_(recorder), key_frame_wanted_(std::move(key_frame_wanted)) {}
   Status consume(const FrameMessage&) override { return tick(); }
   Status consume(const ServerStatus&) override { return tick(); }
 
  private:
   Status tick() {
-    recorder_.tick(utc_now_ns());
+    const std::int64_t now_ns = utc_now_ns();
+    recorder_.tick(now_ns);
+    if (recorder_.wants_key_frame(now_ns)) key_frame_wanted_();
     if (said_) return {};
     if (const Status state = recorder_.status(); !state) {
       said_ = true;  // when it happens; the command fails with it at its end
@@ -53,6 +58,7 @@ class RecorderSink final : public FrameSink {
   }
 
   Recorder& recorder_;
+  const std::function<void()> key_frame_wanted_;
   bool said_ = false;
 };
 
@@ -102,8 +108,8 @@ std::unique_ptr<FrameSink> make_service_sink(ServiceBoard& board, const std::str
   return std::make_unique<ServiceSink>(board, stream);
 }
 
-std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder) {
-  return std::make_unique<RecorderSink>(recorder);
+std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder, std::function<void()> key_frame_wanted) {
+  return std::make_unique<RecorderSink>(recorder, std::move(key_frame_wanted));
 }
 
 std::unique_ptr<FrameSink> make_dds_sink(Publisher& publisher) {

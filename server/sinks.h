@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -23,8 +24,9 @@ std::unique_ptr<FrameSink> make_dds_sink(Publisher& publisher);
 std::unique_ptr<FrameSink> make_gateway_sink(Gateway& gateway, const std::string& stream);
 
 /// Keeps `recorder`'s chunks short in time; it reads the frames themselves off DDS, as any recorder does. A
-/// failing recording is logged once and does not end the stream. `recorder` must outlive it.
-std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder);
+/// failing recording is logged once and does not end the stream. `key_frame_wanted` is called where it wants
+/// one. `recorder` must outlive it.
+std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder, std::function<void()> key_frame_wanted);
 
 /// What the service manager is told of all streams together. Any thread.
 class ServiceBoard {

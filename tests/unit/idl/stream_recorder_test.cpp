@@ -50,7 +50,8 @@ class RecordedOnRequest : public testing::Test {
 
   void publish(int frames) {
     for (int i = 0; i < frames; ++i) {
-      ASSERT_TRUE(publisher_->publish(test::frame_of_group(sequence_++, 10)));
+      const bool is_key = key_wanted_.exchange(false);
+      ASSERT_TRUE(publisher_->publish(test::frame_of_group(sequence_++, is_key ? 1 : key_interval_)));
       ASSERT_TRUE(eventually([&] { return arrived_ == sequence_; }));
     }
   }
@@ -90,7 +91,8 @@ class RecordedOnRequest : public testing::Test {
   std::unique_ptr<Publisher> publisher_;
   std::unique_ptr<StreamRecorder> recorder_;
   std::unique_ptr<Subscriber> subscriber_;
-  std::uint64_t sequence_ = 0;
+  std::uint64_t sequence_ = 0, key_interval_ = 10;
+  std::atomic<bool> key_wanted_ = false;
   std::atomic<std::uint64_t> arrived_ = 0;
 };
 
@@ -184,6 +186,23 @@ TEST_F(RecordedOnRequest, IsSplitAndKeptAsIsSaidOfRecordings) {
   ASSERT_FALSE(frames.empty());
   EXPECT_EQ(frames.back() - frames.front() + 1, frames.size()) << "no frame is missing between the files";
   EXPECT_EQ(recorder_->state().lost, 0U);
+}
+
+TEST_F(RecordedOnRequest, AsksForTheKeyFrameThatAFileIsToEndBefore) {
+  key_interval_ = 1'000'000;
+  start(
+      {.recording = {.segments = {.split_bytes = 20'000}}, .key_frame_wanted = [&] { key_wanted_ = true; }});
+  publish(1);
+  ASSERT_TRUE(recorder_->start());
+  const std::string first = recorder_->state().file;
+  ASSERT_TRUE(eventually([&] {
+    publish(5);
+    return recorder_->state().file > first;
+  }));
+  ASSERT_TRUE(recorder_->stop());
+  ASSERT_TRUE(closes());
+  EXPECT_EQ(frames_in(first).front(), 0U);
+  EXPECT_EQ(frames_in(recorder_->state().file).front(), frames_in(first).back() + 1) << "nothing is lost";
 }
 
 TEST_F(RecordedOnRequest, AFolderThatIsGoneIsSaidAndTheNextTryWorks) {
