@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "base/log.h"
@@ -118,7 +119,14 @@ Command keys_command() {
           sub->add_option("--keys", options->folder,
                           "The folder (default: $RELIEVO_KEYS, ~/.config/relievo/keys or /etc/relievo/keys)")
               ->type_name("DIR");
-          sub->callback([options, verb_] { options->verb = verb_; });
+          sub->callback([options, verb_] {
+            options->verb = verb_;
+            if (const char* const folder = std::getenv("RELIEVO_KEYS");
+                folder != nullptr && options->folder.empty())
+              options->folder = folder;
+            if (options->folder == "none")
+              throw CLI::ValidationError("--keys", "'none' means without keys: name a folder");
+          });
           return sub;
         };
         verb("init", "Make an authority, and this machine's keys: its streams are secured from then on",

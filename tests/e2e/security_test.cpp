@@ -142,6 +142,26 @@ TEST_F(Security, ASecretThatEverybodyCanReadIsSaid) {
                     HasSubstr("chmod 600")));
 }
 
+TEST_F(Security, NoneIsNoFolderOfKeys) {
+  const std::string home = folder_ / "home";
+  const auto keys = [&](std::vector<std::string> arguments, const std::string& variable) {
+    arguments.insert(arguments.begin(), {program("relievo"), "keys"});
+    return test::run(arguments, test::kPatience,
+                     {"HOME=" + home, "XDG_CONFIG_HOME=" + home, "RELIEVO_KEYS=" + variable});
+  };
+  for (const auto& refused :
+       {keys({"init", "--keys", "none"}, ""), keys({"init"}, "none"), keys({"list"}, "none")}) {
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_THAT(refused.err, HasSubstr("without keys"));
+  }
+  EXPECT_FALSE(fs::exists("none"));
+  EXPECT_FALSE(fs::exists(home));
+  EXPECT_EQ(keys({"init"}, folder_ / "other").status, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "other" / "identity.pem")) << "where servers look for them";
+  EXPECT_EQ(keys({"init"}, "").status, 0);
+  EXPECT_TRUE(fs::exists(fs::path(home) / "relievo" / "keys" / "identity.pem"));
+}
+
 TEST_F(Security, KeysAreMadeWholeAndOnce) {
   const auto again = relievo({"keys", "init", "--keys", authority()});
   EXPECT_EQ(again.status, 1);
