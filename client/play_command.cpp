@@ -121,10 +121,13 @@ Command play_command() {
             app.add_option("--wait-readers", options->readers,
                            "Start when this many readers are there (default: one, but wait a second at most)")
                 ->check(whole_number(0, 1000));
-            app.add_flag(
-                "--restamp", options->play.restamp,
-                "Frames are said to be captured now, as far apart as they were (divided by --speed), for "
-                "readers that measure latency; everything else stays as recorded");
+            app.add_option("--longest-pause", options->play.longest_pause_s,
+                           "Shorten longer pauses, where the stream was gone say, to this many seconds "
+                           "(default: as they were)")
+                ->check(number(0.001, 1e9));
+            app.add_flag("--restamp", options->play.restamp,
+                         "Frames are said to be captured now, as far apart as they are played, for "
+                         "readers that measure latency; everything else stays as recorded");
             options->range = add_range_options(app);
             app.add_flag("--json", options->json, "Print the result as JSON");
             app.footer(

@@ -15,8 +15,6 @@
 namespace relievo {
 namespace {
 
-// A longer pause in a recording (the stream was gone meanwhile) is shortened to this.
-constexpr std::int64_t kLongestPause_ns = 5 * kNanosecondsPerSecond;
 constexpr std::int64_t kShortestPass_ns = 30'000'000;
 
 // For more of a file that is being written, which comes by chunks of half a second.
@@ -109,10 +107,9 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
       continue;
     }
     const std::int64_t time_ns = (*sample)->receive_time_ns;
-    const std::int64_t step_ns =
-        std::clamp<std::int64_t>(time_ns - last_ns.value_or(time_ns), 0, kLongestPause_ns);
+    const double step_s = std::max(0.0, seconds(time_ns - last_ns.value_or(time_ns)));
     last_ns = time_ns;
-    due_ns += static_cast<std::int64_t>(static_cast<double>(step_ns) / options.speed);
+    due_ns += std::llround(std::min(step_s, options.longest_pause_s) / options.speed * 1e9);
     if (stop.wait_for(std::chrono::nanoseconds(due_ns - steady_now_ns()))) return {};
     if (auto status = give(**std::move(sample)); !status) return status;
   }

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 
 #include "base/result.h"
@@ -21,7 +22,9 @@ struct PlayOptions {
   bool follow = false;
   // Frames are said to be captured now: in the recorded order, their times apart as recorded, at that speed.
   bool restamp = false;
-  std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none
+  double longest_pause_s =
+      std::numeric_limits<double>::infinity();  // of the recording's; longer ones become this
+  std::optional<TimeRange> range = {};          // of the samples' times; all of them where there is none
 };
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or

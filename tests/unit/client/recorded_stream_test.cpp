@@ -127,6 +127,32 @@ TEST_F(RecordedStreamTest, PlayingFromBetweenKeyFramesSendsTheOneBefore) {
   EXPECT_THAT(played, ElementsAre(30, 33, 34, 35, 36));
 }
 
+/// A pause, of a stream that was gone meanwhile say, is as long as it was unless it is to be shortened.
+TEST_F(RecordedStreamTest, PausesAreOfTheirLength) {
+  const std::filesystem::path file = folder_ / "pause.mcap";
+  test::MadeRecording recording(file, 1);
+  recording.add(0, 0, kStart_ns);
+  recording.add(1, 1, kStart_ns + 40 * kNanosecondsPerSecond);
+  recording.finish();
+  const auto step_s = [&](const PlayOptions& options) {
+    auto stream = RecordedStream::open(file, "");
+    std::vector<std::int64_t> captured_ns, played_ns;
+    StopSignal stop;
+    EXPECT_TRUE(play(*stream, options, stop, [&](const RawSample& sample) {
+      captured_ns.push_back(read_frame_cdr(sample.cdr)->capture_time_ns);
+      played_ns.push_back(steady_now_ns());
+      return Status();
+    }));
+    EXPECT_EQ(played_ns.size(), 2U);
+    EXPECT_NEAR(seconds(played_ns.back() - played_ns.front()),
+                seconds(captured_ns.back() - captured_ns.front()), 0.3)
+        << "the times written are those it is played at";
+    return seconds(captured_ns.back() - captured_ns.front());
+  };
+  EXPECT_NEAR(step_s({.speed = 40, .restamp = true}), 1, 1e-6);
+  EXPECT_NEAR(step_s({.speed = 40, .restamp = true, .longest_pause_s = 20}), 0.5, 1e-6);
+}
+
 // Proves: a file that became shorter while it is played in a loop does not fill the log.
 TEST_F(RecordedStreamTest, WhatIsDamagedIsSaidOnceHoweverOftenItIsPlayed) {
   std::filesystem::resize_file(file_, 100);
