@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "web/gateway/request_target.h"
+
 namespace relievo {
 namespace {
 
@@ -21,7 +23,7 @@ std::optional<std::uint64_t> number(std::string_view text) {
 RangeKind parse_range(std::string_view header, std::uint64_t size, ByteRange& out) {
   constexpr std::string_view kUnit = "bytes=";
   out = {0, size};
-  if (!header.starts_with(kUnit)) return RangeKind::kWhole;
+  if (!begins_with(header, kUnit)) return RangeKind::kWhole;
   header.remove_prefix(kUnit.size());
   const auto dash = header.find('-');
   if (dash == std::string_view::npos) return RangeKind::kWhole;

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <deque>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -29,13 +30,21 @@ void append_le(std::vector<std::uint8_t>& out, std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
 
+/// Of a subscription or a channel: 32 bits.
+std::optional<std::uint32_t> id_of(const nlohmann::json& value) {
+  if (!value.is_number_unsigned()) return std::nullopt;
+  const auto id = value.get<std::uint64_t>();
+  return id <= std::numeric_limits<std::uint32_t>::max() ? std::optional(static_cast<std::uint32_t>(id))
+                                                         : std::nullopt;
+}
+
 /// Numbers of a JSON list, as far as they are some that an id can be.
 std::vector<std::uint32_t> ids_in(const nlohmann::json& message, const char* name) {
   std::vector<std::uint32_t> ids;
   const auto list = message.find(name);
   if (list == message.end() || !list->is_array()) return ids;
-  for (const auto& id : *list)
-    if (id.is_number_unsigned()) ids.push_back(id.get<std::uint32_t>());
+  for (const auto& value : *list)
+    if (const auto id = id_of(value)) ids.push_back(*id);
   return ids;
 }
 
@@ -156,12 +165,10 @@ std::optional<WsClose> FoxgloveFeed::on_text(std::string_view text) {
 
 void FoxgloveFeed::subscribe(const nlohmann::json& wanted) {
   const auto number = [&](const char* name) -> std::optional<std::uint32_t> {
-    if (!wanted.is_object() || !wanted.contains(name) || !wanted[name].is_number_unsigned())
-      return std::nullopt;
-    return wanted[name].get<std::uint32_t>();
+    return wanted.is_object() && wanted.contains(name) ? id_of(wanted[name]) : std::nullopt;
   };
   const auto id = number("id"), channel = number("channelId");
-  if (!id || !channel) return warn("a subscription needs an id and a channelId");
+  if (!id || !channel) return warn("a subscription needs an id and a channelId, numbers of 32 bits");
   if (subscriptions_.count(*id) != 0) return warn("subscription " + std::to_string(*id) + " exists");
   if (subscriptions_.size() >= kMostSubscriptions) return warn("too many subscriptions");
   for (const auto& [stream, known] : channels_) {

@@ -169,6 +169,7 @@ void HttpSession::on_request() {
                                     .target = target_.path,
                                     .host = target_.host,
                                     .origin = value(http::field::origin),
+                                    .if_match = value(http::field::if_match),
                                     .if_none_match = value(http::field::if_none_match),
                                     .authorization = value(http::field::authorization),
                                     .cookie = value(http::field::cookie),

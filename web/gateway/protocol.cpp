@@ -218,7 +218,8 @@ std::string streams_json(const std::vector<StreamSnapshot>& streams, const std::
          {"clients_of", std::move(clients_of)},
          {"frames", s.published}});
   }
-  return text_of({{"version", RELIEVO_VERSION}, {"hint", hint}, {"streams", std::move(list)}});
+  return text_of(
+      {{"version", RELIEVO_VERSION}, {"hint", streams.empty() ? hint : ""}, {"streams", std::move(list)}});
 }
 
 }  // namespace relievo

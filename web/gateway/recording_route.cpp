@@ -13,6 +13,7 @@
 #include <string>
 
 #include "web/gateway/byte_range.h"
+#include "web/gateway/entity_tag.h"
 #include "web/gateway/recording_api.h"
 
 namespace relievo {
@@ -108,7 +109,7 @@ struct Asked {
   OfferedRecording recording;
   bool of_folder = false;
   bool needs_token = false;
-  std::string range, if_range, if_none_match;
+  std::string range, if_range, if_match, if_none_match;
 };
 
 HttpReply reply_to(const Asked& asked) {
@@ -137,9 +138,10 @@ HttpReply reply_to(const Asked& asked) {
   reply.headers = {{"Accept-Ranges", "bytes"},
                    {"Cache-Control", std::string(cache_control(finished, asked.needs_token))},
                    {"ETag", etag}};
-  if (asked.if_none_match == etag || kind == RangeKind::kUnsatisfiable) {
+  const auto failed = failed_condition(asked.if_match, asked.if_none_match, etag);
+  if (failed || kind == RangeKind::kUnsatisfiable) {
     close(descriptor);
-    reply.status = kind == RangeKind::kUnsatisfiable ? 416 : 304;
+    reply.status = failed.value_or(416);
     if (reply.status == 416) reply.headers.emplace_back("Content-Range", "bytes *" + of);
     return reply;
   }
@@ -166,6 +168,7 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
                      .needs_token = context.tokens.needed(),
                      .range = std::string(request.range),
                      .if_range = std::string(request.if_range),
+                     .if_match = std::string(request.if_match),
                      .if_none_match = std::string(request.if_none_match)}] { return reply_to(asked); });
 }
 

@@ -15,6 +15,15 @@ bool all_of(std::string_view text, std::string_view also, int (*kind)(int)) {
   });
 }
 
+/// What "%2C" at `text`'s start stands for.
+std::optional<char> escape_in(std::string_view text) {
+  unsigned byte = 0;
+  const std::string_view digits = text.starts_with('%') ? text.substr(1, 2) : std::string_view();
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
+  if (digits.size() != 2 || error != std::errc() || end != digits.data() + 2) return std::nullopt;
+  return static_cast<char>(byte);
+}
+
 }  // namespace
 
 bool begins_with(std::string_view text, std::string_view lower_case) {
@@ -31,15 +40,20 @@ std::string_view query_of(std::string_view target) {
 std::string percent_decoded(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    unsigned byte = 0;
-    const std::string_view digits = text[i] == '%' ? text.substr(i + 1, 2) : std::string_view();
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
-    if (digits.size() == 2 && error == std::errc() && end == digits.data() + 2) {
-      out += static_cast<char>(byte);
-      i += 2;
-    } else {
-      out += text[i] == '+' ? ' ' : text[i];
-    }
+    const auto escaped = escape_in(text.substr(i));
+    out += escaped.value_or(text[i] == '+' ? ' ' : text[i]);
+    if (escaped) i += 2;
+  }
+  return out;
+}
+
+std::string unescaped(std::string_view path) {
+  std::string out;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const auto escaped = escape_in(path.substr(i));
+    const bool is_plain = escaped && all_of(std::string_view(&*escaped, 1), "-._~", std::isalnum);
+    out += is_plain ? *escaped : path[i];
+    if (is_plain) i += 2;
   }
   return out;
 }

@@ -26,6 +26,10 @@ std::string_view query_of(std::string_view target);
 /// A name or a value of a query: "%2C" is a comma, '+' a space. What is no such escape stays as it is.
 std::string percent_decoded(std::string_view text);
 
+/// A part of a path without those escapes that are no different from what they stand for: "%61" is "a", but
+/// "%2F" is no slash (RFC 3986, 6.2.2.2).
+std::string unescaped(std::string_view path);
+
 /// In whatever case `text` is.
 bool begins_with(std::string_view text, std::string_view lower_case);
 

@@ -6,9 +6,11 @@
 
 #include "web/gateway/assets.h"
 #include "web/gateway/calibration_api.h"
+#include "web/gateway/entity_tag.h"
 #include "web/gateway/foxglove_feed.h"
 #include "web/gateway/recording_api.h"
 #include "web/gateway/recording_route.h"
+#include "web/gateway/request_target.h"
 #include "web/gateway/rig_api.h"
 #include "web/gateway/sign_in.h"
 
@@ -52,15 +54,15 @@ HttpReply refused(Refusal why, int status, std::string line) {
   return reply;
 }
 
-HttpReply asset_reply(const Asset& asset, std::string_view if_none_match) {
+HttpReply asset_reply(const Asset& asset, const HttpRequest& request) {
   HttpReply reply;
   reply.content_type = asset.media_type;
   reply.headers.emplace_back("ETag", asset.etag);
   // Vite puts a hash of the content into every name under /assets/.
   const bool hashed = asset.path.substr(0, 8) == "/assets/";
   reply.headers.emplace_back("Cache-Control", hashed ? "public, max-age=31536000, immutable" : "no-cache");
-  if (if_none_match == asset.etag) {
-    reply.status = 304;
+  if (const auto failed = failed_condition(request.if_match, request.if_none_match, asset.etag)) {
+    reply.status = *failed;
   } else {
     reply.fixed_body = asset.bytes;
   }
@@ -192,7 +194,7 @@ namespace {
 HttpReply page(std::string_view path, const HttpRequest& request) {
   const std::string_view wanted = path == "/" ? "/index.html" : path == "/rig" ? "/rig.html" : path;
   for (const Asset& asset : assets()) {
-    if (asset.path == wanted) return asset_reply(asset, request.if_none_match);
+    if (asset.path == wanted) return asset_reply(asset, request);
   }
   return text_reply(404, "nothing here");
 }
@@ -333,7 +335,7 @@ HttpReply preflight() {
   reply.status = 204;
   reply.headers.emplace_back("Access-Control-Allow-Methods", "GET, HEAD, POST");
   reply.headers.emplace_back("Access-Control-Allow-Headers",
-                             "Authorization, Content-Type, If-None-Match, If-Range, Range");
+                             "Authorization, Content-Type, If-Match, If-None-Match, If-Range, Range");
   reply.headers.emplace_back("Access-Control-Max-Age", "600");
   return reply;
 }
@@ -347,7 +349,7 @@ HttpReply answer_by_method(const HttpRequest& request, const RouteContext& conte
     if (!name) continue;
     if (!is_get && request.method != "POST")
       return wrong_method(route.order == nullptr ? "GET, HEAD" : "GET, HEAD, POST");
-    return answer_at(route, *name, request, context);
+    return answer_at(route, unescaped(*name), request, context);
   }
   if (!is_get) return wrong_method("GET, HEAD");
   if (auto wait = sign_in(request, context.tokens, context.port)) return *std::move(wait);

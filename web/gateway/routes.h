@@ -26,6 +26,7 @@ struct HttpRequest {
   std::string_view target;  // "/api/streams?x"
   std::string_view host;    // header values, empty where absent
   std::string_view origin;
+  std::string_view if_match;
   std::string_view if_none_match;
   std::string_view authorization;
   std::string_view cookie;

@@ -100,6 +100,8 @@ TEST_F(Foxglove, NonsenseIsToldOrClosesTheConnection) {
   WsClient client = connect();
   for (const char* wish : {R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99}]})",
                            R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":"x"}]})",
+                           R"({"op":"subscribe","subscriptions":[{"id":4294967297,"channelId":1}]})",
+                           R"({"op":"subscribe","subscriptions":[{"id":2,"channelId":4294967297}]})",
                            R"({"op":"subscribe","subscriptions":[3]})"}) {
     client.send(wish);
     EXPECT_EQ(next(client, "status")["level"], 1) << wish;
@@ -107,6 +109,7 @@ TEST_F(Foxglove, NonsenseIsToldOrClosesTheConnection) {
   client.send(R"({"op":"of a later version"})");
   client.send(R"({"op":"unsubscribe","subscriptionIds":[5,"a",-1]})");
   subscribe(client, 1, 1);
+  client.send(R"({"op":"unsubscribe","subscriptionIds":[4294967297]})");
   gateway->publish("face", make_frame(0));
   EXPECT_EQ(next_frame(client), "1:1000:face:0");
   const struct {

@@ -56,7 +56,9 @@ TEST_F(GatewayHttp, StreamsAreListed) {
   status.frame_rate = 12.5;
   status.message = "no \"signal\" \xff";  // not UTF-8
   gateway->publish(status);
-  const auto stream = Json::parse(request(port, "GET", "/api/streams").body)["streams"][0];
+  const auto listed = Json::parse(request(port, "GET", "/api/streams").body);
+  EXPECT_EQ(listed["hint"], "") << "there is one";
+  const auto stream = listed["streams"][0];
   EXPECT_EQ(stream["name"], "face");
   EXPECT_EQ(stream["source"], "sim:face");
   EXPECT_EQ(stream["state"], "stalled");

@@ -41,6 +41,7 @@ TEST(ByteRange, Headers) {
     ByteRange range;
   } cases[] = {{"", RangeKind::kWhole, {0, 100}},
                {"bytes=0-9", RangeKind::kPart, {0, 10}},
+               {"Bytes=0-9", RangeKind::kPart, {0, 10}},
                {"bytes=90-", RangeKind::kPart, {90, 10}},
                {"bytes=0-", RangeKind::kPart, {0, 100}},
                {"bytes=-10", RangeKind::kPart, {90, 10}},
@@ -191,6 +192,22 @@ TEST_F(Recordings, AFileThatChangedIsAnotherOne) {
   EXPECT_EQ(get().status, 404);
   std::filesystem::create_directory(file);
   EXPECT_EQ(get().status, 404);
+}
+
+TEST_F(Recordings, AreComparedByAnyOfTheirTags) {
+  const std::string etag = get().headers.at("etag");
+  EXPECT_EQ(get("If-None-Match: W/\"other\", W/" + etag + "\r\n").status, 304);
+  EXPECT_EQ(get("If-None-Match: *\r\nRange: bytes=2000000-\r\n").status, 304)
+      << "before ranges are looked at";
+  EXPECT_EQ(get("If-Match: " + etag + "\r\n").status, 200);
+  const Response other = get("If-Match: \"other\"\r\n");
+  EXPECT_EQ(other.status, 412);
+  EXPECT_EQ(other.body, "");
+}
+
+TEST_F(Recordings, AreFoundByNamesThatAreEscapedWithoutNeed) {
+  EXPECT_EQ(request(port, "GET", "/recordings/fa%63e%2Emcap").body, content);
+  EXPECT_EQ(request(port, "GET", "/ws/fa%63e").status, 426);
 }
 
 TEST_F(Recordings, GoWithTheirStream) {

@@ -16,6 +16,13 @@ TEST(RequestTarget, EscapesOfAQueryAreUndone) {
     EXPECT_EQ(percent_decoded(none).size(), std::string_view(none).size()) << none;
 }
 
+TEST(RequestTarget, OfAPathOnlyEscapesThatChangeNothingAreUndone) {
+  EXPECT_EQ(unescaped("fa%63e%2d1%2E%7emcap"), "face-1.~mcap");
+  for (const char* kept : {"", "a+b", "%2f", "%00", "%20", "%c3%a9", "%", "%6", "%zz", "a%", "%%", "%25"})
+    EXPECT_EQ(unescaped(kept), kept);
+  EXPECT_EQ(unescaped("%2561"), "%2561") << "once";
+}
+
 TEST(RequestTarget, AQueryIsWhatIsBehindTheFirstMark) {
   EXPECT_EQ(query_of("/"), "");
   EXPECT_EQ(query_of("/?"), "");
