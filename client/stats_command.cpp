@@ -44,6 +44,7 @@ void print_line(const LiveReader::Report& before, const LiveReader::Report& now,
 }
 
 void print_json(const Options& options, const LiveReader::Report& report, double took_s) {
+  const auto of_frames = [&](double ms) { return report.frames > 0 ? nlohmann::json(ms) : nlohmann::json(); };
   nlohmann::json j = {{"stream", options.stream},
                       {"quality", to_string(report.rung)},
                       {"seconds", took_s},
@@ -52,8 +53,8 @@ void print_json(const Options& options, const LiveReader::Report& report, double
                       {"lost", report.lost},
                       {"skipped", report.skipped},
                       {"moves", report.moves},
-                      {"decode_ms", report.decode_ms},
-                      {"latency_ms", report.latency_ms},
+                      {"decode_ms", of_frames(report.decode_ms)},
+                      {"latency_ms", of_frames(report.latency_ms)},
                       {"clock_offset_ms", nullptr},
                       {"clock_error_ms", nullptr}};
   j["qualities"] = nlohmann::json::array({to_string(Rung::kFull)});
@@ -115,6 +116,10 @@ Command stats_command() {
         app.add_option("--seconds", options->seconds, "End after so long (default: at Ctrl-C)")
             ->check(number(0.1, 1e9));
         app.add_flag("--json", options->json, "One JSON object at the end instead of a line a second");
+        app.final_callback([options] {
+          if (!valid_stream_name(options->stream))
+            throw CLI::ValidationError("stream", "'" + options->stream + "' cannot name a stream");
+        });
         app.footer(
             "Latency is from the capture until the frame is decoded here, with the difference of the two\n"
             "machines' clocks taken out (clock: how far the server's is ahead).\n\n"

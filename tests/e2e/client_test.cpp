@@ -44,6 +44,7 @@ TEST(Client, WrongUsageIsExitTwoAndOneLine) {
       {"play"},
       {"play", "a.mcap", "--speed", "0"},
       {"play", "a.mcap", "--loop", "--once"},
+      {"stats", "no spaces"},
       {"info"},
       {"info", "face", "--stream", "other"},
       {"export", "a.mcap", "--out", "d", "--format", "stl"},
@@ -129,6 +130,15 @@ TEST(Client, RecordingAnAbsentStreamSaysSoAndLeavesNoFile) {
   EXPECT_THAT(done.err, HasSubstr("waiting for stream 'absent'"));
   EXPECT_THAT(done.err, HasSubstr("error: no stream 'absent' in domain " + kDomain));
   EXPECT_FALSE(std::filesystem::exists(folder / "a.mcap"));
+}
+
+TEST(Client, StatsOfAnAbsentStreamHaveNoTimes) {
+  const auto done = test::run(
+      relievo({"stats", "absent", "--domain", kDomain, "--interface", "lo", "--seconds", "0.2", "--json"}));
+  EXPECT_EQ(done.status, 1);
+  const auto stats = nlohmann::json::parse(done.out);
+  EXPECT_EQ(stats["frames"], 0);
+  EXPECT_TRUE(stats["decode_ms"].is_null() && stats["latency_ms"].is_null()) << done.out;
 }
 
 TEST(Client, StreamsListsWhatIsLive) {
