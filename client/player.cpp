@@ -16,6 +16,7 @@ namespace relievo {
 namespace {
 
 constexpr std::int64_t kShortestPass_ns = 30'000'000;
+constexpr double kLongestStep_s = 1e8;  // of any times that a file may have
 
 // For more of a file that is being written, which comes by chunks of half a second.
 constexpr auto kLookAgain = std::chrono::milliseconds(100);
@@ -109,7 +110,8 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
     const std::int64_t time_ns = (*sample)->receive_time_ns;
     const double step_s = std::max(0.0, seconds(time_ns - last_ns.value_or(time_ns)));
     last_ns = time_ns;
-    due_ns += std::llround(std::min(step_s, options.longest_pause_s) / options.speed * 1e9);
+    const double wait_s = std::min(step_s, options.longest_pause_s) / options.speed;
+    due_ns += std::llround(std::min(wait_s, kLongestStep_s) * 1e9);
     if (stop.wait_for(std::chrono::nanoseconds(due_ns - steady_now_ns()))) return {};
     if (auto status = give(**std::move(sample)); !status) return status;
   }

@@ -36,6 +36,7 @@ struct Options {
 };
 
 constexpr std::chrono::milliseconds kTick{200};
+constexpr double kLongestPause_s = 5;  // of a recording, whose time line shows the whole of it
 constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a file that long unchanged
 
 Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
@@ -90,8 +91,8 @@ class LoopedFile {
 
  private:
   void run(StopSignal& stop) {
-    const Status status = play(recorded_, {.loop = true, .follow = true}, stop,
-                               [this](const RawSample& sample) { return publish(sample); });
+    const Status status = play(recorded_, {.loop = true, .follow = true, .longest_pause_s = kLongestPause_s},
+                               stop, [this](const RawSample& sample) { return publish(sample); });
     if (!status) {
       log_error(file_ + ": " + status.error().message);
       gateway_.withdraw(recorded_.stream());
@@ -222,8 +223,10 @@ Command web_command() {
       "web", "Serve the viewer for live streams and recordings", [](CLI::App& app) {
         auto options = std::make_shared<Options>();
         options->domain = add_domain_options(app);
-        app.add_option("inputs", options->inputs,
-                       "Recordings, played in a loop, and live streams (default: all of the domain)")
+        app.add_option(
+               "inputs", options->inputs,
+               "Recordings, played in a loop (pauses above 5 s as 5 s), and live streams (default: all of "
+               "the domain)")
             ->type_name("FILE|STREAM");
         app.add_option("--listen", options->listen,
                        "Where browsers find the viewer; :PORT for every interface")
