@@ -198,23 +198,36 @@ class Writer final : public RecordingWriter {
   }
 
   /// A file without a name takes all that is written, and gives none of it back.
-  Status check_linked() const {
+  Status check_name() const {
     struct stat of_file {};
-    if (::fstat(file_, &of_file) != 0 || of_file.st_nlink > 0) return {};
-    return Error{"cannot write " + path_.string() + ": it was removed while it was being recorded to"};
+    if (::fstat(file_, &of_file) != 0) return {};
+    const bool removed = of_file.st_nlink == 0;
+    if (!removed && (!options_.keeps_name || is_named(of_file))) return {};
+    return Error{"cannot write " + path_.string() + ": it was " + (removed ? "removed" : "renamed") +
+                 " while it was being recorded to"};
+  }
+  /// Also where the file system does not say.
+  bool is_named(const struct stat& of_file) const {
+    struct stat named {};
+    if (::lstat(path_.c_str(), &named) != 0) return errno != ENOENT && errno != ENOTDIR;
+    return named.st_dev == of_file.st_dev && named.st_ino == of_file.st_ino;
   }
 
   /// The first failure ends the recording: with its index where that still fits, else as it is, which readers
-  /// recover.
+  /// recover. A file that no message has come to is removed.
   Status fail(const Error& error) {
     failure_ = error.message;
     chunk_.clear();
     static_cast<void>(write_index().ok());
+    struct stat of_file {};
+    const bool is_empty =
+        std::all_of(written_.begin(), written_.end(), [](auto count) { return count == 0; });
+    if (is_empty && ::fstat(file_, &of_file) == 0 && is_named(of_file)) ::unlink(path_.c_str());
     static_cast<void>(close_file().ok());
     return error;
   }
   Status write_or_close(Parts parts) {
-    if (auto status = check_linked(); !status) return fail(status.error());
+    if (auto status = check_name(); !status) return fail(status.error());
     std::uint64_t bytes = 0;
     for (const auto part : parts) bytes += part.size();
     if (auto status = reserve(bytes); !status) return fail(status.error());

@@ -182,7 +182,8 @@ Status Recorder::open_file() {
   const std::filesystem::path file = options_.recording.segments.split() ? segments_.next() : options_.file;
   now_writes(file, nullptr);  // before it can be found
   auto writer =
-      RecordingWriter::create(file, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9)});
+      RecordingWriter::create(file, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9),
+                                     .keeps_name = options_.keeps_name});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
   now_writes(file, writer_->growing());

@@ -51,6 +51,7 @@ class Recorder {
     double max_s = 0;              // after the first frame; 0: no limit
     bool foxglove = false;         // channels besides that generic viewers show: FoxgloveChannels
     RecordingOptions recording;    // where it splits, `file` names the files: see RecordingSegments
+    bool keeps_name = false;       // as RecordingWriter::Options
   };
   struct Counts {
     std::uint64_t frames = 0;  // in the files; while all is well, those on their way there among them

@@ -181,8 +181,8 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   lock.unlock();
 
   if (info) {
-    recorder_ = std::make_unique<Recorder>(
-        Recorder::Options{.file = target, .stream = options_.stream, .recording = options_.recording});
+    recorder_ = std::make_unique<Recorder>(Recorder::Options{
+        .file = target, .stream = options_.stream, .recording = options_.recording, .keeps_name = true});
     to_recorder_ = recorder_->callbacks();
     write(*info);
   }

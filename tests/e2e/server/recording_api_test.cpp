@@ -250,6 +250,30 @@ TEST_F(RecordingOnRequest, OntoAFullDiskFailsAloneAndLiveGoesOn) {
   EXPECT_EQ(server.process().wait(), 0) << server.process().err();
 }
 
+TEST_F(RecordingOnRequest, OfWhichNothingFitsIsNotOffered) {
+  std::string script = "trap '' XFSZ; ulimit -f 1; exec";
+  for (const std::string& word : command()) script += " '" + word + "'";
+  WebServer server({"/bin/bash", "-c", script});
+  ASSERT_TRUE(server.goes_on("take", 5)) << server.process().err();
+  ASSERT_EQ(server.order("take", "start").status, 200);
+  ASSERT_TRUE(eventually([&] { return server.recording("take")["state"] == "failed"; }));
+  EXPECT_EQ(server.recording("take")["frames"], 0);
+  EXPECT_TRUE(names_in(out_).empty());
+}
+
+TEST_F(RecordingOnRequest, ThatIsRenamedHasFailedAndKeepsWhatItHas) {
+  WebServer server(command());
+  ASSERT_TRUE(server.goes_on("take", 5)) << server.process().err();
+  ASSERT_EQ(server.order("take", "start").status, 200);
+  ASSERT_TRUE(eventually([&] { return server.recording("take")["whole_bytes"] > 0; }));
+  const std::string name = server.recording("take")["file"];
+  fs::rename(out_ / name, out_ / "mine.mcap");
+  ASSERT_TRUE(eventually([&] { return server.recording("take")["state"] == "failed"; }));
+  EXPECT_THAT(server.recording("take")["message"].get<std::string>(), HasSubstr("it was renamed"));
+  EXPECT_FALSE(frames_in(out_ / "mine.mcap").empty());
+  EXPECT_EQ(server.order("take", "start").status, 200);
+}
+
 TEST_F(RecordingOnRequest, WhatCannotWorkIsSaidAtTheStart) {
   expect_one_error(run(serve(source_, {"--web", "127.0.0.1:0", "--record-dir", out_ / "none"})),
                    "no such folder");

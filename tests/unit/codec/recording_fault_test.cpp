@@ -286,6 +286,44 @@ TEST(RecordingFault, AFileThatIsRemovedMeanwhileEndsTheRecordingWithAWord) {
   EXPECT_FALSE((*writer)->finish());
 }
 
+TEST(RecordingFault, ARenamedFileEndsTheRecordingWhereItsNameIsToStay) {
+  const test::TempFolder folder;
+  const auto file = folder / "a.mcap";
+  auto writer = RecordingWriter::create(file, {.chunk_ns = 0, .keeps_name = true});
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE((*writer)->add_channel(schema(), channel("t")));
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE((*writer)->write(message(0, i, 100)));
+  std::filesystem::rename(file, folder / "b.mcap");
+  std::ofstream(file) << "somebody else's";
+  const Status renamed = (*writer)->write(message(0, 10, 100));
+  ASSERT_FALSE(renamed);
+  EXPECT_NE(renamed.error().message.find("renamed while it was being recorded to"), std::string::npos);
+  EXPECT_EQ(std::filesystem::file_size(file), 15U);
+  const auto reader = open(folder / "b.mcap");
+  EXPECT_FALSE(reader->summary().recovered) << "what came before is whole";
+  EXPECT_GE(read_all(*reader).messages.size(), 9U);
+}
+
+TEST(RecordingFault, AFileThatNothingFitsInIsNotLeftBehind) {
+  test::TempFolder folder;
+  const auto file = folder / "full.mcap";
+  const pid_t child = fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit size{1500, 1500};
+    setrlimit(RLIMIT_FSIZE, &size);
+    auto writer = RecordingWriter::create(file, {});
+    if (!writer || !(*writer)->add_channel(schema(), channel("t"))) _exit(2);
+    if (!(*writer)->write(message(0, 0, 2000)) || !std::filesystem::exists(file)) _exit(3);
+    _exit((*writer)->finish() ? 4 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
 /// A file system of its own, that only this process sees, and nothing left behind.
 bool mount_small_disk(const std::filesystem::path& folder, const char* size) {
   return ::unshare(CLONE_NEWNS) == 0 && ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
