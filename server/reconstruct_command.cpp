@@ -142,22 +142,24 @@ Result<std::set<std::uint64_t>> numbers_of(const std::string& uri, const SourceI
   return out;
 }
 
-/// Removes the surfaces of an earlier run, so that the folder holds one run's. Refuses those that cannot be
-/// of the same frames.
-Status remove_earlier(const fs::path& folder, const std::set<std::uint64_t>& numbers) {
+/// Removes what an earlier run wrote of the same frames, some of which may give no surface now. What is of
+/// others is nobody's to remove.
+void remove_earlier(const fs::path& folder, const std::set<std::uint64_t>& numbers) {
   std::vector<fs::path> earlier;
+  std::string other;
   std::error_code failed;
   for (const auto& entry : fs::directory_iterator(folder, failed)) {
     const auto number = number_of(entry.path());
     if (!number) continue;
-    if (!numbers.contains(*number)) {
-      return Error{folder.string() + " has surfaces of other frames (" + entry.path().filename().string() +
-                   "), which would be mixed with these: give a new folder or remove it"};
-    }
-    earlier.push_back(entry.path());
+    if (numbers.contains(*number))
+      earlier.push_back(entry.path());
+    else
+      other = entry.path().filename().string();
   }
   for (const fs::path& file : earlier) fs::remove(file, failed);  // what cannot be is told when it is written
-  return {};
+  if (!other.empty())
+    log_warning(folder.string() + " has surfaces of frames that are none of this take's (" + other +
+                "): give a folder of its own to keep them apart");
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -177,7 +179,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (failed) return Error{"cannot make the folder " + options.out + ": " + failed.message()};
   const auto numbers = numbers_of(uri, (*source)->info());
   if (!numbers) return numbers.error();
-  if (const Status removed = remove_earlier(options.out, *numbers); !removed) return removed;
+  remove_earlier(options.out, *numbers);
 
   StepWatch steps((*source)->info().rig.frame_rate);
   Totals totals;
