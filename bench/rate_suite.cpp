@@ -196,7 +196,7 @@ Command rate_suite() {
             app.add_option("--deadline", options->deadlines_ms,
                            "Milliseconds in which frames are to be encoded, several too: how they are kept, "
                            "instead of levels")
-                ->check(number(0.001))
+                ->check(number(1e-6))
                 ->type_name("MS");
             add_repeat_options(app, options->repeats, 2);
             add_json_option(app, options->json);
