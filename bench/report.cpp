@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/report.h"
+#include "base/json_text.h"
 
 #include <algorithm>
 #include <cmath>
@@ -75,7 +76,7 @@ void print_json(const Report& report) {
     }
     out["rows"] = std::move(rows);
   }
-  std::printf("%s\n", out.dump(2).c_str());
+  std::printf("%s\n", json_text(out).c_str());
 }
 
 /// Three digits or more, without a tail of them.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/json_text.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "client/commands.h"
@@ -240,7 +241,7 @@ void report(const Options& options, const Converted& converted, const RecordedSt
         {"file", options.out.string()},           {"frames", converted.frames},
         {"unreadable", converted.unreadable},     {"damaged", recorded.damaged()},
         {"bytes_before", converted.bytes_before}, {"bytes_after", converted.bytes_after}};
-    std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(j).c_str());
     return;
   }
   std::printf("%s: %llu frames\n", options.out.c_str(), static_cast<unsigned long long>(converted.frames));

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/json_text.h"
 #include "base/time.h"
 #include "cli/checks.h"
 #include "client/commands.h"
@@ -74,7 +75,7 @@ void print_json(const std::vector<Finding>& findings) {
   nlohmann::json list = nlohmann::json::array();
   for (const Finding& f : findings)
     list.push_back({{"check", f.check}, {"grade", to_string(f.grade)}, {"found", f.found}, {"mend", f.mend}});
-  std::puts(list.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  std::puts(json_text(list).c_str());
 }
 
 Status run(const Options& options, StopSignal& stop) {

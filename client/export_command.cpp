@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -139,14 +140,13 @@ Status run(const Options& options, StopSignal& stop) {
     return Error{options.file + ": no frame in that range is whole, with the key frame it builds on"};
   if (left_out.frames() > 0) log_warning(left_out.text());
   if (options.json) {
-    std::puts(
-        nlohmann::json({{"frames", exported->written},
-                        {format_named(options.format).is_one_file ? "file" : "folder", options.out.string()},
-                        {"format", options.format},
-                        {"unreadable", left_out.frames()},
-                        {"damaged", recorded->damaged()}})
-            .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
-            .c_str());
+    std::puts(json_text(nlohmann::json({{"frames", exported->written},
+                                        {format_named(options.format).is_one_file ? "file" : "folder",
+                                         options.out.string()},
+                                        {"format", options.format},
+                                        {"unreadable", left_out.frames()},
+                                        {"damaged", recorded->damaged()}}))
+                  .c_str());
   } else {
     std::puts(written.c_str());
   }

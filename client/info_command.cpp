@@ -9,6 +9,7 @@
 #include <set>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -174,7 +175,7 @@ void print_frames(const FrameTotals& totals) {
 }
 
 void print_json(const nlohmann::json& j) {
-  std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  std::puts(json_text(j).c_str());
 }
 
 Status describe_file(const Options& options, StopSignal& stop) {

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "client/commands.h"
@@ -73,7 +74,7 @@ Status list(const std::filesystem::path& folder, bool as_json) {
                                 {"revoked", holder.revoked},
                                 {"expires", utc_text(holder.expires_ns)}});
     }
-    std::puts(j.dump(2).c_str());
+    std::puts(json_text(j).c_str());
     return {};
   }
   std::printf("folder     %s\nauthority  %s\nname       %s, may %s\nexpires    %s\n", keys->folder.c_str(),

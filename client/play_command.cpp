@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -88,11 +89,10 @@ Status run(const Options& options, StopSignal& stop) {
   if (!played) return played;
   if (frames == 0 && refused > 0) return Error{"no sample of " + options.file + " could be published"};
   if (options.json) {
-    std::puts(nlohmann::json({{"stream", recorded->stream()},
-                              {"frames", frames},
-                              {"refused", refused},
-                              {"damaged", recorded->damaged()}})
-                  .dump(2)
+    std::puts(json_text(nlohmann::json({{"stream", recorded->stream()},
+                                        {"frames", frames},
+                                        {"refused", refused},
+                                        {"damaged", recorded->damaged()}}))
                   .c_str());
   } else {
     std::printf("%llu frames played\n", static_cast<unsigned long long>(frames));

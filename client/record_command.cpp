@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -88,7 +89,7 @@ void report(const Options& options, const Recorder& recorder) {
                               {"lost", counts.lost},
                               {"bytes", counts.bytes},
                               {"duration_s", counts.duration_s}};
-    std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(j).c_str());
   } else if (files.empty()) {
     std::puts("nothing was received; no file was written");
   } else {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "cli/progress.h"
 #include "client/commands.h"
 #include "codec/recording_recover.h"
@@ -30,7 +31,7 @@ void report(const Options& options, const RecoveredRecording& recovered) {
                               {"attachments", recovered.attachments},
                               {"lost_bytes", recovered.lost_bytes},
                               {"left_out", recovered.left_out}};
-    std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(j).c_str());
     return;
   }
   std::printf("%s: %llu messages and %llu attachments\n", options.out.c_str(),

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -211,7 +212,7 @@ Status run(const Options& options, StopSignal& stop) {
                      {"last", output.last()},
                      {"unreadable", left_out}};
     if (options.mode == "depth") j["depth_m"] = {camera.depth().from_m, camera.depth().to_m};
-    std::puts(j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(j).c_str());
   } else {
     std::puts(output.count() == 1 ? output.last().c_str() : written.c_str());
   }

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -63,7 +64,7 @@ void print_json(const Options& options, const LiveReader::Report& report, double
     j["clock_offset_ms"] = milliseconds(report.clock->offset_ns);
     j["clock_error_ms"] = milliseconds(report.clock->delay_ns) / 2;
   }
-  std::puts(j.dump(2).c_str());
+  std::puts(json_text(j).c_str());
 }
 
 Status run(const Options& options, StopSignal& stop) {

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
@@ -91,7 +92,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (options.json) {
     nlohmann::json list = nlohmann::json::array();
     for (const auto& entry : *found) list.push_back(to_json(entry.second));
-    std::puts(list.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(list).c_str());
   } else if (!found->empty()) {
     print_table(*found);
   }

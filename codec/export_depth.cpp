@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/lens.h"
 #include "base/whole_file.h"
 #include "codec/export.h"
@@ -140,7 +141,7 @@ Status write_camera_json(const std::filesystem::path& path, const PinholeModel& 
                                {"cx", camera.matrix[2]}, {"fy", camera.matrix[4]},
                                {"cy", camera.matrix[5]}, {"distortion", nlohmann::json::array()},
                                {"depth_unit_m", unit_m}, {"depth_scale", 1 / unit_m}};
-  return write_whole_file(path, told.dump(2) + "\n");
+  return write_whole_file(path, json_text(told) + "\n");
 }
 
 }  // namespace relievo

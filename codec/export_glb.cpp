@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/draco_mesh.h"
@@ -284,7 +285,7 @@ void append_chunk(Bytes& out, std::string_view type, std::span<const std::uint8_
 Result<Bytes> to_glb(Document& document) {
   if (!document.binary.empty())
     document.root["buffers"] = json::array({{{"byteLength", document.binary.size()}}});
-  const std::string text = document.root.dump();
+  const std::string text = json_line(document.root);
   const std::size_t size = 12 + 8 + text.size() + 3 + 8 + document.binary.size() + 3;
   if (size > std::numeric_limits<std::uint32_t>::max()) return Error{kTooLarge};
   Bytes out{'g', 'l', 'T', 'F'};

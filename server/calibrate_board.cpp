@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/json_text.h"
 #include "capture/calibrate/board.h"
 #include "capture/calibrate/pictures.h"
 #include "server/calibrate_commands.h"
@@ -55,7 +56,7 @@ Status run(const Options& options) {
                                  {"width_mm", width_mm},
                                  {"height_mm", height_mm},
                                  {"inner_corners", {board->columns, board->rows}}};
-    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(json).c_str());
     return {};
   }
   std::printf("%s: print it %.1f x %.1f mm large, margin included, on something flat and matt,\n",

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/colour.h"
@@ -72,7 +73,7 @@ bool is_palette(Primary colour) {
 void print_json(const ColourCalibration& c, const std::string& out) {
   auto json = nlohmann::json::parse(colour_report(c));
   json["rig"] = out;
-  std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  std::puts(json_text(json).c_str());
 }
 
 void print(const ColourCalibration& c, const std::string& out) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/json_text.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/colour.h"
@@ -109,7 +110,7 @@ Status run(const Options& options, StopSignal& stop) {
                                  {"truth", (out / "truth.yaml").string()},
                                  {"board", options.board},
                                  {"projector", size}};
-    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(json).c_str());
     return {};
   }
   std::printf("%d views of a board and 8 captures of a white sheet, in %s. Next:\n", options.views,

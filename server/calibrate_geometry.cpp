@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/compare_rigs.h"
@@ -62,7 +63,7 @@ void print_json(const Geometry& g, const std::optional<RigDifference>& d, const 
                        {"depth_rms_mm", 1000 * d->depth_rms_m},
                        {"depth_mean_mm", 1000 * d->depth_mean_m}};
   }
-  std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  std::puts(json_text(json).c_str());
 }
 
 void print_lens(const char* name, const PinholeModel& lens, const double* sigma) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/calibration_report.h"
+#include "base/json_text.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -43,7 +44,7 @@ std::string colour_report(const ColourCalibration& c) {
       {"target",
        {{"box", {c.target.x, c.target.y, c.target.width, c.target.height}}, {"pixels", c.target_pixels}}},
       {"colours", colours}};
-  return json.dump();
+  return json_line(json);
 }
 
 std::string geometry_report(const Geometry& g) {
@@ -78,7 +79,7 @@ std::string geometry_report(const Geometry& g) {
                                                            g.projector_from_camera_translation[1],
                                                            g.projector_from_camera_translation[2])},
                          {"views", views}};
-  return json.dump();
+  return json_line(json);
 }
 
 }  // namespace relievo

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/calibration_state.h"
+#include "base/json_text.h"
 
 #include <nlohmann/json.hpp>
 
@@ -48,7 +49,7 @@ std::string to_json(const CalibrationState& s) {
                  {"file_before", s.old},
                  {"coverage", s.coverage != nullptr},
                  {"tilts", s.tilts}};
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_line(out);
 }
 
 }  // namespace relievo

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "capture/source/field_source.h"
 #include "capture/source/take_writer.h"
@@ -100,7 +101,7 @@ Status run(const Options& options, StopSignal& stop) {
                                  {"damaged_pictures", counts.damaged_pictures},
                                  {"restarts", counts.restarts},
                                  {"reconnects", counts.reconnects}};
-    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(json).c_str());
   } else {
     std::printf("%zu frames in %s; lost %llu, damaged pictures %llu\n", frames, options.out.c_str(),
                 static_cast<unsigned long long>(counts.lost_frames),

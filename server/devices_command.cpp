@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "capture/source/v4l2/describe.h"
 #include "server/commands.h"
@@ -150,9 +151,7 @@ Status run(const Options& options) {
   if (options.json) {
     nlohmann::json devices = nlohmann::json::array();
     for (const DeviceDescription& device : found) devices.push_back(to_json(device));
-    std::puts(nlohmann::json({{"devices", devices}})
-                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
-                  .c_str());
+    std::puts(json_text(nlohmann::json({{"devices", devices}})).c_str());
   } else {
     for (const DeviceDescription& device : found) print(device);
     if (found.empty()) log_info("no camera found; -v says what was looked at");

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "capture/evaluate/score.h"
@@ -56,7 +57,7 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
                                 {"rms_um_per_m", s.rms_um_per_m},
                                 {"p95_um_per_m", s.p95_um_per_m},
                                 {"filters", counts}};
-    std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(out).c_str());
     return;
   }
   std::printf("frames        %zu of %zu\n", s.frames, s.of);

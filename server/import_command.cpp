@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
@@ -77,7 +78,7 @@ void print(const Report& r, const Options& options) {
       out["compare"] = {{"points", *r.reference_points},
                         {"nearest_mm", {{"median", r.nearest.median}, {"p90", r.nearest.p90}}}};
     }
-    std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(out).c_str());
     return;
   }
   std::printf("decoded     %zu of %zu lit pixels (%zu with an unclear bit, %zu unlike all around)\n",

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
@@ -73,9 +74,7 @@ Status write_gray(const Options& options, StopSignal& stop) {
   }
   progress.finish();
   if (options.json) {
-    std::puts(nlohmann::json({{"folder", options.out}, {"slides", count}})
-                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
-                  .c_str());
+    std::puts(json_text(nlohmann::json({{"folder", options.out}, {"slides", count}})).c_str());
   } else {
     std::printf(
         "%zu slides of Gray code, %dx%d, in %s: project them in the order of their names, one picture each\n",
@@ -98,7 +97,7 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   if (options.json) {
     const nlohmann::json json = {
         {"folder", options.out}, {"slides", count}, {"stripes", pattern.stripes()}, {"row_stripes", rows}};
-    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(json).c_str());
   } else {
     std::printf(
         "%zu slides, %dx%d, of %d stripes along columns and %d along rows, in %s: project them in the order "
@@ -154,7 +153,7 @@ Status write_video(const Options& options, const Pattern& pattern, StopSignal& s
                                  {"interlaced", options.interlaced},
                                  {"scheme", to_string(pattern.scheme)},
                                  {"stripes", pattern.stripes()}};
-    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(json).c_str());
   } else {
     std::printf(
         "%llu %s of %d stripes, %dx%d, %.2f a second, %.1f s, in %s: play it in a loop, full screen\n",
@@ -210,12 +209,11 @@ Status run(const Options& options, StopSignal& stop) {
   const std::vector<std::uint8_t> bytes(yaml.begin(), yaml.end());
   if (auto s = write_whole_file(fs::path(options.out) / files.back(), bytes); !s) return s;
   if (options.json) {
-    std::puts(nlohmann::json({{"folder", options.out},
-                              {"files", files},
-                              {"order", order},
-                              {"scheme", to_string(pattern->scheme)},
-                              {"stripes", pattern->stripes()}})
-                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
+    std::puts(json_text(nlohmann::json({{"folder", options.out},
+                                        {"files", files},
+                                        {"order", order},
+                                        {"scheme", to_string(pattern->scheme)},
+                                        {"stripes", pattern->stripes()}}))
                   .c_str());
     return {};
   }

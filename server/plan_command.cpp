@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "base/json_text.h"
 #include "capture/plan/plan.h"
 #include "capture/rig_file.h"
 #include "capture/upright.h"
@@ -102,7 +103,7 @@ void print_json(const Plan& plan, const Rig& rig, const Pattern& pattern) {
                               {"one_slide_one_boundary", json_of(plan.one_boundary)},
                               {"one_slide_three_boundaries", json_of(plan.three_boundaries)},
                               {"warnings", plan.warnings}};
-  std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  std::puts(json_text(out).c_str());
 }
 
 std::string span_text(const DepthSpan& span) {

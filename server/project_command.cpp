@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "capture/calibrate/sheet_colours.h"
 #include "capture/calibrate/stripe_stack.h"
@@ -63,7 +64,7 @@ Status list(const Options& options) {
     for (const DisplayMode& mode : output.modes)
       std::printf("  %dx%d at %.0f Hz\n", mode.width, mode.height, mode.refresh_hz);
   }
-  if (options.json) std::puts(all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  if (options.json) std::puts(json_text(all).c_str());
   return {};
 }
 
@@ -118,7 +119,7 @@ Status report(const ShowReport& shown, const Options& options, const DisplayOutp
                                  {"refresh_hz", shown.refresh_hz},
                                  {"synchronised", shown.synchronised},
                                  {"counted_by_display", shown.counted}};
-    std::puts(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(json).c_str());
   } else {
     std::printf("%llu pictures in %llu refreshes of %.2f Hz on %s, %llu missed\n",
                 static_cast<unsigned long long>(shown.pictures),

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "capture/reconstruct/reconstructor.h"
@@ -89,7 +90,7 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
                                   {"surface", t.surface_ms.median()},
                                   {"texture", t.texture_ms.median()},
                                   {"total", t.total_ms.median()}}}};
-    std::puts(out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    std::puts(json_text(out).c_str());
     return;
   }
   if (t.scheme == Scheme::kComplementary || t.scheme == Scheme::kOneSlide) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_text.h"
 #include "capture/calibrate/colour.h"
 
 namespace relievo {
@@ -175,7 +176,7 @@ std::string rig_report(const std::string& stream, const TappedFrame& frame, cons
       {"advice", rig_advice(frame, check)},
       {"pictures", std::move(pictures)},
   };
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_line(out);
 }
 
 }  // namespace relievo

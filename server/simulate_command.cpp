@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "capture/source/sim/scene.h"
 #include "capture/source/sim/sim_options.h"
 #include "capture/source/sim/sim_source.h"
@@ -52,9 +53,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (stopped) return {};  // asked for; nothing is left behind
   if (!done) return done;
   if (options.json) {
-    std::puts(nlohmann::json({{"take", options.out}, {"frames", written}})
-                  .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
-                  .c_str());
+    std::puts(json_text(nlohmann::json({{"take", options.out}, {"frames", written}})).c_str());
   } else {
     std::printf("%llu frames with truth in %s\n", static_cast<unsigned long long>(written),
                 options.out.c_str());

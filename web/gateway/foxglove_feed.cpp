@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/time.h"
 
 namespace relievo {
@@ -23,7 +24,7 @@ constexpr std::uint8_t kMessageData = 1;
 constexpr int kWarning = 1;
 
 std::shared_ptr<const std::string> text_of(const Json& json) {
-  return std::make_shared<const std::string>(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return std::make_shared<const std::string>(json_line(json));
 }
 
 void append_le(std::vector<std::uint8_t>& out, std::uint64_t value, int bytes) {

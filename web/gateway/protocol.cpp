@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "base/time.h"
 
 namespace relievo {
@@ -13,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 // Names and messages come from other processes; bytes that are no UTF-8 must not throw.
 std::string text_of(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json_line(json);
 }
 
 Json pinhole_json(const PinholeModel& model) {

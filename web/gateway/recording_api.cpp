@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_text.h"
 #include "codec/mcap_records.h"
 
 namespace relievo {
@@ -22,7 +23,7 @@ constexpr std::size_t kMostListed = 1000;
 constexpr std::size_t kLongestName = 128;
 
 HttpReply json(const Json& value) {
-  return json_reply(value.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return json_reply(json_line(value));
 }
 
 HttpReply no_folder() {

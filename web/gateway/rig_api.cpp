@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/json_text.h"
 #include "web/gateway/request_target.h"
 
 namespace relievo {
@@ -91,7 +92,7 @@ HttpReply projector_state(const RigControl* control) {
                                    {"stream", state.stream},
                                    {"show", state.shows},
                                    {"message", state.message}};
-  return json_reply(out.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  return json_reply(json_line(out));
 }
 
 HttpReply order_projector(const HttpRequest& request, RigControl* control) {
