@@ -48,18 +48,25 @@ bool needed_later(const RawSample& sample) {
   return header && header->texture == TextureCodec::kH264;
 }
 
-const RecordedInfo* info_of(const RawSample& frame, std::span<const RecordedInfo> infos) {
+namespace {
+
+/// The last one up to then, by this time of its sample; the first one before all of them.
+const RecordedInfo* last_info(std::span<const RecordedInfo> infos, std::int64_t RawSample::*time,
+                              std::int64_t time_ns) {
   if (infos.empty()) return nullptr;
   for (std::size_t i = infos.size(); i-- > 1;)
-    if (infos[i].sample.source_time_ns <= frame.source_time_ns) return &infos[i];
+    if (infos[i].sample.*time <= time_ns) return &infos[i];
   return &infos[0];
 }
 
+}  // namespace
+
+const RecordedInfo* info_of(const RawSample& frame, std::span<const RecordedInfo> infos) {
+  return last_info(infos, &RawSample::source_time_ns, frame.source_time_ns);
+}
+
 const RecordedInfo* info_at(std::int64_t time_ns, std::span<const RecordedInfo> infos) {
-  if (infos.empty()) return nullptr;
-  for (std::size_t i = infos.size(); i-- > 1;)
-    if (infos[i].sample.receive_time_ns <= time_ns) return &infos[i];
-  return &infos[0];
+  return last_info(infos, &RawSample::receive_time_ns, time_ns);
 }
 
 Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, const std::string& stream) {

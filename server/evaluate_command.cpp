@@ -121,12 +121,11 @@ Exposure shown_in(const CapturedFrame& frame, const SourceInfo& info, std::uint6
 
 /// The lead under which the most of the first frames are white that look white. 0 under other schemes: which
 /// of two slides came first changes no score.
-Result<std::uint64_t> find_lead(const Options& options) {
+Result<std::uint64_t> find_lead(const Options& options, const SourceInfo& info) {
   constexpr int kFrames = 30;  // ten times the three of white-frame
+  if (info.pattern.scheme != Scheme::kWhiteFrame) return std::uint64_t{0};
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
-  const SourceInfo& info = (*source)->info();
-  if (info.pattern.scheme != Scheme::kWhiteFrame) return std::uint64_t{0};
   auto reconstructor = Reconstructor::create(info.rig, info.pattern, {.decoder = Decoder::kQuick});
   if (!reconstructor) return reconstructor.error();
   std::vector<int> fitting(static_cast<std::size_t>(cycle_frames(info.pattern)));
@@ -157,7 +156,7 @@ Status run(const Options& options, StopSignal& stop) {
                                               .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
 
-  const auto lead = find_lead(options);
+  const auto lead = find_lead(options, info);
   if (!lead) return lead.error();
 
   Judges judges{Scorer(reconstructor->rig(), reconstructor->pattern())};

@@ -269,6 +269,16 @@ Result<BundleResult> adjust_bundle(const BundleProblem& problem, const BundlePri
   return Adjuster(problem, priors).run();
 }
 
+Rig rig_of(const Devices& devices) {
+  Rig rig;
+  rig.camera = devices.camera;
+  rig.projector = devices.projector;
+  rig.projector_from_camera_rotation = rotation_matrix(devices.projector_from_camera);
+  for (std::size_t i = 0; i < 3; ++i)
+    rig.projector_from_camera_translation[i] = devices.projector_from_camera[3 + i];
+  return rig;
+}
+
 Vec2d project_board(const PinholeModel& lens, const Pose& lens_from_board, Vec2d board_m) {
   const Eigen::Vector3d p = rotation_of(lens_from_board) * Eigen::Vector3d(board_m[0], board_m[1], 0) +
                             translation_of(lens_from_board);

@@ -53,6 +53,9 @@ struct Devices {
   Pose projector_from_camera{};
 };
 
+/// The rig of these, with nothing else in it.
+Rig rig_of(const Devices& devices);
+
 struct BundleResult : Devices {
   std::vector<Pose> camera_from_board;
   /// The devices moved by one standard deviation in directions that are independent of each other: what

@@ -32,20 +32,11 @@ Vec2d minus(Vec2d a, Vec2d b) {
   return {a[0] - b[0], a[1] - b[1]};
 }
 
-Rig rig_of(const Devices& devices) {
-  Rig rig;
-  rig.camera = devices.camera;
-  rig.projector = devices.projector;
-  rig.projector_from_camera_rotation = rotation_matrix(devices.projector_from_camera);
-  for (std::size_t i = 0; i < 3; ++i)
-    rig.projector_from_camera_translation[i] = devices.projector_from_camera[3 + i];
-  return rig;
-}
-
 double depth_sigma(const BundleResult& fit, double distance_m) {
+  const Rig rig = rig_of(fit);
   double squares = 0;
   for (const Devices& moved : fit.deviations) {
-    const auto difference = compare_rigs(rig_of(moved), rig_of(fit), distance_m);
+    const auto difference = compare_rigs(rig_of(moved), rig, distance_m);
     squares += difference ? difference->depth_rms_m * difference->depth_rms_m
                           : std::numeric_limits<double>::infinity();
   }
@@ -302,11 +293,11 @@ class Calibration {
 
   Geometry finish(const BundleResult& fit) {
     Geometry& g = out_;
-    g.camera = fit.camera;
-    g.projector = fit.projector;
-    g.projector_from_camera_rotation = rotation_matrix(fit.projector_from_camera);
-    for (std::size_t i = 0; i < 3; ++i)
-      g.projector_from_camera_translation[i] = fit.projector_from_camera[3 + i];
+    const Rig rig = rig_of(fit);
+    g.camera = rig.camera;
+    g.projector = rig.projector;
+    g.projector_from_camera_rotation = rig.projector_from_camera_rotation;
+    g.projector_from_camera_translation = rig.projector_from_camera_translation;
     g.sigma_px = fit.sigma_px;
     double camera = 0, projector = 0, left_out = 0;
     std::size_t corners_left_out = 0;
@@ -318,7 +309,7 @@ class Calibration {
       report.camera_rms = rms.camera_rms;
       report.projector_rms = rms.projector_rms;
       report.stereo_rms = rms.stereo_rms;
-      planes.push_back(check_plane(g.camera, g.projector, fit.projector_from_camera, w.view));
+      planes.push_back(check_plane(rig, w.view));
       report.plane_rms_m = planes.back().plane_rms_m;
       for (const CornerSight& c : w.left_out) {
         const Offs off = offs_of(fit, w.view.camera_from_board, c);

@@ -45,11 +45,7 @@ double plane_rms(const std::vector<Seen>& corners) {
 
 }  // namespace
 
-PlaneCheck check_plane(const PinholeModel& camera, const PinholeModel& projector,
-                       const Pose& projector_from_camera, const BoardView& view) {
-  Rig rig;
-  rig.projector_from_camera_rotation = rotation_matrix(projector_from_camera);
-  for (std::size_t i = 0; i < 3; ++i) rig.projector_from_camera_translation[i] = projector_from_camera[3 + i];
+PlaneCheck check_plane(const Rig& rig, const BoardView& view) {
   std::vector<Seen> seen;
   double square = 1e9;  // side, as the least distance on the board
   for (const CornerSight& c : view.corners) {
@@ -57,8 +53,8 @@ PlaneCheck check_plane(const PinholeModel& camera, const PinholeModel& projector
       const double apart = std::hypot(c.board_m[0] - d.board_m[0], c.board_m[1] - d.board_m[1]);
       if (apart > 0) square = std::min(square, apart);
     }
-    const auto on_camera = undistort(camera, c.camera_px[0], c.camera_px[1]);
-    const auto on_projector = undistort(projector, c.projector_px[0], c.projector_px[1]);
+    const auto on_camera = undistort(rig.camera, c.camera_px[0], c.camera_px[1]);
+    const auto on_projector = undistort(rig.projector, c.projector_px[0], c.projector_px[1]);
     const auto meeting = on_camera && on_projector ? meet(rig, *on_camera, *on_projector) : std::nullopt;
     if (meeting) seen.push_back({c.board_m, {meeting->point[0], meeting->point[1], meeting->point[2]}});
   }

@@ -16,8 +16,7 @@ struct PlaneCheck {
   double scale_error = 0;   // the board's size against its true one, relative; above 0: too large
 };
 
-PlaneCheck check_plane(const PinholeModel& camera, const PinholeModel& projector,
-                       const Pose& projector_from_camera, const BoardView& view);
+PlaneCheck check_plane(const Rig& rig, const BoardView& view);
 
 /// RMS over all corners, lengths and sizes of several views.
 PlaneCheck together(const std::vector<PlaneCheck>& checks);

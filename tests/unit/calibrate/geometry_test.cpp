@@ -149,7 +149,7 @@ TEST(Geometry, ABoardThatLooksTooLargeIsAScaleError) {
     for (const MeasuredView& measured : ideal_views(rig, 4, 0)) {
       Pose pose = pose_between(rig);
       for (std::size_t i = 3; i < 6; ++i) pose[i] *= baseline;
-      checks.push_back(check_plane(rig.camera, rig.projector, pose,
+      checks.push_back(check_plane(rig_of(Devices{rig.camera, rig.projector, pose}),
                                    {.corners = measured.corners, .camera_from_board = {}}));
       EXPECT_NEAR(checks.back().scale_error, baseline - 1, 1e-6);
     }
