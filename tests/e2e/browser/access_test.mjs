@@ -125,6 +125,7 @@ const checks = {
     await page.keyboard.press('n');
     await page.keyboard.press('7');
     await page.waitForSelector('#legend canvas');
+    await page.waitForSelector('.streams [aria-pressed=true]'); // the list is asked for as its panel opens
     const { chosen, others, kept } = await page.evaluate(() => {
       const ground = (of) => getComputedStyle(document.querySelector(of)).backgroundColor;
       const pressed = ['#modes [aria-pressed=true]', '#ways [aria-pressed=true]', '#tool-streams', '.streams [aria-pressed=true]', '#follow'];
