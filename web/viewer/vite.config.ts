@@ -65,6 +65,7 @@ export default defineConfig({
   },
   worker: { format: 'es' },
   server: {
+    fs: { allow: ['.', '../../idl'] },
     proxy: {
       '/api': gateway,
       '/ws': { target: gateway, ws: true, changeOrigin: true, rewriteWsOrigin: true },

@@ -15,6 +15,8 @@ export interface Sample {
   publishNs: bigint;
 }
 
+export const publishMsOf = ({ publishNs }: Sample): number => Number(publishNs / 1000n) / 1000;
+
 /** A frame keeps its index: of a live stream the first ones go and others come. */
 export interface FrameStore {
   readonly stream: string;
@@ -32,8 +34,8 @@ export interface FrameStore {
   read(index: number): Promise<StoredFrame>;
   /** The same as a recording would hold it. */
   sample(index: number): Promise<Sample>;
-  /** What describes the stream, likewise; null: the store does not have it. */
-  readonly description: Uint8Array | null;
+  /** What describes the stream's frames that were published then (ms UTC), likewise; null: the store does not have it. */
+  describing(publishMs: number): Uint8Array | null;
   /** These frames, which stay there while others come. */
   held(): FrameStore;
 }

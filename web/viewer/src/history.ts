@@ -29,8 +29,6 @@ export class History implements FrameStore {
   private kept: Kept[] = [];
   private times_: Float64Array | null = null; // made when asked for
 
-  readonly description = null;
-
   constructor(
     readonly limits: Readonly<HistoryLimits> = kHistoryLimits,
     readonly stream = '',
@@ -43,6 +41,10 @@ export class History implements FrameStore {
   get end(): number {
     return this.first + this.kept.length;
   }
+  describing(): null {
+    return null;
+  }
+
   /** From the oldest to the newest. */
   get spanMs(): number {
     const [first, last] = [this.kept[0], this.kept[this.kept.length - 1]];

@@ -3,10 +3,10 @@
 import { Decoder } from './decoder';
 import { kTextureJpeg, parseFrame } from './frame';
 import { closePictures } from './frameMemory';
-import type { FrameStore, Sample } from './frameStore';
+import { publishMsOf, type FrameStore } from './frameStore';
 import type { DecodedFrame } from './messages';
 import type { RangeFormat } from './rangeFrames';
-import { writeRecording } from './recordingFile';
+import { writeRecording, type DescribedSample } from './recordingFile';
 import { framesBefore } from './storePlayer';
 import { text } from './strings';
 import { glbOf, plyOf } from './surfaceFiles';
@@ -41,17 +41,17 @@ export async function exportRange(order: RangeOrder): Promise<RangeFile> {
 
 async function asRecording({ store, description, progress, cancelled }: RangeOrder, indices: number[]): Promise<RangeFile> {
   let bytes = 0;
-  async function* samples(): AsyncGenerator<Sample> {
+  async function* samples(): AsyncGenerator<DescribedSample> {
     for (const [done, index] of indices.entries()) {
       cancelled.throwIfAborted();
       const sample = await store.sample(index);
       bytes += sample.data.length;
       if (bytes > kMostBytes) throw new Error(text.take.tooLarge(done, kMostBytes));
-      yield sample;
+      yield { sample, description: store.describing(publishMsOf(sample)) ?? description };
       progress(done + 1);
     }
   }
-  const content = await writeRecording(store.stream, store.description ?? description, samples());
+  const content = await writeRecording(store.stream, samples());
   return { content, frames: indices.length, damaged: 0 };
 }
 

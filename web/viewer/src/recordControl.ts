@@ -5,6 +5,7 @@ import { element, setText } from './dom';
 import { download } from './download';
 import { clockText } from './playback';
 import type { ServerRecording, StreamInfo } from './protocol';
+import type { DescribedSample } from './recordingFile';
 import type { LiveSource } from './liveSource';
 import { text } from './strings';
 import { askBeforeLeaving, mayLeave } from './unsaved';
@@ -22,7 +23,8 @@ export interface Running {
 }
 
 interface Taken extends Running {
-  messages: ArrayBuffer[];
+  frames: { message: ArrayBuffer; info: StreamInfo | null }[];
+  info: StreamInfo | null; // the last that there was
 }
 
 export interface Recorded {
@@ -149,15 +151,19 @@ export class RecordControl {
   }
 
   private start(): void {
-    const { source } = this.of!;
-    const messages = source.keptMessages();
-    const taken = { messages, bytes: messages.reduce((sum, m) => sum + m.byteLength, 0), since: performance.now() };
+    const { source, info } = this.of!;
+    const taken: Taken = { frames: [], info: info(), bytes: 0, since: performance.now() };
+    const take = (message: ArrayBuffer): void => {
+      taken.info = info() ?? taken.info;
+      taken.frames.push({ message, info: taken.info });
+      taken.bytes += message.byteLength;
+    };
+    source.keptMessages().forEach(take);
     this.taken = taken;
     this.saidUntil = 0;
     askBeforeLeaving(taken);
     source.tap = (message) => {
-      taken.messages.push(message);
-      taken.bytes += message.byteLength;
+      take(message);
       if (taken.bytes > kMostBytes) void this.save();
     };
     this.show();
@@ -168,18 +174,24 @@ export class RecordControl {
     this.taken = null;
     of!.source.tap = null;
     try {
-      if (taken!.messages.length === 0) return this.say(say.nothing, true);
-      const [{ writeRecording }, { samplesOf }, { writeStreamInfo }] = await Promise.all([
+      const { frames } = taken!;
+      if (frames.length === 0) return this.say(say.nothing, true);
+      const [{ writeRecording }, { sampleOf }, { writeStreamInfo }] = await Promise.all([
         import('./recordingFile'),
         import('./sample'),
         import('./cdrWriter'),
       ]);
-      const info = of!.info();
-      const samples = samplesOf(of!.stream, taken!.messages);
-      const content = await writeRecording(of!.stream, info === null ? null : writeStreamInfo(info), samples);
+      const described = new Map<StreamInfo | null, Uint8Array | null>([[null, null]]);
+      function* samples(): Generator<DescribedSample> {
+        for (const { message, info } of frames) {
+          if (!described.has(info)) described.set(info, writeStreamInfo(info!));
+          yield { sample: sampleOf(of!.stream, message), description: described.get(info)! };
+        }
+      }
+      const content = await writeRecording(of!.stream, samples());
       const name = `${of!.stream}-${new Date().toISOString().slice(0, 19).replace(/[-:]/g, '').replace('T', '-')}.mcap`;
       download(name, content);
-      this.say(say.savedHere(name, taken!.messages.length, content.size));
+      this.say(say.savedHere(name, frames.length, content.size));
     } catch (error) {
       this.say(say.failed(error instanceof Error ? error.message : String(error)), true);
     } finally {

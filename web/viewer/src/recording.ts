@@ -3,7 +3,7 @@
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
 import { FileError } from './fileError';
 import { kTextureH264, parseFrame } from './frame';
-import type { FrameStore, Sample, StoredFrame } from './frameStore';
+import { publishMsOf, type FrameStore, type Sample, type StoredFrame } from './frameStore';
 import { openAdded, openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
 import type { StreamInfo } from './protocol';
 import { text } from './strings';
@@ -28,8 +28,7 @@ export class Recording implements FrameStore {
     private readonly file: Bytes,
     private readonly frames: McapMessage[],
     readonly stream: string,
-    readonly info: StreamInfo | null,
-    readonly description: Uint8Array | null,
+    private readonly descriptions: Description[], // a server that was started again sent another
     readonly damage: string | null,
     private end_: number | null,
   ) {
@@ -44,14 +43,24 @@ export class Recording implements FrameStore {
     const found = await openMcap(file);
     const frames = ofTopic(found, kFrameTopic);
     if (frames.length === 0) throw new FileError(found.damage === null ? text.file.noFrames : text.file.noWholeFrame);
-    const described = ofTopic(found, kInfoTopic)[0];
-    const description = described === undefined ? null : await readMessage(file, described);
-    const info = description === null ? null : readStreamInfo(description);
     const one = readFrameHead(await readMessageHead(file, frames[0]!, kFrameHeadBytes)).stream;
     // A channel is a stream's; a file of several shows the first.
     const own = frames.filter((m) => m.channel === frames[0]!.channel);
-    const isOf = info?.stream === one; // these frames
-    return new Recording(file, own, one, isOf ? info : null, isOf ? description : null, found.damage, found.end);
+    return new Recording(file, own, one, await readDescriptions(file, found, one), found.damage, found.end);
+  }
+
+  /** Of the frames that were published then (ms UTC); null: the file does not have it. */
+  infoAt(publishMs: number): StreamInfo | null {
+    return this.descriptionAt(publishMs)?.info ?? null;
+  }
+
+  describing(publishMs: number): Uint8Array | null {
+    return this.descriptionAt(publishMs)?.bytes ?? null;
+  }
+
+  // The last that was published before; a frame may also come before the first one.
+  private descriptionAt(publishMs: number): Description | undefined {
+    return this.descriptions.reduce((held, d) => (d.publishMs <= publishMs ? d : held), this.descriptions[0]);
   }
 
   /** Of what is there of a file that may be written on; null: it cannot grow. */
@@ -68,6 +77,7 @@ export class Recording implements FrameStore {
     if (bytes === this.bytes) return false;
     const added = await openAdded(file, end);
     const frames = ofTopic(added, kFrameTopic).filter((m) => m.channel === this.frames[0]!.channel);
+    this.descriptions.push(...(await readDescriptions(file, added, this.stream)));
     [this.bytes, this.end_] = [bytes, added.end];
     if (frames.length === 0) return false;
     for (const frame of frames) this.frames.push(frame);
@@ -169,6 +179,27 @@ export class Recording implements FrameStore {
     if (before === undefined || here === undefined) return 0;
     return Math.max(0, here.sequence - before.sequence - 1);
   }
+}
+
+interface Description {
+  publishMs: number; // UTC
+  info: StreamInfo;
+  bytes: Uint8Array;
+}
+
+/** Those of the stream, in the order in which they came; what is damaged is left out. */
+async function readDescriptions(file: Bytes, found: McapFile, stream: string): Promise<Description[]> {
+  const descriptions: Description[] = [];
+  for (const message of ofTopic(found, kInfoTopic)) {
+    const sample = await readSample(file, message);
+    try {
+      const info = readStreamInfo(sample.data);
+      if (info.stream === stream) descriptions.push({ publishMs: publishMsOf(sample), info, bytes: sample.data });
+    } catch {
+      // what makes no sense describes nothing
+    }
+  }
+  return descriptions;
 }
 
 function ofTopic({ topics, messages }: McapFile, topic: string): McapMessage[] {

@@ -16,11 +16,18 @@ class Parts {
   };
 }
 
-/** `description`: a relievo::StreamInfo, or null; `frames`: oldest first, at least one. Throws what `frames` throws. */
+export interface DescribedSample {
+  sample: Sample; // a frame
+  description: Uint8Array | null; // its relievo::StreamInfo
+}
+
+/**
+ * `frames`: oldest first, at least one; a description is written where it is another one than before. Throws what
+ * `frames` throws.
+ */
 export async function writeRecording(
   stream: string,
-  description: Uint8Array | null,
-  frames: Iterable<Sample> | AsyncIterable<Sample>,
+  frames: Iterable<DescribedSample> | AsyncIterable<DescribedSample>,
 ): Promise<Blob> {
   const parts = new Parts();
   const writer = new McapWriter({ writable: parts, chunkSize: kChunkBytes });
@@ -30,14 +37,16 @@ export async function writeRecording(
     return writer.registerChannel({ topic, schemaId, messageEncoding: 'cdr', metadata: new Map([['stream', stream]]) });
   };
   const ofFrames = await channel('relievo/frame', 'relievo::Frame');
-  let described = description === null;
-  for await (const { data, sequence, logNs, publishNs } of frames) {
-    if (!described) {
-      described = true;
-      const channelId = await channel('relievo/info', 'relievo::StreamInfo');
-      await writer.addMessage({ channelId, sequence: 0, logTime: logNs, publishTime: logNs, data: description! });
+  let ofInfo: number | null = null;
+  let described: Uint8Array | null = null;
+  for await (const { sample, description } of frames) {
+    const { data, sequence, logNs: logTime, publishNs: publishTime } = sample;
+    if (description !== null && description !== described) {
+      described = description;
+      ofInfo ??= await channel('relievo/info', 'relievo::StreamInfo');
+      await writer.addMessage({ channelId: ofInfo, sequence: 0, logTime, publishTime, data: description });
     }
-    await writer.addMessage({ channelId: ofFrames, sequence, logTime: logNs, publishTime: publishNs, data });
+    await writer.addMessage({ channelId: ofFrames, sequence, logTime, publishTime, data });
   }
   await writer.end();
   return new Blob(parts.list, { type: 'application/octet-stream' });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording as a source of frames. One of the server that is still being written grows, and who is at its end goes
 // on with what comes.
-import type { Written } from './protocol';
+import type { FramePrefix, StreamInfo, Written } from './protocol';
 import type { Recording } from './recording';
 import type { FrameSource, Moment, Playback, SourceEvents } from './source';
 import { StorePlayer } from './storePlayer';
@@ -17,6 +17,7 @@ export class RecordingSource extends StorePlayer implements FrameSource {
   private refused = false;
   private asking = false;
   private marking = false;
+  private described: StreamInfo | null = null; // what was said last
   private atEnd = false; // played to it, and nobody did anything since
 
   /** Plays from its start, or is at `begin`; times that it does not have mean nothing. */
@@ -30,7 +31,7 @@ export class RecordingSource extends StorePlayer implements FrameSource {
     queueMicrotask(() => {
       if (this.stopped) return;
       events.open();
-      if (recording.info !== null) events.message({ type: 'info', ...recording.info });
+      this.describe(-Infinity);
       const at = begin === null ? -1 : begin.atMs - (begin.utc ? this.startMs : 0);
       const { times } = this;
       const has = at >= times[0]! && at < times[times.length - 1]! + 1; // links are of whole milliseconds
@@ -94,6 +95,18 @@ export class RecordingSource extends StorePlayer implements FrameSource {
   }
 
   retryNow(): void {}
+
+  protected override handing({ publishMs }: FramePrefix): void {
+    this.describe(publishMs);
+  }
+
+  // Each time that it is another one than before: the server was started again meanwhile, perhaps with another rig.
+  private describe(publishMs: number): void {
+    const info = this.recording.infoAt(publishMs);
+    if (info === null || info === this.described) return;
+    this.described = info;
+    this.events.message({ type: 'info', ...info });
+  }
 
   protected override ended(): void {
     this.atEnd = true;

@@ -40,7 +40,6 @@ export class RemoteFile implements Bytes {
       fetch = (at, init) => ask(at, { ...init, credentials: 'include' });
       head = await fetch(url, first);
     }
-    if (head.status === 404) throw new Error('it is not there (HTTP 404)');
     if (head.status === 416) throw new Error('it is empty: what recorded it ended before the first frame');
     const { size, etag } = versionOf(head);
     return new RemoteFile(url, size, etag, fetch);
@@ -109,7 +108,7 @@ export class RemoteFile implements Bytes {
       try {
         return await this.ask(at, end);
       } catch (error) {
-        if (error instanceof Changed || tried === kTries) throw error;
+        if (error instanceof Final || tried === kTries) throw error;
         await new Promise((resolve) => setTimeout(resolve, kFirstWaitMs * 2 ** (tried - 1)));
       }
     }
@@ -120,9 +119,9 @@ export class RemoteFile implements Bytes {
     const response = await this.fetch(this.url, { headers, cache: 'no-store' });
     if (response.status === 200 || response.status === 416) {
       await response.body?.cancel();
-      throw new Changed('the recording has changed on the server: open it anew');
+      throw new Final('the recording has changed on the server: open it anew');
     }
-    if (response.status !== 206) throw new Error(`the server does not give the recording: HTTP ${response.status}`);
+    if (response.status !== 206) throw refused(response.status, 'the server does not give the recording');
     const bytes = new Uint8Array(await response.arrayBuffer());
     if (bytes.length !== end - at) throw new Error('a part of the recording came short');
     return bytes;
@@ -132,10 +131,18 @@ export class RemoteFile implements Bytes {
 function versionOf(head: Response): { size: number; etag: string } {
   const size = Number(/\/(\d+)$/.exec(head.headers.get('content-range') ?? '')?.[1]);
   const etag = head.headers.get('etag') ?? '';
-  if (head.status !== 206 || !Number.isSafeInteger(size) || etag === '') {
-    throw new Error(`the server does not give parts of it (HTTP ${head.status})`);
+  if (head.status !== 206) throw refused(head.status, 'the server does not give parts of it');
+  if (!Number.isSafeInteger(size) || etag === '') {
+    throw new Error('the server does not say which parts of it there are');
   }
   return { size, etag };
 }
 
-class Changed extends Error {}
+function refused(status: number, otherwise: string): Error {
+  if (status === 401) return new Final('the server wants a token for it: load this page anew to sign in');
+  if (status === 404) return new Final('it is not there (HTTP 404)');
+  return new Error(`${otherwise} (HTTP ${status})`);
+}
+
+/** Asking again does not help. */
+class Final extends Error {}

@@ -13,7 +13,3 @@ export function sampleOf(stream: string, message: ArrayBuffer): Sample {
   const logNs = view.getBigInt64(32, true); // when the server sent it
   return { data, sequence: Number(sequence & 0xffffffffn), logNs, publishNs };
 }
-
-export function* samplesOf(stream: string, messages: readonly ArrayBuffer[]): Generator<Sample> {
-  for (const message of messages) yield sampleOf(stream, message);
-}

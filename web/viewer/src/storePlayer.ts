@@ -3,6 +3,7 @@
 // stays in time.
 import type { FrameStore } from './frameStore';
 import { PlayClock, type Loop } from './playback';
+import type { FramePrefix } from './protocol';
 import type { Playback, SourceEvents } from './source';
 
 /** What the decoder holds: the key frame, and the last frame that was decoded after it. */
@@ -188,6 +189,11 @@ export class StorePlayer implements Playback {
 
   private async hand(index: number, forLater: boolean): Promise<void> {
     const { prefix, message } = await this.store.read(index);
-    if (!this.stopped) this.handed.frame(prefix, message, forLater);
+    if (this.stopped) return;
+    this.handing(prefix);
+    this.handed.frame(prefix, message, forLater);
   }
+
+  /** This frame is handed over next. */
+  protected handing(_prefix: FramePrefix): void {}
 }

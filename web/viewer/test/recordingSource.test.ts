@@ -13,7 +13,9 @@ class Growing {
   times = Float64Array.of(0, kStepMs, 2 * kStepMs);
   first = 0;
   startMs = 0;
-  info = null;
+  /** Of frames from there on, 100 ms each. */
+  infos = new Map<number, { source: string }>();
+  infoAt = (publishMs: number): unknown => [...this.infos].filter(([from]) => from <= Math.max(0, publishMs)).at(-1)?.[1] ?? null;
   get end(): number {
     return this.times.length; // as bytes
   }
@@ -28,7 +30,7 @@ class Growing {
   keyBefore = async (index: number): Promise<number> => index;
   buildsOnFrameBefore = async (): Promise<boolean> => false;
   read = async (index: number): Promise<unknown> => ({
-    prefix: { bytes: 48, sequence: index, captureMs: 0, publishMs: 0, sentMs: 0, drops: 0 },
+    prefix: { bytes: 48, sequence: index, captureMs: 0, publishMs: index * kStepMs, sentMs: 0, drops: 0 },
     message: new ArrayBuffer(48),
   });
 }
@@ -52,16 +54,16 @@ describe('RecordingSource', () => {
   });
 
   /** A page that shows each frame at once while `quick`, else when its credit is given by hand. */
-  function playing(): { file: Growing; source: RecordingSource; shown: number[]; page: { quick: boolean } } {
-    const file = new Growing();
-    const shown: number[] = [];
+  function playing(file = new Growing()): { file: Growing; source: RecordingSource; shown: (number | string)[]; page: { quick: boolean } } {
+    const shown: (number | string)[] = [];
     const page = { quick: true };
     const nothing = (): void => undefined;
     const frame = ({ sequence }: { sequence: number }): void => {
       shown.push(sequence);
       if (page.quick) source.credit();
     };
-    const events = { open: nothing, lost: nothing, message: nothing, clock: nothing, nonsense: nothing, frame };
+    const message = (said: { type: string; source?: string }): void => void shown.push(said.source ?? said.type);
+    const events = { open: nothing, lost: nothing, message, clock: nothing, nonsense: nothing, frame };
     const source = new RecordingSource(file as unknown as Recording, events);
     return { file, source, shown, page };
   }
@@ -91,6 +93,17 @@ describe('RecordingSource', () => {
     await vi.advanceTimersByTimeAsync(1000);
     expect(shown).toEqual([0, 1, 2, 3, 4, 5, 6, 7]);
     expect(source.playing).toBe(false);
+  });
+
+  it('says what describes the frames before the first of them, and only where that changes', async () => {
+    const file = new Growing();
+    file.infos = new Map([[0, { source: 'one' }], [kStepMs, { source: 'other' }]]);
+    const { source, shown } = playing(file);
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(shown).toEqual(['one', 0, 'other', 1, 2]);
+    source.seek(0);
+    await vi.advanceTimersByTimeAsync(50);
+    expect(shown.slice(5)).toEqual(['one', 0]);
   });
 
   it.each(['at its end', 'as its last frame is being shown'])('goes on from where somebody jumps to %s', async (when) => {

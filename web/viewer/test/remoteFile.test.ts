@@ -63,6 +63,19 @@ describe('RemoteFile', () => {
     await expect(file.read(0, 4)).rejects.toThrow('changed');
   });
 
+  it('says at once that a token is wanted, where there is one since', async () => {
+    const server = new Server();
+    let asked = 0;
+    const file = await RemoteFile.open(url, async (at, init) => {
+      if (server.etag === '"one"') return server.fetch(at, init);
+      ++asked;
+      return new Response('a token is wanted', { status: 401 });
+    });
+    server.etag = '';
+    await expect(file.read(3 * kBlock, 4)).rejects.toThrow('sign in');
+    expect(asked).toBe(1);
+  });
+
   it('reads on where it has grown, anew only what may have changed', async () => {
     const server = new Server();
     const file = await RemoteFile.open(url, server.fetch);

@@ -12,7 +12,7 @@ import {
   type Calibration,
   type Kind,
 } from './calibration';
-import { resultOf } from './calibrationResult';
+import { isGood, resultOf } from './calibrationResult';
 import { card } from './cards';
 import { Refused } from './look';
 import { text } from './strings';
@@ -20,6 +20,9 @@ import { text } from './strings';
 const say = text.calibration;
 const kEveryMs = 1500;
 const kEveryWhileUnderWayMs = 250;
+
+/** What to do with a result, where there is one. */
+const bestOf = ({ result }: Calibration): 'keep' | 'more' => (result !== null && !isGood(result) ? 'more' : 'keep');
 
 export class CalibrationCard {
   private readonly next = make('p', { className: 'next', id: 'calibration-next' });
@@ -182,7 +185,7 @@ export class CalibrationCard {
   // Whoever has no mouse stays with what is to be done next.
   private moveFocus(told: Calibration, before: Calibration | null, held: HTMLElement | null): void {
     if (told.state === 'watching' && before?.state === 'pausing') this.buttons.take.focus();
-    else if (told.state === 'solved') this.buttons.keep.focus();
+    else if (told.state === 'solved') this.buttons[bestOf(told)].focus();
     else if (held !== null && this.controls.contains(held)) {
       if (told.state === 'off') this.message.focus();
       else if (told.state === 'watching') this.buttons.take.focus({ preventScroll: true });
@@ -216,7 +219,7 @@ export class CalibrationCard {
     calculate.disabled = told.state !== 'watching' || !told.can_calculate;
     calculate.classList.toggle('first', told.enough);
     keep.hidden = more.hidden = told.state !== 'solved';
-    keep.classList.add('first');
+    for (const action of ['keep', 'more'] as const) this.buttons[action].classList.toggle('first', action === bestOf(told));
     this.automatic.row.hidden = !watching || !geometry;
     this.automatic.set(told.automatic);
   }

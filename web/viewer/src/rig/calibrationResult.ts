@@ -20,8 +20,17 @@ function figures(rows: readonly (readonly [key: string, name: string, value: str
   return list;
 }
 
+const paletteOf = ({ colours }: ColourResult) => colours.filter(({ margin }) => margin !== undefined);
+const weakOf = (result: ColourResult) => paletteOf(result).filter(({ margin }) => margin! <= 0);
+const fits = (result: GeometryResult): boolean => result.stereo_rms_px <= kStereoMost_px;
+const isExact = (result: GeometryResult): boolean => result.depth_sigma_mm <= kDepthMost * result.distance_m;
+
+/** Whether it should be kept; else more should be taken. */
+export const isGood = (result: ColourResult | GeometryResult): boolean =>
+  isGeometry(result) ? fits(result) && isExact(result) : weakOf(result).length === 0 && result.residual <= kResidualMost;
+
 function colours(result: ColourResult): HTMLElement[] {
-  const palette = result.colours.filter(({ margin }) => margin !== undefined);
+  const palette = paletteOf(result);
   const rows = palette.map(({ colour, residual, margin }) => {
     const name = make(
       'th',
@@ -32,8 +41,8 @@ function colours(result: ColourResult): HTMLElement[] {
     const value = make('td', { className: margin! <= 0 ? 'bad' : '' }, margin!.toFixed(0));
     return make('tr', {}, name, value, make('td', {}, residual.toFixed(1)));
   });
-  const weak = palette.filter(({ margin }) => margin! <= 0).map(({ colour }) => text.colours[colour] ?? colour);
-  const good = weak.length === 0 && result.residual <= kResidualMost;
+  const weak = weakOf(result).map(({ colour }) => text.colours[colour] ?? colour);
+  const good = isGood(result);
   return [
     make('p', { className: good ? 'used' : 'bad' }, weak.length > 0 ? say.weak(weak) : good ? say.good : say.residualHigh),
     figures([['residual', say.residual, result.residual.toFixed(1), result.residual > kResidualMost]]),
@@ -47,17 +56,15 @@ function colours(result: ColourResult): HTMLElement[] {
 }
 
 function geometry(result: GeometryResult): HTMLElement[] {
-  const fits = result.stereo_rms_px <= kStereoMost_px;
-  const isKnown = result.depth_sigma_mm <= kDepthMost * result.distance_m;
   const views = result.views.map(({ name, used, stereo_rms_px, why }) => {
     const value = make('td', { className: used ? '' : 'bad' }, used ? `${stereo_rms_px!.toFixed(3)} px` : why ?? '');
     return make('tr', {}, make('th', { scope: 'row' }, name), value);
   });
   return [
-    make('p', { className: fits && isKnown ? 'used' : 'bad' }, !fits ? say.stereoHigh : isKnown ? say.good : say.depthOpen),
+    make('p', { className: isGood(result) ? 'used' : 'bad' }, !fits(result) ? say.stereoHigh : isExact(result) ? say.good : say.depthOpen),
     figures([
-      ['stereo', say.stereo, `${result.stereo_rms_px.toFixed(3)} px`, !fits],
-      ['depth', say.depth, `± ${result.depth_sigma_mm.toFixed(1)} mm`, !isKnown],
+      ['stereo', say.stereo, `${result.stereo_rms_px.toFixed(3)} px`, !fits(result)],
+      ['depth', say.depth, `± ${result.depth_sigma_mm.toFixed(1)} mm`, !isExact(result)],
       ['plane', say.plane, `${result.plane_rms_mm.toFixed(2)} mm`],
       ['squares', say.squares, `${result.square_error_mm.toFixed(2)} mm`],
       ['baseline', say.baseline, `${result.baseline_mm.toFixed(1)} mm`],
