@@ -71,6 +71,7 @@ export class CalibrationCard {
     this.views,
   );
   private told: Calibration | null = null;
+  private answers = 0; // to orders; what was asked for before one may say what was before it
   private shownViews = '';
   private shownResult = '';
   private restarted = false; // a server in the middle of a calibration, which is lost
@@ -115,8 +116,10 @@ export class CalibrationCard {
   // Also while the page is hidden: who stands at the rig may look at something else, and what nobody asks
   // about is given up.
   private async follow(): Promise<void> {
+    const { answers } = this;
     try {
-      this.tell(await calibrationNow());
+      const told = await calibrationNow();
+      if (answers === this.answers) this.tell(told);
     } catch (error) {
       if (!(error instanceof Refused)) this.showAway(true);
     }
@@ -150,7 +153,9 @@ export class CalibrationCard {
 
   private async answer(asked: Promise<Calibration>): Promise<void> {
     try {
-      this.tell(await asked);
+      const told = await asked;
+      ++this.answers;
+      this.tell(told);
     } catch (error) {
       setText(this.message, error instanceof Refused ? sentence(error.message) : text.state.lost);
       this.message.hidden = false;

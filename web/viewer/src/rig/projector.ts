@@ -23,6 +23,7 @@ export class ProjectorCard {
   private readonly state = make('p', { id: 'projector-state' });
   private readonly message = make('p', { className: 'quiet', id: 'projector-message' });
   private show: Show = 'pattern';
+  private answers = 0; // to orders; what was asked for before one may say what was before it
   private readonly start = button(
     say.start,
     say.start,
@@ -44,11 +45,12 @@ export class ProjectorCard {
 
   private async follow(): Promise<void> {
     if (!document.hidden) {
+      const { answers } = this;
       const told = await ask('api/projector')
         .then((response) => response.json() as Promise<Projector>)
         .catch(() => null);
-      if (told !== null) this.tell(told);
-      else this.root.hidden = true; // a gateway without a rig
+      if (told !== null && answers === this.answers) this.tell(told);
+      else if (told === null) this.root.hidden = true; // a gateway without a rig
     }
     window.setTimeout(() => void this.follow(), kEveryMs);
   }
@@ -60,7 +62,9 @@ export class ProjectorCard {
         headers: { 'content-type': 'application/json' },
         body: JSON.stringify(order),
       });
-      this.tell((await response.json()) as Projector);
+      const told = (await response.json()) as Projector;
+      ++this.answers;
+      this.tell(told);
     } catch (error) {
       setText(this.message, say.failed(error instanceof Refused ? error.message : text.state.lost));
     }
