@@ -41,6 +41,8 @@ export class StreamsPanel {
   private readonly rows = new Map<string, Row>();
   private readonly recordings = new Map<string, Row>(); // by file
   private recorded = ''; // what the streams' recorders did when the folder was listed
+  private listings = 0; // of the folder, asked for
+  private shownFile: string | null = null;
   private readonly thumbnails = new Thumbnails();
   private isOpen = false;
   private readonly aligner: Aligner | null;
@@ -108,9 +110,14 @@ export class StreamsPanel {
     const recorded = streams.map(({ recorder }) => `${recorder?.file} ${recorder?.state} ${recorder?.message}`).join();
     if (recorded !== this.recorded) void this.listFolder();
     this.recorded = recorded;
+    this.shownFile = shown;
+    this.markRecording();
+  }
+
+  private markRecording(): void {
     for (const [file, { item, show }] of this.recordings) {
-      item.classList.toggle('shown', file === shown);
-      show.setAttribute('aria-pressed', String(file === shown));
+      item.classList.toggle('shown', file === this.shownFile);
+      show.setAttribute('aria-pressed', String(file === this.shownFile));
     }
   }
 
@@ -143,9 +150,11 @@ export class StreamsPanel {
 
   // Where the server records into a folder.
   private async listFolder(): Promise<void> {
+    const listing = ++this.listings;
     const response = await fetch(new URL('api/recordings', document.baseURI), { cache: 'no-store' }).catch(() => null);
     if (response?.ok !== true) return;
     const { recordings } = (await response.json()) as { recordings: ListedRecording[] };
+    if (listing !== this.listings) return; // asked for again since: what comes then is newer
     this.folderTitle.hidden = recordings.length === 0;
     this.folder.replaceChildren();
     this.recordings.clear();
@@ -158,6 +167,7 @@ export class StreamsPanel {
       this.recordings.set(file, row);
       this.thumbnails.ask({ name: file, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
     }
+    this.markRecording();
   }
 }
 
