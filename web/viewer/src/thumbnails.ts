@@ -8,11 +8,13 @@ import type { SourceEvents } from './source';
 
 export const kThumbnail = { width: 88, height: 66 }; // pixels of the page
 const kPatienceMs = 5000; // with a stream that sends nothing
+const kTries = 3; // of a recording, each twice as long, behind the others: a slow page may need it
 
 interface Job {
   name: string;
   recording: string | null;
   onto: HTMLCanvasElement;
+  tries?: number; // in vain
 }
 
 export class Thumbnails {
@@ -44,8 +46,8 @@ export class Thumbnails {
       unusable: () => this.stop(),
     }));
     window.clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => this.next(), kPatienceMs);
-    const { name, recording } = job;
+    const { name, recording, tries = 0 } = job;
+    this.timer = window.setTimeout(() => this.giveUp({ ...job, tries: tries + 1 }), kPatienceMs * 2 ** tries);
     const opened = recording === null ? null : await openRemote(new URL(recording, document.baseURI)).catch(() => null);
     if (this.jobs[0] !== job) return;
     session.watch(opened === null ? (events) => pictureAlone(name, events) : opened.source);
@@ -57,6 +59,11 @@ export class Thumbnails {
     if (frame === null || job === undefined) return;
     if (frame.texture !== null) drawThumbnail(frame.texture, job.onto);
     closePictures(frame);
+    this.next();
+  }
+
+  private giveUp(job: Job): void {
+    if (job.recording !== null && job.tries! < kTries && job.onto.isConnected) this.jobs.push(job);
     this.next();
   }
 
