@@ -26,6 +26,11 @@ export class Feeder {
   say(line) {
     this.process.stdin.write(`${line}\n`);
   }
+  /** The frame of this number, and none behind it; resolves when the page shows it. */
+  async standStill(page, number) {
+    this.say(`frame ${number}`);
+    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, number);
+  }
   async kill() {
     if (this.process.exitCode !== null || this.process.signalCode !== null) return;
     const ended = new Promise((resolve) => this.process.once('exit', resolve));
@@ -97,12 +102,13 @@ export const shownPast = (page, count) =>
   page.waitForFunction((least) => window.relievo?.diagnostics().shown >= least, count);
 /** Until nothing is drawn any more: what was under way has arrived, and no motion is left. */
 export async function still(page) {
+  const now = () => page.evaluate(() => window.relievo.diagnostics());
   await eventually('the picture does not come to rest', async () => {
-    const before = await look(page);
+    const before = await now();
     if (before.busy) return false;
     await page.waitForTimeout(700);
-    const after = await look(page);
-    return !after.busy && after.drawn === before.drawn;
+    const after = await now();
+    return !after.busy && after.drawn === before.drawn && after.received === before.received;
   });
 }
 
@@ -111,6 +117,31 @@ export const kPlaces = [[0.1, 0.15], [0.9, 0.2], [0.15, 0.85], [0.5, 0.5], [0.4,
 
 export const pick = (page, { x, y }) => page.evaluate(([px, py]) => window.relievo.pick(px, py), [x, y]);
 export const toPage = (page, point) => page.evaluate((p) => window.relievo.toPage(p), point);
+/** What is picked, and the colour, where a point of the rig camera's frame is drawn: of one moment, whatever moves. */
+export const pickAt = (page, point) =>
+  page.evaluate((p) => {
+    const { x, y } = window.relievo.toPage(p);
+    return window.relievo.pick(x, y);
+  }, point);
+export const colourAt = (page, point) =>
+  page.evaluate((p) => {
+    const { x, y } = window.relievo.toPage(p);
+    return window.relievo.pixelAt(x, y);
+  }, point);
+/**
+ * Where such a point is on the page once it stays there, also while a stream goes on: a panel that opens, or a line more
+ * below, moves it some drawings later.
+ */
+export const restingPlace = (page, point) =>
+  page.evaluate(async (p) => {
+    for (let [before, same] = [null, 0]; ; ) {
+      const now = window.relievo.toPage(p);
+      same = before !== null && Math.hypot(now.x - before.x, now.y - before.y) < 0.01 ? same + 1 : 0;
+      if (same === 5) return now;
+      before = now;
+      await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve, 20)));
+    }
+  }, point);
 export async function press(page, key) {
   await page.keyboard.press(key);
   await still(page);

@@ -40,13 +40,18 @@ export class Companions {
     return told;
   }
 
+  /** Whether a frame of one that has come is on its way to the screen. */
+  get isBusy(): boolean {
+    return [...this.shown.values()].some(({ session }) => session.isBusy);
+  }
+
   /** For tests and bug reports. */
   report(): object[] {
     return [...this.shown].map(([name, { session, beside }]) => {
       const { shown, errors, frame } = session.meter.report();
       const { index = null, following = null, times = null } = session.source?.playback ?? {};
       const pose = this.view.poseOf(name);
-      return { name, word: beside.word, shown, errors, frame, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following, frames: times?.length ?? null };
+      return { name, word: beside.word, shown, errors, frame, busy: session.isBusy, pose, right: pose?.translation[0] ?? 0, extent: beside.extent, index, following, frames: times?.length ?? null };
     });
   }
 

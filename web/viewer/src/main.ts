@@ -192,7 +192,7 @@ class Viewer {
       way: this.view?.navigator.way,
       cameraPicture: this.view?.navigator.picture, // where it lies on the page
       drawn: this.view?.drawn,
-      busy: this.view?.isBusy,
+      busy: this.view?.isBusy === true || this.session.isBusy || this.companions?.isBusy === true,
       scale: this.view?.movingScale,
       depthRange: this.view?.depthRange,
       gridStep: this.view?.gridStep,

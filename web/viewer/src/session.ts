@@ -60,6 +60,11 @@ export class Session {
     document.removeEventListener('visibilitychange', this.pause);
   }
 
+  /** Whether a frame that has come is on its way to the screen. */
+  get isBusy(): boolean {
+    return this.underway.size > 0 || this.waiting !== null;
+  }
+
   /** What is known of its source. */
   get facts(): Omit<Facts, 'problem' | 'stream' | 'hint'> {
     const { source, info, status } = this;
