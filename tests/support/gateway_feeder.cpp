@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A gateway with a synthetic moving surface, for the browser test: what it serves is encoded by the real
-// codec. Prints "listening PORT" and obeys lines on stdin: start NAME, also NAME (a second stream of the
-// same frames), apart N (its frames are N ahead of the first one's), stop, frame NUMBER (that one, then
-// stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264 with a key frame every
-// 8th), rig RMS SCALE (how good the first one's is found to be, which it says from then on), place NAME ANGLE
-// X Y Z (where that stream's camera stands in a frame of all: turned about y by radians, metres), sigmas
-// METRES... (of the depths, in as many bands from left to right; the lower half is interpolated). Ends when
-// stdin does, so that no test leaves it behind.
+// codec. Prints "listening PORT" and obeys lines on stdin: announce NAME (without a frame), start NAME, also
+// NAME (a second stream of the same frames), apart N (its frames are N ahead of the first one's), stop, frame
+// NUMBER (that one, then stop), corrupt (one frame), status STATE TEXT, gone, texture NAME (of a codec; h264
+// with a key frame every 8th), rig RMS SCALE (how good the first one's is found to be, which it says from
+// then on), place NAME ANGLE X Y Z (where that stream's camera stands in a frame of all: turned about y by
+// radians, metres), sigmas METRES... (of the depths, in as many bands from left to right; the lower half is
+// interpolated). Ends when stdin does, so that no test leaves it behind.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -146,10 +146,11 @@ void read_orders(Orders& orders) {
     std::string verb, name;
     words >> verb;
     const std::lock_guard lock(orders.mutex);
-    if (verb == "start") {
+    if (verb == "announce" || verb == "start") {
       words >> name;
       orders.stream = name;
-      orders.announce = orders.feeding = true;
+      orders.announce = true;
+      orders.feeding = verb == "start";
     } else if (verb == "also") {
       words >> orders.also;
       orders.announce = true;
