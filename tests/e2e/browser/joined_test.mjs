@@ -10,6 +10,7 @@ import { basename, join } from 'node:path';
 import { launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, runChecks } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
+import { seek } from './timeline.mjs';
 
 const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
 const kFrames = [9, 6];
@@ -53,11 +54,7 @@ async function depthsOf(page, file, expected) {
   assert.equal(times.length, expected.length);
   const depths = [];
   for (const [i, number] of expected.entries()) {
-    await page.evaluate((ms) => {
-      const slider = document.querySelector('#timeline input[type=range]');
-      slider.value = String(ms);
-      slider.dispatchEvent(new Event('input', { bubbles: true }));
-    }, times[i] + 1e-3);
+    await seek(page, i);
     await page.waitForFunction(
       ([index, wanted]) => window.relievo.diagnostics().playback.index === index && window.relievo.surface()?.number === wanted,
       [i, number],

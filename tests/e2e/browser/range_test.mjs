@@ -12,6 +12,7 @@ import { eventually, launchChromium } from './chromium.mjs';
 import { inState, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
+import { seek } from './timeline.mjs';
 import { startWeb } from './web.mjs';
 
 const [serverPath, relievoPath, h264] = process.argv.slice(2);
@@ -53,12 +54,7 @@ async function setRange(page, first, last) {
   await page.focus('#view');
   await page.waitForFunction(() => window.relievo.diagnostics().playback?.playing === false);
   for (const [index, key] of [[first, '['], [last, ']']]) {
-    await page.evaluate((i) => {
-      const { times, first: begin } = window.relievo.diagnostics().playback;
-      const slider = document.querySelector('#timeline input[type=range]');
-      slider.value = String(times[i - begin] + 1e-3);
-      slider.dispatchEvent(new Event('input', { bubbles: true }));
-    }, index);
+    await seek(page, index);
     await eventually(`not at frame ${index}`, async () => (await playback(page)).index === index);
     await page.keyboard.press(key);
   }
@@ -74,7 +70,7 @@ async function take(page, name) {
   await file.saveAs(path);
   return { path, name: file.suggestedFilename() };
 }
-const said = (page) => page.textContent('#panel-take [role=status]');
+const says = (page, words) => page.waitForFunction((of) => new RegExp(of).test(document.querySelector('#panel-take [role=status]')?.textContent), words.source);
 async function openRecorded(page, file) {
   await page.setInputFiles('#file', file);
   await page.waitForFunction((name) => window.relievo.diagnostics().file === name, basename(file)); // no longer another
@@ -106,7 +102,7 @@ const checks = {
     assert.equal(told.damaged_parts + told.unreadable, 0);
     assert.deepEqual(told.info, info(recorded).info);
     assertPart(path, whole, [key, key + 2, key + 3, key + 4, key + 5, key + 6, key + 7].map((i) => numbers[i]));
-    assert.match(await said(page), /^relievo-object\.mcap: 7 frames, [\d.]+ MB$/);
+    await says(page, /^relievo-object\.mcap: 7 frames, [\d.]+ MB$/);
   },
 
   async 'as PLY and GLB, a file a frame'(page) {
@@ -147,7 +143,7 @@ const checks = {
           [...document.querySelectorAll('#range button')].find((b) => b.textContent === 'GLBs').click();
         }),
     );
-    await page.waitForFunction(() => /^Cancelled/.test(document.querySelector('#panel-take [role=status]')?.textContent));
+    await says(page, /^Cancelled/);
     await page.waitForTimeout(500);
     assert.equal(downloads, 0, 'a file all the same');
     const { path } = await take(page, 'MCAP');

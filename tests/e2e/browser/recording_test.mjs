@@ -10,7 +10,7 @@ import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { Feeder, inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
-import { marksAt, pointAt } from './timeline.mjs';
+import { marksAt, pointAt, seek } from './timeline.mjs';
 import { startWeb } from './web.mjs';
 
 const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
@@ -35,14 +35,6 @@ const shownSurface = (page) => page.evaluate(() => window.relievo.surface());
 // A page decodes its first frames in TypeScript, until the WebAssembly is there, which rounds elsewhere.
 const assertSame = (now, { depth }, what) => assert.ok(Math.abs(now.depth - depth) < 1e-6 * depth, `${what}: ${now.depth}, not ${depth}`);
 const onFrame = (page, number) => page.waitForFunction((n) => window.relievo.diagnostics().frame === n, number);
-async function seek(page, index) {
-  const { times } = await playback(page);
-  await page.evaluate((ms) => {
-    const slider = document.querySelector('#timeline input[type=range]');
-    slider.value = String(ms);
-    slider.dispatchEvent(new Event('input', { bubbles: true }));
-  }, times[index] + 1e-3);
-}
 
 /** Gathers what a page sends from here on: requests with a body, and more over a socket than words. */
 async function sentBy(page) {
@@ -118,6 +110,7 @@ const checks = {
       assertSame(await shownSurface(page), surfaces.get(numbers[index]), `frame ${index}, key: ${keys[index]}`);
     }
     await page.keyboard.press(',');
+    await still(page);
     assert.equal((await playback(page)).index, 0);
     assert.equal((await look(page)).errors, 0);
   },
@@ -138,7 +131,7 @@ const checks = {
     assert.equal(new Set(pictures.values()).size, 3, 'the pictures are all alike');
     assert.equal((await playback(page)).index, 2, 'looking is no seeking');
     await page.mouse.move(300, 200);
-    assert.equal(await page.isVisible('.preview'), false);
+    await page.waitForSelector('.preview', { state: 'hidden' });
   },
 
   async 'a range is repeated, at another speed'(page) {
@@ -246,8 +239,8 @@ const checks = {
   async 'what is said of them is put away though it moves while it is clicked'(page) {
     await page.setInputFiles('#file', { name: 'none.mcap', mimeType: 'application/octet-stream', buffer: Buffer.from('none') });
     await page.waitForFunction(() => document.querySelector('#card-title')?.textContent.includes('none.mcap'));
-    const { x, y, width, height } = await page.locator('#dismiss').boundingBox();
-    await page.mouse.move(x + width / 2, y + height / 2);
+    await page.hover('#dismiss'); // once it does not move any more
+    const { y, height } = await page.locator('#dismiss').boundingBox();
     await page.mouse.down();
     await page.evaluate(() => (document.querySelector('#card').style.marginBottom = '90px')); // as a line more below does
     assert.ok((await page.locator('#dismiss').boundingBox()).y + height < y);
@@ -287,7 +280,7 @@ const checks = {
     await probe.goto(`http://127.0.0.1:${feeder.port}/`);
     const seen = await sentBy(probe);
     await probe.evaluate(() => fetch('api/streams', { method: 'POST', body: 'of a file' }).catch(() => null));
-    assert.match(seen.join(), /^POST .*api.streams$/);
+    await eventually(() => `not seen, but ${seen}`, () => /^POST .*api.streams$/.test(seen.join()));
     await probe.close();
   },
 
@@ -316,7 +309,7 @@ const checks = {
     release();
     await answered;
     feeder.say('gone');
-    await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');
+    await page.waitForFunction(() => /left the network/.test(document.querySelector('#card-text')?.textContent));
     await page.waitForTimeout(3000); // for what should not happen: the list comes each second or two
     assert.equal((await look(page)).stream, 'ball');
     await page.close();

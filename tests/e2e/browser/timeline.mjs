@@ -4,9 +4,21 @@ import { eventually } from './chromium.mjs';
 
 const kAgainMs = 5000; // a picture that a busy machine decodes too late is tried again with the next move
 
+/** Goes to the frame of this index, as a hand on the slider does, which is as long as what is there: new frames come to it later. */
+export const seek = (page, index) =>
+  page.waitForFunction((i) => {
+    const { times, first } = window.relievo.diagnostics().playback;
+    const slider = document.querySelector('#timeline input[type=range]');
+    const at = times[i - first];
+    if (!(at >= Number(slider.min) && at <= Number(slider.max))) return false;
+    slider.value = String(Math.min(at + 1e-3, Number(slider.max)));
+    slider.dispatchEvent(new Event('input', { bubbles: true }));
+    return true;
+  }, index);
+
 /**
  * Points at the frame of this index, and waits for the picture of it, or of the nearest one before that is
- * kept apart.
+ * kept apart: of many frames not each has its own. `index` of what is returned says which it is.
  */
 export async function pointAt(page, index) {
   let at = -1;
@@ -24,7 +36,7 @@ export async function pointAt(page, index) {
         again = Date.now() + kAgainMs;
       }
       last = await seen();
-      return last.index === String(index);
+      return last.index === String(place.pictured);
     },
   );
   return page.evaluate(() => {
@@ -38,6 +50,7 @@ export async function pointAt(page, index) {
     }
     const n = data.length / 4;
     return {
+      index: Number(canvas.dataset.index),
       frame: Number(canvas.dataset.frame),
       width: canvas.clientWidth,
       height: canvas.clientHeight,
@@ -81,6 +94,7 @@ const placeOf = (page, index) =>
     const { times, first } = window.relievo.diagnostics().playback;
     const { left, top, width, height } = document.querySelector('#timeline .track').getBoundingClientRect();
     const inset = 8;
+    const apart = Math.max(1, Math.floor((times.length * 6) / width)); // a picture each 6 pixels
     const share = (times[i - first] + 1e-3 - times[0]) / (times[times.length - 1] - times[0]);
-    return { x: left + inset + share * (width - 2 * inset) + 0.6, y: top + height / 2 };
+    return { x: left + inset + share * (width - 2 * inset) + 0.6, y: top + height / 2, pictured: Math.max(first, i - (i % apart)) };
   }, index);
