@@ -6,7 +6,7 @@
 // Run as: node access_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
-import { Feeder, inState, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, inState, look, pagesOf, pointOf, restingPlace, runChecks, shownPast, still } from './feeder.mjs';
 
 const [feederPath] = process.argv.slice(2);
 const feeder = await Feeder.start(feederPath);
@@ -37,6 +37,7 @@ const checks = {
       await page.keyboard.press(key);
       await page.waitForSelector(`#panel-${name}`, { state: 'visible' });
       assert.equal(await page.getAttribute(`#tool-${name}`, 'aria-expanded'), 'true');
+      await page.waitForSelector(`#panel-${name} .body > *`, { state: 'attached' }); // what is in it may be loaded only now
       assert.deepEqual((await nameless(page)).without, [], name);
       await page.keyboard.press('Escape');
       await page.waitForSelector(`#panel-${name}`, { state: 'hidden' });
@@ -101,12 +102,11 @@ const checks = {
     await page.focus('#view');
     await page.keyboard.press('l'); // wherever the check before left it
     await inState(page, 'live');
-    feeder.say(`frame ${kFrame}`);
-    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+    await feeder.standStill(page, kFrame);
     await page.keyboard.press('m');
     await page.click('#panel-measure .segments button:text-is("Point")');
     await still(page);
-    const at = await page.evaluate((p) => window.relievo.toPage(p), pointOf(0.15, 0.2, kFrame));
+    const at = await restingPlace(page, pointOf(0.15, 0.2, kFrame));
     await page.mouse.click(at.x, at.y);
     await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 1);
     const { value } = (await look(page)).measurements[0];
@@ -124,18 +124,18 @@ const checks = {
     await shownPast(page, 2);
     await page.keyboard.press('n');
     await page.keyboard.press('7');
-    await page.waitForSelector('#legend canvas');
-    await page.waitForSelector('.streams [aria-pressed=true]'); // the list is asked for as its panel opens
-    const { chosen, others, kept } = await page.evaluate(() => {
+    const pressed = ['#modes [aria-pressed=true]', '#ways [aria-pressed=true]', '#tool-streams[aria-expanded=true]', '.streams [aria-pressed=true]', '#follow[aria-pressed=true]'];
+    const swatches = ['#badge i', '#legend canvas', '#legend i'];
+    // The list is asked for as its panel opens, and the time line comes with its second frame.
+    await page.waitForFunction((all) => all.every((of) => document.querySelector(of) !== null), [...pressed, ...swatches]);
+    const { chosen, others, kept } = await page.evaluate(([on, coloured]) => {
       const ground = (of) => getComputedStyle(document.querySelector(of)).backgroundColor;
-      const pressed = ['#modes [aria-pressed=true]', '#ways [aria-pressed=true]', '#tool-streams', '.streams [aria-pressed=true]', '#follow'];
-      const swatches = ['#badge i', '#legend canvas', '#legend i'];
       return {
-        chosen: pressed.map(ground),
+        chosen: on.map(ground),
         others: ['#modes [aria-pressed=false]', '#tool-measure'].map(ground),
-        kept: swatches.map((of) => getComputedStyle(document.querySelector(of)).forcedColorAdjust),
+        kept: coloured.map((of) => getComputedStyle(document.querySelector(of)).forcedColorAdjust),
       };
-    });
+    }, [pressed, swatches]);
     assert.equal(new Set(chosen).size, 1, `${chosen}`);
     assert.ok(!others.includes(chosen[0]), `${chosen[0]} is that of ${others}, too`);
     assert.ok(kept.every((adjust) => adjust === 'none'), `${kept}`);
@@ -150,9 +150,8 @@ const checks = {
       await shownPast(page, 2);
       await page.keyboard.press('6');
       await page.keyboard.press('x');
-      await page.waitForSelector('#recording', { state: 'visible' });
-      await page.waitForTimeout(300); // parts follow the header
-      const { cut, over } = await page.evaluate(() => {
+      for (const part of ['#recording', '#legend', '#timeline']) await page.waitForSelector(part, { state: 'visible' });
+      const wrong = () => page.evaluate(() => {
         const box = (e) => e.getBoundingClientRect();
         const parts = [...document.querySelectorAll('header > *, footer > *, #rail, #legend')].filter((e) => e.getClientRects().length > 0);
         const name = (e) => e.id || e.tagName;
@@ -162,7 +161,11 @@ const checks = {
           over: parts.flatMap((a, i) => parts.slice(i + 1).filter((b) => overlap(box(a), box(b))).map((b) => `${name(a)}, ${name(b)}`)),
         };
       });
-      assert.deepEqual([cut, over], [[], []], `${width}x${height}`);
+      let found;
+      await eventually(() => `${width}x${height}: ${JSON.stringify(found)}`, async () => {
+        found = await wrong(); // parts follow the header
+        return found.cut.length + found.over.length === 0;
+      });
       await page.close();
     }
   },

@@ -140,7 +140,7 @@ const checks = {
           await viewerSays(server, /not calibrated/);
           await choose(page, 'colour');
           assert.match(await page.textContent('#calibration-next'), /white sheet/);
-          assert.equal(await page.isVisible('#pictures'), false, 'what the stream shows is paused');
+          await page.waitForSelector('#pictures', { state: 'hidden' }); // what the stream shows is paused
           await eventually('the projector shows no colours', () => screen.seen().coloured > 0.9 || screen.seen().white > 0.9);
           await shot(page, 'colour');
           await press(page, 'take');
@@ -157,7 +157,7 @@ const checks = {
           await choose(page, 'geometry');
           assert.equal(await page.isDisabled('#calibration [data-action=calculate]'), true);
           await press(page, 'take');
-          await page.waitForSelector('#calibration-views [data-used=true]');
+          await page.waitForSelector('#calibration-views [data-used=true]', kLong);
           assert.match(await page.textContent('#calibration-views li'), /35 corners/);
           await page.waitForFunction(() => /hold the board/.test(document.querySelector('#calibration-next')?.textContent));
           await eventually('the projector shows no stripes', () => screen.seen().coloured > 0.9);
@@ -228,20 +228,22 @@ const checks = {
       assert.match(await page.textContent('#calibration-message'), /does not answer/);
       await page.waitForFunction(() => document.body.dataset.state === 'bad');
       await shot(page, 'away');
-      const asked = await page.evaluate(async () => {
+      const { asked, seconds } = await page.evaluate(async () => {
         performance.clearResourceTimings();
+        const begin = performance.now();
         await new Promise((resolve) => setTimeout(resolve, 3000));
-        return performance.getEntriesByType('resource').length;
+        return { asked: performance.getEntriesByType('resource').length, seconds: (performance.now() - begin) / 1000 };
       });
-      assert.ok(asked <= 8, `asked ${asked} times in 3 s`); // of the calibration, the projector and for streams
+      assert.ok(asked <= (8 / 3) * seconds, `asked ${asked} times in ${seconds} s`); // of the calibration, the projector and for streams
       complaints.length = 0; // of the server that is not there
       const again = await Server.run(serverPath, ['serve', '--stream', 'rig', '--rig', rig, '--source', kSource, '--web', new URL(server.address).host]);
       try {
         await reaches(page, 'off');
         assert.match(await page.textContent('#calibration-message'), /was restarted: the calibration was lost/);
-        const { top } = await page.locator('#calibration-message').evaluate((message) => message.getBoundingClientRect());
-        assert.ok(top > 0 && top < 780, `it is said at ${top} px, out of sight`);
-        assert.equal(await page.isVisible('#calibration[inert]'), false);
+        await page.waitForFunction(() => {
+          const { top } = document.querySelector('#calibration-message').getBoundingClientRect();
+          return top > 0 && top < 780 && !document.querySelector('#calibration').inert; // in sight
+        });
         await page.waitForFunction(() => document.body.dataset.state === 'live');
         assert.match(await page.textContent('#calibration-message'), /was restarted/, 'said for a moment alone');
         await shot(page, 'restarted');
@@ -260,7 +262,7 @@ const checks = {
       const page = await open(server.address);
       await choose(page, 'colour');
       await press(page, 'take');
-      await page.waitForSelector('#calibration-views [data-used=false]');
+      await page.waitForSelector('#calibration-views [data-used=false]', kLong);
       assert.match(await page.textContent('#calibration-views li'), /exposure/);
       await shot(page, 'not-used');
       assert.equal((await order(server, { action: 'start', stream: 'rig', kind: 'colour' })).status, 409, 'a second one');
@@ -357,7 +359,7 @@ const checks = {
       await reaches(page, 'watching');
       assert.equal((await state(server)).board, kCharuco);
       await press(page, 'take');
-      await page.waitForSelector('#calibration-views li');
+      await page.waitForSelector('#calibration-views [data-used=true]', kLong);
       assert.match(await page.textContent('#calibration-views [data-used=true]'), /24 corners/);
       await shot(page, 'charuco');
       await page.check('#calibration input[type=checkbox]');
@@ -419,12 +421,12 @@ const checks = {
         const page = await open(server.address, { viewport: { width: 390, height: 844 }, colorScheme });
         await choose(page, 'geometry');
         await press(page, 'take');
-        await page.waitForSelector('#calibration-views li');
+        await page.waitForSelector('#calibration-views li', kLong);
         const wide = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
         assert.ok(wide <= 0, `${wide} px beside the screen`);
         const { bottom } = await page.locator('#calibration [data-action=take]').evaluate((b) => b.getBoundingClientRect());
         assert.ok(bottom <= 844, 'the button is below the screen');
-        await page.waitForSelector('#tilts [data-side=lower]');
+        await page.waitForSelector('#tilts [data-side=lower]', kLong);
         const small = await page.$$eval('#seen :is(span, figcaption, li)', (words) => words.map((w) => parseFloat(getComputedStyle(w).fontSize)).filter((px) => px < 12));
         assert.deepEqual(small, [], 'words that cannot be read');
         const { seen } = await page.evaluate(() => ({ seen: getComputedStyle(document.querySelector('#coverage')).filter }));

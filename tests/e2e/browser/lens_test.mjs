@@ -42,17 +42,23 @@ const checks = {
     const { cameraPicture } = await look(page);
     const scale = cameraPicture.width / camera.width;
     const off = { lens: [], straight: [] };
+    const places = [];
     for (let row = 6; row < camera.height - 6; row += 11) {
       for (let column = 6; column < camera.width - 6; column += 11) {
         const [x, y] = bent(column, row);
         if (Math.hypot(x - column, y - row) < 2) continue; // the two lenses hardly differ there
-        const at = [cameraPicture.x + (column + 0.5) * scale, cameraPicture.y + (row + 0.5) * scale];
-        const [r, g, b, alpha] = await page.evaluate(([px, py]) => window.relievo.pixelAt(px, py), at);
-        if (alpha < 255) continue;
-        const away = (rgb) => Math.hypot(...[r, g, b].map((c, i) => c - rgb[i]));
-        off.lens.push(away(seenAt(column, row)));
-        off.straight.push(away(seenAt(x, y)));
+        places.push({ at: [cameraPicture.x + (column + 0.5) * scale, cameraPicture.y + (row + 0.5) * scale], lens: seenAt(column, row), straight: seenAt(x, y) });
       }
+    }
+    const colours = await page.evaluate(async (all) => {
+      const found = [];
+      for (const at of all) found.push(await window.relievo.pixelAt(...at));
+      return found;
+    }, places.map(({ at }) => at));
+    for (const [i, [r, g, b, alpha]] of colours.entries()) {
+      if (alpha < 255) continue;
+      const away = (rgb) => Math.hypot(...[r, g, b].map((c, channel) => c - rgb[channel]));
+      for (const of of ['lens', 'straight']) off[of].push(away(places[i][of]));
     }
     const mean = (values) => values.reduce((sum, v) => sum + v, 0) / values.length;
     console.log(`      ${off.lens.length} places: off by ${mean(off.lens).toFixed(2)} levels, as a straight lens would see them by ${mean(off.straight).toFixed(2)}`);

@@ -7,8 +7,8 @@ import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { eventually, launchChromium } from './chromium.mjs';
-import { Feeder, isRim, loaded, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { eventually, kLongPatienceMs, launchChromium } from './chromium.mjs';
+import { Feeder, isRim, loaded, look, pagesOf, pointOf, restingPlace, runChecks, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
 import { startWeb } from './web.mjs';
@@ -17,12 +17,13 @@ const [feederPath, serverPath, relievoPath] = process.argv.slice(2);
 const feeder = await Feeder.start(feederPath);
 const browser = await launchChromium();
 const complaints = [];
+const kFrame = 62; // the ball is in the middle
 const kPage = { viewport: { width: 1600, height: 800 } }; // the panel covers nothing that is measured
 const kLargePage = { viewport: { width: 2400, height: 1200 } }; // nor the time line of so wide a picture
 const { open } = pagesOf(browser, `http://127.0.0.1:${feeder.port}`, complaints);
 
 const click = async (page, point) => {
-  const at = await page.evaluate((p) => window.relievo.toPage(p), point);
+  const at = await restingPlace(page, point);
   await page.mouse.click(at.x, at.y);
 };
 const choose = (page, tool) => page.click(`#panel-measure .segments button:text-is("${tool}")`);
@@ -45,7 +46,7 @@ const onFeeder = {
   async 'distances and angles are true'(page) {
     feeder.say('start ball');
     await shownPast(page, 2);
-    feeder.say('stop'); // one surface from here on
+    await feeder.standStill(page, kFrame); // one surface from here on
     await still(page);
     await page.keyboard.press('c');
     await page.keyboard.press('m');
@@ -85,12 +86,13 @@ const onFeeder = {
 
   async 'what the rig itself is wrong by is in it'(page) {
     feeder.say('rig 0.4 0.01');
-    const read = () => page.textContent('#cursor');
-    for (let i = 0; i < 100 && !/±/.test(await read()); ++i) {
-      await page.mouse.move(750 + (i % 2), 400); // which reads again
-      await page.waitForTimeout(50);
-    }
-    assert.match(await read(), /depth [\d.]+ ± [\d.]+ mm/);
+    let said;
+    let i = 0;
+    await eventually(() => `under the cursor is ${said}`, async () => {
+      await page.mouse.move(750 + (++i % 2), 400); // which reads again
+      said = await page.textContent('#cursor');
+      return /depth [\d.]+ ± [\d.]+ mm/.test(said);
+    });
     const { frame } = await look(page);
     const m = await measure(page, 'Distance', [pointOf(0.2, 0.2, frame), pointOf(0.52, 0.55, frame)]);
     assert.equal(m.surface, null);
@@ -100,6 +102,7 @@ const onFeeder = {
     near(rig, Math.hypot((depth * depth * 0.4) / (800 * 0.2), 0.01 * depth), 0.03 * rig, 'of depth');
     assert.match(await page.textContent('#panel-measure'), /of the rig as its calibration found it/);
     await page.click('#panel-measure button:text-is("Clear")');
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 0);
   },
 
   async 'a drag measures nothing, a miss says so'(page) {
@@ -146,11 +149,11 @@ const onServer = {
   },
 
   async 'the readout under the cursor says depth and deviation'(page) {
-    const at = await page.evaluate((p) => window.relievo.toPage(p), onCube(0, 0));
+    const at = await restingPlace(page, onCube(0, 0));
     await page.mouse.move(at.x, at.y);
-    await page.waitForFunction(() => /depth [\d.]+ ± [\d.]+ mm/.test(document.querySelector('#cursor')?.textContent));
+    const said = await page.waitForFunction(() => /depth ([\d.]+) ± [\d.]+ mm/.exec(document.querySelector('#cursor')?.textContent)?.[1]);
     assert.match(await page.textContent('#panel-measure'), /±: one standard deviation.*calibration adds its own/);
-    const depth = Number(/depth ([\d.]+)/.exec(await page.textContent('#cursor'))[1]);
+    const depth = Number(await said.jsonValue());
     near(depth, onCube(0, 0)[2] * 1000, 1, 'depth under the cursor');
   },
 };
@@ -173,7 +176,7 @@ const kFarTop = [['frontRightTop', 'backRightTop'], ['backRightTop', 'backRightB
 async function clickCorners(page, from, to) {
   const count = (await look(page)).measurements.length;
   for (const [i, corner] of [kCorners[from], kCorners[to]].entries()) {
-    const at = await page.evaluate((p) => window.relievo.toPage(p), corner);
+    const at = await restingPlace(page, corner);
     await page.mouse.click(at.x + (i === 0 ? -4 : 3), at.y + 3);
   }
   await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count).catch(async () => assert.fail(`${from} to ${to}: ${await page.textContent('#panel-measure')}`));
@@ -196,7 +199,7 @@ async function beginMeasuring(page) {
   await page.keyboard.press('c');
   await page.keyboard.press('m');
   await choose(page, 'Distance');
-  await page.waitForFunction(() => window.relievo.diagnostics().shown > 4); // with its standard deviations
+  await shownPast(page, (await look(page)).shown + 3); // with its standard deviations
 }
 
 const corners = {
@@ -212,16 +215,14 @@ const corners = {
   async 'a point on an edge is on it, and Alt leaves a click where it is'(page) {
     await choose(page, 'Point');
     const place = onCube(-0.02, kEdge - 0.002);
-    const at = await page.evaluate((p) => window.relievo.toPage(p), place);
-    await page.mouse.click(at.x, at.y);
+    await click(page, place);
     await page.waitForFunction(() => window.relievo.diagnostics().measurements.at(-1)?.tool === 'point');
     const [edge] = (await look(page)).measurements.at(-1).spots;
     assert.equal(edge.kind, 'edge');
     near(edge.point[1], onCube(0, kEdge)[1], 0.0004, 'height of the lower edge');
     const count = (await look(page)).measurements.length;
-    const inside = await page.evaluate((p) => window.relievo.toPage(p), onCube(-0.02, kEdge - 0.006));
     await page.keyboard.down('Alt');
-    await page.mouse.click(inside.x, inside.y);
+    await click(page, onCube(-0.02, kEdge - 0.006));
     await page.keyboard.up('Alt');
     await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count);
     const [free] = (await look(page)).measurements.at(-1).spots;
@@ -230,10 +231,10 @@ const corners = {
   },
 
   async 'what a click would be on is shown before'(page) {
-    const at = await page.evaluate((p) => window.relievo.toPage(p), kCorners.frontRightTop);
+    const at = await restingPlace(page, kCorners.frontRightTop);
     await page.mouse.move(at.x + 3, at.y + 3);
     await page.waitForFunction(() => /^corner · depth/.test(document.querySelector('#cursor')?.textContent));
-    const middle = await page.evaluate((p) => window.relievo.toPage(p), onCube(0, 0));
+    const middle = await restingPlace(page, onCube(0, 0));
     await page.mouse.move(middle.x, middle.y);
     await page.waitForFunction(() => /^depth/.test(document.querySelector('#cursor')?.textContent));
   },
@@ -242,8 +243,7 @@ const corners = {
     const snapping = page.getByLabel('Snap to edges and corners');
     await snapping.uncheck();
     const count = (await look(page)).measurements.length;
-    const at = await page.evaluate((p) => window.relievo.toPage(p), onCube(0.04, 0.03));
-    await page.mouse.click(at.x, at.y);
+    await click(page, onCube(0.04, 0.03));
     await page.waitForFunction((n) => window.relievo.diagnostics().measurements.length > n, count);
     assert.equal((await look(page)).measurements.at(-1).spots[0].kind, 'surface');
     await page.reload();
@@ -293,7 +293,7 @@ const byFinger = {
   async 'a tap near a corner is on it'(page) {
     await beginMeasuring(page);
     await choose(page, 'Point');
-    const at = await page.evaluate((p) => window.relievo.toPage(p), kCorners.frontLeftBottom);
+    const at = await restingPlace(page, kCorners.frontLeftBottom);
     await page.touchscreen.tap(at.x + 9, at.y - 9);
     await page.waitForFunction(() => window.relievo.diagnostics().measurements.length > 0);
     const [spot] = (await look(page)).measurements.at(-1).spots;
@@ -308,7 +308,7 @@ const onFace = {
     await page.keyboard.press('c');
     await page.keyboard.press('m');
     await choose(page, 'Point');
-    await page.waitForFunction(() => window.relievo.diagnostics().shown > 4);
+    await shownPast(page, (await look(page)).shown + 3);
     for (let y = 120; y < 640; y += 65) for (let x = 420; x < 1080; x += 65) await page.mouse.click(x, y);
     const { measurements } = await look(page);
     assert.ok(measurements.length > 30, `${measurements.length} places`);
@@ -325,6 +325,7 @@ const folder = mkdtempSync(join(tmpdir(), 'relievo-measure-'));
 async function checkOn(source, checks, page = kPage) {
   server = await Server.start(serverPath, ['--source', source]);
   const opened = await pagesOf(browser, server.address, complaints).open('/', page);
+  opened.setDefaultTimeout(kLongPatienceMs); // with each frame, which is computed for what is drawn of it
   failed += await runChecks(checks, opened);
   await opened.close();
   await server.kill();

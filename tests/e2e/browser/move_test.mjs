@@ -4,7 +4,7 @@
 // Run as: node move_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, freeMiddle, kJitter_px, kPicture, kPlaces, look, pagesOf, pick, pointOf, press, runChecks, shownPast, still, toPage } from './feeder.mjs';
+import { Feeder, freeMiddle, kJitter_px, kPicture, kPlaces, look, pagesOf, pickAt, pointOf, press, restingPlace, runChecks, shownPast, still, toPage } from './feeder.mjs';
 
 const kPage = { width: 800, height: 500 };
 const kFrame = 62; // the ball is in the middle, its rim at none of kPlaces, and none of them behind it
@@ -20,8 +20,7 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const checks = {
   async 'a drag leaves the camera, and what is picked is where it is drawn'(page) {
     await shownPast(page, 2);
-    feeder.say(`frame ${kFrame}`); // this surface from here on
-    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+    await feeder.standStill(page, kFrame); // this surface from here on
     await still(page);
     await press(page, 'c');
     await page.mouse.move(400, 250);
@@ -33,8 +32,7 @@ const checks = {
     assert.equal(way, 'orbit');
     for (const [u, v] of kPlaces) {
       const point = pointOf(u, v, frame);
-      const at = await toPage(page, point);
-      const picked = await pick(page, at);
+      const picked = await pickAt(page, point);
       for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} at ${u}, ${v}`);
     }
   },
@@ -42,7 +40,7 @@ const checks = {
   async 'a double-click sets the pivot, which then stays in the middle'(page) {
     const { frame } = await look(page);
     const pivot = pointOf(0.4, 0.4, frame);
-    const at = await toPage(page, pivot);
+    const at = await restingPlace(page, pivot);
     assert.equal(await page.evaluate(({ x, y }) => document.elementFromPoint(x, y).id, at), 'view');
     await page.mouse.dblclick(at.x, at.y);
     await still(page);
@@ -83,7 +81,7 @@ const checks = {
   async 'an open panel moves the middle aside, and nothing else'(page) {
     const { frame } = await look(page);
     const pivot = pointOf(0.4, 0.4, frame);
-    const at = await toPage(page, pivot);
+    const at = await restingPlace(page, pivot);
     await page.mouse.dblclick(at.x, at.y);
     await still(page);
     const before = { pose: await page.evaluate(() => window.relievo.pose()), at: await toPage(page, pivot) };
@@ -95,7 +93,7 @@ const checks = {
       assert.deepEqual(await page.evaluate(() => window.relievo.pose()), before.pose);
       for (const [u, v] of kPlaces) {
         const point = pointOf(u, v, frame);
-        const picked = await pick(page, await toPage(page, point));
+        const picked = await pickAt(page, point);
         for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} at ${u}, ${v}`);
       }
     }
@@ -154,7 +152,8 @@ const checks = {
     await press(page, 'y');
     const before = await page.evaluate(() => window.relievo.pose());
     await page.keyboard.down('w');
-    await page.waitForTimeout(300);
+    // With each drawing, however few there are of them.
+    await page.waitForFunction((from) => Math.hypot(...window.relievo.pose().position.map((p, i) => p - from[i])) > 0.1, before.position);
     await page.keyboard.up('w');
     await still(page);
     const ahead = await page.evaluate(() => window.relievo.pose());
@@ -178,7 +177,7 @@ const checks = {
     const page = await open('/', { hasTouch: true });
     feeder.say('start ball');
     await shownPast(page, 2);
-    feeder.say('stop');
+    await feeder.standStill(page, kFrame);
     await still(page);
     const client = await page.context().newCDPSession(page);
     const touch = (type, ...points) =>
@@ -209,8 +208,8 @@ const checks = {
     await page.keyboard.press('r');
     await still(page);
     const { frame } = await look(page);
-    const pivot = pointOf(0.35, 0.35, frame);
-    const at = await toPage(page, pivot);
+    const pivot = pointOf(0.4, 0.4, frame);
+    const at = await restingPlace(page, pivot);
     // All four at once: where each waits for the page's answer, two taps on a loaded machine are too far apart in time.
     const tap = [['touchStart', [at.x, at.y]], ['touchEnd']];
     await Promise.all([...tap, ...tap].map(([type, ...points]) => touch(type, ...points)));

@@ -109,7 +109,7 @@ const checks = {
       await page.waitForFunction(() => document.querySelector('#picture').dataset.shows === 'exposure');
       const { rgb } = await mean(page);
       assert.ok(rgb[0] > 200 && rgb[1] < 80, `clipped pixels are not red: ${rgb}`);
-      assert.ok((await page.getAttribute('[data-figure=clipped]', 'class')).includes('bad'));
+      await page.waitForSelector('[data-figure=clipped].bad');
       await page.context().close();
     });
   },
@@ -170,8 +170,11 @@ const checks = {
           await eventually('the screen shows no stripes', () => screen.seen().coloured > 0.9);
           await page.click('#projector button:has-text("Stop")');
           await eventually('the stripes stay', () => screen.seen().coloured < 0.1);
-          const state = await (await get(server, '/api/projector')).json();
-          assert.equal(state.state, 'off');
+          let state;
+          await eventually(() => `the projector is ${JSON.stringify(state)}`, async () => {
+            state = await (await get(server, '/api/projector')).json();
+            return state.state === 'off';
+          });
           assert.deepEqual([state.stream, state.show], ['rig', 'pattern']);
           const again = await fetch(`${server.address}/api/projector`, {
             method: 'POST',

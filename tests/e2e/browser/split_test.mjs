@@ -5,8 +5,8 @@
 // web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { join } from 'node:path';
-import { launchChromium } from './chromium.mjs';
-import { inState, look, pagesOf, runChecks, shownPast } from './feeder.mjs';
+import { eventually, launchChromium } from './chromium.mjs';
+import { inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
 import { Server } from './server.mjs';
 
 const [serverPath, screenshots] = process.argv.slice(2);
@@ -49,6 +49,17 @@ const colours = (page, id) =>
     [id, kRead],
   );
 
+/** Where these are on the page, whose parts follow each other when one changes. */
+const boxesOf = (page, selectors) =>
+  page.evaluate(
+    (all) =>
+      all.map((of) => {
+        const { left, top, right, bottom } = document.querySelector(of).getBoundingClientRect();
+        return { left, top, right, bottom };
+      }),
+    selectors,
+  );
+
 const checks = {
   async 'the stripes are what the camera sees of them'(page) {
     await shownPast(page, 2);
@@ -71,19 +82,13 @@ const checks = {
   async 'both stand beside the surface, and nothing covers anything'(page) {
     await page.keyboard.press('v');
     assert.equal(await split(page), 'both');
-    const boxes = await page.evaluate(() =>
-      ['#picture', '#stripes', '#view', '#rail', '#timeline', 'header .segments'].map((id) => {
-        const { left, top, right, bottom } = document.querySelector(id).getBoundingClientRect();
-        return { left, top, right, bottom };
-      }),
-    );
-    for (const [i, a] of boxes.slice(0, 2).entries()) {
-      assert.ok(a.right - a.left > 100 && Math.abs((a.right - a.left) / (a.bottom - a.top) - 4 / 3) < 0.02, JSON.stringify(boxes));
-      for (const b of boxes.slice(i + 1)) {
-        const apart = a.right <= b.left + 1 || b.right <= a.left + 1 || a.bottom <= b.top + 1 || b.bottom <= a.top + 1;
-        assert.ok(apart, JSON.stringify(boxes));
-      }
-    }
+    let boxes;
+    const areApart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1 || a.bottom <= b.top + 1 || b.bottom <= a.top + 1;
+    const isWhole = (a) => a.right - a.left > 100 && Math.abs((a.right - a.left) / (a.bottom - a.top) - 4 / 3) < 0.02;
+    await eventually(() => JSON.stringify(boxes), async () => {
+      boxes = await boxesOf(page, ['#picture', '#stripes', '#view', '#rail', '#timeline', 'header .segments']);
+      return boxes.slice(0, 2).every((a, i) => isWhole(a) && boxes.slice(i + 1).every((b) => areApart(a, b)));
+    });
     const [picture, stripes] = [await colours(page, '#picture'), await colours(page, '#stripes')];
     assert.ok(picture.saturated < 0.5 * stripes.saturated, `the texture is coloured too: ${picture.saturated}`);
     if (screenshots) await page.screenshot({ path: join(screenshots, 'split.png') });
@@ -93,6 +98,7 @@ const checks = {
     await page.keyboard.press(' ');
     await inState(page, 'shifted');
     await note(page, 'Where stripes were read');
+    await still(page); // one may have been on its way
     const { vertices } = await look(page);
     const { marked } = await colours(page, '#stripes');
     // Two vertices may lie in one pixel.
@@ -105,14 +111,12 @@ const checks = {
 
   async 'a panel covers neither tools nor time line, however small the page is'(page) {
     await page.keyboard.press('?');
-    const [panel, ...others] = await page.evaluate(() =>
-      ['#panel-help', '#rail', '#timeline', '#modes'].map((id) => {
-        const { left, top, right, bottom } = document.querySelector(id).getBoundingClientRect();
-        return { left, top, right, bottom };
-      }),
-    );
-    assert.ok(panel.bottom - panel.top > 150, JSON.stringify(panel));
-    for (const other of others) assert.ok(panel.right <= other.left || panel.bottom <= other.top, JSON.stringify([panel, other]));
+    let boxes;
+    await eventually(() => JSON.stringify(boxes), async () => {
+      boxes = await boxesOf(page, ['#panel-help', '#rail', '#timeline', '#modes']);
+      const [panel, ...others] = boxes;
+      return panel.bottom - panel.top > 150 && others.every((other) => panel.right <= other.left || panel.bottom <= other.top);
+    });
     await page.keyboard.press('Escape');
   },
 

@@ -5,7 +5,7 @@
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { launchChromium } from './chromium.mjs';
-import { Feeder, freeMiddle, inState, isRim, kJitter_px, kPicture, look, pagesOf, pointOf, runChecks, shownPast, still } from './feeder.mjs';
+import { colourAt, Feeder, freeMiddle, inState, isRim, kJitter_px, kPicture, look, pagesOf, pickAt, pointOf, restingPlace, runChecks, shownPast, still, toPage } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
 const browser = await launchChromium();
@@ -18,7 +18,7 @@ const kApart = 31; // frames between the two streams
 async function placeOf(page, name, u, v) {
   const [{ frame, right }] = name === 'ball' ? [{ frame: kFrame, right: 0 }] : (await look(page)).besides;
   const point = pointOf(u, v, frame);
-  const { x, y } = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
+  const { x, y } = await restingPlace(page, [point[0] + right, point[1], point[2]]);
   return { point, right, at: [x, y] };
 }
 const kNowhere = { rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [0, 0, 0] };
@@ -34,8 +34,7 @@ async function corners(page, right) {
   const colours = [];
   for (const u of [30 / kPicture.width, 1 - 30 / kPicture.width]) {
     const [x, y, z] = pointOf(u, 30 / kPicture.height, frame);
-    const at = await page.evaluate((p) => window.relievo.toPage(p), [x + right, y, z]);
-    colours.push(await page.evaluate(([px, py]) => window.relievo.pixelAt(px, py), [at.x, at.y]));
+    colours.push(await colourAt(page, [x + right, y, z]));
   }
   return colours;
 }
@@ -67,11 +66,8 @@ const checks = {
     assert.match(page.url(), /\?stream=ball,other$/);
     assert.match(await page.textContent('#panel-streams'), /does not say where one rig stands to another/);
     await page.keyboard.press('Escape');
-    feeder.say(`frame ${kFrame}`); // both from here on
-    await page.waitForFunction((n) => {
-      const now = window.relievo.diagnostics();
-      return now.frame === n && now.besides[0].frame === n;
-    }, kFrame);
+    await feeder.standStill(page, kFrame); // both from here on
+    await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame === n, kFrame);
     await still(page);
     const { besides: [{ right, extent }] } = await look(page);
     const width = extent.max[0] - extent.min[0];
@@ -102,7 +98,7 @@ const checks = {
 
   async 'what is under the cursor is read of whichever stream it is'(page) {
     feeder.say(`apart ${kApart}`); // another shape from here on
-    feeder.say(`frame ${kFrame}`);
+    await feeder.standStill(page, kFrame);
     await page.waitForFunction(([n, m]) => {
       const now = window.relievo.diagnostics();
       return now.frame === n && now.besides[0].frame === m;
@@ -115,9 +111,8 @@ const checks = {
         assert.equal(picked.stream, name);
         for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${name}: ${'xyz'[i]} at ${u}, ${v}`);
         await page.mouse.move(...at);
-        const said = new RegExp(`^${name} · depth ([\\d.]+)`);
-        await page.waitForFunction((source) => new RegExp(source).test(document.querySelector('#cursor')?.textContent), said.source);
-        near(Number(said.exec(await page.textContent('#cursor'))[1]), point[2] * 1000, 2, `${name}: depth at ${u}, ${v}`);
+        const said = await page.waitForFunction((of) => new RegExp(`^${of} · depth ([\\d.]+)`).exec(document.querySelector('#cursor')?.textContent)?.[1], name);
+        near(Number(await said.jsonValue()), point[2] * 1000, 2, `${name}: depth at ${u}, ${v}`);
       }
     }
     const depths = await Promise.all(['ball', 'other'].map(async (name) => (await placeOf(page, name, 0.5, 0.5)).point[2]));
@@ -172,7 +167,7 @@ const checks = {
     await page.keyboard.press('ArrowLeft');
     await still(page);
     const middle = await freeMiddle(page);
-    const now = await page.evaluate((p) => window.relievo.toPage(p), [point[0] + right, point[1], point[2]]);
+    const now = await toPage(page, [point[0] + right, point[1], point[2]]);
     near(now.x, middle.x, kJitter_px, 'the pivot, to the right');
     near(now.y, middle.y, kJitter_px, 'the pivot, down');
     await page.keyboard.press('r');
@@ -192,6 +187,7 @@ const checks = {
     const { shown } = await look(page);
     await shownPast(page, shown + 5);
     assert.equal((await look(page)).playback.following, true, 'the first one was stopped too');
+    await page.waitForFunction(() => !window.relievo.diagnostics().besides[0].busy); // what was on its way is shown
     const { index, frame } = await other();
     await page.click('#timeline button[title^="A frame back"]');
     await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].index < n, index);
@@ -236,8 +232,7 @@ const checks = {
     const page = await open('/?stream=ball,other', { viewport: { width: 1200, height: 750 } });
     await besides(page, 1);
     feeder.say(`apart ${kApart}`);
-    feeder.say(`frame ${kFrame}`);
-    await page.waitForFunction((n) => window.relievo.diagnostics().frame === n, kFrame);
+    await feeder.standStill(page, kFrame);
     await page.waitForFunction((n) => window.relievo.diagnostics().besides[0].frame === n, kFrame + kApart);
     await page.keyboard.press('n');
     await page.click(`${rowOf('other')} button:text-is("Place…")`);
@@ -301,14 +296,12 @@ const checks = {
     const pose = { rotation: [Math.cos(angle), 0, Math.sin(angle), 0, 1, 0, -Math.sin(angle), 0, Math.cos(angle)], translation: to };
     for (const [u, v] of [[0.15, 0.2], [0.5, 0.5], [0.85, 0.8]]) {
       const point = pointOf(u, v, kFrame + kApart);
-      const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, point));
-      const picked = await page.evaluate(({ x, y }) => window.relievo.pick(x, y), at);
-      assert.equal(picked?.stream, 'other', `${u}, ${v} at ${at.x}, ${at.y}`);
+      const picked = await pickAt(page, moved(pose, point));
+      assert.equal(picked?.stream, 'other', `${u}, ${v}`);
       for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} at ${u}, ${v}`);
     }
     const [u, v] = [30 / kPicture.width, 30 / kPicture.height];
-    const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, pointOf(u, v, kFrame + kApart)));
-    const [r, g, b] = await page.evaluate(({ x, y }) => window.relievo.pixelAt(x, y), at);
+    const [r, g, b] = await colourAt(page, moved(pose, pointOf(u, v, kFrame + kApart)));
     assert.ok(r > 150 && g < 90 && b < 90, `no red at its corner: ${[r, g, b]}`);
     await page.close();
   },
@@ -327,9 +320,8 @@ const checks = {
     const point = pointOf(0.85, 0.8, kFrame + kApart);
     const [here, there] = [moved(rig(first), moved(pose, point)), moved(rig(other), point)];
     for (const i of [0, 1, 2]) near(here[i], there[i], 1e-6, `${'xyz'[i]} in the frame of both`);
-    const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, point));
-    const picked = await page.evaluate(({ x, y }) => window.relievo.pick(x, y), at);
-    assert.equal(picked?.stream, 'other', `at ${at.x}, ${at.y}`);
+    const picked = await pickAt(page, moved(pose, point));
+    assert.equal(picked?.stream, 'other');
     for (const i of [0, 1, 2]) near(picked.point[i], point[i], 0.002, `${'xyz'[i]} of what is picked`);
     await page.keyboard.press('n');
     await page.waitForFunction(() => /Each stands where its rig, or a person, says/.test(document.querySelector('#panel-streams')?.textContent));
@@ -345,7 +337,7 @@ const checks = {
       await of.click('#panel-measure .segments button:text-is("Distance")');
       await still(of);
       for (const [name, from, its] of ends) {
-        const place = await of.evaluate((p) => window.relievo.toPage(p), moved(name === 'other' ? (await look(of)).besides[0].pose : its, from));
+        const place = await restingPlace(of, moved(name === 'other' ? (await look(of)).besides[0].pose : its, from));
         assert.equal(await of.evaluate(([px, py]) => window.relievo.pick(px, py)?.stream, [place.x, place.y]), name);
         await of.mouse.click(place.x, place.y);
       }
@@ -376,15 +368,14 @@ const checks = {
     await still(page);
     const redOf = async () => {
       const [{ frame, pose }] = (await look(page)).besides;
-      const at = await page.evaluate((p) => window.relievo.toPage(p), moved(pose, pointOf(30 / kPicture.width, 30 / kPicture.height, frame)));
-      return (await page.evaluate(({ x, y }) => window.relievo.pixelAt(x, y), at))[0];
+      return (await colourAt(page, moved(pose, pointOf(30 / kPicture.width, 30 / kPicture.height, frame))))[0];
     };
     const before = await redOf();
     feeder.say('gone');
     await page.waitForFunction(() => window.relievo.diagnostics().besides[0].word === 'Ended');
     await still(page);
     near((await redOf()) / before, 0.34, 0.05, 'how much is left of its red');
-    assert.match(await page.textContent('#source'), /ball · Ended/);
+    await page.waitForFunction(() => /ball · Ended/.test(document.querySelector('#source')?.textContent));
     await page.keyboard.press('n');
     await page.waitForSelector(`${rowOf('ball')} small:text-is("gone")`);
     await page.click(`${rowOf('ball')} button:text-is("Beside")[aria-pressed="true"]`);
@@ -399,6 +390,7 @@ const checks = {
     await shownPast(page, 3);
     await page.waitForFunction(() => /nobody · Waiting/.test(document.querySelector('#source')?.textContent));
     const choice = page.getByLabel('Stream that the time line is of');
+    await choice.locator('option:text-is("nobody · Waiting")').waitFor({ state: 'attached' });
     assert.deepEqual(await choice.locator('option').allTextContents(), ['ball', 'nobody · Waiting']);
     await choice.selectOption('nobody');
     await page.waitForSelector('#timeline.empty');
