@@ -249,15 +249,15 @@ const checks = {
 
     // Playing, it goes on with what was not there when it came to the end.
     await page.keyboard.press(' ');
+    const isBehind = (end, frames) =>
+      page.waitForFunction((least) => window.relievo.diagnostics().playback.index >= least, end.times.length - 1 + frames);
+    const end = await playback(page);
     await page.keyboard.press('End');
-    await eventually('it is not at its end', async () => {
-      const { index, times } = await playback(page);
-      return index === times.length - 1;
-    });
+    await isBehind(end, 0); // a slow page comes to what is the end now when more is there
     for (let i = 0; i < 2; ++i) {
-      const { index, playing } = await playback(page);
-      assert.ok(playing, 'it waits for nothing at its end');
-      await page.waitForFunction((last) => window.relievo.diagnostics().playback.index > last + 6, index);
+      const now = await playback(page);
+      assert.ok(now.playing, 'it waits for nothing at its end');
+      await isBehind(now, 6);
     }
     const { number } = await page.evaluate(() => window.relievo.surface());
     await page.waitForFunction((n) => window.relievo.diagnostics().frame > n, number);
