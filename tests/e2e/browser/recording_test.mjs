@@ -98,7 +98,9 @@ const checks = {
     assert.ok(gaps.every((gap) => gap === 0), `gaps ${gaps}`);
     await eventually('the marks are not drawn where key frames are', async () => {
       const marks = await marksAt(page, '--quiet');
-      return marks.every(({ high, ofColour }, i) => (keys[i] ? high >= 3 && high < 9 && ofColour : high === 0));
+      // Where the machine that recorded was busy, one may have come so soon before or after a key frame that their places are one.
+      const isAlone = (i) => marks.every(({ x }, other) => !keys[other] || Math.abs(x - marks[i].x) > 4);
+      return marks.every(({ high, ofColour }, i) => (keys[i] ? high >= 3 && high < 9 && ofColour : high === 0 || !isAlone(i)));
     });
   },
 

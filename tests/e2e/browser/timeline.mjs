@@ -61,7 +61,7 @@ export async function pointAt(page, index) {
   });
 }
 
-/** Of each frame of the time line: how many pixels high the mark at it is, and whether it is of a colour of style.css. */
+/** Of each frame of the time line: where it is, pixels, how many high the mark at it is, and whether it is of a colour of style.css. */
 export const marksAt = (page, colour) =>
   page.evaluate((property) => {
     const canvas = document.querySelector('#timeline .track canvas');
@@ -85,7 +85,7 @@ export const marksAt = (page, colour) =>
         const bottom = ((height - 1) * columns + column) * 4;
         ofColour ||= rows > 0 && [0, 1, 2].every((c) => Math.abs(data[bottom + c] - wanted[c]) < 24);
       }
-      return { high, ofColour };
+      return { x, high, ofColour };
     });
   }, colour);
 
