@@ -39,6 +39,10 @@ Result<std::filesystem::path> where_it_leads(const std::filesystem::path& path) 
 
 }  // namespace
 
+std::filesystem::path unfinished_name(const std::filesystem::path& path) {
+  return path.string() + ".part" + std::to_string(::getpid());
+}
+
 Status write_whole_file(const std::filesystem::path& named, std::span<const std::uint8_t> bytes) {
   const auto leads = where_it_leads(named);
   if (!leads) return leads.error();
@@ -46,7 +50,7 @@ Status write_whole_file(const std::filesystem::path& named, std::span<const std:
   const auto failed = [&](int error) {
     return Error{"cannot write " + path.string() + ": " + write_failure(error)};
   };
-  const std::string temporary = path.string() + ".part" + std::to_string(::getpid());
+  const std::filesystem::path temporary = unfinished_name(path);
   const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) return failed(errno);
   int error = 0;

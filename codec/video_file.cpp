@@ -10,6 +10,7 @@ extern "C" {
 #include <libavutil/mathematics.h>
 }
 
+#include "base/whole_file.h"
 #include "codec/texture_h264.h"
 #include "codec/video_unit.h"
 
@@ -43,9 +44,8 @@ struct VideoFile::State {
   std::unique_ptr<AVPacket, FreePacket> packet{av_packet_alloc()};
   std::int64_t first_ns = 0, ticks = 0, duration_ticks = kUsualTicks;
 
-  State(fs::path name, const char* muxer_name) : file(std::move(name)), unfinished(file), muxer(muxer_name) {
-    unfinished += ".part";
-  }
+  State(fs::path name, const char* muxer_name)
+      : file(std::move(name)), unfinished(unfinished_name(file)), muxer(muxer_name) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {

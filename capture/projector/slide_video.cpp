@@ -14,6 +14,7 @@ extern "C" {
 #include <utility>
 #include <vector>
 
+#include "base/whole_file.h"
 #include "capture/pattern/schedule.h"
 #include "capture/pattern/slides.h"
 
@@ -174,7 +175,7 @@ Result<SlideVideo> write_slide_video(const fs::path& file, const Pattern& patter
     }
   }
 
-  Muxer muxer(file.string() + ".partial");
+  Muxer muxer(unfinished_name(file));
   if (auto opened = muxer.open(); !opened) return opened.error();
   AVStream* stream = avformat_new_stream(muxer.get(), nullptr);
   avcodec_parameters_from_context(stream->codecpar, codec->get());

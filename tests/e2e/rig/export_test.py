@@ -157,7 +157,7 @@ class Export(unittest.TestCase):
 
     def check_video(self, recording, name, *more):
         file = self.export(recording, "video", name, *more)
-        self.assertEqual(list(self.path.glob("*.part")), [])
+        self.assertEqual(list(self.path.glob(f"{name}.part*")), [])
         probe = self.probed(file)
         stream, = probe["streams"]
         self.assertEqual([stream[k] for k in ("codec_name", "color_range", "color_space")], ["h264", "pc", "smpte170m"])
@@ -183,6 +183,19 @@ class Export(unittest.TestCase):
 
     def test_video_of_still_pictures_is_coded(self):
         self.check_video("jpeg", "coded.mp4")
+
+    def test_two_at_once_write_whole_files_and_touch_no_other(self):
+        file, notes = self.path / "both.mp4", self.path / "both.mp4.part"
+        notes.write_text("mine")
+        ranges = ["0:0", f"0:{FRAMES - 1}"]
+        running = [subprocess.Popen([RELIEVO, "export", self.path / "jpeg.mcap", "--format", "video", "--out", file,
+                                     "--frames", frames], stderr=subprocess.PIPE, text=True) for frames in ranges]
+        for process in running:
+            _, said = process.communicate()
+            self.assertEqual(process.returncode, 0, said)
+        self.assertIn(len(self.probed(file)["packets"]), [1, FRAMES])
+        self.assertEqual(notes.read_text(), "mine")
+        self.assertEqual(list(self.path.glob("both.mp4.part*")), [notes])
 
     def test_a_range_between_key_frames_is_coded(self):
         file = self.path / "late.mp4"
