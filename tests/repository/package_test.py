@@ -58,6 +58,32 @@ class Package(unittest.TestCase):
         subprocess.run(['dpkg-deb', '-e', self.packages['relievo-server'], control], check=True)
         self.assertEqual((control / 'conffiles').read_text().split(), ['/etc/relievo/server.toml'])
 
+    def test_what_is_installed_by_hand_leaves_settings_alone(self):
+        root = Path(self.folder.name) / 'by hand'
+        subprocess.run(['cmake', '--install', build, '--prefix', '/opt/relievo'], check=True, capture_output=True,
+                       env={**os.environ, 'DESTDIR': str(root)})
+        self.assertTrue((root / 'opt/relievo/bin/relievo-server').exists())
+        self.assertEqual([path.name for path in root.iterdir()], ['opt'])
+
+    def test_a_service_that_does_not_run_leaves_no_package_half_installed(self):
+        folder = Path(self.folder.name)
+        programs = folder / 'programs'
+        programs.mkdir()
+        for name in ('systemctl', 'systemd-sysusers', 'sysctl'):
+            # Of a systemd whose services do not come up.
+            (programs / name).write_text('#!/bin/sh\n[ "$1" != try-restart ] && [ "$1" != disable ]\n')
+            (programs / name).chmod(0o755)
+        for name, file in self.packages.items():
+            control = folder / f'{name}.control'
+            subprocess.run(['dpkg-deb', '-e', file, control], check=True)
+            for script, argument in (('postinst', 'configure'), ('prerm', 'remove')):
+                # As on a machine that systemd runs.
+                text = (control / script).read_text().replace('/run/systemd/system', str(programs))
+                done = subprocess.run(['sh', '-c', text, script, argument], capture_output=True, text=True,
+                                      env={**os.environ, 'PATH': f'{programs}:{os.environ["PATH"]}'})
+                self.assertEqual(done.returncode, 0, f'{name} {script}: {done.stderr}')
+                self.assertEqual('journalctl' in done.stderr, script == 'postinst', done.stderr)
+
     def test_the_programs_run(self):
         for name in self.packages:
             self.assertTrue(output(self.root / 'usr/bin' / name, '--version').startswith(name + ' '))
