@@ -31,12 +31,14 @@ struct Options {
 
 Finding check_keys(const std::string& given) {
   const auto folder = find_keys(given);
-  if (!folder) return {Grade::kGood, "keys", "none: streams are plain, and for everybody on the network", ""};
-  const auto keys = read_keys(*folder);
+  if (folder && !*folder)
+    return {Grade::kGood, "keys", "none: streams are plain, and for everybody on the network", ""};
+  const auto keys = folder ? read_keys(**folder) : folder.error();
   if (!keys)
     return {Grade::kTrouble, "keys", keys.error().message,
-            "have them made again: relievo keys add-client NAME, where the authority is"};
-  const std::string found = folder->string() + ": '" + keys->name + "', may " +
+            "nothing can be sent or received until this is mended; keys that are damaged are made again by "
+            "relievo keys add-client NAME, where the authority is"};
+  const std::string found = keys->folder.string() + ": '" + keys->name + "', may " +
                             (keys->may_publish ? "publish and watch" : "watch") + ", until " +
                             utc_text(keys->expires_ns);
   if (keys->expires_ns - utc_now_ns() < kSoonNs)

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -32,6 +34,9 @@ Status init(const std::filesystem::path& folder) {
   log_info("authority " + keys->authority + " made; this machine publishes as '" + keys->name +
            "'. Servers and viewers started from now on use these keys; other machines get theirs by relievo "
            "keys add-client NAME. Keep a copy of the folder: with it lost, nobody can be added or revoked");
+  if (geteuid() == 0)
+    log_info("a server that runs as another user must own the folder: chown -R relievo: " + folder.string() +
+             " where systemd starts it");
   return {};
 }
 
@@ -43,8 +48,8 @@ Status add(const std::filesystem::path& folder, const Options& options) {
     return status;
   std::printf("%s\n", out.c_str());
   log_info(
-      "move this folder to the other machine by a way that nobody reads along, as ~/.config/relievo/keys, "
-      "and delete it here");
+      "move this folder to the other machine by a way that nobody reads along, as ~/.config/relievo/keys "
+      "(or /etc/relievo/keys, for a service: chown -R relievo: it there), and delete it here");
   return {};
 }
 
@@ -90,10 +95,12 @@ Status list(const std::filesystem::path& folder, bool as_json) {
 
 Status run(const Options& options) {
   std::filesystem::path folder = options.folder;
-  if (folder.empty()) {
-    const auto found = options.verb == Options::Verb::kInit ? std::nullopt : find_keys("");
-    folder = found.value_or(user_keys_folder());
+  if (folder.empty() && options.verb != Options::Verb::kInit) {
+    const auto found = find_keys("");
+    if (!found) return found.error();
+    folder = found->value_or("");
   }
+  if (folder.empty()) folder = user_keys_folder();
   switch (options.verb) {
     case Options::Verb::kInit:
       return init(folder);

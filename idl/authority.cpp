@@ -170,10 +170,12 @@ struct Authority {
 
 Result<Authority> open_authority(const fs::path& folder) {
   std::error_code error;
-  if (!fs::exists(folder / kAuthorityKey, error))
+  if (!fs::exists(folder / kAuthorityKey, error) && !error)
     return Error{
         folder.string() + " is no authority: " + kAuthorityKey +
         " is missing (relievo keys init makes one; only the machine where that was done can give keys)"};
+  for (const char* file : {kAuthorityKey, key_files::kAuthority, key_files::kRevoked})
+    if (auto s = check_readable(folder, file); !s) return s.error();
   Authority authority;
   auto certificate = openssl::read_certificate(folder / key_files::kAuthority);
   if (!certificate) return certificate.error();

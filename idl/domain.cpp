@@ -48,7 +48,9 @@ void warn_of_open_keys(const std::filesystem::path& folder) {
 }  // namespace
 
 Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
-  const auto keys = find_keys(options.keys);
+  const auto found = find_keys(options.keys);
+  if (!found) return found.error();
+  const auto& keys = *found;
   if (options.domain < 0 || options.domain > kMaxDomain) {
     return Error{"DDS domain " + std::to_string(options.domain) + " is out of range: use 0 to " +
                  std::to_string(kMaxDomain)};
@@ -67,7 +69,7 @@ Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
     }
     g_closed.wait(lock);
   }
-  auto made = make(options);
+  auto made = make(options, keys);
   if (!made) return made.error();
   const auto close = [number = options.domain](Domain* domain) {
     delete domain;
@@ -82,11 +84,12 @@ Result<std::shared_ptr<Domain>> Domain::open(const DomainOptions& options) {
   return domain;
 }
 
-Result<std::unique_ptr<Domain>> Domain::make(const DomainOptions& options) {
+Result<std::unique_ptr<Domain>> Domain::make(const DomainOptions& options,
+                                             const std::optional<std::filesystem::path>& folder) {
   take_over_dds_log();
   std::unique_ptr<Domain> domain(new Domain);
   domain->interface_ = options.interface;
-  if (const auto folder = find_keys(options.keys)) {
+  if (folder) {
     auto keys = read_keys(*folder);
     if (!keys) return keys.error();
     domain->keys_ = std::move(keys).value();

@@ -34,7 +34,8 @@ class Domain {
   std::int32_t plain_participant() const { return keys_ ? plain_participant_.get() : participant_.get(); }
 
  private:
-  static Result<std::unique_ptr<Domain>> make(const DomainOptions& options);
+  static Result<std::unique_ptr<Domain>> make(const DomainOptions& options,
+                                              const std::optional<std::filesystem::path>& keys);
   Status open_beside(int domain, const NetworkInterface& interface);
 
   std::string interface_;

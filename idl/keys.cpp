@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "idl/keys.h"
 
+#include <fcntl.h>
 #include <openssl/x509v3.h>
+#include <pwd.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
+#include <system_error>
 
 #include "idl/openssl.h"
 
@@ -38,6 +43,13 @@ std::vector<std::string> revoked_serials(X509_CRL* list) {
   return serials;
 }
 
+std::string this_user() {
+  const passwd* const user = getpwuid(geteuid());
+  return user != nullptr ? user->pw_name : std::to_string(geteuid());
+}
+
+constexpr const char* kInPlain = "--keys none does without, in plain";
+
 }  // namespace
 
 std::filesystem::path user_keys_folder() {
@@ -47,28 +59,48 @@ std::filesystem::path user_keys_folder() {
   return std::filesystem::path(home.empty() ? "/" : home) / ".config" / "relievo" / "keys";
 }
 
-std::optional<std::filesystem::path> find_keys(const std::string& given) {
+Result<std::optional<std::filesystem::path>> find_keys(const std::string& given) {
   const std::string asked = given.empty() ? environment("RELIEVO_KEYS") : given;
-  if (asked == "none") return std::nullopt;
-  if (!asked.empty()) return std::filesystem::path(asked);
+  using Folder = std::optional<std::filesystem::path>;
+  if (asked == "none") return Folder();
+  if (!asked.empty()) return Folder(asked);
   for (const std::filesystem::path& folder :
        {user_keys_folder(), std::filesystem::path("/etc/relievo/keys")}) {
-    std::error_code unreadable;  // as good as absent
-    if (std::filesystem::exists(folder / key_files::kIdentity, unreadable)) return folder;
+    // Of a link itself, since one that leads nowhere was meant to lead to keys.
+    std::error_code error;
+    const auto found = std::filesystem::symlink_status(folder, error);
+    if (found.type() == std::filesystem::file_type::not_found) continue;
+    // A folder above that may not be searched: there may be keys in it. Also above the user's own folder, as
+    // where root made ~/.config/relievo, and although $HOME may be another user's: streams in plain by
+    // mistake are worse than a program that asks for the right $HOME.
+    if (error)
+      return Error{"cannot tell whether there are keys in " + folder.string() + ": " + error.message() +
+                   "; let the user " + this_user() + " search the folders above (chmod a+x), " +
+                   "or name its keys (--keys DIR), or " + kInPlain};
+    return Folder(folder);
   }
-  return std::nullopt;
+  return Folder();
+}
+
+Status check_readable(const std::filesystem::path& folder, const char* file) {
+  const std::string path = (folder / file).string();
+  if (faccessat(AT_FDCWD, path.c_str(), R_OK, AT_EACCESS) == 0) return {};
+  const int error = errno;
+  if (error == ENOENT)
+    return Error{
+        "no keys in " + folder.string() + ": " + file +
+        " is missing (relievo keys init makes keys, relievo keys add-client those of another machine; "
+        "--keys none does without)"};
+  const std::string mend = "let the user " + this_user() + " read them: chown -R " + this_user() + ": " +
+                           folder.string() + ", and chmod a+x folders above that are closed; or ";
+  return Error{"cannot read the keys in " + folder.string() + ": " + file + ": " +
+               std::generic_category().message(error) + "; " + (error == EACCES ? mend : "") + kInPlain};
 }
 
 Result<Keys> read_keys(const std::filesystem::path& folder) {
-  std::error_code error;
   for (const char* file : {key_files::kAuthority, key_files::kIdentity, key_files::kPrivate,
-                           key_files::kGovernance, key_files::kPermissions, key_files::kRevoked}) {
-    if (!std::filesystem::exists(folder / file, error))
-      return Error{
-          "no keys in " + folder.string() + ": " + file +
-          " is missing (relievo keys init makes keys, relievo keys add-client those of another machine; "
-          "--keys none does without)"};
-  }
+                           key_files::kGovernance, key_files::kPermissions, key_files::kRevoked})
+    if (auto s = check_readable(folder, file); !s) return s.error();
   const auto authority = openssl::read_certificate(folder / key_files::kAuthority);
   if (!authority) return authority.error();
   const auto identity = openssl::read_certificate(folder / key_files::kIdentity);

@@ -33,15 +33,19 @@ struct Keys {
   std::int64_t expires_ns = 0;  // UTC
 };
 
-/// Where this process finds its keys: `given`, or else $RELIEVO_KEYS, or else what exists of
-/// ~/.config/relievo/keys and /etc/relievo/keys. "none", or no such folder: nothing, streams are plain.
-std::optional<std::filesystem::path> find_keys(const std::string& given);
+/// Where this process finds its keys: `given`, or else $RELIEVO_KEYS, or else the first that exists of
+/// ~/.config/relievo/keys and /etc/relievo/keys, whatever is in it. "none", or no such folder: nothing,
+/// streams are plain. Fails where it cannot be known whether there is one.
+Result<std::optional<std::filesystem::path>> find_keys(const std::string& given);
 
 /// The folder for keys of this user, which find_keys() looks at.
 std::filesystem::path user_keys_folder();
 
-/// Checks all of the folder. The error says which file is missing, damaged or of another authority, or that
-/// the keys have expired.
+/// Whether this user may read a file of the folder. The error says what it lacks, and how to mend it.
+Status check_readable(const std::filesystem::path& folder, const char* file);
+
+/// Checks all of the folder. The error says which file is missing, closed to this user, damaged or of another
+/// authority, or that the keys have expired.
 Result<Keys> read_keys(const std::filesystem::path& folder);
 
 }  // namespace relievo
