@@ -179,6 +179,9 @@ Result<Authority> open_authority(const fs::path& folder) {
   Authority authority;
   auto certificate = openssl::read_certificate(folder / key_files::kAuthority);
   if (!certificate) return certificate.error();
+  // Keys made by a clock that is behind would have expired too early.
+  if (auto s = check_clock("the keys in " + folder.string(), openssl::start_ns(certificate->get())); !s)
+    return s.error();
   auto key = openssl::read_key(folder / kAuthorityKey);
   if (!key) return key.error();
   return Authority{std::move(certificate).value(), std::move(key).value()};

@@ -6,10 +6,12 @@
 #include <pwd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <system_error>
 
+#include "base/time.h"
 #include "idl/openssl.h"
 
 namespace relievo {
@@ -28,10 +30,6 @@ Status check_identity(X509* identity, EVP_PKEY* key, X509* authority, const std:
   if (X509_verify(identity, authority_key.get()) != 1)
     return openssl::failure(std::string(key_files::kIdentity) + " in " + folder.string() +
                             " was not issued by its " + key_files::kAuthority);
-  if (X509_cmp_current_time(X509_get0_notAfter(identity)) < 0)
-    return Error{
-        "the keys in " + folder.string() +
-        " have expired: ask for new ones (relievo keys add-client), or renew them if they are yours"};
   return {};
 }
 
@@ -97,7 +95,7 @@ Status check_readable(const std::filesystem::path& folder, const char* file) {
                std::generic_category().message(error) + "; " + (error == EACCES ? mend : "") + kInPlain};
 }
 
-Result<Keys> read_keys(const std::filesystem::path& folder) {
+Result<Keys> read_keys_of_any_time(const std::filesystem::path& folder) {
   for (const char* file : {key_files::kAuthority, key_files::kIdentity, key_files::kPrivate,
                            key_files::kGovernance, key_files::kPermissions, key_files::kRevoked})
     if (auto s = check_readable(folder, file); !s) return s.error();
@@ -122,7 +120,30 @@ Result<Keys> read_keys(const std::filesystem::path& folder) {
   keys.authority = openssl::fingerprint(authority->get());
   keys.revoked = revoked_serials(revoked->get());
   keys.may_publish = permissions->find("<grant name=\"publisher\">") != std::string::npos;
-  keys.expires_ns = openssl::expiry_ns(identity->get());
+  keys.valid_from_ns = std::max(openssl::start_ns(identity->get()), openssl::start_ns(authority->get()));
+  keys.expires_ns = std::min(openssl::expiry_ns(identity->get()), openssl::expiry_ns(authority->get()));
+  return keys;
+}
+
+Status check_clock(const std::string& what, std::int64_t valid_from_ns) {
+  const std::int64_t now_ns = utc_now_ns();
+  if (now_ns >= valid_from_ns) return {};
+  return Error{what + " are valid from " + utc_text(valid_from_ns) + " on, and this machine's clock says " +
+               utc_text(now_ns) + ": set it (date -s, or let timesyncd or chronyd do it)"};
+}
+
+Status check_time(const Keys& keys) {
+  const std::string what = "the keys in " + keys.folder.string();
+  if (auto s = check_clock(what, keys.valid_from_ns); !s) return s;
+  if (utc_now_ns() < keys.expires_ns) return {};
+  return Error{what + " have expired on " + utc_text(keys.expires_ns) +
+               ": ask for new ones (relievo keys add-client NAME, where the authority is)"};
+}
+
+Result<Keys> read_keys(const std::filesystem::path& folder) {
+  auto keys = read_keys_of_any_time(folder);
+  if (!keys) return keys;
+  if (auto s = check_time(*keys); !s) return s.error();
   return keys;
 }
 

@@ -30,7 +30,8 @@ struct Keys {
   std::string authority;             // its fingerprint, 16 hexadecimal digits
   std::vector<std::string> revoked;  // serials, as far as this folder knows
   bool may_publish = false;
-  std::int64_t expires_ns = 0;  // UTC
+  std::int64_t valid_from_ns = 0;  // UTC
+  std::int64_t expires_ns = 0;
 };
 
 /// Where this process finds its keys: `given`, or else $RELIEVO_KEYS, or else the first that exists of
@@ -44,8 +45,16 @@ std::filesystem::path user_keys_folder();
 /// Whether this user may read a file of the folder. The error says what it lacks, and how to mend it.
 Status check_readable(const std::filesystem::path& folder, const char* file);
 
-/// Checks all of the folder. The error says which file is missing, closed to this user, damaged or of another
-/// authority, or that the keys have expired.
+/// Checks all of the folder but the time. The error says which file is missing, closed to this user, damaged
+/// or of another authority.
+Result<Keys> read_keys_of_any_time(const std::filesystem::path& folder);
+
+/// The same for keys that are valid now, by this machine's clock; the error says whether they have expired or
+/// the clock is behind.
 Result<Keys> read_keys(const std::filesystem::path& folder);
+Status check_time(const Keys& keys);
+
+/// The clock is behind the time from which `what` is valid.
+Status check_clock(const std::string& what, std::int64_t valid_from_ns);
 
 }  // namespace relievo

@@ -6,9 +6,11 @@
 #include <openssl/pem.h>
 #include <openssl/x509v3.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <ctime>
+#include <limits>
 
 #include "base/time.h"
 #include "base/whole_file.h"
@@ -26,6 +28,13 @@ Bio reader_of(const std::string& bytes) {
 /// What OpenSSL would ask a person at the terminal for.
 int no_password(char*, int, int, void*) {
   return -1;
+}
+
+std::int64_t utc_ns(const ASN1_TIME* time) {
+  std::tm parts{};
+  if (ASN1_TIME_to_tm(time, &parts) != 1) return 0;
+  constexpr std::int64_t kLast_s = std::numeric_limits<std::int64_t>::max() / kNanosecondsPerSecond;
+  return std::clamp<std::int64_t>(timegm(&parts), -kLast_s, kLast_s) * kNanosecondsPerSecond;
 }
 
 template <typename Owned, typename Read>
@@ -91,6 +100,8 @@ Result<std::string> read_signed(const std::filesystem::path& file, X509* signer)
   sk_X509_push(certificates.get(), signer);
   const std::unique_ptr<X509_STORE, Deleter<X509_STORE_free>> trusted(X509_STORE_new());
   X509_STORE_add_cert(trusted.get(), signer);
+  // Out of its time it would be told as a forgery.
+  X509_STORE_set_flags(trusted.get(), X509_V_FLAG_NO_CHECK_TIME);
   const Bio out(BIO_new(BIO_s_mem()));
   if (PKCS7_verify(document.get(), certificates.get(), trusted.get(), content, out.get(),
                    PKCS7_TEXT | PKCS7_NOINTERN) != 1)
@@ -114,10 +125,12 @@ std::string serial_of(const X509* certificate) {
   return hex(X509_get0_serialNumber(certificate));
 }
 
+std::int64_t start_ns(const X509* certificate) {
+  return utc_ns(X509_get0_notBefore(certificate));
+}
+
 std::int64_t expiry_ns(const X509* certificate) {
-  std::tm parts{};
-  if (ASN1_TIME_to_tm(X509_get0_notAfter(certificate), &parts) != 1) return 0;
-  return static_cast<std::int64_t>(timegm(&parts)) * kNanosecondsPerSecond;
+  return utc_ns(X509_get0_notAfter(certificate));
 }
 
 std::string name_of(const X509* certificate) {

@@ -49,7 +49,8 @@ Result<Key> read_key(const std::filesystem::path& file);
 Result<Certificate> read_certificate(const std::filesystem::path& file);
 Result<RevocationList> read_revocation_list(const std::filesystem::path& file);
 
-/// The text of a file that `signer` signed (S/MIME, detached, as DDS Security wants its documents).
+/// The text of a file that `signer` signed (S/MIME, detached, as DDS Security wants its documents), whenever
+/// the signer is valid.
 Result<std::string> read_signed(const std::filesystem::path& file, x509_st* signer);
 
 /// What was written to a memory BIO.
@@ -58,7 +59,8 @@ std::string text_of(bio_st* memory);
 /// The certificate's number, hexadecimal.
 std::string serial_of(const x509_st* certificate);
 std::string hex(const asn1_string_st* number);
-std::int64_t expiry_ns(const x509_st* certificate);  // UTC
+std::int64_t start_ns(const x509_st* certificate);   // valid from, UTC
+std::int64_t expiry_ns(const x509_st* certificate);  // to
 /// Its common name.
 std::string name_of(const x509_st* certificate);
 /// The first 64 bits of its SHA-256, hexadecimal: names an authority.

@@ -35,3 +35,10 @@ extern "C" int gettimeofday(timeval* time, void*) noexcept {
   *time = {now.tv_sec, now.tv_nsec / 1000};
   return failed;
 }
+
+extern "C" time_t time(time_t* into) noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  if (into != nullptr) *into = now.tv_sec;
+  return now.tv_sec;
+}
