@@ -42,7 +42,9 @@ Finding check_keys(const std::string& given) {
                             (keys->may_publish ? "publish and watch" : "watch") + ", until " +
                             utc_text(keys->expires_ns);
   if (keys->expires_ns - utc_now_ns() < kSoonNs)
-    return {Grade::kAdvice, "keys", found, "they expire soon: relievo keys add-client NAME makes new ones"};
+    return {Grade::kAdvice, "keys", found,
+            keys->of_authority ? "they expire soon: relievo keys renew makes new ones"
+                               : "they expire soon: relievo keys add-client NAME makes new ones"};
   return {Grade::kGood, "keys", found, ""};
 }
 

@@ -18,7 +18,7 @@ namespace relievo {
 namespace {
 
 struct Options {
-  enum class Verb { kNone, kInit, kAdd, kRevoke, kList } verb = Verb::kNone;
+  enum class Verb { kNone, kInit, kAdd, kRenew, kRevoke, kList } verb = Verb::kNone;
   std::string folder;
   std::string name;
   std::string out;
@@ -53,6 +53,15 @@ Status add(const std::filesystem::path& folder, const Options& options) {
   return {};
 }
 
+Status renew(const std::filesystem::path& folder) {
+  if (auto status = renew_keys(folder); !status) return status;
+  const auto keys = read_keys(folder);
+  if (!keys) return keys.error();
+  log_info("new keys for '" + keys->name + "', until " + utc_text(keys->expires_ns) +
+           ": restart the servers of this machine");
+  return {};
+}
+
 Status revoke(const std::filesystem::path& folder, const Options& options) {
   if (auto status = revoke_keys(folder, options.name); !status) return status;
   log_info("the keys of '" + options.name +
@@ -62,9 +71,11 @@ Status revoke(const std::filesystem::path& folder, const Options& options) {
 }
 
 Status list(const std::filesystem::path& folder, bool as_json) {
-  const auto keys = read_keys(folder);
+  const auto keys = read_keys_of_any_time(folder);
   if (!keys) return keys.error();
   const auto holders = list_keys(folder);  // fails where this is no authority's folder
+  if (keys->of_authority && !holders) return holders.error();
+  if (const Status time = check_time(*keys); !time) log_warning(time.error().message);
   if (as_json) {
     nlohmann::json j{{"folder", keys->folder.string()},
                      {"authority", keys->authority},
@@ -88,7 +99,10 @@ Status list(const std::filesystem::path& folder, bool as_json) {
   if (!holders) return {};
   std::printf("\n%-32s %-8s %s\n", "HOLDER", "STATE", "EXPIRES");
   for (const KeyHolder& holder : *holders)
-    std::printf("%-32s %-8s %s\n", holder.name.c_str(), holder.revoked ? "revoked" : "valid",
+    std::printf("%-32s %-8s %s\n", holder.name.c_str(),
+                holder.revoked                      ? "revoked"
+                : holder.expires_ns <= utc_now_ns() ? "expired"
+                                                    : "valid",
                 utc_text(holder.expires_ns).c_str());
   return {};
 }
@@ -106,6 +120,8 @@ Status run(const Options& options) {
       return init(folder);
     case Options::Verb::kAdd:
       return add(folder, options);
+    case Options::Verb::kRenew:
+      return renew(folder);
     case Options::Verb::kRevoke:
       return revoke(folder, options);
     case Options::Verb::kList:
@@ -143,6 +159,9 @@ Command keys_command() {
         add->add_option("NAME", options->name, "Whose keys they are")->required();
         add->add_option("--out", options->out, "The new folder (default: NAME.keys)")->type_name("DIR");
         add->add_flag("--publish", options->publish, "They let it publish streams, not only watch");
+        verb("renew",
+             "Make new keys for this machine, which has the authority, before or after the old ones expire",
+             Options::Verb::kRenew);
         verb("revoke", "Let somebody's keys count no longer", Options::Verb::kRevoke)
             ->add_option("NAME", options->name, "Whose")
             ->required();

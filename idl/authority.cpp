@@ -5,12 +5,14 @@
 #include <openssl/pem.h>
 #include <openssl/rand.h>
 #include <openssl/x509v3.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <string_view>
+#include <tuple>
 
 #include "base/stream.h"
 #include "base/time.h"
@@ -23,7 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAuthorityKey = "authority.key";
 constexpr const char* kHolders = "holders";  // certificates issued, NAME.pem
 constexpr long kSecondsOfAYear = 365L * 24 * 3600;
 constexpr long kAuthorityYears = 20;
@@ -170,11 +171,11 @@ struct Authority {
 
 Result<Authority> open_authority(const fs::path& folder) {
   std::error_code error;
-  if (!fs::exists(folder / kAuthorityKey, error) && !error)
+  if (!fs::exists(folder / key_files::kAuthorityKey, error) && !error)
     return Error{
-        folder.string() + " is no authority: " + kAuthorityKey +
+        folder.string() + " is no authority: " + key_files::kAuthorityKey +
         " is missing (relievo keys init makes one; only the machine where that was done can give keys)"};
-  for (const char* file : {kAuthorityKey, key_files::kAuthority, key_files::kRevoked})
+  for (const char* file : {key_files::kAuthorityKey, key_files::kAuthority, key_files::kRevoked})
     if (auto s = check_readable(folder, file); !s) return s.error();
   Authority authority;
   auto certificate = openssl::read_certificate(folder / key_files::kAuthority);
@@ -182,7 +183,11 @@ Result<Authority> open_authority(const fs::path& folder) {
   // Keys made by a clock that is behind would have expired too early.
   if (auto s = check_clock("the keys in " + folder.string(), openssl::start_ns(certificate->get())); !s)
     return s.error();
-  auto key = openssl::read_key(folder / kAuthorityKey);
+  if (utc_now_ns() >= openssl::expiry_ns(certificate->get()))
+    return Error{"the authority in " + folder.string() + " has expired on " +
+                 utc_text(openssl::expiry_ns(certificate->get())) +
+                 ": make a new one (relievo keys init --keys DIR), and new keys for everybody"};
+  auto key = openssl::read_key(folder / key_files::kAuthorityKey);
   if (!key) return key.error();
   return Authority{std::move(certificate).value(), std::move(key).value()};
 }
@@ -243,6 +248,21 @@ Status write_keys(const fs::path& folder, const Authority& authority, const std:
   return {};
 }
 
+/// Beside those of the same name, which can be revoked still.
+Status add_holder(const fs::path& folder, const std::string& name, const std::string& certificate_pem) {
+  const fs::path file = folder / kHolders / (name + ".pem");
+  std::error_code error;
+  if (fs::exists(file, error)) {
+    const auto before = openssl::read_certificate(file);
+    if (!before) return before.error();
+    // '+' is in no name.
+    const fs::path aside = folder / kHolders / (name + "+" + openssl::serial_of(before->get()) + ".pem");
+    fs::rename(file, aside, error);
+    if (error) return Error{"cannot write " + aside.string() + ": " + error.message()};
+  }
+  return write_whole_file(file, certificate_pem);
+}
+
 /// A folder that gets its name when all is in it, or else is gone.
 class NewFolder {
  public:
@@ -300,7 +320,7 @@ Status create_authority(const fs::path& folder) {
   auto certificate = new_certificate("Relievo authority", key->get(), nullptr, nullptr);
   if (!certificate) return certificate.error();
   const Authority authority{std::move(certificate).value(), std::move(key).value()};
-  if (auto s = write_secret(fresh->path() / kAuthorityKey, pem(authority.key.get())); !s) return s;
+  if (auto s = write_secret(fresh->path() / key_files::kAuthorityKey, pem(authority.key.get())); !s) return s;
   const auto nobody = revocation_list(authority, {});
   if (!nobody) return nobody.error();
   std::error_code error;
@@ -308,7 +328,7 @@ Status create_authority(const fs::path& folder) {
   const std::string name = this_machine();
   std::string holder;
   if (auto s = write_keys(fresh->path(), authority, name, KeyRole::kPublisher, *nobody, holder); !s) return s;
-  if (auto s = write_whole_file(fresh->path() / kHolders / (name + ".pem"), holder); !s) return s;
+  if (auto s = add_holder(fresh->path(), name, holder); !s) return s;
   return fresh->keep();
 }
 
@@ -321,9 +341,9 @@ Status issue_keys(const fs::path& folder, const std::string& name, KeyRole role,
   const auto holders = list_keys(folder);
   if (!holders) return holders.error();
   for (const KeyHolder& holder : *holders)
-    if (holder.name == name)
-      return Error{"'" + name + "' has keys already" +
-                   (holder.revoked ? ", which were revoked: choose another name" : ": choose another name")};
+    if (holder.name == name && !holder.revoked && holder.expires_ns > utc_now_ns())
+      return Error{"'" + name + "' has keys already, until " + utc_text(holder.expires_ns) +
+                   ": choose another name, or revoke them first (relievo keys revoke " + name + ")"};
   const auto revoked = revocation_list(*authority, *holders);
   if (!revoked) return revoked.error();
   auto fresh = NewFolder::create(out);
@@ -331,8 +351,41 @@ Status issue_keys(const fs::path& folder, const std::string& name, KeyRole role,
   std::string holder;
   if (auto s = write_keys(fresh->path(), *authority, name, role, *revoked, holder); !s) return s;
   // First, so that no keys are out there that nobody can revoke.
-  if (auto s = write_whole_file(folder / kHolders / (name + ".pem"), holder); !s) return s;
+  if (auto s = add_holder(folder, name, holder); !s) return s;
   return fresh->keep();
+}
+
+Status renew_keys(const fs::path& folder) {
+  const auto authority = open_authority(folder);
+  if (!authority) return authority.error();
+  const auto holders = list_keys(folder);
+  if (!holders) return holders.error();
+  const auto revoked = revocation_list(*authority, *holders);
+  if (!revoked) return revoked.error();
+  const auto before = openssl::read_certificate(folder / key_files::kIdentity);
+  if (!before) return before.error();
+  const std::string name = openssl::name_of(before->get());
+  auto fresh = NewFolder::create(folder / "renewed");  // never kept: what is in it moves up
+  if (!fresh) return fresh.error();
+  std::string holder;
+  if (auto s = write_keys(fresh->path(), *authority, name, KeyRole::kPublisher, *revoked, holder); !s)
+    return s;
+  if (auto s = add_holder(folder, name, holder); !s) return s;
+  struct stat owner {};
+  if (stat(folder.c_str(), &owner) != 0) return Error{"cannot read " + folder.string()};
+  for (const char* file : {key_files::kPrivate, key_files::kIdentity, key_files::kAuthority,
+                           key_files::kGovernance, key_files::kPermissions, key_files::kRevoked}) {
+    const fs::path made = fresh->path() / file, place = folder / file;
+    // Where root renews the keys of a service's user.
+    if (chown(made.c_str(), owner.st_uid, owner.st_gid) != 0 && geteuid() == 0)
+      return Error{"cannot give " + made.string() + " to the owner of " + folder.string()};
+    std::error_code error;
+    fs::rename(made, place, error);
+    if (error)
+      return Error{"cannot write " + place.string() + ": " + error.message() +
+                   "; relievo keys renew, once more, mends it"};
+  }
+  return {};
 }
 
 Status revoke_keys(const fs::path& folder, const std::string& name) {
@@ -340,11 +393,15 @@ Status revoke_keys(const fs::path& folder, const std::string& name) {
   if (!authority) return authority.error();
   auto holders = list_keys(folder);
   if (!holders) return holders.error();
-  const auto found =
-      std::find_if(holders->begin(), holders->end(), [&](const KeyHolder& h) { return h.name == name; });
-  if (found == holders->end()) return Error{"nobody named '" + name + "' has keys: see relievo keys list"};
-  if (found->revoked) return Error{"the keys of '" + name + "' were revoked already"};
-  found->revoked = true;
+  bool known = false, changed = false;
+  for (KeyHolder& holder : *holders) {
+    if (holder.name != name) continue;
+    known = true;
+    changed = changed || !holder.revoked;
+    holder.revoked = true;
+  }
+  if (!known) return Error{"nobody named '" + name + "' has keys: see relievo keys list"};
+  if (!changed) return Error{"the keys of '" + name + "' were revoked already"};
   const auto list = revocation_list(*authority, *holders);
   if (!list) return list.error();
   return write_whole_file(folder / key_files::kRevoked, *list);
@@ -352,8 +409,8 @@ Status revoke_keys(const fs::path& folder, const std::string& name) {
 
 Result<std::vector<KeyHolder>> list_keys(const fs::path& folder) {
   if (const auto authority = open_authority(folder); !authority) return authority.error();
-  const auto keys = read_keys(folder);
-  if (!keys) return keys.error();
+  const auto revoked = read_revoked(folder);
+  if (!revoked) return revoked.error();
   std::vector<KeyHolder> holders;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder / kHolders, error)) {
@@ -362,13 +419,14 @@ Result<std::vector<KeyHolder>> list_keys(const fs::path& folder) {
     KeyHolder holder;
     holder.name = openssl::name_of(certificate->get());
     holder.serial = openssl::serial_of(certificate->get());
-    holder.revoked =
-        std::find(keys->revoked.begin(), keys->revoked.end(), holder.serial) != keys->revoked.end();
+    holder.revoked = std::find(revoked->begin(), revoked->end(), holder.serial) != revoked->end();
     holder.expires_ns = openssl::expiry_ns(certificate->get());
     holders.push_back(std::move(holder));
   }
   if (error) return Error{"cannot read " + (folder / kHolders).string() + ": " + error.message()};
-  std::sort(holders.begin(), holders.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  std::sort(holders.begin(), holders.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.name, a.expires_ns) < std::tie(b.name, b.expires_ns);
+  });
   return holders;
 }
 

@@ -21,12 +21,17 @@ enum class KeyRole {
 /// nothing, where `folder` exists and is not empty.
 Status create_authority(const std::filesystem::path& folder);
 
-/// Writes a folder of keys for another machine to `out`, which must not exist. `name`: as a stream's, not in
-/// use. Fails where `authority` is no authority.
+/// Writes a folder of keys for another machine to `out`, which must not exist. `name`: as a stream's, of
+/// nobody whose keys are valid. Fails where `authority` is no authority, or has expired; its own keys, those
+/// of this machine, may have.
 Status issue_keys(const std::filesystem::path& authority, const std::string& name, KeyRole role,
                   const std::filesystem::path& out);
 
-/// The keys of that name count no longer, for whoever has this folder's list of revoked keys and starts
+/// New keys for this machine, of the same name, in place of those in the authority's folder. Those count
+/// until they expire or the name is revoked.
+Status renew_keys(const std::filesystem::path& authority);
+
+/// All keys of that name count no longer, for whoever has this folder's list of revoked keys and starts
 /// afterwards.
 Status revoke_keys(const std::filesystem::path& authority, const std::string& name);
 
@@ -35,7 +40,7 @@ struct KeyHolder {
   bool revoked = false;
   std::int64_t expires_ns = 0;  // UTC
 };
-/// All who got keys, by name.
+/// All keys that were made, by name, and of each name by their end.
 Result<std::vector<KeyHolder>> list_keys(const std::filesystem::path& authority);
 
 }  // namespace relievo

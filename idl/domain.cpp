@@ -40,7 +40,7 @@ Status create_domain(dds_domainid_t id, const std::string& config, Entity& out) 
 }
 
 void warn_of_open_keys(const std::filesystem::path& folder) {
-  for (const char* secret : {key_files::kPrivate, "authority.key"})
+  for (const char* secret : {key_files::kPrivate, key_files::kAuthorityKey})
     if (const auto file = folder / secret; readable_by_all(file))
       log_warning("every user of this machine can read the secret in " + file.string() + ": chmod 600 it");
 }

@@ -33,14 +33,6 @@ Status check_identity(X509* identity, EVP_PKEY* key, X509* authority, const std:
   return {};
 }
 
-std::vector<std::string> revoked_serials(X509_CRL* list) {
-  std::vector<std::string> serials;
-  const STACK_OF(X509_REVOKED)* entries = X509_CRL_get_REVOKED(list);
-  for (int i = 0; i < sk_X509_REVOKED_num(entries); ++i)
-    serials.push_back(openssl::hex(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(entries, i))));
-  return serials;
-}
-
 std::string this_user() {
   const passwd* const user = getpwuid(geteuid());
   return user != nullptr ? user->pw_name : std::to_string(geteuid());
@@ -95,6 +87,16 @@ Status check_readable(const std::filesystem::path& folder, const char* file) {
                std::generic_category().message(error) + "; " + (error == EACCES ? mend : "") + kInPlain};
 }
 
+Result<std::vector<std::string>> read_revoked(const std::filesystem::path& folder) {
+  const auto list = openssl::read_revocation_list(folder / key_files::kRevoked);
+  if (!list) return list.error();
+  std::vector<std::string> serials;
+  const STACK_OF(X509_REVOKED)* entries = X509_CRL_get_REVOKED(list->get());
+  for (int i = 0; i < sk_X509_REVOKED_num(entries); ++i)
+    serials.push_back(openssl::hex(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(entries, i))));
+  return serials;
+}
+
 Result<Keys> read_keys_of_any_time(const std::filesystem::path& folder) {
   for (const char* file : {key_files::kAuthority, key_files::kIdentity, key_files::kPrivate,
                            key_files::kGovernance, key_files::kPermissions, key_files::kRevoked})
@@ -110,7 +112,7 @@ Result<Keys> read_keys_of_any_time(const std::filesystem::path& folder) {
   if (!governance) return governance.error();
   const auto permissions = openssl::read_signed(folder / key_files::kPermissions, authority->get());
   if (!permissions) return permissions.error();
-  const auto revoked = openssl::read_revocation_list(folder / key_files::kRevoked);
+  auto revoked = read_revoked(folder);
   if (!revoked) return revoked.error();
 
   Keys keys;
@@ -118,8 +120,10 @@ Result<Keys> read_keys_of_any_time(const std::filesystem::path& folder) {
   keys.name = openssl::name_of(identity->get());
   keys.serial = openssl::serial_of(identity->get());
   keys.authority = openssl::fingerprint(authority->get());
-  keys.revoked = revoked_serials(revoked->get());
+  keys.revoked = *std::move(revoked);
   keys.may_publish = permissions->find("<grant name=\"publisher\">") != std::string::npos;
+  std::error_code unreadable;  // as good as absent: it is not ours then
+  keys.of_authority = std::filesystem::exists(folder / key_files::kAuthorityKey, unreadable);
   keys.valid_from_ns = std::max(openssl::start_ns(identity->get()), openssl::start_ns(authority->get()));
   keys.expires_ns = std::min(openssl::expiry_ns(identity->get()), openssl::expiry_ns(authority->get()));
   return keys;
@@ -136,8 +140,11 @@ Status check_time(const Keys& keys) {
   const std::string what = "the keys in " + keys.folder.string();
   if (auto s = check_clock(what, keys.valid_from_ns); !s) return s;
   if (utc_now_ns() < keys.expires_ns) return {};
-  return Error{what + " have expired on " + utc_text(keys.expires_ns) +
-               ": ask for new ones (relievo keys add-client NAME, where the authority is)"};
+  const char* mend = keys.of_authority
+                         ? "renew them (relievo keys renew; where the authority itself has expired, "
+                           "relievo keys init makes a new one)"
+                         : "ask for new ones (relievo keys add-client NAME, where the authority is)";
+  return Error{what + " have expired on " + utc_text(keys.expires_ns) + ": " + mend};
 }
 
 Result<Keys> read_keys(const std::filesystem::path& folder) {

@@ -13,7 +13,7 @@
 
 namespace relievo {
 
-/// Files of such a folder. Only identity.key is secret.
+/// Files of such a folder. Only identity.key is secret, but for an authority's.
 namespace key_files {
 inline constexpr const char* kAuthority = "authority.pem";      // whose keys these are
 inline constexpr const char* kIdentity = "identity.pem";        // who this is
@@ -21,6 +21,7 @@ inline constexpr const char* kPrivate = "identity.key";         // readable by i
 inline constexpr const char* kGovernance = "governance.p7s";    // what is protected, and how
 inline constexpr const char* kPermissions = "permissions.p7s";  // what this machine may do
 inline constexpr const char* kRevoked = "revoked.pem";          // keys that count no longer
+inline constexpr const char* kAuthorityKey = "authority.key";   // an authority's alone, secret, too
 }  // namespace key_files
 
 struct Keys {
@@ -30,6 +31,7 @@ struct Keys {
   std::string authority;             // its fingerprint, 16 hexadecimal digits
   std::vector<std::string> revoked;  // serials, as far as this folder knows
   bool may_publish = false;
+  bool of_authority = false;       // its folder can make keys
   std::int64_t valid_from_ns = 0;  // UTC
   std::int64_t expires_ns = 0;
 };
@@ -44,6 +46,9 @@ std::filesystem::path user_keys_folder();
 
 /// Whether this user may read a file of the folder. The error says what it lacks, and how to mend it.
 Status check_readable(const std::filesystem::path& folder, const char* file);
+
+/// Serials of the keys that count no longer, as far as the folder knows.
+Result<std::vector<std::string>> read_revoked(const std::filesystem::path& folder);
 
 /// Checks all of the folder but the time. The error says which file is missing, closed to this user, damaged
 /// or of another authority.
