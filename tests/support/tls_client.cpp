@@ -30,14 +30,14 @@ std::string common_name(X509* certificate) {
 }  // namespace
 
 bool make_certificate(const std::filesystem::path& cert, const std::filesystem::path& key,
-                      const std::string& common_name, const std::string& password) {
+                      const std::string& common_name, const std::string& password, Validity validity) {
   const Owned<EVP_PKEY> pair(EVP_EC_gen("P-256"));
   const Owned<X509> made(X509_new());
   if (!pair || !made) return false;
   X509_set_version(made.get(), 2);
   ASN1_INTEGER_set(X509_get_serialNumber(made.get()), 1);
-  X509_gmtime_adj(X509_getm_notBefore(made.get()), -60);
-  X509_gmtime_adj(X509_getm_notAfter(made.get()), 3600);
+  X509_gmtime_adj(X509_getm_notBefore(made.get()), validity.from_s);
+  X509_gmtime_adj(X509_getm_notAfter(made.get()), validity.until_s);
   X509_set_pubkey(made.get(), pair.get());
   X509_NAME* name = X509_get_subject_name(made.get());
   X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC,

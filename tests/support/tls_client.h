@@ -10,10 +10,17 @@
 
 namespace relievo::test {
 
+/// Of a certificate, from now on.
+struct Validity {
+  long from_s = -60;
+  long until_s = 90L * 24 * 3600;
+};
+
 /// Writes a new key, locked by `password` where that is not empty, and a certificate that it signs itself, as
 /// PEM; false where that fails.
 bool make_certificate(const std::filesystem::path& cert, const std::filesystem::path& key,
-                      const std::string& common_name, const std::string& password = {});
+                      const std::string& common_name, const std::string& password = {},
+                      Validity validity = {});
 
 /// Trusts whatever certificate it is shown.
 class TlsClient : public TcpClient {

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <boost/asio/ssl/context.hpp>
+#include <ctime>
+#include <limits>
 #include <sstream>
 
 #include "base/log.h"
@@ -23,7 +25,8 @@ using ErrorCode = boost::system::error_code;
 
 constexpr std::size_t kLeastToken = 16, kMostToken = 256;
 constexpr std::size_t kLargestTokenFile = 1 << 20, kLargestPem = 1 << 20;
-constexpr std::size_t kMadeToken = 24;  // bytes of chance
+constexpr std::size_t kMadeToken = 24;            // bytes of chance
+constexpr std::int64_t kSoon_s = 14 * 24 * 3600;  // before the end of a certificate
 constexpr const char* kHowToMake = "make one with: openssl rand -hex 24 > FILE";
 
 // What needs no quoting in an address, a cookie or a header.
@@ -55,6 +58,16 @@ Result<std::vector<std::string>> read_tokens(const std::filesystem::path& file) 
   }
   if (tokens.empty()) return Error{"there is no token in " + file.string() + "; " + kHowToMake};
   return tokens;
+}
+
+std::int64_t unix_time(const ASN1_TIME* time) {
+  std::tm parts{};
+  return ASN1_TIME_to_tm(time, &parts) == 1 ? timegm(&parts) : 0;
+}
+
+std::string date(std::int64_t unix_s) {
+  constexpr std::int64_t kLast_s = std::numeric_limits<std::int64_t>::max() / kNanosecondsPerSecond;
+  return utc_text(std::clamp(unix_s, -kLast_s, kLast_s) * kNanosecondsPerSecond);
 }
 
 }  // namespace
@@ -123,11 +136,13 @@ Result<TlsFiles> TlsFiles::load(const std::filesystem::path& cert, const std::fi
   out.key_ = key;
   out.cert_mark_ = mark_of(cert);
   out.key_mark_ = mark_of(key);
-  if (const Status read = out.read(); !read) return read.error();
+  auto served = out.read();
+  if (!served) return served.error();
+  out.served_ = *std::move(served);
   return out;
 }
 
-Status TlsFiles::read() {
+Result<TlsFiles::Served> TlsFiles::read() const {
   auto context = std::make_shared<ssl::context>(ssl::context::tls_server);
   ErrorCode error;
   context->set_options(ssl::context::default_workarounds | ssl::context::no_sslv2 | ssl::context::no_sslv3 |
@@ -147,22 +162,64 @@ Status TlsFiles::read() {
   if (error)
     return Error{"cannot use the key " + key_.string() + ": " + error.message() +
                  "; it must be the certificate's own, a PEM file without a password"};
-  context_ = std::move(context);
-  return {};
+  const X509* const own = SSL_CTX_get0_certificate(context->native_handle());
+  return Served{.context = std::move(context),
+                .valid_from_s = unix_time(X509_get0_notBefore(own)),
+                .expires_s = unix_time(X509_get0_notAfter(own))};
+}
+
+bool TlsFiles::take(Served newer) {
+  const std::int64_t now_s = utc_now_ns() / kNanosecondsPerSecond;
+  if (newer.expires_s <= now_s && now_s < served_.expires_s) {
+    log_warning("the old certificate stays: " + cert_.string() + " has expired on " + date(newer.expires_s) +
+                "; put a valid one in its place");
+    return false;
+  }
+  served_ = std::move(newer);
+  said_ = Dates::kGood;
+  return true;
+}
+
+void TlsFiles::replace_with(TlsFiles newer) {
+  cert_ = std::move(newer.cert_);
+  key_ = std::move(newer.key_);
+  cert_mark_ = newer.cert_mark_;
+  key_mark_ = newer.key_mark_;
+  take(std::move(newer.served_));
+}
+
+void TlsFiles::warn_of_dates() {
+  const std::int64_t now_s = utc_now_ns() / kNanosecondsPerSecond;
+  const Dates dates = served_.expires_s <= now_s             ? Dates::kExpired
+                      : now_s < served_.valid_from_s         ? Dates::kNotYet
+                      : served_.expires_s - now_s <= kSoon_s ? Dates::kSoon
+                                                             : Dates::kGood;
+  if (dates == said_) return;
+  said_ = dates;
+  const std::string what = "the certificate " + cert_.string();
+  constexpr const char* kMend = ": put a new one in its place, and it is read again";
+  if (dates == Dates::kExpired)
+    log_warning(what + " has expired on " + date(served_.expires_s) + ", and browsers refuse it" + kMend);
+  if (dates == Dates::kNotYet)
+    log_warning(what + " is valid from " + date(served_.valid_from_s) +
+                " on, and browsers refuse it until then; this machine's clock says " + date(now_s));
+  if (dates == Dates::kSoon) log_warning(what + " expires on " + date(served_.expires_s) + kMend);
 }
 
 std::shared_ptr<ssl::context> TlsFiles::context() {
   const FileMark cert = mark_of(cert_), key = mark_of(key_);
-  if (cert == cert_mark_ && key == key_mark_) return context_;
-  cert_mark_ = cert;
-  key_mark_ = key;
-  // Between the two files' replacement they do not fit together; the second one brings us here again.
-  if (const Status again = read(); !again) {
-    log_warning("the old certificate stays: " + again.error().message);
-  } else {
-    log_info("the certificate " + cert_.string() + " was read again");
+  if (cert != cert_mark_ || key != key_mark_) {
+    cert_mark_ = cert;
+    key_mark_ = key;
+    // Between the two files' replacement they do not fit together; the second one brings us here again.
+    if (auto again = read(); !again) {
+      log_warning("the old certificate stays: " + again.error().message);
+    } else if (take(*std::move(again))) {
+      log_info("the certificate " + cert_.string() + " was read again");
+    }
   }
-  return context_;
+  warn_of_dates();
+  return served_.context;
 }
 
 }  // namespace relievo

@@ -59,14 +59,29 @@ class TlsFiles {
   /// For a new connection; of the files as they are now, or as they last were in order. Those that already
   /// are connected keep theirs.
   std::shared_ptr<boost::asio::ssl::context> context();
+  /// By the files of `newer`; a certificate that is still valid stays where theirs has expired, which is
+  /// logged.
+  void replace_with(TlsFiles newer);
+  /// Logs, each once for a certificate, that it is not valid yet, ends soon, or has expired.
+  void warn_of_dates();
+  /// Until when what context() gave last is valid, Unix time.
+  std::int64_t expiry_s() const { return served_.expires_s; }
 
  private:
+  struct Served {
+    std::shared_ptr<boost::asio::ssl::context> context;
+    std::int64_t valid_from_s = 0, expires_s = 0;  // Unix time
+  };
+  enum class Dates { kGood, kNotYet, kSoon, kExpired };
+
   TlsFiles() = default;
-  Status read();
+  Result<Served> read() const;
+  bool take(Served newer);
 
   std::filesystem::path cert_, key_;
   FileMark cert_mark_, key_mark_;
-  std::shared_ptr<boost::asio::ssl::context> context_;
+  Served served_;
+  Dates said_ = Dates::kGood;
 };
 
 }  // namespace relievo

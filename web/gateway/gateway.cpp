@@ -67,6 +67,14 @@ struct Credentials {
     }
     return out;
   }
+  void replace_with(Credentials newer) {
+    tokens = std::move(newer.tokens);
+    if (tls && newer.tls)
+      tls->replace_with(*std::move(newer.tls));
+    else
+      tls = std::move(newer.tls);
+    if (tls) tls->warn_of_dates();
+  }
 };
 
 class Server : public Gateway, private ConnectionHost {
@@ -149,6 +157,8 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
     return reply;
   }
   credentials_.tokens.reload();  // also on a connection that has been open since before
+  counts_.certificate_expiry_s.reset();
+  if (credentials_.tls) counts_.certificate_expiry_s = credentials_.tls->expiry_s();
   return relievo::answer(request, {.hub = hub_,
                                    .counts = counts_,
                                    .tokens = credentials_.tokens,
@@ -167,6 +177,7 @@ Status Server::listen() {
   auto listener = Listener::open(io_, options_.host, options_.port);
   if (!listener) return listener.error();
   listener_ = *std::move(listener);
+  if (credentials_.tls) credentials_.tls->warn_of_dates();
   if (listener_->loopback()) return {};
   const std::string place = options_.host + ":" + std::to_string(listener_->port());
   Tokens& tokens = credentials_.tokens;
@@ -200,7 +211,7 @@ Status Server::apply(const WebOptions& web) {
                  ": name a token file, or say open, or restart for a token that is made and printed"};
   net::post(io_, [this, web, needs_token, credentials = *std::move(loaded)]() mutable {
     if (needs_token) credentials.tokens = *made_;
-    credentials_ = std::move(credentials);
+    credentials_.replace_with(std::move(credentials));
     web_ = std::move(web);
     const std::int64_t now_ns = steady_now_ns();
     limits_.change(connections_of(web_, false), requests_of(web_, false), now_ns);

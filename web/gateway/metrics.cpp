@@ -156,6 +156,10 @@ std::string metrics_text(const std::vector<StreamSnapshot>& streams, const Gatew
                static_cast<double>(counts.refused[i]));
   }
 
+  out.family("relievo_gateway_certificate_expiry_seconds", "gauge",
+             "Until when the certificate that browsers are shown is valid, as Unix time.");
+  if (counts.certificate_expiry_s) out.sample("", static_cast<double>(*counts.certificate_expiry_s));
+
   out.family(
       "relievo_dds_refused_total", "counter",
       "DDS peers turned away: handshakes that failed (a peer tries again and again), and readers without "

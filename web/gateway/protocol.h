@@ -64,12 +64,13 @@ enum class Refusal : std::uint8_t {
 constexpr std::size_t kRefusals = 11;
 std::string_view to_string(Refusal refusal);
 
-/// Counts of the gateway itself.
+/// Counts of the gateway itself, and its certificate.
 struct GatewayCounts {
   std::uint64_t connections = 0;  // TCP, accepted so far
   std::uint64_t requests = 0;     // HTTP, answered so far
   std::array<std::uint64_t, kRefusals> refused{};
-  int clients = 0;  // WebSocket, now
+  int clients = 0;                                   // WebSocket, now
+  std::optional<std::int64_t> certificate_expiry_s;  // Unix time; of the one that browsers are shown
 
   void refuse(Refusal why) { ++refused[static_cast<std::size_t>(why)]; }
 };

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: https and wss work, speak nothing older than TLS 1.2, tell who comes without, and take a new
-// certificate without a client losing its stream.
+// certificate without a client losing its stream; one out of its time is said.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
+
+#include "base/time.h"
 
 #include "tests/support/temp_folder.h"
 #include "tests/support/tls_client.h"
@@ -11,6 +15,15 @@
 
 namespace relievo::test {
 namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr long kDay_s = 24 * 3600;
+
+std::string date_in(long s) {
+  return utc_text(utc_now_ns() + s * kNanosecondsPerSecond, "%Y-%m-%d");
+}
 
 class GatewayTls : public GatewayTest {
  protected:
@@ -21,6 +34,15 @@ class GatewayTls : public GatewayTest {
   Response get(const std::string& target) {
     TlsClient client(port);
     return request(client, port, "GET", target);
+  }
+
+  void make(const std::string& name, Validity validity) const {
+    ASSERT_TRUE(make_certificate(cert, key, name, "", validity));
+  }
+  /// Until when the gateway says that its certificate is valid, from now on, in days.
+  double days_left() {
+    const double until_s = metric_in(get("/metrics").body, "relievo_gateway_certificate_expiry_seconds");
+    return std::round((until_s - seconds(utc_now_ns())) / static_cast<double>(kDay_s));
   }
 
   TempFolder folder;
@@ -96,6 +118,67 @@ TEST_F(GatewayTls, ANewCertificateReachesNewClientsAndDisturbsNoOther) {
 
   gateway->publish("face", make_frame(0));
   EXPECT_TRUE(client.next_of("frame"));
+}
+
+TEST_F(GatewayTls, ACertificateOutOfItsTimeIsSaidOnce) {
+  const struct {
+    Validity validity;
+    std::string said, date;
+  } cases[] = {{{-9 * kDay_s, -2 * kDay_s}, " has expired on ", date_in(-2 * kDay_s)},
+               {{5 * kDay_s, 90 * kDay_s}, " is valid from ", date_in(5 * kDay_s)},
+               {{-9 * kDay_s, 13 * kDay_s}, " expires on ", date_in(13 * kDay_s)}};
+  for (const auto& c : cases) {
+    make("first", {});
+    start({.port = 0, .web = {.tls_cert = cert, .tls_key = key}});
+    testing::internal::CaptureStderr();
+    if (c.said != " has expired on ") {  // which would not take a valid one's place
+      make("late", c.validity);
+      EXPECT_EQ(TlsClient(port).peer_name(), "late");
+      EXPECT_EQ(TlsClient(port).peer_name(), "late");
+      const std::string log = testing::internal::GetCapturedStderr();
+      EXPECT_THAT(log, HasSubstr("warning: the certificate " + cert + c.said + c.date));
+      EXPECT_EQ(log.find(c.said), log.rfind(c.said)) << "once";
+      testing::internal::CaptureStderr();
+    }
+    make("late", c.validity);
+    start({.port = 0, .web = {.tls_cert = cert, .tls_key = key}});
+    EXPECT_EQ(TlsClient(port).peer_name(), "late") << "whose certificate it is may know better";
+    const std::string log = testing::internal::GetCapturedStderr();
+    EXPECT_THAT(log, HasSubstr("warning: the certificate " + cert + c.said + c.date));
+    EXPECT_EQ(log.find(c.said), log.rfind(c.said)) << "once";
+  }
+  testing::internal::CaptureStderr();
+  make("good", {});
+  start({.port = 0, .web = {.tls_cert = cert, .tls_key = key}});
+  EXPECT_EQ(TlsClient(port).peer_name(), "good");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), Not(HasSubstr("warning")));
+}
+
+TEST_F(GatewayTls, AnExpiredCertificateDoesNotReplaceAValidOne) {
+  EXPECT_EQ(TlsClient(port).peer_name(), "first");
+  testing::internal::CaptureStderr();
+  make("expired", {-9 * kDay_s, -2 * kDay_s});
+  EXPECT_EQ(TlsClient(port).peer_name(), "first");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              HasSubstr("the old certificate stays: " + cert + " has expired on " + date_in(-2 * kDay_s)));
+  ASSERT_TRUE(gateway->apply({.tls_cert = cert, .tls_key = key}));
+  EXPECT_EQ(TlsClient(port).peer_name(), "first") << "nor where the configuration is read again";
+  EXPECT_EQ(days_left(), 90);
+  make("next", {-9 * kDay_s, 30 * kDay_s});
+  EXPECT_EQ(TlsClient(port).peer_name(), "next");
+
+  make("expired", {-9 * kDay_s, -2 * kDay_s});
+  start({.port = 0, .web = {.tls_cert = cert, .tls_key = key}});
+  make("expired later", {-9 * kDay_s, -kDay_s});
+  EXPECT_EQ(TlsClient(port).peer_name(), "expired later") << "of two expired ones the newer file";
+}
+
+TEST_F(GatewayTls, MetricsSayUntilWhenTheCertificateIsValid) {
+  EXPECT_EQ(days_left(), 90);
+  make("next", {-60, 30 * kDay_s});
+  EXPECT_EQ(days_left(), 30);
+  start({.port = 0});
+  EXPECT_EQ(metric("relievo_gateway_certificate_expiry_seconds"), -1) << "no certificate";
 }
 
 TEST_F(GatewayTls, FilesThatCannotBeUsedAreOneClearLine) {
