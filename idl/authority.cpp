@@ -248,6 +248,15 @@ Status write_keys(const fs::path& folder, const Authority& authority, const std:
   return {};
 }
 
+/// Where root keeps the keys of a service's user, that user reads what root writes.
+Status give_to_owner_of(const fs::path& folder, const fs::path& file) {
+  struct stat owner {};
+  if (geteuid() != 0 || stat(folder.c_str(), &owner) != 0) return {};
+  if (chown(file.c_str(), owner.st_uid, owner.st_gid) == 0) return {};
+  return Error{"cannot give " + file.string() + " to the owner of " + folder.string() + ": " +
+               write_failure(errno)};
+}
+
 /// Beside those of the same name, which can be revoked still.
 Status add_holder(const fs::path& folder, const std::string& name, const std::string& certificate_pem) {
   const fs::path file = folder / kHolders / (name + ".pem");
@@ -260,7 +269,8 @@ Status add_holder(const fs::path& folder, const std::string& name, const std::st
     fs::rename(file, aside, error);
     if (error) return Error{"cannot write " + aside.string() + ": " + error.message()};
   }
-  return write_whole_file(file, certificate_pem);
+  if (auto s = write_whole_file(file, certificate_pem); !s) return s;
+  return give_to_owner_of(folder, file);
 }
 
 /// A folder that gets its name when all is in it, or else is gone.
@@ -371,14 +381,10 @@ Status renew_keys(const fs::path& folder) {
   if (auto s = write_keys(fresh->path(), *authority, name, KeyRole::kPublisher, *revoked, holder); !s)
     return s;
   if (auto s = add_holder(folder, name, holder); !s) return s;
-  struct stat owner {};
-  if (stat(folder.c_str(), &owner) != 0) return Error{"cannot read " + folder.string()};
   for (const char* file : {key_files::kPrivate, key_files::kIdentity, key_files::kAuthority,
                            key_files::kGovernance, key_files::kPermissions, key_files::kRevoked}) {
     const fs::path made = fresh->path() / file, place = folder / file;
-    // Where root renews the keys of a service's user.
-    if (chown(made.c_str(), owner.st_uid, owner.st_gid) != 0 && geteuid() == 0)
-      return Error{"cannot give " + made.string() + " to the owner of " + folder.string()};
+    if (auto s = give_to_owner_of(folder, made); !s) return s;
     std::error_code error;
     fs::rename(made, place, error);
     if (error)
@@ -404,7 +410,8 @@ Status revoke_keys(const fs::path& folder, const std::string& name) {
   if (!changed) return Error{"the keys of '" + name + "' were revoked already"};
   const auto list = revocation_list(*authority, *holders);
   if (!list) return list.error();
-  return write_whole_file(folder / key_files::kRevoked, *list);
+  if (auto s = write_whole_file(folder / key_files::kRevoked, *list); !s) return s;
+  return give_to_owner_of(folder, folder / key_files::kRevoked);
 }
 
 Result<std::vector<KeyHolder>> list_keys(const fs::path& folder) {

@@ -3,6 +3,7 @@
 // then.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -96,6 +97,31 @@ TEST_F(UserKeys, WhatIsNoFolderIsRefused) {
   fs::remove(where_);
   fs::create_symlink(where_, where_);
   expect_refused("Too many levels of symbolic links");
+}
+
+TEST_F(UserKeys, WhatRootChangesStaysItsOwners) {
+  if (::geteuid() != 0) GTEST_SKIP() << "root's commands";
+  constexpr uid_t kNobody = 65534;
+  make_keys(where_);
+  ASSERT_EQ(::chown(where_.c_str(), kNobody, kNobody), 0);
+  for (const auto& entry : fs::recursive_directory_iterator(where_))
+    ASSERT_EQ(::chown(entry.path().c_str(), kNobody, kNobody), 0);
+  const std::string umask = "umask 077; exec \"$0\" \"$@\"";
+  for (const std::vector<std::string>& verb :
+       {std::vector<std::string>{"add-client", "anna", "--out", folder_ / "anna"},
+        {"revoke", "anna"},
+        {"renew"}}) {
+    std::vector<std::string> command = {"/bin/sh", "-c", umask, program("relievo"), "keys"};
+    command.insert(command.end(), verb.begin(), verb.end());
+    command.insert(command.end(), {"--keys", where_});
+    const auto done = test::run(command);
+    ASSERT_EQ(done.status, 0) << done.err;
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(where_)) {
+    struct stat info {};
+    ASSERT_EQ(::stat(entry.path().c_str(), &info), 0);
+    EXPECT_EQ(info.st_uid, kNobody) << entry.path();
+  }
 }
 
 class ClosedKeys : public UserKeys {
