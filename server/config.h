@@ -43,10 +43,11 @@ struct ServedDecoder {
 /// One stream that is served, and from what.
 struct StreamConfig {
   std::string source = "sim:face";
-  std::string scheme;    // of a simulated source; empty: as the source says
-  CameraOptions camera;  // of a camera, in the table [camera]
-  std::string stream;    // its name; empty: as the source's, see name_of()
-  std::string record;    // empty: not recorded from the start
+  std::string scheme;          // of a simulated source; empty: as the source says
+  CameraOptions camera;        // of a camera, in the table [camera]
+  std::string stream;          // its name; empty: as the source's, see name_of()
+  std::string record;          // empty: not recorded from the start
+  bool record_beside = false;  // a file of that name that is there already: to the next unused one
   std::optional<std::uint64_t> frames;
   bool loop = false;
   bool fast = false;

@@ -311,6 +311,7 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.text("source", config.source);
   reader.scheme("scheme", config.scheme);
   reader.text("record", config.record);
+  config.record_beside = !config.record.empty();  // a service comes back by itself
   if (const auto frames = reader.integer("frames", 1, std::numeric_limits<std::int64_t>::max())) {
     config.frames = static_cast<std::uint64_t>(*frames);
   }

@@ -46,6 +46,7 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   set(flags.source, config.source);
   set(flags.stream, config.stream);
   set(flags.record, config.record);
+  if (flags.record) config.record_beside = false;  // there is a person who can give another name
   set(flags.threads, config.threads);
   if (!flags.scheme.empty()) config.scheme = flags.scheme;
   if (flags.decoder) set_decoder(*flags.decoder, config);

@@ -194,7 +194,8 @@ void StreamSet::run(Entry& entry) {
 
 Status StreamSet::run_once(Entry& entry) {
   StreamConfig config = entry.config;
-  if (entry.again && !config.record.empty()) config.record = unused_name(config.record);
+  if (!config.record.empty() && (entry.again || config.record_beside))
+    config.record = unused_name(config.record);
   auto opened = ServedStream::open(config, around_, entry.stopping);
   const bool comes_later = std::exchange(entry.tried_before, true);
   entry.again = entry.again || opened;
@@ -207,9 +208,10 @@ Status StreamSet::run_once(Entry& entry) {
     if (entry.stopping || entry.paused) return {};
   }
   if (!opened) return opened.error();
-  if (comes_later)
-    log_info((around_.config.streams.empty() ? "" : name_of(config) + ": ") + "streaming from " +
-             config.source);
+  const std::string label = around_.config.streams.empty() ? "" : name_of(config) + ": ";
+  if (comes_later) log_info(label + "streaming from " + config.source);
+  if (config.record != entry.config.record)
+    log_info(label + "recorded to " + config.record + ": " + entry.config.record + " is there already");
   const Status done = (*opened)->run();
   const std::lock_guard lock(mutex_);
   entry.stream = nullptr;

@@ -138,6 +138,30 @@ TEST_F(SeveralStreams, OneThatFailsIsTriedAgainAndTheOtherLosesNothing) {
   EXPECT_EQ(server.process().wait(), 0) << server.process().err();
 }
 
+// As after a crash or a reboot: nobody is there to give a service another name.
+TEST_F(SeveralStreams, WhatTheConfigurationRecordsToMayBeThereFromBefore) {
+  const fs::path file = folder_ / "left.mcap";
+  const std::string record = "record = \"" + file.string() + "\"\n";
+  const auto serves = [&](const fs::path& into, const std::string& label) {
+    WebServer server(command());
+    EXPECT_TRUE(server.goes_on("left", 2)) << server.process().err();
+    EXPECT_TRUE(eventually([&] { return fs::exists(into); })) << into << server.process().err();
+    EXPECT_THAT(server.process().err(), HasSubstr(label + "recorded to " + into.string() + ": " +
+                                                  file.string() + " is there already"));
+    server.process().signal(SIGTERM);
+    EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+  };
+  std::ofstream(file) << "a recording of before";
+  write(record + "stream = \"left\"\nsource = \"take:" + (folder_ / "one").string() + "\"\n");
+  serves(folder_ / "left-2.mcap", "");
+  std::vector<std::string> by_hand = command();
+  by_hand.insert(by_hand.end(), {"--record", file.string()});
+  expect_one_error(run(by_hand), "exists already");
+  write(table("left", "one", record) + table("right", "two"));
+  serves(folder_ / "left-3.mcap", "left: ");
+  EXPECT_EQ(read_text(file), "a recording of before");
+}
+
 TEST_F(SeveralStreams, AReloadChangesWhatChangedAndNothingElse) {
   WebServer server(command());
   ASSERT_TRUE(server.goes_on("right", 2)) << server.process().err();
