@@ -12,10 +12,6 @@
 namespace relievo {
 namespace {
 
-// A killed writer's stream is gone after this. Cyclone renews it with every sample and, while there is none,
-// each four fifths of it: short enough to be noticed, long enough for a loaded machine to be half a second
-// late.
-constexpr std::int64_t kLiveliness_ns = 2'500'000'000;
 constexpr std::int64_t kMaxBlocking_ns = 100'000'000;  // a publisher waits no longer for its socket
 constexpr int kMaxStreams = 256;                       // of a reader: what a hostile peer can make it hold
 

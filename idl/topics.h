@@ -18,6 +18,11 @@ namespace relievo {
 /// What a stream's server writes: the topics that are subscribed to, recorded and played.
 constexpr std::array<Topic, 3> kTopics = {Topic::kInfo, Topic::kFrame, Topic::kStatus};
 
+/// A killed writer's stream is gone after this. Cyclone renews it with every sample and, while there is none,
+/// each four fifths of it: short enough to be noticed, long enough for a loaded machine to be half a second
+/// late.
+constexpr std::int64_t kLiveliness_ns = 2'500'000'000;
+
 /// Who speaks of a stream: its server, or whoever watches it.
 enum class Role { kServer, kWatcher };
 

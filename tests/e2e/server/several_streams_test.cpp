@@ -26,6 +26,10 @@ class Reader {
       const std::lock_guard lock(mutex_);
       started_.push_back(info.started_ns);
     };
+    callbacks.gone = [this](const std::string&) {
+      const std::lock_guard lock(mutex_);
+      ++gone_;
+    };
     callbacks.frame = [this](const std::string&, const FrameMessage& frame) {
       const std::lock_guard lock(mutex_);
       if (!frames_.empty() && frame.sequence != frames_.back() + 1) ++gaps_;
@@ -43,6 +47,10 @@ class Reader {
     const std::lock_guard lock(mutex_);
     return gaps_;
   }
+  int gone() const {
+    const std::lock_guard lock(mutex_);
+    return gone_;
+  }
   std::set<std::int64_t> starts() const {
     const std::lock_guard lock(mutex_);
     return {started_.begin(), started_.end()};
@@ -57,6 +65,7 @@ class Reader {
   std::vector<std::int64_t> started_;
   std::vector<std::uint64_t> frames_;
   std::uint64_t gaps_ = 0;
+  int gone_ = 0;
   std::unique_ptr<Subscriber> subscriber_;
 };
 
@@ -180,6 +189,27 @@ TEST_F(SeveralStreams, AReloadChangesWhatChangedAndNothingElse) {
   EXPECT_EQ(left.gaps(), 0U);
   server.process().signal(SIGTERM);
   EXPECT_EQ(server.process().wait(), 0) << server.process().err();
+}
+
+// Cyclone lets the liveliness of all other writers of a server run out when those of one stream are deleted.
+TEST_F(SeveralStreams, WatchersOfTheOthersAreNotToldThatTheyAreGone) {
+  WebServer server(command());
+  const Reader left("left");
+  for (int round = 0; round < 3; ++round) {
+    const Reader right("right");
+    ASSERT_TRUE(left.gets(2) && right.gets(2)) << server.process().err();
+    write(table("left", "one"));
+    ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+    EXPECT_TRUE(eventually([&] { return right.gone() == 1; })) << "its end is told";
+    EXPECT_TRUE(left.gets(2));
+    EXPECT_EQ(left.gone(), 0) << "it goes on";
+    write(table("left", "one") + table("right", "two"));
+    ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  }
+  EXPECT_EQ(left.starts().size(), 1U);
+  EXPECT_EQ(left.gaps(), 0U);
+  server.process().signal(SIGKILL);
+  EXPECT_TRUE(eventually([&] { return left.gone() == 1; })) << "a crash is told";
 }
 
 // A camera that is not there is tried again, and each stream that begins says so anew.
