@@ -16,14 +16,16 @@ namespace relievo {
 namespace {
 
 constexpr std::int64_t kKeyInterval_ns = kNanosecondsPerSecond;  // between wishes for a key frame
+constexpr std::int64_t kClockInterval_ns = 100'000'000;          // between questions until the first answer
 
 /// Median of the last values.
 class LastValues {
  public:
   void add(double value) { values_[count_++ % values_.size()] = value; }
-  double median() const {
+  /// Nothing where there are none.
+  std::optional<double> median() const {
     const std::size_t n = std::min(count_, values_.size());
-    if (n == 0) return 0;
+    if (n == 0) return std::nullopt;
     auto sorted = values_;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(n / 2);
     std::nth_element(sorted.begin(), middle, sorted.begin() + static_cast<std::ptrdiff_t>(n));
@@ -63,7 +65,7 @@ class DdsLiveReader final : public LiveReader {
   Report report() const override {
     const std::lock_guard lock(mutex_);
     Report out = report_;
-    out.decode_ms = decode_ms_.median();
+    out.decode_ms = decode_ms_.median().value_or(0);
     out.latency_ms = latency_ms_.median();
     if (clock_) out.clock = clock_->offset();
     return out;
@@ -165,11 +167,20 @@ class DdsLiveReader final : public LiveReader {
     }
     ++report_.frames;
     report_.bytes += message.data->size();
-    const std::int64_t latency_ns = now_ns + (clock ? clock->offset_ns : 0) - message.capture_time_ns;
     decode_ms_.add(milliseconds(took_ns));
-    latency_ms_.add(milliseconds(latency_ns));
     told_.decode.add(seconds(took_ns));
+    if (!clock) return ask_for_clock();
+    const std::int64_t latency_ns = now_ns + clock->offset_ns - message.capture_time_ns;
+    latency_ms_.add(milliseconds(latency_ns));
     told_.decoded_after.add(seconds(latency_ns));
+  }
+
+  /// Soon again, since no latency is known before the first answer.
+  void ask_for_clock() {
+    const std::int64_t now_ns = steady_now_ns();
+    if (!clock_ || now_ns - clock_asked_ns_ < kClockInterval_ns) return;
+    clock_asked_ns_ = now_ns;
+    clock_->ask();
   }
 
   const Options options_;
@@ -181,7 +192,7 @@ class DdsLiveReader final : public LiveReader {
   QualityChoice choice_;
   QualityChoice::Seen seen_;
   Lateness lateness_;
-  std::int64_t key_asked_ns_ = 0;
+  std::int64_t key_asked_ns_ = 0, clock_asked_ns_ = 0;
   std::uint64_t published_ = 0;      // when the last status was sent,
   Rung published_of_ = Rung::kFull;  // of that rung
   bool any_since_status_ = true;

@@ -38,10 +38,11 @@ class LiveReader {
     std::uint64_t lost = 0;     // on the way here
     std::uint64_t skipped = 0;  // that build on a lost one, or do not decode
     std::uint64_t moves = 0;    // from rung to rung
-    double decode_ms = 0;       // medians of the last frames,
-    double latency_ms = 0;  // from capture until decoded: across machines right within half of clock's delay
-    std::optional<ClockOffset>
-        clock;  // of the server, from here; nothing: not known, and none is reckoned with
+    double decode_ms = 0;       // median of the last frames, as is:
+    // From capture until decoded: across machines right within half of clock's delay; nothing before there
+    // was a frame with the clock known.
+    std::optional<double> latency_ms;
+    std::optional<ClockOffset> clock;  // of the server, from here; nothing: not known
   };
 
   /// Fails where the domain cannot be joined or nothing can be called so. A stream that is not there is

@@ -32,7 +32,6 @@ void RungRelay::update(const std::string& name, Stream& stream) {
   for (const Rung rung : kRungs)  // full comes anyway, and nobody wishes for slow
     if (rung != Rung::kFull) relay(name, stream, rung);
   const std::int64_t now_ns = steady_now_ns();
-  if (stream.asked_ns != 0 && now_ns - stream.asked_ns < kNanosecondsPerSecond) return;
   if (stream.asked_ns == 0) {
     auto made = ClockProbe::create(domain_, name);
     if (made)
@@ -40,10 +39,15 @@ void RungRelay::update(const std::string& name, Stream& stream) {
     else
       log_warning("the clock of " + name + "'s server cannot be compared: " + made.error().message);
   }
-  stream.asked_ns = now_ns;
+  const std::int64_t asked_ns = std::exchange(stream.asked_ns, now_ns);
   if (!stream.clock) return;
-  if (const auto clock = stream.clock->offset()) gateway_.set_clock(name, clock->offset_ns);
-  stream.clock->ask();
+  const auto clock = stream.clock->offset();
+  if (clock) gateway_.set_clock(name, clock->offset_ns);
+  if (clock && now_ns - asked_ns < kNanosecondsPerSecond) {
+    stream.asked_ns = asked_ns;
+    return;
+  }
+  stream.clock->ask();  // at each call until the first answer: no latency is known before
 }
 
 void RungRelay::relay(const std::string& name, Stream& stream, Rung rung) {

@@ -33,19 +33,27 @@ std::string clock_text(const std::optional<ClockOffset>& clock) {
   return text;
 }
 
+std::string latency_text(const std::optional<double>& latency_ms) {
+  if (!latency_ms) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", *latency_ms);
+  return text;
+}
+
 void print_line(const LiveReader::Report& before, const LiveReader::Report& now, double took_s) {
   const double rate = static_cast<double>(now.frames - before.frames) / took_s;
   const double mbit_s = static_cast<double>(now.bytes - before.bytes) * 8e-6 / took_s;
-  std::printf("%-8s %6.1f/s %8.2f Mbit/s %6llu lost %6llu skipped  decode %6.1f ms  latency %7.1f ms  %s%s\n",
+  std::printf("%-8s %6.1f/s %8.2f Mbit/s %6llu lost %6llu skipped  decode %6.1f ms  latency %7s ms  %s%s\n",
               std::string(to_string(now.rung)).c_str(), rate, mbit_s,
               static_cast<unsigned long long>(now.lost - before.lost),
-              static_cast<unsigned long long>(now.skipped - before.skipped), now.decode_ms, now.latency_ms,
-              clock_text(now.clock).c_str(), now.live ? "" : "  (waiting for the stream)");
+              static_cast<unsigned long long>(now.skipped - before.skipped), now.decode_ms,
+              latency_text(now.latency_ms).c_str(), clock_text(now.clock).c_str(),
+              now.live ? "" : "  (waiting for the stream)");
   std::fflush(stdout);
 }
 
 void print_json(const Options& options, const LiveReader::Report& report, double took_s) {
-  const auto of_frames = [&](double ms) { return report.frames > 0 ? nlohmann::json(ms) : nlohmann::json(); };
+  using nlohmann::json;
   nlohmann::json j = {{"stream", options.stream},
                       {"quality", to_string(report.rung)},
                       {"seconds", took_s},
@@ -54,8 +62,8 @@ void print_json(const Options& options, const LiveReader::Report& report, double
                       {"lost", report.lost},
                       {"skipped", report.skipped},
                       {"moves", report.moves},
-                      {"decode_ms", of_frames(report.decode_ms)},
-                      {"latency_ms", of_frames(report.latency_ms)},
+                      {"decode_ms", report.frames > 0 ? json(report.decode_ms) : json()},
+                      {"latency_ms", report.latency_ms ? json(*report.latency_ms) : json()},
                       {"clock_offset_ms", nullptr},
                       {"clock_error_ms", nullptr}};
   j["qualities"] = nlohmann::json::array({to_string(Rung::kFull)});

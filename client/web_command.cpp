@@ -42,7 +42,7 @@ constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a
 Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   Subscriber::Callbacks callbacks;
   callbacks.info = [&](const StreamInfo& info) {
-    gateway.announce(info);
+    gateway.announce(info, ServerClock::kElsewhere);
     relay.add(info.stream);
   };
   callbacks.frame = [&](const std::string& stream, const FrameMessage& frame) {

@@ -94,7 +94,7 @@ class Server : public Gateway, private ConnectionHost {
   std::uint16_t port() const override { return listener_->port(); }
   std::string made_token() const override { return made_ ? made_->first() : std::string(); }
   Status apply(const WebOptions& web) override;
-  void announce(const StreamInfo& info) override { hub_.announce(info); }
+  void announce(const StreamInfo& info, ServerClock clock) override { hub_.announce(info, clock); }
   void publish(const std::string& stream, const FrameMessage& frame) override { hub_.publish(stream, frame); }
   void publish(const ServerStatus& status) override;
   void offer(const std::string& stream, const OfferedRecording& recording) override {

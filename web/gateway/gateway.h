@@ -20,6 +20,7 @@
 #include "web/gateway/offered_recording.h"
 #include "web/gateway/recording_control.h"
 #include "web/gateway/rig_control.h"
+#include "web/gateway/server_clock.h"
 #include "web/gateway/stage_times.h"
 
 namespace relievo {
@@ -70,7 +71,8 @@ class Gateway {
   virtual Status apply(const WebOptions& web) = 0;
 
   /// A new stream, or new information on a known one. What is published of a stream before is ignored.
-  virtual void announce(const StreamInfo& info) = 0;
+  virtual void announce(const StreamInfo& info, ServerClock clock) = 0;
+  void announce(const StreamInfo& info) { announce(info, ServerClock::kHere); }
   /// Frames of lower rungs (FrameMessage::rung) go to the clients that wish for those.
   virtual void publish(const std::string& stream, const FrameMessage& frame) = 0;
   virtual void publish(const ServerStatus& status) = 0;
@@ -80,7 +82,7 @@ class Gateway {
   virtual void offer(const std::string& stream, const OfferedRecording& recording) = 0;
   /// Clients of that rung of a stream, which are to be given its frames by publish().
   virtual int watchers(const std::string& stream, Rung rung) const = 0;
-  /// How far the clock of the stream's server is ahead of this machine's.
+  /// How far the clock of the stream's server, which is elsewhere, is ahead of this machine's.
   virtual void set_clock(const std::string& stream, std::int64_t offset_ns) = 0;
   /// The stream is gone: clients are told and stay connected, since it may come back.
   virtual void withdraw(const std::string& stream) = 0;

@@ -45,6 +45,7 @@ struct Hub::Watcher {
 
 struct Hub::Entry {
   StreamSnapshot facts;
+  ServerClock clock = ServerClock::kHere;
   bool live = false;  // announced and not withdrawn
   std::shared_ptr<const std::string> info_text, status_text, recording_text;
   std::uint64_t info_version = 0, status_version = 0, recording_version = 0;
@@ -55,7 +56,11 @@ struct Hub::Entry {
   std::optional<std::int64_t> key_asked_ns;
   std::vector<std::shared_ptr<Watcher>> watchers;
 
-  std::int64_t server_now_ns() const { return utc_now_ns() + facts.clock_offset_ns.value_or(0); }
+  /// Where the time by the server's clock is known.
+  void add_since(std::int64_t capture_time_ns, Histogram& histogram) const {
+    if (clock == ServerClock::kElsewhere && !facts.clock_offset_ns) return;
+    histogram.add(seconds(utc_now_ns() + facts.clock_offset_ns.value_or(0) - capture_time_ns));
+  }
 };
 
 bool Hub::is_on(const Watcher& watcher, Rung rung) {
@@ -105,13 +110,14 @@ void Hub::erase_if_unused(const std::string& stream) {
   if (it != streams_.end() && !it->second->live && it->second->watchers.empty()) streams_.erase(it);
 }
 
-void Hub::announce(const StreamInfo& info) {
+void Hub::announce(const StreamInfo& info, ServerClock clock) {
   auto text = std::make_shared<const std::string>(info_message(info));
   const std::lock_guard lock(mutex_);
   auto& entry = streams_[info.stream];
   if (!entry) entry = std::make_unique<Entry>();
   if (entry->live && *entry->info_text == *text) return;  // DDS repeats it to every late joiner
   entry->facts.info = info;
+  entry->clock = clock;
   entry->info_text = std::move(text);
   entry->info_version = next_version_++;
   const bool is_new = !std::exchange(entry->live, true);
@@ -130,7 +136,7 @@ void Hub::publish(const std::string& stream, const FrameMessage& frame) {
   if (frame.rung == Rung::kFull) {
     ++entry.facts.published;
     entry.facts.published_after.add(seconds(frame.publish_time_ns - frame.capture_time_ns));
-    entry.facts.here_after.add(seconds(entry.server_now_ns() - frame.capture_time_ns));
+    entry.add_since(frame.capture_time_ns, entry.facts.here_after);
     entry.latest = frame;
     if (is_key) entry.latest_key = frame;
   }
@@ -350,17 +356,16 @@ void Hub::count_sent(const Watcher& watcher, std::size_t bytes, std::int64_t cap
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(watcher.stream);
   if (it == streams_.end()) return;
-  const std::int64_t now_ns = it->second->server_now_ns();
   ++it->second->facts.sent;
   it->second->facts.sent_bytes += bytes;
-  it->second->facts.sent_after.add(seconds(now_ns - capture_time_ns));
+  it->second->add_since(capture_time_ns, it->second->facts.sent_after);
 }
 
 void Hub::count_taken(const Watcher& watcher, std::int64_t capture_time_ns) {
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(watcher.stream);
   if (it == streams_.end()) return;
-  it->second->facts.taken_after.add(seconds(it->second->server_now_ns() - capture_time_ns));
+  it->second->add_since(capture_time_ns, it->second->facts.taken_after);
 }
 
 std::vector<StreamSnapshot> Hub::snapshot() const {

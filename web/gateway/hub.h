@@ -20,6 +20,7 @@
 #include "base/rung.h"
 #include "base/stream.h"
 #include "web/gateway/offered_recording.h"
+#include "web/gateway/server_clock.h"
 #include "web/gateway/stage_times.h"
 
 namespace relievo {
@@ -63,12 +64,12 @@ class Hub {
   Hub& operator=(const Hub&) = delete;
   ~Hub();
 
-  void announce(const StreamInfo& info);
+  void announce(const StreamInfo& info, ServerClock clock = ServerClock::kHere);
   /// Frames and status of a stream that is not announced are ignored.
   void publish(const std::string& stream, const FrameMessage& frame);
   void publish(const ServerStatus& status);
-  /// What to add to this machine's time for that of the stream's server; what is said of the time since
-  /// capture counts on it. Forgotten when the stream is withdrawn.
+  /// What to add to this machine's time for that of the stream's server, which is elsewhere; before that no
+  /// time since capture is counted. Forgotten when the stream is withdrawn.
   void set_clock(const std::string& stream, std::int64_t offset_ns);
   std::int64_t clock_offset_ns(const std::string& stream) const;  // 0 where it is not known
   void withdraw(const std::string& stream);

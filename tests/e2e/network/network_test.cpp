@@ -68,7 +68,7 @@ class NetworkTest : public OnANetwork {
     const auto latency = text.find("latency");
     if (latency == std::string::npos || std::sscanf(text.c_str(), "%15s %lf/s", quality, &line.rate) != 2)
       return std::nullopt;
-    line.latency_ms = std::stod(text.substr(latency + 7));
+    if (std::sscanf(text.c_str() + latency, "latency %lf", &line.latency_ms) != 1) return std::nullopt;
     line.quality = quality;
     return line;
   }

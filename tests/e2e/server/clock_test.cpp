@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: a server whose clock is set while it runs goes on, in the time that it is then, as do its
-// recordings.
+// recordings; clients whose clock is another count no latency before they know the difference.
 #include <signal.h>
 
 #include <cstdlib>
@@ -8,6 +8,7 @@
 #include "base/time.h"
 #include "codec/recording.h"
 #include "tests/e2e/server/web_server.h"
+#include "tests/support/metric.h"
 
 namespace relievo::test {
 namespace {
@@ -72,6 +73,64 @@ TEST_F(SetClock, AStreamGoesOnInTheTimeThatItIsThen) {
   }
   EXPECT_GE(frames, 30U);
   EXPECT_GE(files, 3U) << "a file of one minute ends where an hour passes, forth or back";
+}
+
+/// Of clients here, an hour ahead of the server.
+class ClockAnHourBehind : public SetClock {
+ protected:
+  void SetUp() override {
+    SetClock::SetUp();
+    set_by(-kHour_s);
+    ASSERT_TRUE(eventually([&] { return hours_off() == -1; }));
+  }
+  static std::vector<std::string> client(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), program("relievo").string());
+    arguments.insert(arguments.end(), {"--domain", std::to_string(own_domain()), "--interface", "lo"});
+    return arguments;
+  }
+  static double metric(std::uint16_t port, const std::string& name) {
+    return metric_in(request(port, "GET", "/metrics").body, name);
+  }
+};
+
+TEST_F(ClockAnHourBehind, AGatewayCountsNoLatencyBeforeItKnows) {
+  WebServer gateway(client({"web", "--listen", "127.0.0.1:0"}));
+  ASSERT_NE(gateway.port(), 0) << gateway.process().err();
+  const std::string of = R"({stream="take",until="here"})";
+  ASSERT_TRUE(
+      eventually([&] { return metric(gateway.port(), "relievo_gateway_latency_seconds_count" + of) >= 3; }));
+  EXPECT_LT(metric(gateway.port(), "relievo_gateway_latency_seconds_sum" + of), 600);
+  EXPECT_NEAR(metric(gateway.port(), R"(relievo_gateway_clock_offset_seconds{stream="take"})"), -kHour_s, 60);
+}
+
+TEST_F(ClockAnHourBehind, StatsCountsNoLatencyBeforeItKnows) {
+  Process stats(client({"stats", "take"}));
+  std::string of;
+  ASSERT_TRUE(eventually([&] {
+    const std::string metrics = request(server_->port(), "GET", "/metrics").body;
+    const std::string name = "relievo_client_latency_seconds_count";
+    const auto at = metrics.find(name + "{stream=\"take\"");
+    if (at == std::string::npos) return false;
+    of = metrics.substr(at + name.size(), metrics.find('}', at) + 1 - at - name.size());
+    return metric_in(metrics, name + of) >= 3;
+  }));
+  EXPECT_LT(metric(server_->port(), "relievo_client_latency_seconds_sum" + of), 600);
+  stats.signal(SIGINT);
+  EXPECT_EQ(stats.wait(), 0) << stats.err();
+  for (const std::string& line : lines(stats.out())) {
+    double latency_ms = 0;
+    const bool told = std::sscanf(line.c_str() + line.find("latency"), "latency %lf ms", &latency_ms) == 1;
+    EXPECT_LT(latency_ms, 600'000) << line;
+    EXPECT_FALSE(told && line.find("clock not known") != std::string::npos) << line;
+    EXPECT_TRUE(told || line.find("latency       - ms") != std::string::npos) << line;
+  }
+}
+
+TEST_F(ClockAnHourBehind, StatsInJsonHasALatencyOnlyWhereItIsOne) {
+  const Finished done = run(client({"stats", "take", "--json", "--seconds", "1.2"}));
+  const auto stats = nlohmann::json::parse(done.out);
+  const auto& latency = stats["latency_ms"];
+  EXPECT_TRUE(latency.is_null() || (latency < 600'000 && !stats["clock_offset_ms"].is_null())) << done.out;
 }
 
 }  // namespace

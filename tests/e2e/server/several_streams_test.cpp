@@ -280,15 +280,15 @@ TEST_F(SeveralStreams, MetricsSayWhatItsClientsDecode) {
     if (at == std::string::npos) return false;
     const auto open = metrics.find('{', at);
     of = metrics.substr(open, metrics.find('}', at) + 1 - open);
-    return value("relievo_client_decode_seconds_count" + of) >= 3 &&
+    return value("relievo_client_latency_seconds_count" + of) >= 3 &&
            value("relievo_stage_seconds_count{stream=\"left\",stage=\"decode\"}") >= 1;
   })) << metrics;
   EXPECT_THAT(of, HasSubstr(":" + std::to_string(client.pid()) + "\",id="));
   EXPECT_GT(value("relievo_client_decode_seconds_sum" + of), 0);
-  EXPECT_EQ(value("relievo_client_latency_seconds_count" + of),
-            value("relievo_client_decode_seconds_count" + of));
-  EXPECT_GE(value("relievo_client_latency_seconds_sum" + of),
-            value("relievo_client_decode_seconds_sum" + of));
+  EXPECT_LE(value("relievo_client_latency_seconds_count" + of),
+            value("relievo_client_decode_seconds_count" + of))
+      << "counted once the clocks are compared";
+  EXPECT_GT(value("relievo_client_latency_seconds_sum" + of), 0);
   EXPECT_EQ(value("relievo_client_lost_total" + of), 0);
   EXPECT_EQ(value("relievo_stage_seconds_count{stream=\"right\",stage=\"decode\"}"), 0);
 }

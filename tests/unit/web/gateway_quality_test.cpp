@@ -252,5 +252,17 @@ TEST_F(GatewayQuality, TimesAreByTheClockOfTheStreamsServer) {
   EXPECT_GE(metric(R"(relievo_gateway_latency_seconds_sum{stream="face",until="here"})"), 0);
 }
 
+TEST_F(GatewayQuality, NoTimeIsCountedBeforeTheServersClockIsKnown) {
+  gateway->announce(make_info("far"), ServerClock::kElsewhere);
+  FrameMessage frame = make_frame(0);
+  frame.capture_time_ns = frame.publish_time_ns = utc_now_ns() + 3'600 * kNanosecondsPerSecond;
+  gateway->publish("far", frame);
+  EXPECT_EQ(metric(R"(relievo_gateway_latency_seconds_count{stream="far",until="published"})"), 1);
+  EXPECT_EQ(metric(R"(relievo_gateway_latency_seconds_count{stream="far",until="here"})"), 0);
+  gateway->set_clock("far", 3'600 * kNanosecondsPerSecond);
+  gateway->publish("far", frame);
+  EXPECT_EQ(metric(R"(relievo_gateway_latency_seconds_count{stream="far",until="here"})"), 1);
+}
+
 }  // namespace
 }  // namespace relievo::test
