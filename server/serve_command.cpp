@@ -32,7 +32,7 @@ struct Flags {
   std::optional<int> domain, threads, texture_quality, draco_speed, step_bits, key_interval, fill_holes;
   std::optional<double> bound_px, deadline_ms, texture_db;
   std::optional<std::uint64_t> frames;
-  bool loop = false, fast = false, half_lines = false, dense = false;
+  std::optional<bool> loop, fast, half_lines, dense;
   CameraOptions camera;
 };
 
@@ -40,6 +40,12 @@ struct Flags {
 template <typename Flag, typename Field>
 void set(const Flag& flag, Field& field) {
   if (flag) field = *flag;
+}
+
+/// --NAME, or --NAME=false where the file says true.
+void add_switch(CLI::App& app, const std::string& name, std::optional<bool>& out, const std::string& help) {
+  app.add_flag_function(
+      name, [&out](std::int64_t given) { out = given > 0; }, help);
 }
 
 void set_stream(const Flags& flags, StreamConfig& config) {
@@ -65,11 +71,11 @@ void set_stream(const Flags& flags, StreamConfig& config) {
   set(flags.draco_speed, config.draco_speed);
   if (flags.ladder) config.ladder = parse_ladder(*flags.ladder).value();  // the option is checked
   set(flags.fill_holes, config.surface.fill_holes);
-  config.half_lines = config.half_lines || flags.half_lines;
-  config.surface.dense = config.surface.dense || flags.dense;
+  set(flags.half_lines, config.half_lines);
+  set(flags.dense, config.surface.dense);
   if (flags.frames) config.frames = flags.frames;
-  config.loop = config.loop || flags.loop;
-  config.fast = config.fast || flags.fast;
+  set(flags.loop, config.loop);
+  set(flags.fast, config.fast);
   config.camera = merged(std::move(config.camera), flags.camera);
 }
 
@@ -186,9 +192,9 @@ Command serve_command() {
                "be on this machine: ordered, quick, or quick with fewer lines) or paper (as published)")
             ->check(CLI::IsMember(kServedDecoders))
             ->type_name("NAME");
-        app.add_flag("--half-lines", f->half_lines, kHalfLinesHelp);
-        app.add_flag("--dense", f->dense,
-                     "A vertex at each pixel of a line, interpolated between boundaries of one surface");
+        add_switch(app, "--half-lines", f->half_lines, kHalfLinesHelp);
+        add_switch(app, "--dense", f->dense,
+                   "A vertex at each pixel of a line, interpolated between boundaries of one surface");
         app.add_option("--fill-holes", f->fill_holes,
                        "Bridge so many missing boundaries or lines of one surface (default 0: none)")
             ->check(CLI::Range(0, kMostFilled))
@@ -271,8 +277,8 @@ Command serve_command() {
               return rungs ? std::string() : rungs.error().message;
             })
             ->type_name("NAMES");
-        app.add_flag("--loop", f->loop, "Start a take again at its end");
-        app.add_flag("--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");
+        add_switch(app, "--loop", f->loop, "Start a take again at its end");
+        add_switch(app, "--fast", f->fast, "No pacing, nothing dropped: as fast as the machine allows");
         add_rig_flags(app, f->camera);
         add_camera_flags(app, f->camera);
         app.final_callback([f] {

@@ -456,6 +456,15 @@ TEST_F(SeveralStreams, TheOnlyStreamIsReloadedToo) {
   EXPECT_EQ(server.process().wait(), 0) << server.process().err();
 }
 
+TEST_F(SeveralStreams, FlagsWinAlsoWhereTheySwitchOff) {
+  write("stream = \"left\"\nsource = \"take:" + (folder_ / "one").string() + "\"\nhalf_lines = true\n");
+  std::vector<std::string> once = command();
+  once.insert(once.end(), {"--loop=false", "--half-lines=false", "--decoder", "auto", "--frames", "30"});
+  const Finished done = run(once);
+  EXPECT_EQ(done.status, 0) << done.err;
+  EXPECT_THAT(done.err, HasSubstr("6 frames captured")) << "all of the take, once";
+}
+
 TEST_F(SeveralStreams, FlagsOfOneStreamAreRefused) {
   std::vector<std::string> with_source = command();
   with_source.insert(with_source.end(), {"--source", "sim:face"});
