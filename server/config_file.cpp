@@ -341,6 +341,16 @@ void read_stream(Reader& reader, StreamConfig& config) {
   reader.table("camera", [&](Reader& camera) { read_camera(camera, config.camera); });
 }
 
+/// Whatever way there is written, also where there is nothing yet.
+bool same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  const auto place_of = [](const std::filesystem::path& file) {
+    std::error_code failed;
+    const auto place = std::filesystem::weakly_canonical(std::filesystem::absolute(file, failed), failed);
+    return failed ? file.lexically_normal() : place;
+  };
+  return place_of(a) == place_of(b);
+}
+
 /// A table [[stream]].
 void read_one_of_many(Reader& reader, ServeConfig& config) {
   StreamConfig stream = config;
@@ -350,7 +360,7 @@ void read_one_of_many(Reader& reader, ServeConfig& config) {
   for (const StreamConfig& other : config.streams) {
     if (name_of(other) == name_of(stream))
       reader.refuse("two streams are called '" + name_of(stream) + "': give each a name of its own");
-    if (!stream.record.empty() && other.record == stream.record)
+    if (!stream.record.empty() && !other.record.empty() && same_file(other.record, stream.record))
       reader.refuse("two streams are recorded to " + stream.record + ": give each a file of its own");
   }
   config.streams.push_back(std::move(stream));

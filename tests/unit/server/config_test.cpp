@@ -245,6 +245,18 @@ TEST(Config, SeveralStreamsMustNotBeMixedUp) {
   ASSERT_FALSE(files.status);
   EXPECT_NE(files.status.error().message.find(":3: two streams are recorded to a.mcap"), std::string::npos)
       << files.status.error().message;
+  const std::string here = std::filesystem::current_path() / "rec" / "a.mcap";
+  for (const std::string& same : {std::string("rec/../rec/a.mcap"), std::string("./rec//a.mcap"), here}) {
+    const Read twice =
+        read("[[stream]]\nname = \"a\"\nrecord = \"rec/a.mcap\"\n[[stream]]\nname = \"b\"\nrecord = \"" +
+             same + "\"\n");
+    ASSERT_FALSE(twice.status) << same;
+    EXPECT_NE(twice.status.error().message.find(":4: two streams are recorded to " + same), std::string::npos)
+        << twice.status.error().message;
+  }
+  EXPECT_TRUE(read("[[stream]]\nname = \"a\"\nrecord = \"rec/a.mcap\"\n"
+                   "[[stream]]\nname = \"b\"\nrecord = \"rec/b.mcap\"\n[[stream]]\nname = \"c\"\n")
+                  .status);
 }
 
 TEST(Config, ACamerasTable) {
