@@ -11,7 +11,7 @@ namespace relievo {
 struct WebOptions {
   std::string tls_cert, tls_key;        // PEM files, both or none: https; read again when they have changed
   std::string token_file;               // a token a line; who has one may watch
-  bool open = false;                    // anybody may watch, on whatever address
+  std::optional<bool> open = {};        // anybody may watch, on whatever address. Not said: no
   std::vector<std::string> origins;     // "https://viewer.example": other sites whose pages may watch
   std::optional<int> max_clients = {};  // WebSocket clients; more are refused with 503. Not said: 64
   // Connections from one address. Not said: 32, and as many as there are places from this machine, since a

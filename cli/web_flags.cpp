@@ -21,7 +21,10 @@ std::shared_ptr<WebOptions> add_web_flags(CLI::App& app) {
                      "-hex 24 (default: on this machine alone none is needed, otherwise one is made "
                      "and printed)")
           ->type_name("FILE");
-  app.add_flag("--open", options->open, "Anybody who reaches the address may watch")->excludes(tokens);
+  app.add_flag("--open", options->open, "Anybody who reaches the address may watch")
+      ->check([tokens](const std::string& on) {
+        return on == "true" && tokens->count() > 0 ? "lets everybody in: leave out --token-file" : "";
+      });
   app.add_option("--allow-origin", options->origins,
                  "Pages of this site may watch too, and a proxy may speak for it; may be repeated")
       ->type_name("https://HOST[:PORT]")
@@ -54,7 +57,7 @@ ValueCheck web_origin() {
 WebOptions merged(const WebOptions& flags, WebOptions config) {
   for (const auto text : {&WebOptions::tls_cert, &WebOptions::tls_key, &WebOptions::token_file})
     if (!(flags.*text).empty()) config.*text = flags.*text;
-  config.open = config.open || flags.open;
+  if (flags.open) config.open = flags.open;
   if (!flags.origins.empty()) config.origins = flags.origins;
   for (const auto count : {&WebOptions::max_clients, &WebOptions::max_per_address})
     if (flags.*count) config.*count = flags.*count;
@@ -65,7 +68,7 @@ WebOptions merged(const WebOptions& flags, WebOptions config) {
 Status check_web_options(const WebOptions& options) {
   if (options.tls_cert.empty() != options.tls_key.empty())
     return Error{"a certificate needs its key: give --tls-cert FILE and --tls-key FILE together"};
-  if (options.open && !options.token_file.empty())
+  if (options.open.value_or(false) && !options.token_file.empty())
     return Error{"--open lets everybody watch, --token-file only who has a token: leave one out"};
   return {};
 }

@@ -152,9 +152,9 @@ std::optional<Mistake> find_mistake(const RecordingTexts& recording) {
 
 std::optional<Mistake> find_mistake(const WebOptions& gateway) {
   const Status sound = check_web_options(gateway);
-  return mistake(gateway.open              ? "gateway.open"
-                 : gateway.tls_key.empty() ? "gateway.tls_cert"
-                                           : "gateway.tls_key",
+  return mistake(gateway.open.value_or(false) ? "gateway.open"
+                 : gateway.tls_key.empty()    ? "gateway.tls_cert"
+                                              : "gateway.tls_key",
                  sound);
 }
 

@@ -120,7 +120,8 @@ class Reader {
     if (!value) return refuse(*node, key, "must be " + names + " in quotes");
     out = *value;
   }
-  void flag(std::string_view key, bool& out) {
+  template <typename Flag>  // bool, or one that may be unsaid
+  void flag(std::string_view key, Flag& out) {
     if (const toml::node* node = take(key)) {
       if (const auto value = node->value_exact<bool>())
         out = *value;

@@ -181,7 +181,7 @@ Status Server::listen() {
   if (listener_->loopback()) return {};
   const std::string place = options_.host + ":" + std::to_string(listener_->port());
   Tokens& tokens = credentials_.tokens;
-  if (!web_.open && !tokens.needed()) {
+  if (!web_.open.value_or(false) && !tokens.needed()) {
     auto made = Tokens::make();
     if (!made) return made.error();
     made_ = tokens = *std::move(made);
@@ -205,7 +205,7 @@ void Server::publish(const ServerStatus& status) {
 Status Server::apply(const WebOptions& web) {
   auto loaded = Credentials::load(web);
   if (!loaded) return loaded.error();
-  const bool needs_token = !listener_->loopback() && !web.open && !loaded->tokens.needed();
+  const bool needs_token = !listener_->loopback() && !web.open.value_or(false) && !loaded->tokens.needed();
   if (needs_token && !made_)
     return Error{"others reach " + (options_.host.empty() ? "every interface" : options_.host) +
                  ": name a token file, or say open, or restart for a token that is made and printed"};

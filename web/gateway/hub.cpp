@@ -56,10 +56,14 @@ struct Hub::Entry {
   std::optional<std::int64_t> key_asked_ns;
   std::vector<std::shared_ptr<Watcher>> watchers;
 
-  /// Where the time by the server's clock is known.
+  /// Of the server's clock to this one, where it is known.
+  std::optional<std::int64_t> clock_offset_ns() const {
+    if (clock == ServerClock::kElsewhere || facts.clock_offset_ns) return facts.clock_offset_ns;
+    return 0;
+  }
   void add_since(std::int64_t capture_time_ns, Histogram& histogram) const {
-    if (clock == ServerClock::kElsewhere && !facts.clock_offset_ns) return;
-    histogram.add(seconds(utc_now_ns() + facts.clock_offset_ns.value_or(0) - capture_time_ns));
+    if (const auto offset_ns = clock_offset_ns())
+      histogram.add(seconds(utc_now_ns() + *offset_ns - capture_time_ns));
   }
 };
 
@@ -310,10 +314,10 @@ void Hub::set_clock(const std::string& stream, std::int64_t offset_ns) {
   if (it != streams_.end() && it->second->live) it->second->facts.clock_offset_ns = offset_ns;
 }
 
-std::int64_t Hub::clock_offset_ns(const std::string& stream) const {
+std::optional<std::int64_t> Hub::clock_offset_ns(const std::string& stream) const {
   const std::lock_guard lock(mutex_);
   const auto it = streams_.find(stream);
-  return it == streams_.end() ? 0 : it->second->facts.clock_offset_ns.value_or(0);
+  return it == streams_.end() ? std::nullopt : it->second->clock_offset_ns();
 }
 
 std::optional<Hub::Delivery> Hub::take(Watcher& watcher, bool want_frame) {

@@ -71,7 +71,8 @@ class Hub {
   /// What to add to this machine's time for that of the stream's server, which is elsewhere; before that no
   /// time since capture is counted. Forgotten when the stream is withdrawn.
   void set_clock(const std::string& stream, std::int64_t offset_ns);
-  std::int64_t clock_offset_ns(const std::string& stream) const;  // 0 where it is not known
+  /// Of its server's clock to this machine's; nothing where it is not known.
+  std::optional<std::int64_t> clock_offset_ns(const std::string& stream) const;
   void withdraw(const std::string& stream);
   /// A stream that was announced is played from this file, until it is withdrawn.
   void offer(const std::string& stream, const OfferedRecording& recording);

@@ -135,8 +135,9 @@ std::string quality_message(Rung now, const std::vector<Rung>& lower) {
   return text_of({{"type", "quality"}, {"now", to_string(now)}, {"of", std::move(of)}});
 }
 
-std::string time_message(double t0, std::int64_t now_ns) {
-  return text_of({{"type", "time"}, {"t0", t0}, {"server_ms", milliseconds(now_ns)}});
+std::string time_message(double t0, std::optional<std::int64_t> now_ns) {
+  return text_of(
+      {{"type", "time"}, {"t0", t0}, {"server_ms", now_ns ? Json(milliseconds(*now_ns)) : Json()}});
 }
 
 std::array<std::uint8_t, kFramePrefixBytes> frame_prefix(const FrameMessage& frame, std::uint64_t drops,

@@ -25,8 +25,9 @@ std::string gone_message();
 /// Which rung a client that chose its quality is on from the next frame on, and which there are.
 std::string quality_message(Rung now, const std::vector<Rung>& lower);
 
-/// The answer to a client's {"type":"time","t0":T}: T unchanged and the server's UTC.
-std::string time_message(double t0, std::int64_t now_ns);
+/// The answer to a client's {"type":"time","t0":T}: T unchanged and the server's UTC, or nothing where how
+/// far its clock is off is not known yet.
+std::string time_message(double t0, std::optional<std::int64_t> now_ns);
 
 constexpr std::size_t kFramePrefixBytes = 48;
 

@@ -70,7 +70,8 @@ std::optional<WsClose> StreamFeed::on_text(std::string_view text) {
     count_taken(message->credit);
   } else if (message->type == ClientMessage::Type::kTime) {
     if (replies_.size() >= kReplyLimit) return WsClose{1008, "too many questions"};
-    const std::int64_t server_ns = utc_now_ns() + hub_.clock_offset_ns(stream_);
+    std::optional<std::int64_t> server_ns = hub_.clock_offset_ns(stream_);
+    if (server_ns) *server_ns += utc_now_ns();
     replies_.push_back(std::make_shared<const std::string>(time_message(message->t0, server_ns)));
   } else if (message->type == ClientMessage::Type::kQuality) {
     chooses_ = true;

@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "cli/web_flags.h"
 #include "server/camera_flags.h"
 #include "tests/support/temp_folder.h"
 
@@ -196,6 +197,13 @@ sync = "5s"
   EXPECT_LT(flags_win->sync_s, 0);
   EXPECT_FALSE(recording_options({.keep_size = "1GB"}).ok()) << "nothing ends that could be removed";
   EXPECT_EQ(recording_options({.sync = "chunk"})->sync_s, 0);
+}
+
+TEST(Config, AFlagThatClosesTheGatewayWins) {
+  const WebOptions open{.open = true};
+  EXPECT_EQ(merged(WebOptions{.open = false}, open).open, false);
+  EXPECT_EQ(merged(WebOptions{}, open).open, true);
+  EXPECT_EQ(merged(open, WebOptions{}).open, true);
 }
 
 TEST(Config, RecordingsOnRequest) {

@@ -259,6 +259,11 @@ TEST_F(GatewayQuality, NoTimeIsCountedBeforeTheServersClockIsKnown) {
   gateway->publish("far", frame);
   EXPECT_EQ(metric(R"(relievo_gateway_latency_seconds_count{stream="far",until="published"})"), 1);
   EXPECT_EQ(metric(R"(relievo_gateway_latency_seconds_count{stream="far",until="here"})"), 0);
+  WsClient client(port, "far");
+  ASSERT_TRUE(client.send(R"({"type":"time","t0":1})"));
+  const auto answer = client.next_of("time");
+  ASSERT_TRUE(answer);
+  EXPECT_TRUE(Json::parse(answer->data)["server_ms"].is_null()) << answer->data;
   gateway->set_clock("far", 3'600 * kNanosecondsPerSecond);
   gateway->publish("far", frame);
   EXPECT_EQ(metric(R"(relievo_gateway_latency_seconds_count{stream="far",until="here"})"), 1);

@@ -208,6 +208,7 @@ TEST_F(GatewayStream, StatusArrivesAndRepeatedInfoDoesNot) {
 }
 
 TEST_F(GatewayStream, TimeIsAnswered) {
+  gateway->announce(make_info());
   WsClient client(port, "face");
   const double before_ms = milliseconds(utc_now_ns());
   client.send(R"({"type":"time","t0":12.5})");

@@ -7,6 +7,7 @@ import { backoffS, type Refusal } from './state';
 import { VideoTextures } from './videoTexture';
 
 const kClockEveryMs = 4000;
+const kClockSoonMs = 500; // again, where the gateway does not know the server's clock yet
 const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
@@ -112,12 +113,17 @@ export class Connection {
         return;
       }
       const message = parseServerMessage(data);
-      if (message?.type === 'time') this.events.clock(message.t0, message.server_ms, utcNow());
+      if (message?.type === 'time') this.compareClocks(message.t0, message.server_ms);
       else if (message !== null) this.events.message(message);
     } catch (error) {
       if (typeof data !== 'string') this.credit();
       this.events.nonsense(error instanceof Error ? error.message : String(error));
     }
+  }
+
+  private compareClocks(t0: number, serverMs: number | null): void {
+    if (serverMs !== null) this.events.clock(t0, serverMs, utcNow());
+    else this.lastClock = performance.now() - kClockEveryMs + kClockSoonMs;
   }
 
   private onLost(): void {

@@ -32,6 +32,7 @@ export class Meter {
   /** Of another source from now on. */
   begin(): void {
     this.restart();
+    this.clock.clear();
     this.drops = new DropCounter();
     this.before = { skipped: this.skipped, errors: this.errors };
   }

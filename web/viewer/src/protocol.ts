@@ -70,7 +70,7 @@ export type ServerMessage =
   | { type: 'waiting'; hint: string }
   | { type: 'gone' }
   | { type: 'quality'; now: Rung; of: Rung[] }
-  | { type: 'time'; t0: number; server_ms: number };
+  | { type: 'time'; t0: number; server_ms: number | null } // null: how far its clock is off is not known yet;
 
 const kTypes = ['info', 'status', 'waiting', 'gone', 'time', 'quality'];
 

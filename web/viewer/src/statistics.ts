@@ -72,6 +72,11 @@ export class ClockOffset {
     if (this.samples.length > 12) this.samples.shift();
   }
 
+  /** Of another server from now on. */
+  clear(): void {
+    this.samples = [];
+  }
+
   /** Server time minus local time; null before the first exchange. */
   get(): number | null {
     return this.best()?.offset ?? null;
