@@ -42,13 +42,37 @@ struct Options {
   int live_views = 8;
   std::string out;
   std::string update;
-  std::string scan = "interlaced";
-  double frame_rate = 29.97;
+  std::string scan;
+  std::optional<double> frame_rate;
   std::string pictures;
   std::string compare;
   int threads = 2;
   bool json = false;
 };
+
+/// How the camera scans, which views at rest do not show.
+struct Scanning {
+  std::optional<Scan> scan;
+  std::optional<FieldOrder> field_order;
+  std::optional<double> frame_rate;
+};
+
+/// What is asked for, else as the rig of before has it.
+Scanning scanning_of(const Options& options, const RigPart& before) {
+  Scanning out{before.scan, {}, before.frame_rate};
+  if (before.whole) out.field_order = before.whole->field_order;
+  if (!options.scan.empty()) out.scan = options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive;
+  if (!options.camera.field_order.empty())
+    out.field_order = options.camera.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+  if (options.frame_rate) out.frame_rate = options.frame_rate;
+  return out;
+}
+
+void set_scanning(const Scanning& scanning, Rig& rig) {
+  rig.scan = scanning.scan.value_or(Scan::kInterlaced);
+  rig.field_order = scanning.field_order.value_or(FieldOrder::kTop);
+  rig.frame_rate = scanning.frame_rate.value_or(29.97);
+}
 
 void print_json(const Geometry& g, const std::optional<RigDifference>& d, const std::string& out) {
   auto json = nlohmann::json::parse(geometry_report(g));
@@ -155,6 +179,7 @@ Status run(const Options& options, StopSignal& stop) {
   const std::string out = options.out.empty() ? options.update : options.out;
   ViewCode code{.stripes = {}, .projector = options.projector};
   code.colours = before.colours.value_or(CameraColours{});
+  Scanning scanning = scanning_of(options, before);
   if (!options.source.empty()) {
     CameraOptions camera = options.camera;
     if (options.pattern != "gray") camera.pattern = options.pattern;
@@ -171,9 +196,11 @@ Status run(const Options& options, StopSignal& stop) {
     if (!taken) return taken.error();
     if (stop.stopped()) return {};
     code.projector = {taken->rig.projector.width, taken->rig.projector.height};
-    if (!before.scan) before.scan = taken->rig.scan;
-    if (!before.frame_rate) before.frame_rate = taken->rig.frame_rate;
+    if (!scanning.scan) scanning.scan = taken->rig.scan;
+    if (!scanning.frame_rate) scanning.frame_rate = taken->rig.frame_rate;
+    scanning.field_order = taken->rig.field_order;  // it was captured so, the flag heeded
   }
+  code.field_order = scanning.field_order.value_or(FieldOrder::kTop);
   auto stripes = stripes_of(options.views, options.pattern);
   if (!stripes) return stripes.error();
   code.stripes = *std::move(stripes);
@@ -188,8 +215,7 @@ Status run(const Options& options, StopSignal& stop) {
   warn_of_depth(*geometry, *measured, projector);
 
   Rig rig = before.whole.value_or(Rig{});
-  rig.scan = before.scan.value_or(options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive);
-  rig.frame_rate = before.frame_rate.value_or(options.frame_rate);
+  set_scanning(scanning, rig);
   set_colours(code.colours, rig);
   rig = with_geometry(rig, *geometry);
   if (!options.pictures.empty()) {
@@ -244,14 +270,14 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
   auto* out = app.add_option("-o,--out", o->out, "The rig.yaml to write");
   auto* update =
       app.add_option("--update", o->update,
-                     "A rig.yaml, or one with colours only: keep its scan, frame rate and colour matrix; "
-                     "written back unless --out says otherwise");
-  app.add_option("--scan", o->scan, "How the camera scans, for a new rig.yaml")
-      ->check(CLI::IsMember({"interlaced", "progressive"}))
-      ->capture_default_str();
-  app.add_option("--frame-rate", o->frame_rate, "Frames a second, for a new rig.yaml")
-      ->check(number(0.001, 10000))
-      ->capture_default_str();
+                     "A rig.yaml, or one with colours only: keep its scan, field order, frame rate and "
+                     "colour matrix; written back unless --out says otherwise");
+  app.add_option("--scan", o->scan,
+                 "How the camera scans (default: as the rig to update or the source has it, else interlaced)")
+      ->check(CLI::IsMember({"interlaced", "progressive"}));
+  app.add_option("--frame-rate", o->frame_rate,
+                 "Frames a second (default: those of the rig to update or the source, else 29.97)")
+      ->check(number(0.001, 10000));
   app.add_option("--pictures", o->pictures, "Folder for residuals.png");
   app.add_option("--compare", o->compare,
                  "Another rig.yaml of the same devices: report how far this one is from it");
@@ -259,6 +285,11 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   add_camera_flags(app, o->camera);
+  app.get_option("--field-order")
+      ->description(
+          "The field of an interlaced camera that is exposed first, in views and in the rig.yaml (default: "
+          "as "
+          "the rig to update or the source has it, else top)");
   app.add_flag("--json", o->json, "Print the report as JSON");
   app.final_callback([out, update, projector, source] {
     if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");

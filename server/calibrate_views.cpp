@@ -69,8 +69,10 @@ OneView measure_one(const fs::path& folder, const ViewCode& code, const Board& b
     if (!stack) return OneView{{.name = name, .corners = {}, .refused = stack.error().message}};
     return OneView{measure_view(name, *stack, board, how, pool), stack->width(), stack->height()};
   };
-  return code.stripes ? measured(read_stripe_stack(folder, *code.stripes, width, height, go_on), code.colours)
-                      : measured(read_gray_stack(folder, width, height, go_on), GrayDecodeOptions{});
+  if (!code.stripes) return measured(read_gray_stack(folder, width, height, go_on), GrayDecodeOptions{});
+  return measured(read_stripe_stack(folder, *code.stripes, width, height,
+                                    {.field_order = code.field_order, .on_picture = go_on}),
+                  code.colours);
 }
 
 }  // namespace

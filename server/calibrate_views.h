@@ -20,6 +20,7 @@ struct ViewCode {
   std::optional<Pattern> stripes;  // none: Gray code
   Size projector;
   CameraColours colours;
+  FieldOrder field_order = FieldOrder::kTop;  // of views that are an interlaced camera's frames
 };
 
 struct MeasuredViews {

@@ -46,6 +46,10 @@ struct Options {
   bool json = false;
 };
 
+FieldOrder first_field(const Options& options) {
+  return options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+}
+
 /// Whoever projects a folder projects all of its pictures. Those in `names` are replaced.
 Status refuse_other_pictures(const fs::path& folder, const std::vector<std::string>& names) {
   std::error_code none;
@@ -89,11 +93,12 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   std::vector<std::string> names = stripe_view_names(pattern.slides, scan);
   for (std::string& name : names) name += ".png";
   if (auto s = refuse_other_pictures(options.out, names); !s) return s;
-  if (auto s = write_stripe_slides(options.out, pattern, options.size.width, options.size.height, scan); !s)
+  const auto [width, height] = options.size;
+  if (auto s = write_stripe_slides(options.out, pattern, width, height, scan, first_field(options)); !s)
     return s;
   if (auto s = write_whole_file(fs::path(options.out) / "pattern.yaml", to_yaml(pattern)); !s) return s;
   const std::size_t count = names.size();
-  const int rows = row_pattern(pattern, options.size.width, options.size.height).stripes();
+  const int rows = row_pattern(pattern, width, height).stripes();
   if (options.json) {
     const nlohmann::json json = {
         {"folder", options.out}, {"slides", count}, {"stripes", pattern.stripes()}, {"row_stripes", rows}};
@@ -103,7 +108,7 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
         "%zu slides, %dx%d, of %d stripes along columns and %d along rows, in %s: project them in the order "
         "of "
         "their names, one picture each\n",
-        count, options.size.width, options.size.height, pattern.stripes(), rows, options.out.c_str());
+        count, width, height, pattern.stripes(), rows, options.out.c_str());
   }
   return {};
 }
@@ -132,15 +137,14 @@ std::vector<std::string> names_in_order(const Options& options, const Pattern& p
 /// Beside FILE.mkv, FILE.pattern.yaml, so that what was played is known.
 Status write_video(const Options& options, const Pattern& pattern, StopSignal& stop) {
   const fs::path file = options.out;
-  const auto video = write_slide_video(
-      file, pattern,
-      {.width = options.size.width,
-       .height = options.size.height,
-       .interlaced = options.interlaced,
-       .field_order = options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop,
-       .frame_rate = options.rate,
-       .duration_s = options.seconds,
-       .stopped = [&stop] { return stop.stopped(); }});
+  const auto video = write_slide_video(file, pattern,
+                                       {.width = options.size.width,
+                                        .height = options.size.height,
+                                        .interlaced = options.interlaced,
+                                        .field_order = first_field(options),
+                                        .frame_rate = options.rate,
+                                        .duration_s = options.seconds,
+                                        .stopped = [&stop] { return stop.stopped(); }});
   if (!video) return stop.stopped() ? Status() : video.error();
   const fs::path yaml = fs::path(file).replace_extension(".pattern.yaml");
   if (auto s = write_whole_file(yaml, to_yaml(pattern)); !s) return s;
@@ -192,7 +196,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (const Status alone = refuse_other_pictures(options.out, order); !alone) return alone;
   std::vector<std::string> files;
   const auto [width, height] = options.size;
-  const FieldOrder first = options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+  const FieldOrder first = first_field(options);
   for (std::size_t i = 0; i < order.size(); ++i) {
     const int frame = static_cast<int>(options.interlaced ? i : i / 2);
     if (std::ranges::find(files, order[i]) != files.end()) continue;  // white again

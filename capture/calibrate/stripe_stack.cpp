@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "capture/calibrate/pictures.h"
+#include "capture/pattern/schedule.h"
 #include "capture/pattern/slides.h"
 #include "capture/picture_file.h"
 
@@ -53,8 +54,7 @@ StripePair deinterlaced(const Image8& frame, int slide_row) {
 }
 
 Result<StripeStack> read_stripe_stack(const fs::path& folder, const Pattern& pattern, int projector_width,
-                                      int projector_height,
-                                      const std::function<bool(std::size_t, std::size_t)>& on_picture) {
+                                      int projector_height, const ReadStripesOptions& options) {
   auto files = pictures_in(folder);
   if (!files) return files.error();
   const auto slides = static_cast<std::size_t>(pattern.slides);
@@ -68,7 +68,7 @@ Result<StripeStack> read_stripe_stack(const fs::path& folder, const Pattern& pat
   StripeStack stack{projector_width, projector_height, pattern, {}, {}};
   std::vector<Image8> pictures;
   for (std::size_t i = 0; i < files->size(); ++i) {
-    if (on_picture && !on_picture(i, files->size())) return Error{"stopped"};
+    if (options.on_picture && !options.on_picture(i, files->size())) return Error{"stopped"};
     auto picture = read_rgb((*files)[i]);
     if (!picture) return picture.error();
     if (!pictures.empty() &&
@@ -80,7 +80,7 @@ Result<StripeStack> read_stripe_stack(const fs::path& folder, const Pattern& pat
   std::vector<StripePair> pairs;
   for (std::size_t i = 0; i < pictures.size(); i += interlaced ? 1 : 2) {
     if (interlaced) {
-      pairs.push_back(deinterlaced(pictures[i]));
+      pairs.push_back(deinterlaced(pictures[i], first_row(options.field_order, 0)));
     } else {
       pairs.push_back({std::move(pictures[i]), std::move(pictures[i + 1])});
     }
@@ -104,7 +104,7 @@ Status write_stripe_view(const fs::path& folder, const StripeStack& stack) {
 }
 
 Result<std::vector<Image8>> draw_stripe_slides(const Pattern& pattern, int projector_width,
-                                               int projector_height, Scan scan) {
+                                               int projector_height, Scan scan, FieldOrder first) {
   if (pattern.stripes() > projector_width) {
     return Error{std::to_string(pattern.stripes()) + " stripes do not fit " +
                  std::to_string(projector_width) + " projector columns: ask for fewer"};
@@ -119,7 +119,8 @@ Result<std::vector<Image8>> draw_stripe_slides(const Pattern& pattern, int proje
       };
       Image8 lit = draw(false), other = draw(true);
       if (scan == Scan::kInterlaced) {
-        for (int y = 1; y < projector_height; y += 2) std::copy_n(other.row(y), other.stride(), lit.row(y));
+        for (int y = first_row(first, 1); y < projector_height; y += 2)
+          std::copy_n(other.row(y), other.stride(), lit.row(y));
       }
       out.push_back(std::move(lit));
       if (scan != Scan::kInterlaced) out.push_back(std::move(other));
@@ -129,8 +130,8 @@ Result<std::vector<Image8>> draw_stripe_slides(const Pattern& pattern, int proje
 }
 
 Status write_stripe_slides(const fs::path& folder, const Pattern& pattern, int projector_width,
-                           int projector_height, Scan scan) {
-  const auto slides = draw_stripe_slides(pattern, projector_width, projector_height, scan);
+                           int projector_height, Scan scan, FieldOrder first) {
+  const auto slides = draw_stripe_slides(pattern, projector_width, projector_height, scan, first);
   if (!slides) return slides.error();
   const auto names = stripe_view_names(pattern.slides, scan);
   for (std::size_t i = 0; i < slides->size(); ++i) {

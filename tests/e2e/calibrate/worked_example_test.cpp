@@ -9,7 +9,7 @@
 
 #include "base/whole_file.h"
 #include "capture/rig_file.h"
-#include "tests/support/process.h"
+#include "tests/e2e/calibrate/calibrate_report.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo::test {
@@ -18,19 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
-
-Finished server(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), program("relievo-server").string());
-  return run(arguments, kLongPatience);
-}
-
-json report(const std::vector<std::string>& arguments) {
-  const Finished done = server(arguments);
-  EXPECT_EQ(done.status, 0) << done.err;
-  const json parsed = json::parse(done.out, nullptr, false);
-  EXPECT_FALSE(parsed.is_discarded()) << done.out;
-  return parsed.is_discarded() ? json::object() : parsed;
-}
 
 TEST(CalibrationExample, FromNothingToAReconstruction) {
   const TempFolder folder;

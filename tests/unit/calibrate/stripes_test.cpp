@@ -214,6 +214,28 @@ TEST(StripeFolder, SlidesAsWrittenAreDecodedBack) {
   }
 }
 
+TEST(StripeFolder, SlidesMayBeOnTheBottomFieldsRows) {
+  const test::TempFolder folder;
+  const Pattern pattern = stripes(16);
+  const auto bottom = FieldOrder::kBottom;
+  ASSERT_TRUE(write_stripe_slides(folder.path(), pattern, 320, 240, Scan::kInterlaced, bottom).ok());
+  WorkerPool pool(1);
+  const auto stack = read_stripe_stack(folder.path(), pattern, 320, 240, {.field_order = bottom});
+  ASSERT_TRUE(stack.ok()) << stack.error().message;
+  const auto edges = decode_stripes(*stack, kNotKnown, pool);
+  ASSERT_TRUE(edges.ok()) << edges.error().message;
+  for (const GrayEdge& e : edges->columns.edges) ASSERT_NEAR(e.x, e.value, 0.6);
+  for (const GrayEdge& e : edges->rows.edges) ASSERT_NEAR(e.y, e.value, 1.1);
+  const auto whole = draw_stripe_slides(pattern, 320, 240, Scan::kProgressive);
+  ASSERT_TRUE(whole.ok()) << whole.error().message;
+  for (const int row : {1, 239}) {
+    EXPECT_TRUE(std::equal(whole->at(0).row(row), whole->at(0).row(row) + 3 * 320,
+                           stack->columns.at(0).lit.row(row)));
+    EXPECT_TRUE(std::equal(whole->at(1).row(row - 1), whole->at(1).row(row - 1) + 3 * 320,
+                           stack->columns.at(0).complement.row(row - 1)));
+  }
+}
+
 TEST(StripeFolder, WrongFoldersAreRefused) {
   const test::TempFolder folder;
   const auto refusal = [&] {
