@@ -42,6 +42,15 @@ Status write_gray_view(const fs::path& folder, const std::vector<Image8>& pictur
   return {};
 }
 
+/// What calibrate geometry cannot see in the views.
+std::string scanning_flags(const Rig& rig) {
+  char rate[32];
+  std::snprintf(rate, sizeof rate, "%.9g", rig.frame_rate);
+  std::string out = " --scan " + std::string(to_string(rig.scan)) + " --frame-rate " + rate;
+  if (rig.scan == Scan::kInterlaced && rig.field_order == FieldOrder::kBottom) out += " --field-order bottom";
+  return out;
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto spec = sim::parse_sim_options(options.spec);
   if (!spec) return spec.error();
@@ -109,7 +118,10 @@ Status run(const Options& options, StopSignal& stop) {
                                  {"colours", (out / "colours").string()},
                                  {"truth", (out / "truth.yaml").string()},
                                  {"board", options.board},
-                                 {"projector", size}};
+                                 {"projector", size},
+                                 {"scan", to_string(rig.scan)},
+                                 {"field_order", to_string(rig.field_order)},
+                                 {"frame_rate", rig.frame_rate}};
     std::puts(json_text(json).c_str());
     return {};
   }
@@ -117,9 +129,10 @@ Status run(const Options& options, StopSignal& stop) {
               options.out.c_str());
   std::printf("  relievo-server calibrate colour %s/colours --out rig.yaml\n", options.out.c_str());
   std::printf(
-      "  relievo-server calibrate geometry %s/views --board %s --projector %s --update rig.yaml --compare "
+      "  relievo-server calibrate geometry %s/views --board %s --projector %s%s --update rig.yaml --compare "
       "%s/truth.yaml\n",
-      options.out.c_str(), options.board.c_str(), size.c_str(), options.out.c_str());
+      options.out.c_str(), options.board.c_str(), size.c_str(), scanning_flags(rig).c_str(),
+      options.out.c_str());
   return {};
 }
 

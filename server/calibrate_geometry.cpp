@@ -68,15 +68,36 @@ Scanning scanning_of(const Options& options, const RigPart& before) {
   return out;
 }
 
+/// The flags of what nothing says, and is assumed therefore.
+std::vector<std::string> assumed(const Scanning& scanning) {
+  std::vector<std::string> out;
+  if (!scanning.scan) out.emplace_back("--scan");
+  if (!scanning.frame_rate) out.emplace_back("--frame-rate");
+  return out;
+}
+
 void set_scanning(const Scanning& scanning, Rig& rig) {
   rig.scan = scanning.scan.value_or(Scan::kInterlaced);
   rig.field_order = scanning.field_order.value_or(FieldOrder::kTop);
   rig.frame_rate = scanning.frame_rate.value_or(29.97);
 }
 
-void print_json(const Geometry& g, const std::optional<RigDifference>& d, const std::string& out) {
+struct Outcome {
+  const Geometry& geometry;
+  const Rig& rig;
+  std::vector<std::string> assumed;
+  std::optional<RigDifference> difference;
+  std::string file;
+};
+
+void print_json(const Outcome& outcome) {
+  const auto& [g, rig, assumed, d, file] = outcome;
   auto json = nlohmann::json::parse(geometry_report(g));
-  json["rig"] = out;
+  json["rig"] = file;
+  json["scan"] = to_string(rig.scan);
+  json["field_order"] = to_string(rig.field_order);
+  json["frame_rate"] = rig.frame_rate;
+  json["assumed"] = assumed;
   if (d) {
     json["compare"] = {{"camera_focal_percent", 100 * d->camera_focal},
                        {"projector_focal_percent", 100 * d->projector_focal},
@@ -85,7 +106,8 @@ void print_json(const Geometry& g, const std::optional<RigDifference>& d, const 
                        {"baseline_mm", 1000 * d->baseline_m},
                        {"rotation_deg", d->rotation_rad * 180 / std::numbers::pi},
                        {"depth_rms_mm", 1000 * d->depth_rms_m},
-                       {"depth_mean_mm", 1000 * d->depth_mean_m}};
+                       {"depth_mean_mm", 1000 * d->depth_mean_m},
+                       {"scanning", d->scanning}};
   }
   std::puts(json_text(json).c_str());
 }
@@ -95,7 +117,19 @@ void print_lens(const char* name, const PinholeModel& lens, const double* sigma)
               lens.fy(), sigma[0], lens.cx(), lens.cy(), sigma[2], sigma[3]);
 }
 
-void print(const Geometry& g, const std::optional<RigDifference>& d, const std::string& out) {
+void print_scanning(const Rig& rig, const std::vector<std::string>& assumed) {
+  const char* order = rig.scan == Scan::kProgressive           ? ""
+                      : rig.field_order == FieldOrder::kBottom ? ", bottom field first"
+                                                               : ", top field first";
+  std::printf("scan       %s%s, %.6g frames a second\n", std::string(to_string(rig.scan)).c_str(), order,
+              rig.frame_rate);
+  if (assumed.empty()) return;
+  const std::string flags = assumed.front() + (assumed.size() > 1 ? " and " + assumed.back() : "");
+  std::printf("           as usual, since nothing says it: give %s where it is otherwise\n", flags.c_str());
+}
+
+void print(const Outcome& outcome) {
+  const auto& [g, rig, assumed, d, file] = outcome;
   std::printf("view                  corners  camera  projector  stereo   plane\n");
   for (const ViewReport& r : g.reports) {
     if (r.used) {
@@ -121,6 +155,7 @@ void print(const Geometry& g, const std::optional<RigDifference>& d, const std::
   std::printf("depth      at %.2f m is known to +- %.2f mm\n", g.distance_m, 1000 * g.depth_sigma_m);
   const auto& t = g.projector_from_camera_translation;
   std::printf("baseline   %.1f mm\n", 1000 * std::hypot(t[0], t[1], t[2]));
+  print_scanning(rig, assumed);
   if (d) {
     std::printf(
         "compared   focal lengths off by %.2f %% and %.2f %%, centres by %.1f and %.1f px (camera, "
@@ -130,8 +165,9 @@ void print(const Geometry& g, const std::optional<RigDifference>& d, const std::
                 d->rotation_rad * 180 / std::numbers::pi);
     std::printf("           so depth at %.2f m is off by %.2f mm (RMS), %+.2f mm on average\n", g.distance_m,
                 1000 * d->depth_rms_m, 1000 * d->depth_mean_m);
+    for (const std::string& other : d->scanning) std::printf("           %s\n", other.c_str());
   }
-  std::printf("written    %s\n", out.c_str());
+  std::printf("written    %s\n", file.c_str());
 }
 
 /// Where views are too few or too alike, all figures of how well they fit are good.
@@ -231,10 +267,11 @@ Status run(const Options& options, StopSignal& stop) {
   // Last: what fails before it leaves the rig of before.
   if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
   if (const auto seen = upright(rig, {}); !seen) log_warning(seen.error().message);
+  const Outcome outcome{*geometry, rig, assumed(scanning), difference, out};
   if (options.json) {
-    print_json(*geometry, difference, out);
+    print_json(outcome);
   } else {
-    print(*geometry, difference, out);
+    print(outcome);
   }
   warn_of_size(*geometry);
   return {};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "capture/calibrate/ray_pairs.h"
 #include "capture/reconstruct/triangulate.h"
@@ -26,6 +27,23 @@ double angle_between(const std::array<double, 9>& a, const std::array<double, 9>
   return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0));
 }
 
+std::vector<std::string> other_scanning(const Rig& rig, const Rig& reference) {
+  std::vector<std::string> out;
+  const auto differs = [&](const std::string& what, std::string_view own, std::string_view there) {
+    out.push_back(what + ": " + std::string(own) + ", not " + std::string(there));
+  };
+  if (rig.scan != reference.scan) differs("scan", to_string(rig.scan), to_string(reference.scan));
+  if (rig.scan == reference.scan && rig.scan == Scan::kInterlaced && rig.field_order != reference.field_order)
+    differs("field order", to_string(rig.field_order), to_string(reference.field_order));
+  constexpr double kSame = 1e-4;  // 29.97 is said of 30000 / 1001
+  if (std::fabs(rig.frame_rate - reference.frame_rate) > kSame * reference.frame_rate) {
+    char text[64];
+    std::snprintf(text, sizeof text, "frame rate: %.6g, not %.6g", rig.frame_rate, reference.frame_rate);
+    out.emplace_back(text);
+  }
+  return out;
+}
+
 }  // namespace
 
 Result<RigDifference> compare_rigs(const Rig& rig, const Rig& reference, double distance_m) {
@@ -35,6 +53,7 @@ Result<RigDifference> compare_rigs(const Rig& rig, const Rig& reference, double 
     return Error{"the rigs' cameras or projectors differ in size"};
   }
   RigDifference out;
+  out.scanning = other_scanning(rig, reference);
   out.camera_focal = focal(rig.camera, reference.camera);
   out.projector_focal = focal(rig.projector, reference.projector);
   out.camera_centre_px = centre(rig.camera, reference.camera);

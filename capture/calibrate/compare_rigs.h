@@ -2,6 +2,9 @@
 // How far a calibrated rig is from another, such as a simulation's truth.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "base/result.h"
 #include "base/rig.h"
 
@@ -16,6 +19,9 @@ struct RigDifference {
   /// picture where the projector reaches, comes out of the other rig at a depth that is off by this (RMS) ...
   double depth_rms_m = 0;
   double depth_mean_m = 0;  // ... and on average
+  /// How the cameras scan where they do otherwise, each as "scan: interlaced, not progressive", the
+  /// reference last.
+  std::vector<std::string> scanning;
 };
 
 /// Fails where the devices' sizes differ or the two see nothing in common at `distance_m`.

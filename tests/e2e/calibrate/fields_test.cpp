@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <sstream>
 
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/stripe_stack.h"
@@ -92,6 +93,55 @@ TEST_F(FieldOrders, ALiveSourceSaysItsOwn) {
        "--views", "3", "--board", kBoard, "--out", rig_, "--json"});
   EXPECT_EQ(written().scan, Scan::kInterlaced);
   EXPECT_EQ(written().field_order, FieldOrder::kBottom);
+}
+
+/// The words of the command that an example prints last, with our own rig.yaml.
+std::vector<std::string> next_command(const std::string& printed, const std::string& rig) {
+  std::istringstream words(printed.substr(printed.rfind("calibrate geometry")));
+  std::vector<std::string> out;
+  for (std::string word; words >> word;) out.push_back(word == "rig.yaml" ? rig : word);
+  return out;
+}
+
+TEST_F(FieldOrders, WhatAnExampleOffersNextSaysHowItsCameraScans) {
+  for (const auto& [keys, scan, order, rate] :
+       {std::tuple(",scan=progressive,rate=60", Scan::kProgressive, FieldOrder::kTop, 60.0),
+        std::tuple(",field_order=bottom,rate=25", Scan::kInterlaced, FieldOrder::kBottom, 25.0)}) {
+    fs::remove_all(example_);
+    const Finished made =
+        server({"calibrate", "example", "--rig", "object,width=320,height=240,stripes=40" + std::string(keys),
+                "--board", kBoard, "--views", "3", "--out", example_});
+    ASSERT_EQ(made.status, 0) << made.err;
+    report({"calibrate", "colour", example_ + "/colours", "--out", rig_, "--json"});
+    const Finished done = server(next_command(made.out, rig_));
+    ASSERT_EQ(done.status, 0) << done.err;
+    EXPECT_THAT(done.out, testing::Not(testing::AnyOf(HasSubstr(", not "), HasSubstr("as usual"))));
+    EXPECT_EQ(written().scan, scan);
+    EXPECT_EQ(written().field_order, order);
+    EXPECT_EQ(written().frame_rate, rate);
+  }
+}
+
+TEST_F(FieldOrders, WhatIsAssumedAndWhatDiffersIsSaid) {
+  make_example(",scan=progressive,rate=60", 3);
+  const std::vector<std::string> more{"--out", rig_, "--compare", example_ + "/truth.yaml"};
+  const json silent = report(geometry(more));
+  EXPECT_EQ(silent.at("scan"), "interlaced");
+  EXPECT_EQ(silent.at("assumed"), json({"--scan", "--frame-rate"}));
+  EXPECT_EQ(silent.at("compare").at("scanning"),
+            json({"scan: interlaced, not progressive", "frame rate: 29.97, not 60"}));
+  std::vector<std::string> in_words = geometry(more);
+  std::erase(in_words, "--json");
+  const Finished done = server(in_words);
+  EXPECT_THAT(done.out,
+              HasSubstr("scan       interlaced, top field first, 29.97 frames a second\n"
+                        "           as usual, since nothing says it: give --scan and --frame-rate"));
+  EXPECT_THAT(done.out, HasSubstr("           scan: interlaced, not progressive\n"));
+  // The rig that was written so is mended by saying it.
+  const json said = report(geometry({"--update", rig_, "--scan", "progressive", "--frame-rate", "60",
+                                     "--compare", example_ + "/truth.yaml"}));
+  EXPECT_EQ(said.at("assumed"), json::array());
+  EXPECT_EQ(said.at("compare").at("scanning"), json::array());
 }
 
 }  // namespace
