@@ -20,6 +20,7 @@
 #include "capture/pattern/schedule.h"
 #include "capture/pattern/slides.h"
 #include "capture/projector/slide_video.h"
+#include "capture/rig_file.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "cli/size_option.h"
@@ -62,6 +63,34 @@ Status refuse_other_pictures(const fs::path& folder, const std::vector<std::stri
   return {};
 }
 
+/// A folder of a take, or of views: what was captured is there, not what is to be projected.
+bool holds_captures(const fs::path& folder) {
+  std::error_code none;
+  if (fs::exists(folder / "rig.yaml", none) || fs::exists(folder / "timestamps.csv", none)) return true;
+  return std::ranges::any_of(fs::directory_iterator(folder, none), [](const fs::directory_entry& entry) {
+    std::error_code ignored;
+    if (!entry.is_directory(ignored)) return false;
+    const auto pictures = pictures_in(entry.path());
+    return pictures && !pictures->empty();
+  });
+}
+
+/// True of a file that says something else, or cannot be read.
+bool is_other_pattern(const fs::path& file, const Pattern& pattern) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) return false;
+  const auto before = read_pattern(file);
+  return !before || to_yaml(*before) != to_yaml(pattern);
+}
+
+/// Captures cannot be decoded without the pattern that they were taken under.
+Status refuse_other_captures(const fs::path& folder, const Pattern& pattern) {
+  const fs::path file = folder / "pattern.yaml";
+  if (!is_other_pattern(file, pattern) || !holds_captures(folder)) return {};
+  return Error{file.string() +
+               " is another pattern, which the captures in that folder were taken under: give a new folder"};
+}
+
 Status write_gray(const Options& options, StopSignal& stop) {
   const std::size_t count = gray_slides(options.size.width, options.size.height).size();
   std::vector<std::string> names;
@@ -93,6 +122,7 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   std::vector<std::string> names = stripe_view_names(pattern.slides, scan);
   for (std::string& name : names) name += ".png";
   if (auto s = refuse_other_pictures(options.out, names); !s) return s;
+  if (auto s = refuse_other_captures(options.out, pattern); !s) return s;
   const auto [width, height] = options.size;
   if (auto s = write_stripe_slides(options.out, pattern, width, height, scan, first_field(options)); !s)
     return s;
@@ -134,9 +164,14 @@ std::vector<std::string> names_in_order(const Options& options, const Pattern& p
   return out;
 }
 
-/// Beside FILE.mkv, FILE.pattern.yaml, so that what was played is known.
+/// Beside FILE.mkv, FILE.pattern.yaml, so that what was played is known. The two are replaced together.
 Status write_video(const Options& options, const Pattern& pattern, StopSignal& stop) {
-  const fs::path file = options.out;
+  const fs::path file = options.out, yaml = fs::path(file).replace_extension(".pattern.yaml");
+  std::error_code ignored;
+  if (is_other_pattern(yaml, pattern) && !fs::exists(file, ignored)) {
+    return Error{yaml.string() + " is another pattern, and not of a video " + file.string() +
+                 ", which is not there: give another name, or remove it"};
+  }
   const auto video = write_slide_video(file, pattern,
                                        {.width = options.size.width,
                                         .height = options.size.height,
@@ -146,7 +181,6 @@ Status write_video(const Options& options, const Pattern& pattern, StopSignal& s
                                         .duration_s = options.seconds,
                                         .stopped = [&stop] { return stop.stopped(); }});
   if (!video) return stop.stopped() ? Status() : video.error();
-  const fs::path yaml = fs::path(file).replace_extension(".pattern.yaml");
   if (auto s = write_whole_file(yaml, to_yaml(pattern)); !s) return s;
   const double rate = static_cast<double>(video->rate_numerator) / video->rate_denominator;
   if (options.json) {
@@ -194,6 +228,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (options.both_axes) return write_both_axes(options, *pattern);
   const std::vector<std::string> order = names_in_order(options, *pattern);
   if (const Status alone = refuse_other_pictures(options.out, order); !alone) return alone;
+  if (const Status own = refuse_other_captures(options.out, *pattern); !own) return own;
   std::vector<std::string> files;
   const auto [width, height] = options.size;
   const FieldOrder first = first_field(options);
@@ -239,7 +274,8 @@ Command pattern_command() {
       [](CLI::App& app) {
         auto o = std::make_shared<Options>();
         app.add_option("--out", o->out,
-                       "Folder without other pictures, made where it is missing, or video FILE.mkv: lossless "
+                       "Folder without other pictures or captures, made where it is missing, or video "
+                       "FILE.mkv: lossless "
                        "(FFV1), to be "
                        "played in a loop")
             ->type_name("DIR|FILE.mkv")

@@ -227,6 +227,40 @@ TEST_F(ServerFault, SlidesOfAnEarlierPatternAreNotProjectedWithTheNewOnes) {
   EXPECT_EQ(names_in(out_), before);
 }
 
+// Without the pattern that they were taken under, captures are lost.
+TEST_F(ServerFault, ThePatternOfCapturesIsNotReplacedByAnother) {
+  const auto pattern = [](const fs::path& out, const std::vector<std::string>& more) {
+    std::vector<std::string> command{"pattern", "--size", "128x96", "--out", out.string()};
+    command.insert(command.end(), more.begin(), more.end());
+    return run(server(command));
+  };
+  const std::vector<std::string> first{"--stripes", "32"}, other{"--stripes", "16"};
+  const std::string of_take = read_text(take_ / "pattern.yaml");
+  expect_one_error(pattern(take_, first), "pattern.yaml is another pattern, which the captures");
+  expect_one_error(pattern(take_, {"--stripes", "32", "--both-axes"}), "give a new folder");
+  EXPECT_EQ(read_text(take_ / "pattern.yaml"), of_take);
+  EXPECT_FALSE(names_in(take_).contains("slide1.png"));
+
+  ASSERT_EQ(pattern(out_, first).status, 0);
+  EXPECT_EQ(pattern(out_, other).status, 0) << "of slides alone";
+  fs::create_directory(out_ / "pose 1");
+  fs::copy_file(take_ / "frames" / "000000.png", out_ / "pose 1" / "1.png");
+  EXPECT_EQ(pattern(out_, other).status, 0) << "the same again";
+  expect_one_error(pattern(out_, first), "pattern.yaml is another pattern");
+
+  const fs::path video = folder_ / "slides.mkv", yaml = folder_ / "slides.pattern.yaml";
+  const auto play = [&](std::vector<std::string> more) {
+    more.insert(more.end(), {"--seconds", "0.1"});
+    return pattern(video, more);
+  };
+  ASSERT_EQ(play(first).status, 0);
+  EXPECT_EQ(play(other).status, 0) << "both are replaced";
+  fs::remove(video);
+  expect_one_error(play(first), "slides.pattern.yaml is another pattern");
+  EXPECT_FALSE(fs::exists(video));
+  EXPECT_EQ(play(other).status, 0);
+}
+
 TEST_F(ServerFault, NoRoomForTheReconstruction) {
   // A limit on the size of files stands for a full disk: writing fails in the middle of one.
   std::string script = "trap '' XFSZ; ulimit -f 8; exec";
