@@ -151,7 +151,18 @@ void warn_of_pictures(const GrayStack& stack, const GrayMaps& maps, const Option
       "nothing move?");
 }
 
+/// Where results go among the pictures, none of these is replaced.
+Status check_picture(const Options& options) {
+  std::error_code ignored;
+  if (!fs::equivalent(options.folder, options.out, ignored) || is_imported(options.folder)) return {};
+  const fs::path picture = fs::path(options.out) / kImportedPicture;
+  if (!fs::exists(picture, ignored)) return {};
+  return Error{picture.string() +
+               " is one of the pictures, and would be replaced: give --out another folder"};
+}
+
 Status run(const Options& options, StopSignal& stop) {
+  if (const Status kept = check_picture(options); !kept) return kept;
   std::optional<ImportedRig> rig;
   if (!options.calibration.empty()) {
     auto imported = import_rig(options.calibration, options.projector.width, options.projector.height);
@@ -200,9 +211,9 @@ Status run(const Options& options, StopSignal& stop) {
   }
   if (const Status made = make_folder(options.out); !made) return made;
   const fs::path out = options.out;
-  if (const Status s = write_npy(out / "columns.npy", maps->columns); !s) return s;
-  if (const Status s = write_npy(out / "rows.npy", maps->rows); !s) return s;
-  if (const Status s = write_png(out / "picture.png", stack->picture); !s) return s;
+  if (const Status s = write_npy(out / kImportedColumns, maps->columns); !s) return s;
+  if (const Status s = write_npy(out / kImportedRows, maps->rows); !s) return s;
+  if (const Status s = write_png(out / kImportedPicture, stack->picture); !s) return s;
   if (rig) {
     if (const Status s = write_ply_points(out / "points.ply", dense->cloud); !s) return s;
     if (const Status s = write_whole_file(out / "rig.yaml", to_yaml(rig->rig)); !s) return s;
@@ -215,7 +226,9 @@ void define_gray(CLI::App& app, const std::shared_ptr<Options>& o) {
   app.add_option("folder", o->folder,
                  "Folder of pictures: named [AXIS-BIT-INVERSE], or in the order of projection")
       ->required();
-  app.add_option("-o,--out", o->out, "Folder for columns.npy, rows.npy, picture.png, points.ply, rig.yaml")
+  app.add_option(
+         "-o,--out", o->out,
+         "Folder for columns.npy, rows.npy, picture.png, points.ply, rig.yaml; may be the folder of pictures")
       ->required();
   auto* projector = add_size_option(app, "--projector", o->projector,
                                     "The projector's size in pixels, unless --calibration knows it");

@@ -54,6 +54,8 @@ Result<bool> is_white_and_black(const fs::path& a, const fs::path& b) {
 Result<std::vector<Capture>> captures_of(const fs::path& folder, int width, int height) {
   auto files = pictures_in(folder);
   if (!files) return files.error();
+  if (is_imported(folder))
+    std::erase_if(*files, [](const fs::path& file) { return file.filename() == kImportedPicture; });
   std::vector<Capture> captures;
   for (const fs::path& file : *files) {
     if (const auto slide = tag_of(file.filename().string())) captures.push_back({file, *slide});
@@ -154,6 +156,11 @@ class Builder {
 };
 
 }  // namespace
+
+bool is_imported(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / kImportedColumns, ignored) && fs::exists(folder / kImportedRows, ignored);
+}
 
 Result<GrayStack> read_gray_stack(const fs::path& folder, int projector_width, int projector_height,
                                   const std::function<bool(std::size_t, std::size_t)>& on_picture) {

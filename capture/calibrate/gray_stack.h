@@ -17,7 +17,17 @@
 
 namespace relievo {
 
-/// `.png`, `.jpg`, `.jpeg`, `.bmp`, `.tif`, `.tiff` and `.pgm` directly in `folder`; other files are ignored.
+/// Beside these, `relievo-server import gray` writes a picture of the scene where it is told to write into
+/// the folder of pictures: it is none of them.
+inline constexpr const char* kImportedPicture = "picture.png";
+inline constexpr const char* kImportedColumns = "columns.npy";
+inline constexpr const char* kImportedRows = "rows.npy";
+
+/// Whether `folder` has what an import wrote, and so its kImportedPicture is no capture.
+bool is_imported(const std::filesystem::path& folder);
+
+/// `.png`, `.jpg`, `.jpeg`, `.bmp`, `.tif`, `.tiff` and `.pgm` directly in `folder`; other files, and
+/// the picture of an import, are ignored.
 /// Errors name the folder or the file, and the count of pictures expected.
 /// `on_picture(done, of)` is called before each picture and stops the reading, with an error, by returning
 /// false.

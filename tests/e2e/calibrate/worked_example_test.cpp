@@ -191,6 +191,27 @@ TEST(CalibrationExample, GraySlidesAreImportedBack) {
   EXPECT_TRUE(fs::exists(folder / "maps/columns.npy"));
 }
 
+TEST(CalibrationExample, AnImportMayWriteAmongThePicturesAgainAndAgain) {
+  const TempFolder folder;
+  const std::string slides = (folder / "slides").string();
+  report({"pattern", "--gray", "--size", "128x96", "--out", slides, "--json"});
+  const std::vector<std::string> import{"import", "gray",  slides, "--projector",
+                                        "128x96", "--out", slides, "--json"};
+  const json first = report(import);
+  EXPECT_EQ(first.at("decoded_pixels"), 128 * 96);
+  EXPECT_EQ(report(import), first);
+  EXPECT_TRUE(fs::exists(slides + "/picture.png"));
+  // One of that name which no import wrote is a capture.
+  for (const std::string ours : {"columns.npy", "rows.npy", "picture.png"}) fs::remove(slides + "/" + ours);
+  fs::rename(slides + "/gray_29.png", slides + "/picture.png");
+  const auto before = read_whole_file(slides + "/picture.png", 100000);
+  ASSERT_TRUE(before.ok()) << before.error().message;
+  const Finished refused = server(import);
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.err, HasSubstr("give --out another folder"));
+  EXPECT_EQ(read_whole_file(slides + "/picture.png", 100000).value(), *before);
+}
+
 TEST(CalibrationExample, ViewsThatDoNotBelongAreNamedAndASizeThatCannotBeIsWarnedOf) {
   const TempFolder folder;
   const std::string out = (folder / "example").string(), other = (folder / "other").string();
