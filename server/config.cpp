@@ -158,11 +158,22 @@ std::optional<Mistake> find_mistake(const WebOptions& gateway) {
                  sound);
 }
 
+/// A folder's last name may be new; of others it is a slip of the pen.
+Status check_can_make(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (fs::is_directory(folder, ignored)) return {};
+  if (fs::exists(folder, ignored)) return Error{"cannot record to " + folder + ": it is no folder"};
+  fs::path path = fs::absolute(folder, ignored).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();  // "takes/"
+  if (fs::is_directory(path.parent_path(), ignored)) return {};
+  return Error{"cannot record to " + folder + ": there is no folder " + path.parent_path().string() +
+               "; make it, or is the name right?"};
+}
+
 Status check_folder(const ServeConfig& config) {
   if (config.record_folder.empty()) return {};
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(config.record_folder, ignored))
-    return Error{"cannot record to " + config.record_folder + ": there is no such folder"};
+  if (const Status there = check_can_make(config.record_folder); !there) return there;
   if (config.web == "none")
     return Error{"recordings to " + config.record_folder +
                  " are started by the web API: leave out --web none, or give --record FILE"};

@@ -90,12 +90,22 @@ void say_what_waits(const ServeConfig& now, const ServeConfig& wanted) {
   if (!waits.empty()) log_warning("of the new configuration, " + waits + " needs a restart");
 }
 
+/// The folder that it is in is there, as find_mistake() has it.
+Status make_record_folder(const ServeConfig& config) {
+  if (config.record_folder.empty()) return {};
+  std::error_code code;
+  std::filesystem::create_directory(config.record_folder, code);
+  if (code) return Error{"cannot make the folder " + config.record_folder + ": " + code.message()};
+  return {};
+}
+
 /// All of the new configuration, or nothing.
 Status reload(const ServeConfig& now, const ReadAgain& again, Gateway* gateway, StreamSet& streams) {
   const auto wanted = again();
   if (!wanted) return wanted.error();
   if (now.streams.empty() != wanted->streams.empty())
     return Error{"between one stream and tables [[stream]] the server must be restarted"};
+  if (const Status made = make_record_folder(*wanted); !made) return made;
   if (gateway != nullptr) {
     if (const Status applied = gateway->apply(wanted->gateway); !applied) return applied;
   }
@@ -138,6 +148,7 @@ class Reloads {
 Status serve(const ServeConfig& config, const ReadAgain& again, StopSignal& stop) {
   std::optional<Reloads> reloads;
   if (again) reloads.emplace(stop);
+  if (const Status made = make_record_folder(config); !made) return made;
   KeyFrameWishes wishes;  // outlives the gateway and the streams
   ServiceBoard board;
   std::optional<RecordingDesk> desk;

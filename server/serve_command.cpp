@@ -167,7 +167,7 @@ Command serve_command() {
         f->recording = add_recording_flags(app);
         app.add_option("--record-dir", f->record_folder,
                        "Folder of recordings that are started and stopped over the web API (docs/WEB.md), by "
-                       "the viewer or a program")
+                       "the viewer or a program; made where only its last name is new")
             ->type_name("DIR");
         app.add_option(
                "--pre-roll", f->pre_roll,

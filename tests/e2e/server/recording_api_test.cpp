@@ -274,9 +274,24 @@ TEST_F(RecordingOnRequest, ThatIsRenamedHasFailedAndKeepsWhatItHas) {
   EXPECT_EQ(server.order("take", "start").status, 200);
 }
 
+TEST_F(RecordingOnRequest, TheFolderIsMadeAlsoAnewByAReload) {
+  const fs::path config = folder_ / "server.toml", takes = out_ / "takes";
+  std::ofstream(config) << "loop = true\n[recording]\nfolder = \"" << takes.string() << "/\"\n";
+  WebServer server(serve(source_, {"--web", "127.0.0.1:0", "--config", config}));
+  ASSERT_TRUE(server.goes_on("take", 2)) << server.process().err();
+  EXPECT_TRUE(fs::is_directory(takes));
+  fs::remove(takes);
+  server.process().signal(SIGHUP);
+  ASSERT_TRUE(server.process().wait_for_text("was read again")) << server.process().err();
+  ASSERT_EQ(server.order("take", "start").status, 200);
+  EXPECT_EQ(names_in(takes).size(), 1U);
+}
+
 TEST_F(RecordingOnRequest, WhatCannotWorkIsSaidAtTheStart) {
-  expect_one_error(run(serve(source_, {"--web", "127.0.0.1:0", "--record-dir", out_ / "none"})),
-                   "no such folder");
+  expect_one_error(run(serve(source_, {"--web", "127.0.0.1:0", "--record-dir", out_ / "none/takes"})),
+                   "there is no folder " + (out_ / "none").string());
+  expect_one_error(run(serve(source_, {"--web", "127.0.0.1:0", "--record-dir", take_ / "rig.yaml"})),
+                   "it is no folder");
   expect_one_error(run(serve(source_, {"--web", "none", "--record-dir", out_})), "--web none");
   const Finished wrong = run(serve(source_, {"--record-dir", out_, "--pre-roll", "long"}));
   EXPECT_EQ(wrong.status, 2);
