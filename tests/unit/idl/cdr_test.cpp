@@ -9,7 +9,10 @@
 #include <cstring>
 #include <limits>
 #include <random>
+#include <regex>
 
+#include "base/filter_counts.h"
+#include "base/rung.h"
 #include "idl/transport.h"
 
 namespace relievo {
@@ -216,6 +219,20 @@ TEST(Cdr, ReadsWhereTheCameraStands) {
   EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, -1, 0, 0, 0}).ok());
   EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, 1}).ok());
   EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, std::numeric_limits<double>::infinity()}).ok());
+}
+
+TEST(Cdr, TheIdlNamesFiltersAndRungsAsTheyAreSent) {
+  const std::string idl =
+      std::regex_replace(std::string(topic_type(Topic::kStatus).idl), std::regex("\\s*\n *// "), " ");
+  std::string filters = "did since the start: ";
+  for (const Filter& filter : kFilters)
+    filters += std::string(filter.name) + (&filter == &kFilters.back() ? "." : ", ");
+  EXPECT_THAT(idl, testing::HasSubstr(filters));
+  std::string rungs = "Rungs are ";
+  for (std::size_t i = 1; i < kRungs.size(); ++i)
+    rungs +=
+        std::to_string(i) + " " + std::string(to_string(kRungs[i])) + (i + 1 == kRungs.size() ? "." : ", ");
+  EXPECT_THAT(idl, testing::HasSubstr(rungs));
 }
 
 TEST(Cdr, SchemaIsTheWholeIdl) {
