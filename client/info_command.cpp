@@ -132,6 +132,7 @@ nlohmann::json info_json(const StreamInfo& info) {
         {"projector_from_camera_rotation", info.rig.projector_from_camera_rotation},
         {"projector_from_camera_translation", info.rig.projector_from_camera_translation},
         {"colour_matrix", info.rig.colour_matrix},
+        {"camera_gamma", info.rig.camera_gamma},
         {"stereo_rms_px", known(info.rig.stereo_rms_px)},
         {"scale_error", known(info.rig.scale_error)},
         {"world_from_camera", place_json(info.rig)}}},

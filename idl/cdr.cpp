@@ -24,6 +24,7 @@ constexpr std::size_t kMaxText = 4096;  // of a source or message: far above wha
 constexpr std::uint32_t kMaxPictureSize_px = 1u << 16;
 constexpr std::uint32_t kMaxColours = 8;  // primaries there are
 constexpr std::uint32_t kMaxSlides = 10;
+constexpr double kMostGamma = 3;  // as in rig.yaml
 constexpr std::size_t kMaxStripes = 1u << 16;
 
 // A cursor over XCDR version 2: values aligned to their size but at most to 4, relative to the first byte
@@ -185,9 +186,15 @@ Rig read_rig(Cursor& in, bool& possible) {
     possible = possible && rig.stereo_rms_px >= 0 && rig.scale_error >= 0;
     if (!in.more()) return;  // of a server that did not say where its camera stands
     const CameraPose pose{.rotation = in.doubles<9>(), .translation = in.doubles<3>()};
-    if (std::all_of(pose.rotation.begin(), pose.rotation.end(), [](double v) { return v == 0; })) return;
-    possible = possible && is_rotation(pose.rotation);
-    rig.world_from_camera = pose;
+    if (std::any_of(pose.rotation.begin(), pose.rotation.end(), [](double v) { return v != 0; })) {
+      possible = possible && is_rotation(pose.rotation);
+      rig.world_from_camera = pose;
+    }
+    if (!in.more()) return;  // of a server that did not say its camera's gamma
+    const double gamma = in.number();
+    if (gamma == 0) return;  // as of one that passes on what it read
+    possible = possible && gamma >= 1 && gamma <= kMostGamma;
+    rig.camera_gamma = gamma;
   });
   return rig;
 }

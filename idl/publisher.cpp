@@ -57,6 +57,7 @@ relievo_Rig to_dds(const Rig& rig) {
     std::copy(rotation.begin(), rotation.end(), out.world_from_camera_rotation);
     std::copy(translation.begin(), translation.end(), out.world_from_camera_translation);
   }
+  out.camera_gamma = rig.camera_gamma;
   return out;
 }
 

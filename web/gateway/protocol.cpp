@@ -107,6 +107,7 @@ std::string info_message(const StreamInfo& info) {
   // All there is to know, so that a page can write a recording.
   json["field_order"] = to_string(info.rig.field_order);
   json["colour_matrix"] = info.rig.colour_matrix;
+  json["camera_gamma"] = info.rig.camera_gamma;
   json["pattern"] = {{"base", info.pattern.base},
                      {"slides", info.pattern.slides},
                      {"palette", info.pattern.palette},

@@ -287,6 +287,29 @@ TEST_F(RecordingOnRequest, TheFolderIsMadeAlsoAnewByAReload) {
   EXPECT_EQ(names_in(takes).size(), 1U);
 }
 
+// What was captured through a curve cannot be told from the colour matrix alone.
+TEST_F(RecordingOnRequest, ARecordingKeepsItsCamerasGamma) {
+  const fs::path file = folder_ / "g.mcap";
+  const Finished done = run(serve("sim:plane,gamma=2.2,width=160,height=120,stripes=30,frames=12",
+                                  {"--web", "none", "--fast", "--frames", "12", "--record", file}));
+  ASSERT_EQ(done.status, 0) << done.err;
+  auto reader = RecordingReader::open(file);
+  ASSERT_TRUE(reader) << reader.error().message;
+  std::string rig;
+  for (const RecordingAttachment& a : (*reader)->summary().attachments)
+    if (a.name == "rig.yaml") rig.assign(a.data.begin(), a.data.end());
+  EXPECT_THAT(rig, HasSubstr("\ncamera_gamma: 2.2"));
+  for (;;) {
+    const auto message = (*reader)->next();
+    ASSERT_TRUE(message && *message) << "no description";
+    if ((*reader)->summary().channels[(**message).channel].topic != "relievo/info") continue;
+    const auto info = read_info_cdr((**message).data);
+    ASSERT_TRUE(info) << info.error().message;
+    EXPECT_EQ(info->rig.camera_gamma, 2.2);
+    return;
+  }
+}
+
 TEST_F(RecordingOnRequest, WhatCannotWorkIsSaidAtTheStart) {
   expect_one_error(run(serve(source_, {"--web", "127.0.0.1:0", "--record-dir", out_ / "none/takes"})),
                    "there is no folder " + (out_ / "none").string());

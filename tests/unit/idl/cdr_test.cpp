@@ -221,6 +221,27 @@ TEST(Cdr, ReadsWhereTheCameraStands) {
   EXPECT_FALSE(read({1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, std::numeric_limits<double>::infinity()}).ok());
 }
 
+TEST(Cdr, ReadsTheCamerasGamma) {
+  const auto read = [](std::vector<double> pose, std::vector<double> gamma) {
+    pose.insert(pose.begin(), {0.25, 5e-4});
+    pose.insert(pose.end(), gamma.begin(), gamma.end());
+    return read_info_cdr(description({1, 2}, pose).finish());
+  };
+  const std::vector<double> placed{0, -1, 0, 1, 0, 0, 0, 0, 1, 1.5, -0.25, 2}, silent(12, 0);
+  for (const auto& pose : {placed, silent}) {
+    const auto said = read(pose, {2.2});
+    ASSERT_TRUE(said.ok()) << said.error().message;
+    EXPECT_EQ(said->rig.camera_gamma, 2.2);
+    EXPECT_EQ(said->rig.world_from_camera.has_value(), pose == placed);
+    EXPECT_EQ(said->pattern.scheme, Scheme::kWhiteFrame);
+    EXPECT_EQ(read(pose, {}).value().rig.camera_gamma, 1) << "of a server that did not say it";
+    EXPECT_EQ(read(pose, {0}).value().rig.camera_gamma, 1);
+    EXPECT_EQ(read(pose, {3, 7}).value().rig.camera_gamma, 3) << "of one that says more";
+  }
+  for (const double impossible : {0.5, -1.0, 3.5, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_FALSE(read(silent, {impossible}).ok()) << impossible;
+}
+
 TEST(Cdr, TheIdlNamesFiltersAndRungsAsTheyAreSent) {
   const std::string idl =
       std::regex_replace(std::string(topic_type(Topic::kStatus).idl), std::regex("\\s*\n *// "), " ");

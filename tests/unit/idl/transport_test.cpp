@@ -113,6 +113,7 @@ TEST(Transport, DescriptionAndStatusReachALateJoiner) {
   info.rig.field_order = FieldOrder::kBottom;
   info.rig.stereo_rms_px = 0.25;
   info.rig.scale_error = 5e-4;
+  info.rig.camera_gamma = 2.2;
   info.rig.world_from_camera = {.rotation = {0, -1, 0, 1, 0, 0, 0, 0, 1}, .translation = {1.5, -0.25, 2}};
   info.pattern.scheme = Scheme::kWhiteFrame;
   auto publisher = expect_made(Publisher::create(kDomain, info));

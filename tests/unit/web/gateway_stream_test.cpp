@@ -29,6 +29,7 @@ TEST_F(GatewayStream, InfoComesFirstAndDescribesTheRig) {
   EXPECT_EQ(info["pattern"]["sequence"].size(), 90u);
   EXPECT_EQ(info["pattern"]["scheme"], "complementary");
   EXPECT_EQ(info["colour_matrix"].size(), 9u);
+  EXPECT_EQ(info["camera_gamma"], 1);
   EXPECT_EQ(info["field_order"], "top");
   EXPECT_EQ(info["frame_rate"], 29.97);
   EXPECT_EQ(info["camera"]["width"], 640);
@@ -83,6 +84,7 @@ TEST_F(GatewayStream, InfoSaysHowGoodTheRigIs) {
   StreamInfo described = make_info();
   described.rig.stereo_rms_px = 0.25;
   described.rig.scale_error = 5e-4;
+  described.rig.camera_gamma = 2.2;
   gateway->announce(described);
   WsClient client(port, "face");
   const auto message = client.next();
@@ -90,6 +92,7 @@ TEST_F(GatewayStream, InfoSaysHowGoodTheRigIs) {
   const auto info = Json::parse(message->data);
   EXPECT_EQ(info["stereo_rms_px"], 0.25);
   EXPECT_EQ(info["scale_error"], 5e-4);
+  EXPECT_EQ(info["camera_gamma"], 2.2);
 }
 
 TEST_F(GatewayStream, InfoSaysWhereTheCameraStands) {

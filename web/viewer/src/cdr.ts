@@ -120,7 +120,8 @@ function readRig(cursor: Cursor): Omit<StreamInfo, 'stream' | 'source' | 'stripe
     const [rotation, translation] = more() ? [cursor.doubles(9), cursor.doubles(3)] : [[], []];
     const isPlaced = rotation.some((v) => v !== 0); // else it is not said
     const place = isPlaced ? { world_from_camera_rotation: rotation, world_from_camera_translation: translation } : {};
-    return { frame_rate, scan, camera, ...pose, stereo_rms_px, scale_error, ...place };
+    const camera_gamma = (more() && cursor.double()) || 1; // 0 is not said, either
+    return { frame_rate, scan, camera, ...pose, stereo_rms_px, scale_error, camera_gamma, ...place };
   });
 }
 

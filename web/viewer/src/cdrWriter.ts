@@ -107,6 +107,7 @@ export function writeStreamInfo(info: StreamInfo): Uint8Array | null {
       sample.doubles([info.stereo_rms_px ?? 0, info.scale_error ?? 0]);
       sample.doubles(info.world_from_camera_rotation ?? Array<number>(9).fill(0));
       sample.doubles(info.world_from_camera_translation ?? [0, 0, 0]);
+      sample.doubles([info.camera_gamma ?? 1]);
     });
     sample.appendable(() => {
       sample.u32(pattern.base);

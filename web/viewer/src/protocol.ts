@@ -32,6 +32,7 @@ export interface StreamInfo {
   started_ns?: number;
   field_order?: string;
   colour_matrix?: number[]; // row-major
+  camera_gamma?: number; // 1 where missing
   pattern?: Pattern;
 }
 

@@ -28,6 +28,19 @@ describe('a description', () => {
     expect(readStreamInfo(writeStreamInfo(older)!)).toMatchObject({ stereo_rms_px: 0, scale_error: 0 });
     expect(readStreamInfo(writeStreamInfo(older)!)).not.toHaveProperty('world_from_camera_rotation');
   });
+  it('of a server that did not say its camera\'s gamma', () => {
+    const whole = writeStreamInfo(kInfo)!;
+    const gamma = new Uint8Array(new Float64Array([kInfo.camera_gamma!]).buffer);
+    const at = whole.findIndex((_, i) => gamma.every((byte, k) => whole[i + k] === byte));
+    const older = Uint8Array.from([...whole.subarray(0, at), ...whole.subarray(at + 8)]);
+    const lengths = new DataView(older.buffer);
+    const kRigAt = 44; // behind the header, the names and the time of the start
+    expect(kRigAt + 4 + lengths.getUint32(kRigAt, true)).toBe(at + 8);
+    for (const length of [4, kRigAt]) lengths.setUint32(length, lengths.getUint32(length, true) - 8, true);
+    const { camera_gamma: _, ...rest } = readStreamInfo(whole);
+    expect(readStreamInfo(older)).toEqual({ ...rest, camera_gamma: 1 });
+    expect(readStreamInfo(writeStreamInfo({ ...kInfo, camera_gamma: 0 })!).camera_gamma).toBe(1);
+  });
   it('of stripes that are not all there is none', () => {
     const whole = writeStreamInfo(kInfo)!;
     expect(() => readStreamInfo(whole.subarray(0, whole.length - 8))).toThrow(/ends too early/);

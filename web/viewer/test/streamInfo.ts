@@ -18,6 +18,7 @@ export const kInfo: StreamInfo = {
   scale_error: 5e-4,
   world_from_camera_rotation: [0, -1, 0, 1, 0, 0, 0, 0, 1],
   world_from_camera_translation: [1.5, -0.25, 2],
+  camera_gamma: 2.2,
   colour_matrix: [1, 0, 0, 0, 1, 0, 0, 0, 1],
   pattern: { base: 6, slides: 2, palette: [1, 2, 4, 6, 5, 3], sequence: [0, 7, 14], scheme: 'complementary' },
 };
