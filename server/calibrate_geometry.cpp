@@ -246,7 +246,17 @@ Status run(const Options& options, StopSignal& stop) {
   PinholeModel projector;
   projector.width = code.projector.width;
   projector.height = code.projector.height;
+  if (measured->of_fields) {
+    if (scanning.scan == Scan::kProgressive)
+      return Error{
+          "the views are frames of an interlaced camera, a picture a slide, and its scan is said to be "
+          "progressive: say --scan interlaced, or give each slide and its complement as a picture"};
+    scanning.scan = Scan::kInterlaced;
+  }
   const auto geometry = calibrate_geometry(measured->views, measured->camera, projector, {});
+  if (!geometry && measured->of_fields && !scanning.field_order)
+    return Error{geometry.error().message +
+                 "; or does the camera's bottom field come first (--field-order bottom)?"};
   if (!geometry) return geometry.error();
   warn_of_depth(*geometry, *measured, projector);
 

@@ -37,6 +37,7 @@ Result<std::vector<fs::path>> views_in(const std::string& folder) {
 struct OneView {
   MeasuredView view;
   int width = 0, height = 0;  // 0 where it could not be read
+  bool of_fields = false;     // frames of an interlaced camera
 };
 
 /// The size of most views' pictures; of two as frequent ones the first.
@@ -70,9 +71,11 @@ OneView measure_one(const fs::path& folder, const ViewCode& code, const Board& b
     return OneView{measure_view(name, *stack, board, how, pool), stack->width(), stack->height()};
   };
   if (!code.stripes) return measured(read_gray_stack(folder, width, height, go_on), GrayDecodeOptions{});
-  return measured(read_stripe_stack(folder, *code.stripes, width, height,
-                                    {.field_order = code.field_order, .on_picture = go_on}),
-                  code.colours);
+  const auto stack = read_stripe_stack(folder, *code.stripes, width, height,
+                                       {.field_order = code.field_order, .on_picture = go_on});
+  OneView one = measured(stack, code.colours);
+  one.of_fields = stack && stack->of_fields;
+  return one;
 }
 
 }  // namespace
@@ -110,6 +113,7 @@ Result<MeasuredViews> measure_views(const std::string& folder, const ViewCode& c
       one.view.refused = "its pictures are " + text_of({one.width, one.height}) + ", others " + text_of(size);
       log_warning("view " + one.view.name + " is left out: " + one.view.refused);
     }
+    out.of_fields = out.of_fields || one.of_fields;
     out.views.push_back(std::move(one.view));
   }
   if (out.camera.width == 0)

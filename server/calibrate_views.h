@@ -25,7 +25,8 @@ struct ViewCode {
 
 struct MeasuredViews {
   std::vector<MeasuredView> views;
-  PinholeModel camera;  // its size
+  PinholeModel camera;     // its size
+  bool of_fields = false;  // some are an interlaced camera's frames
 };
 
 /// `pattern`: "gray", or the file of the stripes' pattern; empty: FOLDER/pattern.yaml where it is there, Gray

@@ -28,6 +28,7 @@ struct StripeStack {
   Pattern pattern;                  // along columns; along rows it is row_pattern() of it
   std::vector<StripePair> columns;  // [slide]
   std::vector<StripePair> rows;     // [slide]
+  bool of_fields = false;           // each pair from a frame of an interlaced camera
 
   int width() const { return columns.empty() ? 0 : columns.front().lit.width(); }
   int height() const { return columns.empty() ? 0 : columns.front().lit.height(); }

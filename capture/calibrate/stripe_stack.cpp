@@ -65,7 +65,7 @@ Result<StripeStack> read_stripe_stack(const fs::path& folder, const Pattern& pat
                  " (each slide and its complement, along columns, then along rows), or " +
                  number(2 * slides) + " frames of an interlaced camera"};
   }
-  StripeStack stack{projector_width, projector_height, pattern, {}, {}};
+  StripeStack stack{projector_width, projector_height, pattern, {}, {}, interlaced};
   std::vector<Image8> pictures;
   for (std::size_t i = 0; i < files->size(); ++i) {
     if (options.on_picture && !options.on_picture(i, files->size())) return Error{"stopped"};

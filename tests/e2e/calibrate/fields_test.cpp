@@ -66,7 +66,11 @@ TEST_F(FieldOrders, ViewsWhoseBottomFieldComesFirstCalibrate) {
   make_example("", 5);
   for (const auto& view : fs::directory_iterator(example_ + "/views"))
     if (view.is_directory()) interlace(view.path(), FieldOrder::kBottom);
+  EXPECT_THAT(server(geometry({"--out", rig_})).err, HasSubstr("--field-order bottom"));
+  EXPECT_THAT(server(geometry({"--scan", "progressive", "--out", rig_})).err,
+              HasSubstr("say --scan interlaced"));
   const json flagged = report(geometry({"--field-order", "bottom", "--out", rig_}));
+  EXPECT_EQ(flagged.at("assumed"), json({"--frame-rate"})) << "frames of two fields tell the scan";
   EXPECT_LT(flagged.at("stereo_rms_px").get<double>(), 0.3);
   EXPECT_EQ(written().field_order, FieldOrder::kBottom);
   // The rig knows it from now on.
