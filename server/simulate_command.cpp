@@ -68,6 +68,10 @@ Command simulate_command() {
       "simulate", "Render a take of a simulated scene, with its truth", [](CLI::App& app) {
         auto options = std::make_shared<Options>();
         app.add_option("--scene", options->scene, "SCENE[,KEY=VALUE...], see below")
+            ->check([](const std::string& scene) {
+              const Status possible = check_sim(scene);
+              return possible ? std::string() : possible.error().message;
+            })
             ->type_name("SCENE")
             ->required();
         app.add_option("--frames", options->frames, "Frames (default: one period of the scene's motion)")

@@ -46,6 +46,8 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
       {"pattern", "--slides", "0", "--out", "folder"},
       {"simulate", "--frames", "5"},
       {"simulate", "--scene", "plane", "--frames", "-1", "--out", "folder"},
+      {"simulate", "--scene", "plane,bogus=1", "--out", "folder"},
+      {"simulate", "--scene", "plane,stripes=-1", "--out", "folder"},
   };
   for (const auto& arguments : wrong) {
     std::string shown;
