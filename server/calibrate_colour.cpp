@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/json_text.h"
 #include "base/log.h"
@@ -100,7 +102,29 @@ void print(const ColourCalibration& c, const std::string& out) {
   std::printf("residual   %.2f of 255 (RMS)\nwritten    %s\n", c.residual, out.c_str());
 }
 
+/// Where the camera answers to each of the projector's primaries with another channel, as pictures written
+/// BGR do.
+void warn_of_exchanged_channels(const ColourCalibration& c) {
+  std::set<std::size_t> answered;
+  std::string other;
+  for (const ColourReport& r : c.colours) {
+    for (std::size_t own = 0; own < 3; ++own) {
+      if (r.colour != Primary{1} << own) continue;
+      const auto channel =
+          static_cast<std::size_t>(std::ranges::max_element(r.captured) - r.captured.begin());
+      answered.insert(channel);
+      if (channel != own)
+        other += (other.empty() ? "" : ", ") + std::string(kChannels[own]) + " as " + kChannels[channel];
+    }
+  }
+  if (answered.size() == 3 && !other.empty())
+    log_warning("the camera sees " + other +
+                ": were the channels of its pictures exchanged, as BGR? They are decoded all the same, but "
+                "textures have these colours");
+}
+
 void warn(const ColourCalibration& c) {
+  warn_of_exchanged_channels(c);
   if (c.residual > kMostResidual) {
     char residual[16];
     std::snprintf(residual, sizeof residual, "%.0f", c.residual);

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/whole_file.h"
+#include "capture/calibrate/pictures.h"
+#include "capture/picture_file.h"
 #include "capture/rig_file.h"
 #include "tests/e2e/calibrate/calibrate_report.h"
 #include "tests/support/temp_folder.h"
@@ -18,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 TEST(CalibrationExample, FromNothingToAReconstruction) {
   const TempFolder folder;
@@ -109,6 +112,26 @@ TEST(CalibrationExample, SwappedCapturesReplaceNoColours) {
   const Finished turned = server({"calibrate", "colour", out + "/colours", "--out", rig});
   EXPECT_EQ(turned.status, 0) << turned.err;
   EXPECT_THAT(turned.err, HasSubstr("the colours are far off"));
+}
+
+TEST(CalibrationExample, ExchangedChannelsAreWarnedOf) {
+  const TempFolder folder;
+  const std::string example = folder / "example", rig = folder / "rig.yaml";
+  report({"calibrate", "example", "--rig", "object,width=160,height=120,stripes=20", "--board",
+          "chessboard:7x5:40mm", "--views", "3", "--out", example, "--json"});
+  const std::vector<std::string> calibrate{"calibrate", "colour", example + "/colours", "--out", rig};
+  EXPECT_THAT(server(calibrate).err, Not(HasSubstr("exchanged")));
+  for (const auto& file : fs::directory_iterator(example + "/colours")) {
+    auto picture = read_rgb(file.path());
+    ASSERT_TRUE(picture.ok()) << picture.error().message;
+    for (int y = 0; y < picture->height(); ++y)
+      for (int x = 0; x < picture->width(); ++x)
+        std::swap(picture->row(y)[3 * x], picture->row(y)[3 * x + 2]);
+    ASSERT_TRUE(write_png(file.path(), *picture).ok());
+  }
+  const Finished done = server(calibrate);
+  EXPECT_EQ(done.status, 0) << done.err;
+  EXPECT_THAT(done.err, HasSubstr("the camera sees red as blue, blue as red"));
 }
 
 TEST(CalibrationExample, WhatFailsBesidesTheRigLeavesTheRigOfBefore) {
