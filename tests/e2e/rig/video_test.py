@@ -89,7 +89,7 @@ class Video(unittest.TestCase):
 
     def test_interrupted_leaves_nothing(self):
         child = subprocess.Popen([SERVER, "pattern", "--out", self.path / "long.mkv", "--seconds", "36000"])
-        while child.poll() is None and not any(p.suffix == ".partial" for p in self.path.iterdir()):
+        while child.poll() is None and not any(p.name.startswith("long.mkv.part") for p in self.path.iterdir()):
             time.sleep(0.01)
         child.send_signal(signal.SIGINT)
         self.assertEqual(child.wait(60), 0)
