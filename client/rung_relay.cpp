@@ -39,15 +39,11 @@ void RungRelay::update(const std::string& name, Stream& stream) {
     else
       log_warning("the clock of " + name + "'s server cannot be compared: " + made.error().message);
   }
-  const std::int64_t asked_ns = std::exchange(stream.asked_ns, now_ns);
-  if (!stream.clock) return;
-  const auto clock = stream.clock->offset();
+  const auto clock = stream.clock ? stream.clock->offset() : std::nullopt;
   if (clock) gateway_.set_clock(name, clock->offset_ns);
-  if (clock && now_ns - asked_ns < kNanosecondsPerSecond) {
-    stream.asked_ns = asked_ns;
-    return;
-  }
-  stream.clock->ask();  // at each call until the first answer: no latency is known before
+  if (clock && now_ns - stream.asked_ns < kNanosecondsPerSecond) return;
+  stream.asked_ns = now_ns;
+  if (stream.clock) stream.clock->ask();  // at each call until the first answer: no latency is known before
 }
 
 void RungRelay::relay(const std::string& name, Stream& stream, Rung rung) {

@@ -381,8 +381,7 @@ Status renew_keys(const fs::path& folder) {
   if (auto s = write_keys(fresh->path(), *authority, name, KeyRole::kPublisher, *revoked, holder); !s)
     return s;
   if (auto s = add_holder(folder, name, holder); !s) return s;
-  for (const char* file : {key_files::kPrivate, key_files::kIdentity, key_files::kAuthority,
-                           key_files::kGovernance, key_files::kPermissions, key_files::kRevoked}) {
+  for (const char* file : key_files::kEach) {
     const fs::path made = fresh->path() / file, place = folder / file;
     if (auto s = give_to_owner_of(folder, made); !s) return s;
     std::error_code error;

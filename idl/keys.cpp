@@ -98,8 +98,7 @@ Result<std::vector<std::string>> read_revoked(const std::filesystem::path& folde
 }
 
 Result<Keys> read_keys_of_any_time(const std::filesystem::path& folder) {
-  for (const char* file : {key_files::kAuthority, key_files::kIdentity, key_files::kPrivate,
-                           key_files::kGovernance, key_files::kPermissions, key_files::kRevoked})
+  for (const char* file : key_files::kEach)
     if (auto s = check_readable(folder, file); !s) return s.error();
   const auto authority = openssl::read_certificate(folder / key_files::kAuthority);
   if (!authority) return authority.error();

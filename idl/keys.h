@@ -3,6 +3,7 @@
 // Security 1.1: authenticated, access-controlled, encrypted). docs/SECURITY.md. Any thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -21,7 +22,9 @@ inline constexpr const char* kPrivate = "identity.key";         // readable by i
 inline constexpr const char* kGovernance = "governance.p7s";    // what is protected, and how
 inline constexpr const char* kPermissions = "permissions.p7s";  // what this machine may do
 inline constexpr const char* kRevoked = "revoked.pem";          // keys that count no longer
-inline constexpr const char* kAuthorityKey = "authority.key";   // an authority's alone, secret, too
+/// Those of each folder of keys.
+inline constexpr std::array kEach{kAuthority, kIdentity, kPrivate, kGovernance, kPermissions, kRevoked};
+inline constexpr const char* kAuthorityKey = "authority.key";  // an authority's alone, secret, too
 }  // namespace key_files
 
 struct Keys {

@@ -25,6 +25,7 @@
 #include "server/calibrate_views.h"
 #include "server/calibration_report.h"
 #include "server/camera_flags.h"
+#include "server/options.h"
 
 namespace relievo {
 namespace {
@@ -62,8 +63,7 @@ Scanning scanning_of(const Options& options, const RigPart& before) {
   Scanning out{before.scan, {}, before.frame_rate};
   if (before.whole) out.field_order = before.whole->field_order;
   if (!options.scan.empty()) out.scan = options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive;
-  if (!options.camera.field_order.empty())
-    out.field_order = options.camera.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+  if (!options.camera.field_order.empty()) out.field_order = field_order_named(options.camera.field_order);
   if (options.frame_rate) out.frame_rate = options.frame_rate;
   return out;
 }
@@ -335,8 +335,7 @@ std::function<Status(StopSignal&)> define_calibrate_geometry(CLI::App& app) {
   app.get_option("--field-order")
       ->description(
           "The field of an interlaced camera that is exposed first, in views and in the rig.yaml (default: "
-          "as "
-          "the rig to update or the source has it, else top)");
+          "as the rig to update or the source has it, else top)");
   app.add_flag("--json", o->json, "Print the report as JSON");
   app.final_callback([out, update, projector, source] {
     if (out->empty() && update->empty()) throw CLI::RequiredError("--out or --update");

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/calibration_report.h"
-#include "base/json_text.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "base/json_text.h"
 
 namespace relievo {
 namespace {

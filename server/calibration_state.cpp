@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/calibration_state.h"
-#include "base/json_text.h"
 
 #include <nlohmann/json.hpp>
+
+#include "base/json_text.h"
 
 namespace relievo {
 namespace {

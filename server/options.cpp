@@ -57,6 +57,10 @@ Result<std::string> with_scheme(const std::string& source, const std::string& sc
   return source + ",scheme=" + scheme;
 }
 
+FieldOrder field_order_named(const std::string& name) {
+  return name == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+}
+
 const char* scheme_help() {
   return "Schemes (rates at 29.97 frames a second; docs/SCHEMES.md):\n"
          "  complementary  slide 1 and its complement, slide 2 and its complement: texture 30 Hz, geometry "

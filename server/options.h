@@ -34,6 +34,9 @@ void add_scheme_option(CLI::App& app, std::string& scheme);
 /// take's pattern.yaml does, and so does a simulated source's key.
 Result<std::string> with_scheme(const std::string& source, const std::string& scheme);
 
+/// Of "bottom" or "top", as --field-order has it.
+FieldOrder field_order_named(const std::string& name);
+
 /// The projection schemes with their rates and weaknesses, for help texts.
 const char* scheme_help();
 

@@ -47,10 +47,6 @@ struct Options {
   bool json = false;
 };
 
-FieldOrder first_field(const Options& options) {
-  return options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
-}
-
 /// Whoever projects a folder projects all of its pictures. Those in `names` are replaced.
 Status refuse_other_pictures(const fs::path& folder, const std::vector<std::string>& names) {
   std::error_code none;
@@ -124,7 +120,9 @@ Status write_both_axes(const Options& options, const Pattern& pattern) {
   if (auto s = refuse_other_pictures(options.out, names); !s) return s;
   if (auto s = refuse_other_captures(options.out, pattern); !s) return s;
   const auto [width, height] = options.size;
-  if (auto s = write_stripe_slides(options.out, pattern, width, height, scan, first_field(options)); !s)
+  if (auto s = write_stripe_slides(options.out, pattern, width, height, scan,
+                                   field_order_named(options.field_order));
+      !s)
     return s;
   if (auto s = write_whole_file(fs::path(options.out) / "pattern.yaml", to_yaml(pattern)); !s) return s;
   const std::size_t count = names.size();
@@ -176,7 +174,7 @@ Status write_video(const Options& options, const Pattern& pattern, StopSignal& s
                                        {.width = options.size.width,
                                         .height = options.size.height,
                                         .interlaced = options.interlaced,
-                                        .field_order = first_field(options),
+                                        .field_order = field_order_named(options.field_order),
                                         .frame_rate = options.rate,
                                         .duration_s = options.seconds,
                                         .stopped = [&stop] { return stop.stopped(); }});
@@ -231,7 +229,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (const Status own = refuse_other_captures(options.out, *pattern); !own) return own;
   std::vector<std::string> files;
   const auto [width, height] = options.size;
-  const FieldOrder first = first_field(options);
+  const FieldOrder first = field_order_named(options.field_order);
   for (std::size_t i = 0; i < order.size(); ++i) {
     const int frame = static_cast<int>(options.interlaced ? i : i / 2);
     if (std::ranges::find(files, order[i]) != files.end()) continue;  // white again

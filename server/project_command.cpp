@@ -141,7 +141,7 @@ Status project(const Options& options, StopSignal& stop) {
   DisplayChoice choice{options.output, options.size.width, options.size.height, options.refresh_hz};
   ShowOptions show;
   show.interlaced = options.interlaced;
-  show.field_order = options.field_order == "bottom" ? FieldOrder::kBottom : FieldOrder::kTop;
+  show.field_order = field_order_named(options.field_order);
   if (!options.rig.empty()) {
     const auto rig = read_rig(options.rig);
     if (!rig) return rig.error();

@@ -15,6 +15,7 @@
 #include "tests/support/own_domain.h"
 #include "tests/support/patience.h"
 #include "tests/support/streams.h"
+#include "tests/unit/idl/old_peer.h"
 
 namespace relievo {
 namespace {
@@ -95,37 +96,21 @@ TEST(ClientReports, TheServerHearsWhatItsClientsDecode) {
   EXPECT_NE(heard.clients[0].id, heard.clients[1].id);
 }
 
-/// The old type under the name that it has on the network, in a process of its own as far as DDS can tell.
-class OldPeer {
- public:
-  explicit OldPeer(const std::string& stream, Role role)
-      : domain_(Domain::open(kDomain).value()),
-        participant_(dds_create_participant(static_cast<dds_domainid_t>(kDomain.domain), nullptr, nullptr)) {
-    dds_topic_descriptor_t type = relievo_old_ClockQuestion_desc;
-    type.m_typename = relievo_ClockQuestion_desc.m_typename;
-    const Qos qos(dds_create_qos());
-    const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
-    dds_qset_data_representation(qos.get(), 1, &representation);
-    const dds_entity_t topic =
-        dds_create_topic(participant_.get(), &type, "relievo/clock_question", qos.get(), nullptr);
-    EXPECT_GT(topic, 0);
-    const bool writes = role == Role::kWatcher;
-    group_ = create_group(participant_.get(), role, writes, stream).value();
-    end_ = Entity(writes ? dds_create_writer(group_.get(), topic, qos.get(), nullptr)
-                         : dds_create_reader(group_.get(), topic, qos.get(), nullptr));
-    EXPECT_GT(end_.get(), 0);
-  }
-  std::int32_t end() const { return end_.get(); }
-
- private:
-  std::shared_ptr<Domain> domain_;  // with the network's settings
-  Entity participant_, group_, end_;
-};
+test::OldPeer old_peer(const std::string& stream, Role role) {
+  return {{.domain = kDomain,
+           .stream = stream,
+           .role = role,
+           .writes = role == Role::kWatcher,
+           .topic = "relievo/clock_question"},
+          relievo_old_ClockQuestion_desc,
+          relievo_ClockQuestion_desc,
+          Qos(dds_create_qos())};
+}
 
 TEST(ClientReports, AnOldClientIsAnsweredByANewServer) {
   const auto publisher = Publisher::create(kDomain, test::example_info("newer"));
   ASSERT_TRUE(publisher);
-  const OldPeer client("newer", Role::kWatcher);
+  const test::OldPeer client = old_peer("newer", Role::kWatcher);
   const auto domain = Domain::open(kDomain);
   const auto group = create_group((*domain)->participant(), Role::kWatcher, false, "newer");
   const auto answers = create_reader((*domain)->participant(), group->get(), SideTopic::kClockAnswer);
@@ -145,7 +130,7 @@ TEST(ClientReports, AnOldClientIsAnsweredByANewServer) {
 }
 
 TEST(ClientReports, AnOldServerUnderstandsANewClient) {
-  const OldPeer server("older", Role::kServer);
+  const test::OldPeer server = old_peer("older", Role::kServer);
   const auto probe = ClockProbe::create(kDomain, "older");
   ASSERT_TRUE(probe);
   bool asked = false, told = false;

@@ -16,41 +16,24 @@
 #include "tests/support/own_domain.h"
 #include "tests/support/patience.h"
 #include "tests/support/streams.h"
+#include "tests/unit/idl/old_peer.h"
 
 namespace relievo {
 namespace {
 
 const DomainOptions kDomain{test::own_domain(), "lo"};
 
-/// Reads or writes the old type under the name that it has on the network.
-class OldPeer {
- public:
-  OldPeer(const std::string& stream, Role role)
-      : domain_(Domain::open(kDomain).value()),
-        participant_(dds_create_participant(static_cast<dds_domainid_t>(kDomain.domain), nullptr, nullptr)) {
-    dds_topic_descriptor_t type = relievo_old_StreamInfo_desc;
-    type.m_typename = relievo_StreamInfo_desc.m_typename;
-    const Qos qos(dds_create_qos());
-    const dds_data_representation_id_t representation = DDS_DATA_REPRESENTATION_XCDR2;
-    dds_qset_data_representation(qos.get(), 1, &representation);
-    dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
-    dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
-    const dds_entity_t topic =
-        dds_create_topic(participant_.get(), &type, "relievo/info", qos.get(), nullptr);
-    EXPECT_GT(topic, 0);
-    const bool writes = role == Role::kServer;
-    if (writes) dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, DDS_SECS(2));
-    group_ = create_group(participant_.get(), role, writes, stream).value();
-    end_ = Entity(writes ? dds_create_writer(group_.get(), topic, qos.get(), nullptr)
-                         : dds_create_reader(group_.get(), topic, qos.get(), nullptr));
-    EXPECT_GT(end_.get(), 0);
-  }
-  std::int32_t end() const { return end_.get(); }
-
- private:
-  std::shared_ptr<Domain> domain_;  // with the network's settings
-  Entity participant_, group_, end_;
-};
+test::OldPeer old_peer(const std::string& stream, Role role) {
+  const bool writes = role == Role::kServer;
+  Qos qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+  dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (writes) dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, DDS_SECS(2));
+  return {{.domain = kDomain, .stream = stream, .role = role, .writes = writes, .topic = "relievo/info"},
+          relievo_old_StreamInfo_desc,
+          relievo_StreamInfo_desc,
+          std::move(qos)};
+}
 
 TEST(OldDescription, AnOldReaderUnderstandsOneOfACameraWithAGamma) {
   StreamInfo info = test::example_info("newer");
@@ -58,7 +41,7 @@ TEST(OldDescription, AnOldReaderUnderstandsOneOfACameraWithAGamma) {
   info.rig.scale_error = 5e-4;
   const auto publisher = Publisher::create(kDomain, info);
   ASSERT_TRUE(publisher) << publisher.error().message;
-  const OldPeer reader("newer", Role::kWatcher);
+  const test::OldPeer reader = old_peer("newer", Role::kWatcher);
   bool read = false;
   EXPECT_TRUE(test::eventually([&] {
     take_all(reader.end(), [&](const void* sample) {
@@ -72,7 +55,7 @@ TEST(OldDescription, AnOldReaderUnderstandsOneOfACameraWithAGamma) {
 }
 
 TEST(OldDescription, OfAnOldServerIsOfACameraWithoutAGamma) {
-  const OldPeer writer("older", Role::kServer);
+  const test::OldPeer writer = old_peer("older", Role::kServer);
   char stream[] = "older", source[] = "sim:face";
   std::uint8_t palette[] = {1, 2};
   std::uint32_t stripes[] = {0, 3};
