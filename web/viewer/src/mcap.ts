@@ -25,8 +25,9 @@ export const bytesOf = (blob: Blob): Bytes => ({
 
 export interface McapMessage {
   channel: number;
-  timeMs: number; // log time, UTC
-  at: number; // of its record in the file
+  timeMs: number; // log time, UTC; where there is a `part`, as if those of its chunk were evenly apart
+  at: number; // of its record in the file; where there is a `part`, not before that was read
+  part?: Part;
 }
 
 export interface McapFile {
@@ -46,6 +47,8 @@ const kMessageHead = 22; // of a message's content, before its data
 const kMaxChunk = 2 ** 30;
 const kTogether = 16; // reads at a time
 const kWindow = 2 ** 20; // read at once while looking for a recording
+const kFarBytes = 2 ** 24; // of a remote file, up to which all of it may be read to open it
+const kLongestChunkMs = 1000; // of those whose messages are taken for evenly apart; ours last half of it
 const kOp = { header: 1, footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, dataEnd: 15 };
 
 /** Throws a FileError where the file is none of ours. */
@@ -69,7 +72,9 @@ function inOrder(found: McapFile): McapFile {
 }
 
 /** A message, whole. */
-export async function readSample(file: Bytes, { at }: McapMessage): Promise<Sample> {
+export async function readSample(file: Bytes, message: McapMessage): Promise<Sample> {
+  await message.part?.read(file);
+  const { at } = message;
   const head = await file.read(at, kRecordHead);
   const length = lengthOf(head);
   if (head[0] !== kOp.message || !(length >= kMessageHead && length <= kMaxChunk)) throw new Error('a message is damaged');
@@ -90,8 +95,9 @@ export async function readMessage(file: Bytes, message: McapMessage): Promise<Ui
 }
 
 /** The first bytes of a message's data; `little`: and nothing around them. */
-export function readMessageHead(file: Bytes, { at }: McapMessage, length: number, little = false): Promise<Uint8Array> {
-  const from = at + kRecordHead + kMessageHead;
+export async function readMessageHead(file: Bytes, message: McapMessage, length: number, little = false): Promise<Uint8Array> {
+  await message.part?.read(file, little);
+  const from = message.at + kRecordHead + kMessageHead;
   return little && file.readLittle !== undefined ? file.readLittle(from, length) : file.read(from, length);
 }
 
@@ -143,7 +149,7 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
   const summary = await file.read(summaryAt, summaryEnd - summaryAt + kFooterBytes - 4);
   if (crc !== 0 && crc32(summary) !== crc) return null;
   const topics = new Map<number, string>();
-  const chunks: { at: number; recordsAt: number; indexAt: number; indexBytes: number }[] = [];
+  const chunks: Chunk[] = [];
   try {
     for (const { op, content } of records(summary)) {
       if (op === kOp.channel) {
@@ -155,12 +161,7 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
       const chunk = readChunkIndex(content);
       if (chunk.at >= from) chunks.push(chunk);
     }
-    const messages: McapMessage[] = [];
-    for (let i = 0; i < chunks.length; i += kTogether) {
-      const some = chunks.slice(i, i + kTogether);
-      const indices = await Promise.all(some.map((chunk) => file.read(chunk.indexAt, chunk.indexBytes)));
-      for (const [j, index] of indices.entries()) addIndexed(index, some[j]!.recordsAt, file.size, messages);
-    }
+    const messages = (isFar(file) ? await readEnds(file, chunks) : null) ?? (await readIndices(file, chunks));
     return { topics, messages, end: summaryAt - kDataEndBytes, damage: null };
   } catch (error) {
     if (error instanceof FileError) throw error;
@@ -168,13 +169,126 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
   }
 }
 
-function readChunkIndex(content: Uint8Array): { at: number; recordsAt: number; indexAt: number; indexBytes: number } {
+interface Chunk {
+  startMs: number; // of its messages
+  endMs: number;
+  at: number;
+  recordsAt: number;
+  indexAt: number; // of its message indexes, one a channel,
+  indexBytes: number;
+  indices: { channel: number; at: number }[]; // and of each
+}
+
+function readChunkIndex(content: Uint8Array): Chunk {
   const view = viewOf(content);
   const [at, length] = [u64(view, 16), u64(view, 24)];
   const offsets = view.getUint32(32, true); // bytes of the map
+  const indices = Array.from({ length: Math.floor(offsets / 10) }, (_, i) => ({
+    channel: view.getUint16(36 + 10 * i, true),
+    at: u64(view, 38 + 10 * i),
+  }));
   const indexBytes = u64(view, 36 + offsets);
   checkCompression(content, 44 + offsets);
-  return { at, recordsAt: at + kRecordHead + kChunkHead, indexAt: at + length, indexBytes };
+  const [startMs, endMs] = [timeMs(view, 0), timeMs(view, 8)];
+  return { startMs, endMs, at, recordsAt: at + kRecordHead + kChunkHead, indexAt: at + length, indexBytes, indices };
+}
+
+async function readIndices(file: Bytes, chunks: Chunk[]): Promise<McapMessage[]> {
+  const messages: McapMessage[] = [];
+  for (let i = 0; i < chunks.length; i += kTogether) {
+    const some = chunks.slice(i, i + kTogether);
+    const indices = await Promise.all(some.map((chunk) => file.read(chunk.indexAt, chunk.indexBytes)));
+    for (const [j, index] of indices.entries()) addIndexed(index, some[j]!.recordsAt, file.size, messages);
+  }
+  return messages;
+}
+
+/** Of which not everything is read to know what is in it: message indexes lie all over it. */
+const isFar = (file: Bytes): boolean => file.isRemote === true && file.size > kFarBytes;
+
+/**
+ * The messages by the chunks' own index alone, which says how many there are of each channel; those of the first and
+ * the last chunk as they are. Null where that does not do: chunks that overlap, or last so long that a guess is none.
+ */
+async function readEnds(file: Bytes, chunks: Chunk[]): Promise<McapMessage[] | null> {
+  const ordered = [...chunks].sort((a, b) => a.startMs - b.startMs);
+  const [first, last] = [ordered[0], ordered[ordered.length - 1]];
+  if (first === undefined || first === last) return null;
+  for (const [i, chunk] of ordered.entries()) {
+    if (!(chunk.endMs - chunk.startMs <= kLongestChunkMs) || (i > 0 && chunk.startMs < ordered[i - 1]!.endMs)) return null;
+  }
+  const guessed: McapMessage[] = [];
+  for (const chunk of ordered.slice(1, -1)) {
+    const messages = guess(chunk);
+    if (messages === null) return null;
+    for (const message of messages) guessed.push(message);
+  }
+  const ends = await readIndices(file, [first, last!]);
+  return [...ends, ...guessed];
+}
+
+/** Null where its message indexes do not lie one behind the other. */
+function guess(chunk: Chunk): McapMessage[] | null {
+  const { startMs, endMs, indexAt, indexBytes } = chunk;
+  const indices = [...chunk.indices].sort((a, b) => a.at - b.at);
+  const messages: McapMessage[] = [];
+  const part = new Part(chunk, messages);
+  let at = indexAt;
+  for (const [i, index] of indices.entries()) {
+    const end = indices[i + 1]?.at ?? indexAt + indexBytes;
+    const count = (end - at - kRecordHead - kMessageIndexHead) / kMessageIndexEntry;
+    if (index.at !== at || !Number.isInteger(count) || count < 0) return null;
+    const step = (endMs - startMs) / Math.max(1, count - 1);
+    for (let j = 0; j < count; ++j) messages.push({ channel: index.channel, timeMs: startMs + j * step, at: -1, part });
+    at = end;
+  }
+  return at === indexAt + indexBytes ? messages : null;
+}
+
+const kMessageIndexHead = 6; // of a message index's content: channel, bytes of its entries
+const kMessageIndexEntry = 16;
+
+/** A chunk of which it is not known yet where in it its messages are. */
+export class Part {
+  private reading: Promise<void> | null = null;
+
+  /** `messages` are given their places. */
+  constructor(
+    private readonly chunk: { recordsAt: number; indexAt: number; indexBytes: number },
+    private readonly messages: readonly McapMessage[],
+  ) {}
+
+  /** `little`: nothing around its index is wanted. */
+  read(file: Bytes, little = false): Promise<void> {
+    this.reading ??= this.readOnce(file, little).catch((error: unknown) => {
+      this.reading = null;
+      throw error;
+    });
+    return this.reading;
+  }
+
+  private async readOnce(file: Bytes, little: boolean): Promise<void> {
+    const { recordsAt, indexAt, indexBytes } = this.chunk;
+    const index =
+      little && file.readLittle !== undefined ? await file.readLittle(indexAt, indexBytes) : await file.read(indexAt, indexBytes);
+    const found: McapMessage[] = [];
+    addIndexed(index, recordsAt, file.size, found);
+    found.sort((a, b) => a.timeMs - b.timeMs || a.at - b.at);
+    const places = new Map<number, number[]>();
+    for (const { channel, at } of found) {
+      const of = places.get(channel);
+      if (of === undefined) places.set(channel, [at]);
+      else of.push(at);
+    }
+    const next = new Map<number, number>(); // of each channel's
+    for (const message of this.messages) {
+      const i = next.get(message.channel) ?? 0;
+      const at = places.get(message.channel)?.[i];
+      if (at === undefined) throw new Error('the index of a part of it is damaged');
+      next.set(message.channel, i + 1);
+      message.at = at;
+    }
+  }
 }
 
 const kChunkHead = 40; // of an uncompressed chunk's content, before its records

@@ -14,6 +14,7 @@ const kInfoTopic = 'relievo/info';
 const kTogether = 64; // heads read at a time
 const kFarHeadMs = 8; // between those of a remote file
 const kFarSayMs = 500; // between marks drawn meanwhile
+const kMostFarHeads = 20_000; // that are asked for one by one; of longer ones those have marks that were shown
 
 export class Recording implements FrameStore {
   times: Float64Array;
@@ -102,7 +103,7 @@ export class Recording implements FrameStore {
 
   /**
    * All heads, for marks on the time line; of a remote file one after the other, so that what plays goes
-   * before. `progress` after some of them; stops where it returns false.
+   * before, and none of one that is so long that this would keep its server busy for hours. `progress` after some of them; stops where it returns false.
    */
   async readHeads(progress: () => boolean): Promise<void> {
     if (this.file.isRemote === true) return this.readFarHeads(progress);
@@ -114,6 +115,7 @@ export class Recording implements FrameStore {
   }
 
   private async readFarHeads(progress: () => boolean): Promise<void> {
+    if (this.count > kMostFarHeads) return void progress();
     let saidAt = performance.now();
     for (let i = 0; i < this.count; ++i) {
       if (this.heads[i] !== undefined) continue;

@@ -4,14 +4,15 @@ import { McapWriter, type McapWriterOptions } from '@mcap/core';
 import { describe, expect, it } from 'vitest';
 import { kFrameHeadBytes, readFrameHead } from '../src/cdr';
 import { crc32 } from '../src/crc32';
-import { openMcap, readMessage, readMessageHead, type Bytes } from '../src/mcap';
+import { openMcap, readMessage, readMessageHead, type Bytes, type McapFile, type McapMessage } from '../src/mcap';
 import { Recording } from '../src/recording';
+import { RemoteFile } from '../src/remoteFile';
 
 const kChannels = ['relievo/frame', 'relievo/status'];
 
-/** A relievo::Frame as CDR; every `keyEvery`th is a key frame. */
-function frameCdr(sequence: number, isKey: boolean): Uint8Array {
-  const payload = new Uint8Array(70 + sequence);
+/** A relievo::Frame as CDR, of so many `more` bytes. */
+function frameCdr(sequence: number, isKey: boolean, more = 0): Uint8Array {
+  const payload = new Uint8Array(70 + sequence + more);
   payload.set([0x52, 0x4c, 0x56, 0x46, 1, isKey ? 1 : 0]);
   const out = new DataView(new ArrayBuffer(4 + 4 + 12 + 32 + 4 + payload.length));
   out.setUint8(1, 9);
@@ -41,7 +42,7 @@ class Memory implements Bytes {
   read = async (at: number, length: number): Promise<Uint8Array> => this.bytes.slice(at, at + length);
 }
 
-async function write(frames: number[], options: Partial<McapWriterOptions> = {}, channels = kChannels): Promise<Memory> {
+async function write(frames: number[], options: Partial<McapWriterOptions> = {}, channels = kChannels, more = 0): Promise<Memory> {
   const file = new Memory();
   const writer = new McapWriter({ writable: file, chunkSize: 700, ...options });
   await writer.start({ profile: '', library: 'test' });
@@ -53,7 +54,7 @@ async function write(frames: number[], options: Partial<McapWriterOptions> = {},
   for (const sequence of frames) {
     const time = 1_700_000_000_000_000_000n + BigInt(sequence) * 33_000_000n;
     const message = { sequence, logTime: time, publishTime: time };
-    await writer.addMessage({ channelId: ids.get(kChannels[0]!)!, ...message, data: frameCdr(sequence, sequence % 5 === 0) });
+    await writer.addMessage({ channelId: ids.get(kChannels[0]!)!, ...message, data: frameCdr(sequence, sequence % 5 === 0, more) });
     await writer.addMessage({ channelId: ids.get(kChannels[1]!)!, ...message, data: new Uint8Array([1, 2, 3]) });
   }
   await writer.end();
@@ -62,6 +63,26 @@ async function write(frames: number[], options: Partial<McapWriterOptions> = {},
 }
 
 const kFrames = Array.from({ length: 23 }, (_, i) => i);
+
+/** A file as a server has it, and how much of it was asked for. */
+class Server {
+  asked = 0;
+  broken = false; // what it gives is zeros
+  constructor(private readonly file: Memory) {}
+  open = (): Promise<RemoteFile> =>
+    RemoteFile.open(new URL('http://server/face.mcap'), async (_, init) => {
+      const [from, to] = new Headers(init.headers).get('Range')!.slice('bytes='.length).split('-').map(Number) as [number, number];
+      const part = await this.file.read(from, to - from + 1);
+      this.asked += part.length;
+      const headers = { ETag: '"1"', 'Content-Range': `bytes ${from}-${to}/${this.file.size}` };
+      return new Response(this.broken ? new Uint8Array(part.length) : new Uint8Array(part), { status: 206, headers });
+    });
+}
+
+/** 20 MB in chunks of about five frames. */
+const kLarge = 100_000;
+const writeLarge = (frames: number[]): Promise<Memory> => write(frames, { chunkSize: 5 * kLarge }, kChannels, kLarge);
+const ofChannel = ({ topics, messages }: McapFile, i: number): McapMessage[] => messages.filter((m) => topics.get(m.channel) === kChannels[i]);
 
 describe('openMcap', () => {
   it('finds every message by the index, in order', async () => {
@@ -78,6 +99,43 @@ describe('openMcap', () => {
       expect(readFrameHead(data)).toMatchObject({ stream: 'face', sequence: i, number: i + 100, isKey: i % 5 === 0, length: 70 + i });
       expect(readFrameHead(await readMessageHead(file, frame, kFrameHeadBytes)).sequence).toBe(i);
     }
+  });
+
+  it('reads of a large file of a server what is in it, and no more before it is wanted', async () => {
+    const file = await writeLarge(Array.from({ length: 200 }, (_, i) => i));
+    const server = new Server(file);
+    const far = await server.open();
+    const found = await openMcap(far);
+    expect(server.asked).toBeLessThan(file.size / 10);
+    const frames = ofChannel(found, 0);
+    for (const channel of [0, 1]) {
+      const times = ofChannel(found, channel).map((m) => m.timeMs);
+      expect(times.length).toBe(200);
+      expect([...times].sort((a, b) => a - b)).toEqual(times);
+      for (const [i, timeMs] of times.entries()) expect(Math.abs(timeMs - 1.7e12 - i * 33)).toBeLessThan(5 * 33);
+    }
+    // In any order, several of one part at once.
+    const order = [150, 151, 199, 0, 152];
+    const read = await Promise.all(order.map((i) => readMessage(far, frames[i]!)));
+    for (const [k, i] of order.entries()) expect(read[k]).toEqual(frameCdr(i, i % 5 === 0, kLarge));
+    expect(readFrameHead(await readMessageHead(far, frames[42]!, kFrameHeadBytes, true)).sequence).toBe(42);
+    expect(server.asked).toBeLessThan(file.size / 4);
+  });
+
+  it('reads the places of all messages of such a file where chunks overlap', async () => {
+    const file = await writeLarge(Array.from({ length: 200 }, (_, i) => (i % 2 === 0 ? i : 199 - i)));
+    const far = await openMcap(await new Server(file).open());
+    expect(far.messages).toEqual((await openMcap(file)).messages);
+  });
+
+  it('says that the index of a part of it is damaged, and tries again', async () => {
+    const server = new Server(await writeLarge(Array.from({ length: 200 }, (_, i) => i)));
+    const far = await server.open();
+    const frame = ofChannel(await openMcap(far), 0)[100]!;
+    server.broken = true;
+    await expect(readMessageHead(far, frame, kFrameHeadBytes, true)).rejects.toThrow('damaged');
+    server.broken = false;
+    expect(await readMessage(far, frame)).toEqual(frameCdr(100, true, kLarge));
   });
 
   it('goes through a file that was cut short, whole chunks only', async () => {
@@ -210,6 +268,18 @@ describe('Recording', () => {
     expect(recording.end).toBeGreaterThan(end!);
     expect(await recording.grow()).toBe(false);
     expect(recording.count).toBe(14);
+  });
+
+  it('asks for no frames but those that are shown where there are very many', async () => {
+    const server = new Server(await write(Array.from({ length: 20_001 }, (_, i) => i % 100), { chunkSize: 10_000 }));
+    const recording = await Recording.open(await server.open());
+    const asked = server.asked;
+    let told = 0;
+    await recording.readHeads(() => ++told > 0);
+    expect([told, server.asked]).toEqual([1, asked]);
+    await recording.read(3);
+    expect(recording.isKey(3)).not.toBeNull();
+    expect(recording.isKey(4)).toBeNull();
   });
 
   it('of this device does not grow', async () => {
