@@ -30,6 +30,7 @@ struct Hub::Watcher {
   bool needs_key = false;              // it lacks a frame that others build on
   bool joins = true;                   // no key frame was asked for since it is there
   std::uint64_t drops = 0;
+  std::uint64_t drops_before = 0;   // the frame in the slot
   Rung rung = Rung::kFull;          // it is on,
   Rung wished = Rung::kFull;        // and is to be on:
   Rung detail = Rung::kFull;        // this, or
@@ -120,6 +121,7 @@ void Hub::announce(const StreamInfo& info, ServerClock clock) {
   auto& entry = streams_[info.stream];
   if (!entry) entry = std::make_unique<Entry>();
   if (entry->live && *entry->info_text == *text) return;  // DDS repeats it to every late joiner
+  if (entry->live) forget_frames(*entry);                 // a server that was replaced before anyone noticed
   entry->facts.info = info;
   entry->clock = clock;
   entry->info_text = std::move(text);
@@ -216,20 +218,13 @@ void Hub::publish_recording(const std::string& stream, const RecordingState& sta
   wake_all(entry);
 }
 
-void Hub::withdraw(const std::string& stream) {
-  const std::lock_guard lock(mutex_);
-  const auto it = streams_.find(stream);
-  if (it == streams_.end() || !it->second->live) return;
-  Entry& entry = *it->second;
-  entry.live = false;
+/// What was of a session that is over: nothing that comes builds on it, and other qualities may be there.
+void Hub::forget_frames(Entry& entry) {
   entry.latest.reset();
   entry.latest_key.reset();
   entry.facts.status.reset();
-  entry.facts.recording = {};
-  entry.facts.clock_offset_ns.reset();
   entry.decodable = {};
-  entry.status_version = entry.recording_version = 0;
-  entry.recording_text.reset();
+  entry.status_version = 0;
   for (const auto& watcher : entry.watchers) {
     watcher->needs_key = true;  // whatever comes next
     watcher->rung = Rung::kFull;
@@ -239,6 +234,19 @@ void Hub::withdraw(const std::string& stream) {
     ++watcher->drops;
     ++entry.facts.client_drops;
   }
+}
+
+void Hub::withdraw(const std::string& stream) {
+  const std::lock_guard lock(mutex_);
+  const auto it = streams_.find(stream);
+  if (it == streams_.end() || !it->second->live) return;
+  Entry& entry = *it->second;
+  entry.live = false;
+  forget_frames(entry);
+  entry.facts.recording = {};
+  entry.facts.clock_offset_ns.reset();
+  entry.recording_version = 0;
+  entry.recording_text.reset();
   wake_all(entry);
   wake_list();
   erase_if_unused(stream);

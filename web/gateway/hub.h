@@ -107,6 +107,7 @@ class Hub {
 
  private:
   struct Entry;
+  static void forget_frames(Entry& entry);
   void wake_all(Entry& entry);
   void wake_list();
   void offer(Entry& entry, Watcher& watcher, const FrameMessage& frame);

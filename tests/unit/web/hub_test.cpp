@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: what builds on a frame that was lost on its way to the gateway goes to no client, and the stream is
-// asked for a key frame instead.
+// asked for a key frame instead. A server that took another one's place before that was known to be gone is a
+// stream of its own: with its description go its frames alone, in the qualities that it has.
 #include "web/gateway/hub.h"
 
 #include <gtest/gtest.h>
 
+#include "base/time.h"
 #include "codec/frame3d_codec.h"
 #include "tests/support/make_grid.h"
 #include "tests/unit/web/gateway_fixture.h"
@@ -71,6 +73,58 @@ TEST_F(HubTest, PicturesThatBuildOnALostOneGoToNobody) {
   EXPECT_EQ(asked, 1);
   EXPECT_EQ(through(encode(true, kVideo)), 5U);
   EXPECT_EQ(through(encode(false, kVideo)), 6U);
+}
+
+class AnotherServer : public HubTest {
+ protected:
+  /// Under the same name, after a crash say.
+  void takes_its_place() {
+    StreamInfo info = make_info();
+    info.started_ns += kNanosecondsPerSecond;
+    info.rig.camera.width /= 2;
+    hub.announce(info);
+    next = 0;
+  }
+  void has(std::vector<RungStatus> rungs) {
+    hub.publish({.stream = "face", .state = StreamState::kRunning, .rungs = std::move(rungs)});
+  }
+  /// Whether a watcher is sent anything but text.
+  bool gets_a_frame(Hub::Watcher& of) {
+    auto delivery = hub.take(of, true);
+    while (delivery && !delivery->frame) delivery = hub.take(of, true);
+    return delivery.has_value();
+  }
+};
+
+TEST_F(AnotherServer, OldFramesDoNotComeWithItsDescription) {
+  hub.publish("face", encode(true, TextureCodec::kJpeg));
+  takes_its_place();
+  const auto late = hub.watch("face", [] {});
+  EXPECT_FALSE(gets_a_frame(*watcher));
+  EXPECT_FALSE(gets_a_frame(*late));
+  EXPECT_EQ(through(encode(true, TextureCodec::kJpeg)), 0U);
+  EXPECT_TRUE(gets_a_frame(*late));
+}
+
+TEST_F(AnotherServer, WhatBuildsOnOldFramesGoesToNobody) {
+  EXPECT_EQ(through(encode(true, TextureCodec::kJpeg)), 0U);
+  takes_its_place();
+  next = 1;  // of whose frames the first one, a key, was lost
+  EXPECT_EQ(through(encode(false, TextureCodec::kJpeg)), std::nullopt);
+  EXPECT_EQ(asked, 1);
+}
+
+TEST_F(AnotherServer, WithoutTheQualityThatAClientIsOnItGetsTheStreamAsItIs) {
+  has({{.rung = Rung::kReduced}});
+  hub.choose(*watcher, Rung::kReduced, false);
+  FrameMessage reduced = encode(true, TextureCodec::kJpeg);
+  reduced.rung = Rung::kReduced;
+  EXPECT_EQ(through(reduced), 1U) << "numbers go on";
+  takes_its_place();
+  EXPECT_TRUE(hub.rungs(*watcher).empty()) << "it has not said yet";
+  has({});
+  EXPECT_EQ(through(encode(true, TextureCodec::kJpeg)), 0U);
+  EXPECT_EQ(through(encode(true, TextureCodec::kJpeg)), 1U);
 }
 
 }  // namespace
