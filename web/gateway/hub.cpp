@@ -176,6 +176,7 @@ void Hub::offer(Entry& entry, Watcher& watcher, const FrameMessage& frame) {
   if (!useless) {
     watcher.latest = frame;
     watcher.latest->sequence = watcher.last_sequence;
+    watcher.drops_before = watcher.drops;
   }
   if (useless && needed == BuildsOn::kFrameBefore) watcher.needs_key = true;
 }
@@ -274,7 +275,8 @@ std::shared_ptr<Hub::Watcher> Hub::watch(const std::string& stream, std::functio
   if (!entry) entry = std::make_unique<Entry>();
   const BuildsOn needed = entry->latest ? builds_on(*entry->latest) : BuildsOn::kNothing;
   watcher->latest = needed == BuildsOn::kNothing ? entry->latest : entry->latest_key;
-  if (watcher->latest) watcher->last_sequence = watcher->latest->sequence;
+  // An older key frame stands for all up to the last one: those between are no loss to who was not here.
+  if (watcher->latest) watcher->last_sequence = watcher->latest->sequence = entry->latest->sequence;
   watcher->needs_key = !watcher->latest || needed == BuildsOn::kFrameBefore;
   entry->watchers.push_back(watcher);
   if (watcher->needs_key && entry->latest) ask_for_key_frame(*entry);
@@ -358,7 +360,7 @@ std::optional<Hub::Delivery> Hub::take(Watcher& watcher, bool want_frame) {
     return Delivery{.text = entry.recording_text};
   }
   if (want_frame && watcher.latest) {
-    return Delivery{.frame = std::exchange(watcher.latest, std::nullopt), .drops = watcher.drops};
+    return Delivery{.frame = std::exchange(watcher.latest, std::nullopt), .drops = watcher.drops_before};
   }
   watcher.woken = false;
   return std::nullopt;

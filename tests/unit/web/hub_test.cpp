@@ -75,6 +75,51 @@ TEST_F(HubTest, PicturesThatBuildOnALostOneGoToNobody) {
   EXPECT_EQ(through(encode(false, kVideo)), 6U);
 }
 
+/// What a page makes of the numbers that come with frames: how many were lost before the gateway.
+class CountedDrops : public HubTest {
+ protected:
+  /// Takes what there is; false where there is no frame.
+  bool take(Hub::Watcher& of) {
+    auto delivery = hub.take(of, true);
+    while (delivery && !delivery->frame) delivery = hub.take(of, true);
+    if (!delivery) return false;
+    const std::uint64_t sequence = delivery->frame->sequence;
+    const std::uint64_t dropped = delivery->drops - std::exchange(drops, delivery->drops);
+    if (last) lost_before += sequence - *last - 1 - dropped;
+    last = sequence;
+    return true;
+  }
+
+  std::optional<std::uint64_t> last;
+  std::uint64_t drops = 0, lost_before = 0;
+};
+
+TEST_F(CountedDrops, WhoJoinsHasLostNothing) {
+  for (const bool key : {true, false, false}) hub.publish("face", encode(key, TextureCodec::kH264));
+  const auto late = hub.watch("face", [] {});
+  EXPECT_TRUE(take(*late));
+  EXPECT_EQ(last, 2U) << "the key frame, which stands for what is there";
+  for (const bool key : {false, true, false}) {
+    hub.publish("face", encode(key, TextureCodec::kH264));
+    take(*late);
+    EXPECT_EQ(lost_before, 0U);
+  }
+  EXPECT_EQ(last, 5U);
+  EXPECT_EQ(drops, 1U) << "what it could not decode was kept from it";
+}
+
+TEST_F(CountedDrops, AFrameComesWithTheDropsBeforeIt) {
+  hub.publish("face", encode(true, TextureCodec::kH264));
+  EXPECT_TRUE(take(*watcher));
+  for (const bool key : {false, false, false}) hub.publish("face", encode(key, TextureCodec::kH264));
+  EXPECT_TRUE(take(*watcher)) << "the first one, behind which two were dropped";
+  EXPECT_EQ(drops, 0U);
+  for (const bool key : {false, true}) hub.publish("face", encode(key, TextureCodec::kH264));
+  EXPECT_TRUE(take(*watcher));
+  EXPECT_EQ(drops, 3U);
+  EXPECT_EQ(lost_before, 0U);
+}
+
 class AnotherServer : public HubTest {
  protected:
   /// Under the same name, after a crash say.
