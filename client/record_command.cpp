@@ -51,11 +51,10 @@ Status watch(const Options& options, Recorder& recorder, Subscriber& subscriber,
   std::int64_t last_live_ns = steady_now_ns();
   bool said_waiting = false;
   while (!recorder.done() && !stop.wait_for(kTick)) {
-    const std::int64_t utc_ns = utc_now_ns();
-    recorder.tick(utc_ns);
-    if (recorder.wants_key_frame(utc_ns)) subscriber.request_key_frame(options.stream);
-    const Recorder::Counts counts = recorder.counts();
     const std::int64_t now_ns = steady_now_ns();
+    recorder.tick(now_ns);
+    if (recorder.wants_key_frame(now_ns)) subscriber.request_key_frame(options.stream);
+    const Recorder::Counts counts = recorder.counts();
     if (counts.live) last_live_ns = now_ns;
     const std::int64_t absent_ns = now_ns - last_live_ns;
     if (counts.frames == 0 && !counts.live && !said_waiting && absent_ns >= kSayWaitingAfter_ns) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "idl/recorder.h"
 
-#include <cmath>
+#include <cstdlib>
 #include <utility>
 
 #include "base/log.h"
@@ -12,6 +12,7 @@ namespace relievo {
 namespace {
 
 constexpr std::int64_t kAskAgain_ns = kNanosecondsPerSecond;
+constexpr std::int64_t kClockStep_ns = kNanosecondsPerSecond;  // below it a clock is not said to be set
 constexpr std::int64_t kKeyFrameTime_ns = 10 * kNanosecondsPerSecond;  // in which one that is asked for comes
 
 constexpr const char* kRigAttachment = "rig.yaml";
@@ -114,7 +115,7 @@ Status Recorder::status() const {
 
 void Recorder::tick(std::int64_t now_ns) {
   std::lock_guard lock(mutex_);
-  if (writer_ && !error_) fail(writer_->flush_if_due(now_ns));
+  if (writer_ && !error_) fail(writer_->flush_if_due(now_ns + log_from_even_ns_));
   if (options_.max_s > 0 && first_frame_ns_ > 0 && seconds(now_ns - first_frame_ns_) >= options_.max_s) {
     limit_reached_ = true;
   }
@@ -123,7 +124,7 @@ void Recorder::tick(std::int64_t now_ns) {
 bool Recorder::wants_key_frame(std::int64_t now_ns) {
   const std::lock_guard lock(mutex_);
   if (!full_ns_ || limit_reached_ || error_) return false;
-  if (asked_ns_ && std::abs(now_ns - *asked_ns_) < kAskAgain_ns) return false;
+  if (asked_ns_ && now_ns - *asked_ns_ < kAskAgain_ns) return false;
   asked_ns_ = now_ns;
   return true;
 }
@@ -145,15 +146,16 @@ void Recorder::add(const RawSample& sample) {
   const bool is_frame = sample.topic == Topic::kFrame;
   if (error_ && is_frame && !limit_reached_) ++counts_.missed;
   if (limit_reached_ || error_) return;
+  const std::int64_t now_ns = sample.even_time_ns();
   if (is_frame && options_.max_s > 0 && first_frame_ns_ > 0 &&
-      seconds(sample.receive_time_ns - first_frame_ns_) >= options_.max_s) {
+      seconds(now_ns - first_frame_ns_) >= options_.max_s) {
     limit_reached_ = true;
     return;
   }
   if (!writer_) {
-    fail(open_file());
+    fail(open_file(sample));
   } else if (is_frame && segment_ends_before(sample)) {
-    fail(next_segment(sample.receive_time_ns));
+    fail(next_segment(sample));
   }
   if (!error_) fail(write(sample));
   if (!error_ && is_frame && foxglove_) fail(write_for_viewers(sample));
@@ -165,20 +167,21 @@ void Recorder::add(const RawSample& sample) {
   counts_.bytes += sample.cdr.size();
   counts_.live = true;
   if (!is_frame) return;
-  if (first_frame_ns_ == 0) first_frame_ns_ = sample.receive_time_ns;
-  if (counts_.frames == frames_before_) segment_ns_ = sample.receive_time_ns;
+  if (first_frame_ns_ == 0) first_frame_ns_ = now_ns;
+  if (counts_.frames == frames_before_) segment_ns_ = now_ns;
   ++counts_.frames;
-  counts_.duration_s = seconds(sample.receive_time_ns - first_frame_ns_);
+  counts_.duration_s = seconds(now_ns - first_frame_ns_);
   limit_reached_ = options_.max_frames > 0 && counts_.frames >= options_.max_frames;
 }
 
 void Recorder::add_attachments() {
   // raw comes before info, so there are a writer and a sample.
   if (!writer_ || !info_ || !info_sample_ || error_ || limit_reached_) return;
-  fail(attachments_.add_to(*writer_, *info_, info_sample_->cdr, utc_now_ns()));
+  fail(attachments_.add_to(*writer_, *info_, info_sample_->cdr, described_ns_));
 }
 
-Status Recorder::open_file() {
+Status Recorder::open_file(const RawSample& first) {
+  log_from_even_ns_ = first.receive_time_ns - first.even_time_ns();
   const std::filesystem::path file = options_.recording.segments.split() ? segments_.next() : options_.file;
   now_writes(file, nullptr);  // before it can be found
   auto writer =
@@ -213,17 +216,27 @@ void Recorder::now_writes(const std::filesystem::path& file,
   open_ = true;
 }
 
+/// UTC as it was when the file was begun, going on evenly whatever the clock is set to: a file is read in the
+/// order of its log times, so that what was received later must not seem to be from before.
+std::int64_t Recorder::log_time_ns(const RawSample& sample) const {
+  return sample.even_time_ns() + log_from_even_ns_;
+}
+
+bool Recorder::clock_was_set(const RawSample& sample) const {
+  return std::llabs(sample.receive_time_ns - log_time_ns(sample)) >= kClockStep_ns;
+}
+
 /// At a frame that decodes without those before. Where none comes although it was asked for, the file goes
 /// on: up to what may be kept of all files, since otherwise it would fill the disk.
 bool Recorder::segment_ends_before(const RawSample& frame) {
   if (!options_.recording.segments.split() || counts_.frames == frames_before_) return false;
-  const std::int64_t now_ns = frame.receive_time_ns;
+  const std::int64_t now_ns = frame.even_time_ns();
   const std::uint64_t bytes = writer_->size();
-  const double duration_s = std::abs(seconds(now_ns - segment_ns_));  // the clock may be set back
-  if (!full_ns_ && !segments_.is_full(bytes, duration_s)) return false;
+  const double duration_s = seconds(now_ns - segment_ns_);
+  if (!full_ns_ && !segments_.is_full(bytes, duration_s) && !clock_was_set(frame)) return false;
   if (holds_key_frame(frame.cdr)) return true;
   if (!full_ns_) full_ns_ = now_ns;
-  if (std::abs(now_ns - *full_ns_) < kKeyFrameTime_ns) return false;
+  if (now_ns - *full_ns_ < kKeyFrameTime_ns) return false;
   if (!std::exchange(said_waiting_, true))
     log_warning("stream '" + options_.stream + "' sends no frame that decodes alone: the recording's files " +
                 "become longer than asked for");
@@ -231,14 +244,15 @@ bool Recorder::segment_ends_before(const RawSample& frame) {
 }
 
 /// Each file can be read without the others: it begins with the stream's description.
-Status Recorder::next_segment(std::int64_t now_ns) {
+Status Recorder::next_segment(const RawSample& first) {
   if (const Status finished = writer_->finish(); !finished) return finished;
-  if (const Status opened = open_file(); !opened) return opened;
+  if (const Status opened = open_file(first); !opened) return opened;
   full_ns_.reset();
   attachments_ = {};
   if (info_sample_) {
     RawSample info = *info_sample_;
-    info.receive_time_ns = now_ns;
+    info.receive_time_ns = first.receive_time_ns;
+    info.steady_time_ns = first.steady_time_ns;
     if (const Status written = write(info); !written) return written;
   }
   add_attachments();
@@ -249,10 +263,14 @@ Status Recorder::next_segment(std::int64_t now_ns) {
 }
 
 Status Recorder::write(const RawSample& sample) {
+  if (clock_was_set(sample) && !options_.recording.segments.split() && !std::exchange(said_set_, true))
+    log_warning("the clock was set while " + file().string() +
+                " is recorded: its times go on by what the clock said when it was begun");
   RecordedMessage message;
   message.channel = channels_[static_cast<std::size_t>(sample.topic)];
   message.sequence = sequence_of(sample);
-  message.log_time_ns = sample.receive_time_ns;
+  message.log_time_ns = log_time_ns(sample);
+  if (sample.topic == Topic::kInfo) described_ns_ = message.log_time_ns;
   message.publish_time_ns = sample.source_time_ns;
   message.data = sample.cdr;
   return writer_->write(message);
@@ -265,7 +283,7 @@ Status Recorder::write_for_viewers(const RawSample& frame) {
   const auto decoded = decoder_.decode(view->data);
   if (!decoded) return {};
   return foxglove_->write(*writer_, *decoded,
-                          {frame.receive_time_ns, frame.source_time_ns, view->capture_time_ns});
+                          {log_time_ns(frame), frame.source_time_ns, view->capture_time_ns});
 }
 
 /// What was still in memory is not in the file either.

@@ -81,7 +81,8 @@ class Recorder {
   bool done() const;
   /// Ok, or why writing has failed.
   Status status() const;
-  /// To be called about ten times a second: bounds what a crash loses while no samples come.
+  /// To be called about ten times a second: bounds what a crash loses while no samples come. `now_ns`, here
+  /// and below: as RawSample::even_time_ns.
   void tick(std::int64_t now_ns);
   /// Whether the stream's server is to be asked for a key frame: a file is full, and ends before the next
   /// one. To be called as often; true once a second.
@@ -93,10 +94,12 @@ class Recorder {
  private:
   void add(const RawSample& sample);
   void add_attachments();
-  Status open_file();
+  Status open_file(const RawSample& first);
+  std::int64_t log_time_ns(const RawSample& sample) const;
+  bool clock_was_set(const RawSample& sample) const;
   void now_writes(const std::filesystem::path& file, std::shared_ptr<const GrowingRecording> growing);
   bool segment_ends_before(const RawSample& frame);
-  Status next_segment(std::int64_t now_ns);
+  Status next_segment(const RawSample& first);
   Status write(const RawSample& sample);
   Status write_for_viewers(const RawSample& frame);
   void fail(const Status& status);
@@ -108,6 +111,9 @@ class Recorder {
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;  // of what goes there
   const RecordingSegments segments_;
+  std::int64_t log_from_even_ns_ = 0;     // to add for a file's log times: see log_time_ns()
+  std::int64_t described_ns_ = 0;         // log time of the last description
+  bool said_set_ = false;                 // that the clock was
   std::int64_t segment_ns_ = 0;           // when its first frame was received
   std::optional<std::int64_t> full_ns_;   // since when it waits for a key frame to end before
   std::optional<std::int64_t> asked_ns_;  // when one was last asked for

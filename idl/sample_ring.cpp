@@ -27,14 +27,14 @@ std::uint64_t SampleRing::push(std::shared_ptr<const RawSample> sample, std::opt
 
 /// The last key frame that is old enough; where there is no key frame, nothing decodes, and age alone counts.
 std::uint64_t SampleRing::begin_wanted(std::optional<std::uint64_t> unread) {
-  const std::int64_t old_ns = samples_.back()->receive_time_ns - keep_ns_;
+  const std::int64_t old_ns = samples_.back()->even_time_ns() - keep_ns_;
   std::uint64_t wanted = begin_;
   if (keys_.empty()) {
-    while (wanted < end() && at(wanted)->receive_time_ns < old_ns) ++wanted;
+    while (wanted < end() && at(wanted)->even_time_ns() < old_ns) ++wanted;
   } else {
     wanted = keys_.front();
     for (const std::uint64_t key : keys_) {
-      if (at(key)->receive_time_ns > old_ns) break;
+      if (at(key)->even_time_ns() > old_ns) break;
       wanted = key;
     }
   }

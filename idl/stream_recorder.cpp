@@ -177,6 +177,7 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   if (!recorder_ && !samples.empty()) {
     info = info_;
     info->receive_time_ns = samples.front()->receive_time_ns;  // before the frames that it describes
+    info->steady_time_ns = samples.front()->steady_time_ns;
   }
   lock.unlock();
 
@@ -192,7 +193,7 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   std::filesystem::path file;
   std::shared_ptr<const GrowingRecording> growing;
   if (recorder_) {
-    const std::int64_t now_ns = utc_now_ns();
+    const std::int64_t now_ns = steady_now_ns();
     recorder_->tick(now_ns);
     if (options_.key_frame_wanted && recorder_->wants_key_frame(now_ns)) options_.key_frame_wanted();
     written = recorder_->status();

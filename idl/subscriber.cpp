@@ -368,7 +368,8 @@ class DdsSubscriber final : public Subscriber {
   void raw(Topic topic, const std::string& stream, std::span<const std::uint8_t> cdr,
            const dds_sample_info_t& sample) {
     if (!callbacks_.raw) return;
-    callbacks_.raw({topic, stream, sample.source_timestamp, utc_now_ns(), Bytes(cdr.begin(), cdr.end())});
+    callbacks_.raw({topic, stream, sample.source_timestamp, utc_now_ns(), Bytes(cdr.begin(), cdr.end()),
+                    steady_now_ns()});
   }
 
   void end(Topic topic, std::uint64_t instance) {

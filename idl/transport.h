@@ -36,6 +36,10 @@ struct RawSample {
   std::int64_t source_time_ns = 0;  // the writer's time stamp
   std::int64_t receive_time_ns = 0;
   Bytes cdr;
+  std::int64_t steady_time_ns = 0;  // when it was received, by the monotonic clock; 0: not known
+
+  /// By a clock that nobody sets while a program runs, where that is known.
+  std::int64_t even_time_ns() const { return steady_time_ns > 0 ? steady_time_ns : receive_time_ns; }
 };
 
 /// The self-contained OMG IDL of a topic's type, its name and its DDS topic name ("relievo/frame").

@@ -46,7 +46,7 @@ class RecorderSink final : public FrameSink {
 
  private:
   Status tick() {
-    const std::int64_t now_ns = utc_now_ns();
+    const std::int64_t now_ns = steady_now_ns();
     recorder_.tick(now_ns);
     if (recorder_.wants_key_frame(now_ns)) key_frame_wanted_();
     if (said_) return {};

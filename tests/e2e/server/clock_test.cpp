@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: a server whose clock is set while it runs goes on, in the time that it is then, as do its
-// recordings; clients whose clock is another count no latency before they know the difference.
+// recordings, and those of a client whose clock is set; clients whose clock is another count no latency
+// before they know the difference.
 #include <signal.h>
 
 #include <cstdlib>
@@ -73,6 +74,39 @@ TEST_F(SetClock, AStreamGoesOnInTheTimeThatItIsThen) {
   }
   EXPECT_GE(frames, 30U);
   EXPECT_GE(files, 3U) << "a file of one minute ends where an hour passes, forth or back";
+}
+
+TEST_F(SetClock, ARecordingOfAClientGoesOnEvenly) {
+  const std::string file = folder_ / "client.mcap";
+  const auto clock = folder_ / "clients_clock";
+  std::ofstream(clock) << 0;
+  Process recorder({program("relievo"), "record", "take", "--out", file, "--json", "--seconds", "1000",
+                    "--domain", std::to_string(own_domain()), "--interface", "lo"},
+                   {std::string("LD_PRELOAD=") + RELIEVO_SET_CLOCK, "RELIEVO_CLOCK_SET=" + clock.string()});
+  std::uintmax_t size = 1000;
+  for (const int hours : {1, -2}) {
+    ASSERT_TRUE(wait_for_size(file, size)) << recorder.err();
+    std::ofstream(clock.string() + ".new") << hours * kHour_s;
+    std::filesystem::rename(clock.string() + ".new", clock);
+    size = 2 * std::filesystem::file_size(file);  // more than was on its way
+  }
+  ASSERT_TRUE(wait_for_size(file, size)) << recorder.err();
+  recorder.signal(SIGINT);
+  ASSERT_EQ(recorder.wait(), 0) << recorder.err();
+  const auto said = nlohmann::json::parse(recorder.out());
+  EXPECT_GT(said["duration_s"], 0);
+  EXPECT_LT(said["duration_s"], kHour_s);
+  const auto reader = RecordingReader::open(file);
+  ASSERT_TRUE(reader) << reader.error().message;
+  EXPECT_LT(seconds((*reader)->summary().end_ns - (*reader)->summary().start_ns), kHour_s);
+  std::optional<std::uint32_t> last;
+  while (const auto message = (*reader)->next()) {
+    if (!*message) break;
+    if ((*reader)->summary().channels[(*message)->channel].topic != "relievo/frame") continue;
+    EXPECT_TRUE(!last || (*message)->sequence > *last) << "in the order in which they came";
+    last = (*message)->sequence;
+  }
+  EXPECT_TRUE(last);
 }
 
 /// Of clients here, an hour ahead of the server.

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proves: files that a recording is split into decode alone, and nothing is lost for that.
+// Proves: files that a recording is split into decode alone, and nothing is lost for that; a clock that is
+// set meanwhile puts nothing out of its order, and neither ends a recording nor makes it longer.
 #include "idl/recorder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "idl/cdr.h"
 #include "tests/support/key_frames.h"
@@ -105,6 +110,94 @@ TEST_F(RecorderInFiles, ASegmentsTimeCountsFromItsFirstFrame) {
   EXPECT_FALSE(wants_key_frame());
   for (int i = 0; i < 3; ++i) frames(5, true);
   EXPECT_THAT(finished(), ElementsAre(10, 5));
+}
+
+/// Of a machine whose clock is set.
+class RecorderOfASetClock : public testing::Test {
+ protected:
+  void start(const Recorder::Options& options) {
+    recorder_ = std::make_unique<Recorder>(options);
+    callbacks_ = recorder_->callbacks();
+  }
+  void frames(int count) {
+    for (int i = 0; i < count; ++i) {
+      FrameMessage frame = test::frame_of_group(0, 1);
+      frame.sequence = sequence_++;
+      callbacks_.raw({Topic::kFrame, "face", 0, steady_ns_ + utc_from_steady_ns_,
+                      write_frame_cdr("face", frame), steady_ns_});
+      steady_ns_ += kFrame_ns;
+      recorder_->tick(steady_ns_);
+    }
+  }
+  /// Log times and sequence numbers of a file's frames, as they are read.
+  static std::vector<std::pair<std::int64_t, std::uint32_t>> read(const std::filesystem::path& file) {
+    std::vector<std::pair<std::int64_t, std::uint32_t>> out;
+    const auto reader = RecordingReader::open(file);
+    EXPECT_TRUE(reader) << file;
+    while (reader) {
+      const auto message = (*reader)->next();
+      if (!message || !*message) break;
+      out.emplace_back((**message).log_time_ns, (**message).sequence);
+    }
+    return out;
+  }
+
+  static constexpr std::int64_t kHour_ns = 3600 * kNanosecondsPerSecond;
+  const test::TempFolder folder_;
+  const std::filesystem::path file_ = folder_ / "face.mcap";
+  std::unique_ptr<Recorder> recorder_;
+  Subscriber::Callbacks callbacks_;
+  std::int64_t steady_ns_ = kHour_ns, utc_from_steady_ns_ = 1'700'000'000 * kNanosecondsPerSecond;
+  std::uint64_t sequence_ = 0;
+  std::map<std::filesystem::path, std::int64_t> begun_ns_;
+};
+
+TEST_F(RecorderOfASetClock, AFileGoesOnEvenly) {
+  const std::int64_t begun_ns = steady_ns_ + utc_from_steady_ns_;
+  start({.file = file_, .stream = "face"});
+  for (const std::int64_t set_by_ns : {std::int64_t{0}, kHour_ns, -2 * kHour_ns, -3 * kFrame_ns / 2}) {
+    utc_from_steady_ns_ += set_by_ns;
+    frames(5);
+  }
+  EXPECT_TRUE(recorder_->finish());
+  EXPECT_DOUBLE_EQ(recorder_->counts().duration_s, 1.9);
+  const auto read_back = read(file_);
+  ASSERT_EQ(read_back.size(), 20U);
+  for (std::uint32_t i = 0; i < 20; ++i) EXPECT_EQ(read_back[i], (std::pair{begun_ns + i * kFrame_ns, i}));
+}
+
+TEST_F(RecorderOfASetClock, ItsLimitIsOfTimeThatPassed) {
+  start({.file = file_, .stream = "face", .max_s = 2});
+  frames(5);
+  utc_from_steady_ns_ += kHour_ns;
+  frames(5);
+  utc_from_steady_ns_ -= 2 * kHour_ns;
+  frames(9);
+  EXPECT_FALSE(recorder_->done());
+  frames(5);
+  EXPECT_TRUE(recorder_->done());
+  EXPECT_TRUE(recorder_->finish());
+  EXPECT_EQ(recorder_->counts().frames, 20U);
+}
+
+TEST_F(RecorderOfASetClock, OfSeveralFilesTheNextOneBeginsAndSaysTheTimeAsItIs) {
+  start({.file = file_, .stream = "face", .recording = {.segments = {.split_s = 3600}}});
+  for (const std::int64_t set_by_ns : {std::int64_t{0}, kHour_ns, -2 * kHour_ns}) {
+    utc_from_steady_ns_ += set_by_ns;
+    const std::int64_t begun_ns = steady_ns_ + utc_from_steady_ns_;
+    frames(5);
+    EXPECT_TRUE(recorder_->status());
+    const std::filesystem::path now = recorder_->file();
+    EXPECT_EQ(recorder_->files().back(), now);
+    begun_ns_[now] = begun_ns;
+  }
+  EXPECT_TRUE(recorder_->finish());
+  ASSERT_EQ(begun_ns_.size(), 3U);
+  for (const auto& [file, begun_ns] : begun_ns_) {
+    const auto read_back = read(file);
+    ASSERT_EQ(read_back.size(), 5U) << file;
+    EXPECT_EQ(read_back.front().first, begun_ns) << file;
+  }
 }
 
 }  // namespace

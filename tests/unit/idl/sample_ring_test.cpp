@@ -41,6 +41,19 @@ TEST(SampleRing, WithoutPreRollItBeginsWithTheLastKeyFrame) {
   EXPECT_EQ(ring.begin(), 30U);
 }
 
+TEST(SampleRing, AClockThatIsSetMakesNothingOlderOrYounger) {
+  for (const std::int64_t set_by_ns : {3600 * kSecond, -3600 * kSecond}) {
+    SampleRing ring(2.5, kPlenty);
+    for (std::uint64_t n = 0; n < 100; ++n) {
+      RawSample one = *sample(n);
+      one.steady_time_ns = 1 + one.receive_time_ns;
+      if (n >= 50) one.receive_time_ns += set_by_ns;
+      ring.push(std::make_shared<const RawSample>(std::move(one)), std::nullopt);
+      EXPECT_EQ(ring.begin(), n < 25 ? 0 : (n - 25) / 10 * 10) << n;
+    }
+  }
+}
+
 TEST(SampleRing, WithoutKeyFramesAgeAloneCounts) {
   SampleRing ring(1, kPlenty);
   for (std::uint64_t n = 1; n < 100; ++n) ring.push(sample(n, 1000), std::nullopt);
