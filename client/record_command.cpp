@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/json_text.h"
 #include "base/log.h"
@@ -45,17 +47,34 @@ std::string lost_note(std::uint64_t lost) {
   return lost > 0 ? std::to_string(lost) + " lost" : std::string();
 }
 
-// Until the recorder is done, the stream stays away too long, or somebody stops us.
-Status watch(const Options& options, Recorder& recorder, Subscriber& subscriber, StopSignal& stop) {
+Rung rung_of(const Options& options) {
+  return rung_named(options.quality).value_or(Rung::kFull);
+}
+
+/// Whether a stream has the quality that is recorded, as its status says.
+bool has_quality(const ServerStatus& status, Rung rung) {
+  return rung == Rung::kFull ||
+         std::ranges::any_of(status.rungs, [&](const RungStatus& r) { return r.rung == rung; });
+}
+
+// Until the recorder is done, the stream stays away too long, or somebody stops us. `misses`: it lacks the
+// quality.
+Status watch(const Options& options, Recorder& recorder, Subscriber& subscriber,
+             const std::atomic<bool>& misses, StopSignal& stop) {
   Progress progress("record", "frames", options.frames);
   std::int64_t last_live_ns = steady_now_ns();
-  bool said_waiting = false;
+  bool said_waiting = false, said_missing = false;
+  const std::string missing = "stream '" + options.stream + "' has no quality '" + options.quality + "'";
   while (!recorder.done() && !stop.wait_for(kTick)) {
     const std::int64_t now_ns = steady_now_ns();
     recorder.tick(now_ns);
     if (recorder.wants_key_frame(now_ns)) subscriber.request_key_frame(options.stream);
     const Recorder::Counts counts = recorder.counts();
-    if (counts.live) last_live_ns = now_ns;
+    if (misses && !std::exchange(said_missing, true))
+      log_warning(missing +
+                  ": nothing of it is recorded until its server has (serve --ladder); what there is, " +
+                  "is --quality full");
+    if (counts.live && !misses) last_live_ns = now_ns;
     const std::int64_t absent_ns = now_ns - last_live_ns;
     if (counts.frames == 0 && !counts.live && !said_waiting && absent_ns >= kSayWaitingAfter_ns) {
       log_info("waiting for stream '" + options.stream + "' in domain " +
@@ -64,6 +83,7 @@ Status watch(const Options& options, Recorder& recorder, Subscriber& subscriber,
     }
     if (options.wait_s >= 0 && seconds(absent_ns) > options.wait_s) {
       if (counts.frames > 0) return {};
+      if (counts.live) return Error{missing + ": its server was started with another --ladder"};
       return Error{"no stream '" + options.stream + "' in domain " + std::to_string(options.domain->domain) +
                    ": is its server running? `relievo streams` lists what there is"};
     }
@@ -117,10 +137,13 @@ Status run(Options options, StopSignal& stop) {
                      .max_s = options.seconds,
                      .foxglove = options.foxglove,
                      .recording = *recording});
-  auto subscriber = Subscriber::create(*options.domain, options.stream, recorder.callbacks(),
-                                       rung_named(options.quality).value_or(Rung::kFull));
+  const Rung rung = rung_of(options);
+  std::atomic<bool> misses{false};
+  auto callbacks = recorder.callbacks();
+  callbacks.status = [&](const ServerStatus& status) { misses = !has_quality(status, rung); };
+  auto subscriber = Subscriber::create(*options.domain, options.stream, std::move(callbacks), rung);
   if (!subscriber) return subscriber.error();
-  const Status watched = watch(options, recorder, **subscriber, stop);
+  const Status watched = watch(options, recorder, **subscriber, misses, stop);
   subscriber->reset();
   const Status finished = recorder.finish();
   const Recorder::Counts counts = recorder.counts();

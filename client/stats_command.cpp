@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -40,7 +41,20 @@ std::string latency_text(const std::optional<double>& latency_ms) {
   return text;
 }
 
-void print_line(const LiveReader::Report& before, const LiveReader::Report& now, double took_s) {
+/// It was asked for by name, and the stream is there without it.
+bool lacks_quality(const Options& options, const LiveReader::Report& report) {
+  const auto rung = rung_named(options.quality);
+  return report.live && rung && *rung != Rung::kFull &&
+         std::ranges::find(report.rungs, *rung) == report.rungs.end();
+}
+
+void print_line(const Options& options, const LiveReader::Report& before, const LiveReader::Report& now,
+                double took_s) {
+  if (lacks_quality(options, now)) {
+    std::printf("%-8s the stream has no such quality\n", options.quality.c_str());
+    std::fflush(stdout);
+    return;
+  }
   const double rate = static_cast<double>(now.frames - before.frames) / took_s;
   const double mbit_s = static_cast<double>(now.bytes - before.bytes) * 8e-6 / took_s;
   std::printf("%-8s %6.1f/s %8.2f Mbit/s %6llu lost %6llu skipped  decode %6.1f ms  latency %7s ms  %s%s\n",
@@ -92,7 +106,7 @@ Status run(const Options& options, StopSignal& stop) {
     const bool stopped = wait.count() <= 0 || stop.wait_for(wait);
     const LiveReader::Report now = (*reader)->report();
     const std::int64_t now_ns = steady_now_ns();
-    if (!options.json && now_ns > before_ns) print_line(before, now, seconds(now_ns - before_ns));
+    if (!options.json && now_ns > before_ns) print_line(options, before, now, seconds(now_ns - before_ns));
     before = now;
     before_ns = now_ns;
     if (stopped || (options.seconds > 0 && seconds(now_ns - begin_ns) >= options.seconds)) break;

@@ -54,6 +54,29 @@ TEST(Record, RecorderKeepsToItsLimitAndSurvivesARestartOfTheServer) {
   EXPECT_EQ(restarts, 1) << testing::PrintToString(sequence);
 }
 
+TEST(Record, SaysThatAStreamLacksTheQualityAndGoesOnWhereItHasIt) {
+  const TempFolder folder;
+  const auto file = folder / "reduced.mcap";
+  const auto serve = [](const char* ladder) {
+    return std::make_unique<Process>(std::vector<std::string>{
+        program("relievo-server"), "serve", "--source", "sim:plane,width=160,height=120,stripes=30,rate=10",
+        "--stream", "face", "--web", "none", "--domain", kDomain, "--interface", "lo", "--ladder", ladder});
+  };
+  auto server = serve("none");
+  Process recorder(
+      on_loopback({"record", "face", "--quality", "reduced", "--frames", "5", "--out", file, "--json"}));
+  ASSERT_TRUE(recorder.wait_for_text("has no quality 'reduced'")) << server->err();
+  const auto refused = run(
+      on_loopback({"record", "face", "--quality", "reduced", "--wait", "1", "--out", folder / "none.mcap"}));
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.err, HasSubstr("error: stream 'face' has no quality 'reduced'"));
+  server->signal(SIGTERM);
+  EXPECT_EQ(server->wait(), 0) << server->err();
+  server = serve("reduced");
+  ASSERT_EQ(recorder.wait(), 0) << recorder.err();
+  EXPECT_EQ(info(file)["frames"], 5);
+}
+
 TEST(Record, FullDiskEndsTheRecordingWithAReadableFile) {
   const TempFolder folder;
   const auto file = folder / "full.mcap";
