@@ -258,6 +258,23 @@ TEST(Play, DescriptionSurvivesADamagedFirstChunk) {
   EXPECT_THAT(request(port, "GET", "/api/streams").body, HasSubstr("\"stripes\":7"));
 }
 
+TEST(Play, WebOffersNoQualitiesThatWereThereAtTheTime) {
+  const TempFolder folder;
+  const auto file = folder / "face.mcap";
+  const auto served =
+      run({program("relievo-server"), "serve", "--source",
+           "sim:plane,width=160,height=120,stripes=30,rate=20", "--stream", "face", "--web", "none",
+           "--domain", kDomain, "--interface", "lo", "--frames", "50", "--record", file});
+  ASSERT_EQ(served.status, 0) << served.err;
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const std::uint16_t port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  WsClient client(port, "face");
+  const auto status = client.next_of("status");
+  ASSERT_TRUE(status);
+  EXPECT_EQ(nlohmann::json::parse(status->data)["rungs"], nlohmann::json::array()) << status->data;
+}
+
 TEST(Play, WebServesARecordingInALoop) {
   const TempFolder folder;
   const auto file = folder / "loop.mcap";
