@@ -7,6 +7,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "base/json_text.h"
@@ -42,13 +43,12 @@ struct FrameTotals {
   std::uint64_t vertices = 0, triangles = 0;
   std::set<std::string> geometry_codecs, texture_codecs;
   std::uint32_t texture_width = 0, texture_height = 0;  // of the last frame
-  std::int64_t first_ns = 0, last_ns = 0;               // publish times
+  std::uint64_t steps = 0;                              // from a frame to the next of its session,
+  std::int64_t steps_ns = 0;                            // which took so long
+  std::int64_t last_ns = 0;
   std::uint64_t last_sequence = 0;
 
-  double rate() const {
-    return frames > 1 && last_ns > first_ns ? static_cast<double>(frames - 1) / seconds(last_ns - first_ns)
-                                            : 0;
-  }
+  double rate() const { return steps_ns > 0 ? static_cast<double>(steps) / seconds(steps_ns) : 0; }
   std::uint64_t bytes() const { return geometry_bytes + texture_bytes + other_bytes; }
 };
 
@@ -58,13 +58,24 @@ std::string codec_name(GeometryCodec codec) {
   return codec == GeometryCodec::kGrid ? "grid" : std::to_string(static_cast<int>(codec));
 }
 
-void add_frame(FrameTotals& totals, std::uint64_t sequence, std::int64_t publish_time_ns,
-               std::span<const std::uint8_t> data) {
-  if (totals.frames > 0 && sequence > totals.last_sequence)
-    totals.lost += sequence - totals.last_sequence - 1;
-  totals.last_sequence = sequence;
-  if (totals.frames++ == 0) totals.first_ns = publish_time_ns;
-  totals.last_ns = publish_time_ns;
+/// As which, and when, a frame was published.
+struct FramePlace {
+  std::uint64_t sequence = 0;
+  std::int64_t time_ns = 0;
+  bool begins = false;  // another session than the frame before: between them nothing was lost or late
+};
+
+void add_frame(FrameTotals& totals, const FramePlace& at, std::span<const std::uint8_t> data) {
+  if (totals.frames++ > 0 && !at.begins) {
+    if (at.sequence > totals.last_sequence) totals.lost += at.sequence - totals.last_sequence - 1;
+    if (at.time_ns >
+        totals.last_ns) {  // not where it is played again from its start, or the clock was set back
+      ++totals.steps;
+      totals.steps_ns += at.time_ns - totals.last_ns;
+    }
+  }
+  totals.last_sequence = at.sequence;
+  totals.last_ns = at.time_ns;
   const auto header = read_frame_header(data);
   if (!header) {
     ++totals.unreadable;
@@ -186,21 +197,26 @@ Status describe_file(const Options& options, StopSignal& stop) {
   if (!infos) return infos.error();
   FrameTotals totals;
   std::vector<std::uint64_t> session_frames(infos->size());
+  const RecordedInfo* last_session = nullptr;
   Progress progress("read", "frames", recorded->frames());
   while (!stop.stopped()) {
     auto sample = recorded->next();
     if (!sample) return sample.error();
     if (!*sample) break;
     if ((*sample)->topic != Topic::kFrame) continue;
-    if (const RecordedInfo* session = info_of(**sample, *infos))
-      ++session_frames[static_cast<std::size_t>(session - infos->data())];
+    const RecordedInfo* const session = info_of(**sample, *infos);
+    if (session) ++session_frames[static_cast<std::size_t>(session - infos->data())];
     const auto frame = read_frame_cdr((*sample)->cdr);
     if (!frame) {
       ++totals.unreadable;
       ++totals.frames;
       continue;
     }
-    add_frame(totals, frame->sequence, frame->publish_time_ns, frame->data);
+    add_frame(totals,
+              {.sequence = frame->sequence,
+               .time_ns = frame->publish_time_ns,
+               .begins = std::exchange(last_session, session) != session},
+              frame->data);
     progress.update(totals.frames);
   }
   progress.finish();
@@ -281,7 +297,7 @@ Status describe_live(const Options& options, StopSignal& stop) {
   };
   callbacks.frame = [&](const std::string&, const FrameMessage& f) {
     std::lock_guard lock(mutex);
-    add_frame(totals, f.sequence, f.publish_time_ns, *f.data);
+    add_frame(totals, {.sequence = f.sequence, .time_ns = f.publish_time_ns}, *f.data);
   };
   auto subscriber = Subscriber::create(*options.domain, options.what, callbacks);
   if (!subscriber) return subscriber.error();

@@ -41,7 +41,10 @@ std::string duration_text(double s) {
     std::snprintf(text, sizeof text, "%.2f s", s);
   } else {
     const auto whole = static_cast<long long>(s);
-    std::snprintf(text, sizeof text, "%lld min %lld s", whole / 60, whole % 60);
+    if (whole < 3600)
+      std::snprintf(text, sizeof text, "%lld min %lld s", whole / 60, whole % 60);
+    else
+      std::snprintf(text, sizeof text, "%lld h %lld min", whole / 3600, whole / 60 % 60);
   }
   return text;
 }

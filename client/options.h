@@ -17,7 +17,7 @@ namespace relievo {
 /// --domain, --interface and --keys, filled while parsing.
 std::shared_ptr<DomainOptions> add_domain_options(CLI::App& app);
 
-/// "12.3 MB", "2 min 5 s".
+/// "12.3 MB"; "2 min 5 s", "26 h 5 min".
 std::string bytes_text(std::uint64_t bytes);
 std::string duration_text(double s);
 
