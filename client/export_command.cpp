@@ -50,14 +50,16 @@ struct Exported {
   bool stopped = false;
 };
 
-/// `after_ns`: the recording's start, of the first frame of another camera.
-Error another_camera(std::int64_t after_ns) {
+/// `after_ns`: the recording's start, of the first frame that what is written has no room for.
+Error two_parts(const std::string& why, std::int64_t after_ns) {
   char from[48], to[48];
   std::snprintf(from, sizeof from, "%.9f", seconds(after_ns));
   std::snprintf(to, sizeof to, "%.9f", seconds(after_ns - 1));
-  return Error{
-      std::string("the camera was calibrated anew within the range, and camera.json describes one: ") +
-      "export each part into a folder of its own, one with --to " + to + ", one with --from " + from};
+  return Error{why + ": export each part by itself, one with --to " + to + ", one with --from " + from};
+}
+
+std::string size_text(const Image8& image) {
+  return std::to_string(image.width()) + " x " + std::to_string(image.height());
 }
 
 bool are_equal(const PinholeModel& a, const PinholeModel& b) {
@@ -82,7 +84,8 @@ Result<std::optional<Rig>> find_rig(RecordedStream& recorded, const TimeRange& r
     if ((*sample)->topic != Topic::kFrame || (*sample)->receive_time_ns < range.from_ns) continue;
     const Rig& its = info_of(**sample, *infos)->info.rig;
     if (rig && !are_equal(rig->camera, its.camera))
-      return another_camera((*sample)->receive_time_ns - recorded.summary().start_ns);
+      return two_parts("the camera was calibrated anew within the range, and camera.json describes one",
+                       (*sample)->receive_time_ns - recorded.summary().start_ns);
     rig = its;
   }
 }
@@ -111,10 +114,16 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
   if (!frames) return frames.error();
   Exported exported;
   Progress progress("export", "frames", range->frames);
+  std::string size;  // of a video's pictures
   while (!exported.stopped) {
     const auto next = frames->next();
     if (!next) return next.error();
     if (!*next) break;
+    const std::string its = size_text((*next)->frame.texture);
+    if (options.format == "video" && exported.written > 0 && its != size)
+      return two_parts("the texture is " + size + " at first and then " + its + ", and a video has one size",
+                       (*next)->sample.receive_time_ns - recorded.summary().start_ns);
+    size = its;
     if (auto status = (*writer)->add((*next)->frame, (*next)->data); !status) return status.error();
     progress.update(++exported.written);
     exported.stopped = stop.stopped();

@@ -455,5 +455,28 @@ TEST(RecordingFormats, DepthIsOfOneCamera) {
   EXPECT_EQ(nlohmann::json::parse(camera)["width"], 192);
 }
 
+TEST(RecordingFormats, AVideoIsOfOneSize) {
+  const TempFolder folder;
+  const auto both = record_two_sessions(folder);
+  const auto video = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {program("relievo"), "export", both, "--format", "video", "--reencode", "--out",
+                               folder / "v.mp4"});
+    return run(more);
+  };
+  const auto refused = video({});
+  if (refused.err.find("cannot write video") != std::string::npos) GTEST_SKIP() << refused.err;
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.err, HasSubstr("160 x 120 at first and then 192 x 144"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "v.mp4"));
+  for (const std::string option : {"--to ", "--from "}) {
+    const auto at = refused.err.find(option);
+    ASSERT_NE(at, std::string::npos) << refused.err;
+    const auto begin = at + option.size();
+    const auto part = video({option.substr(0, option.size() - 1),
+                             refused.err.substr(begin, refused.err.find_first_of(",\n", begin) - begin)});
+    EXPECT_EQ(part.status, 0) << part.err;
+  }
+}
+
 }  // namespace
 }  // namespace relievo::test
