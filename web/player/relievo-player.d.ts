@@ -3,7 +3,7 @@
 export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points' | 'normals' | 'depth' | 'confidence';
 export type Theme = 'auto' | 'dark' | 'light';
 
-/** `idle`: no src. `live` and `stalled`: a live stream. `behind`: a live stream as it was. `file`: a recording. */
+/** `idle`: no src, or not in a page. `live` and `stalled`: a live stream. `behind`: a live stream as it was. `file`: a recording. */
 export type PlayerState = 'idle' | 'loading' | 'live' | 'stalled' | 'ended' | 'lost' | 'behind' | 'file' | 'failed';
 
 export interface FrameDetail {
@@ -23,11 +23,11 @@ export interface RelievoPlayerEventMap extends HTMLElementEventMap {
 }
 
 /**
- * `<relievo-player src=... mode=... controls grid loop paused>`: 3D video from a Relievo gateway, or a recording.
- * Attributes and properties of the same name are one.
+ * `<relievo-player src=... mode=... theme=... controls grid loop>`: 3D video from a Relievo gateway, or a recording, which plays
+ * by itself. Attributes and properties of the same name are one.
  */
 export interface RelievoPlayerElement extends HTMLElement {
-  /** A recording (.mcap), or the address of a gateway's page with ?stream=NAME. */
+  /** A recording (.mcap), or the address of a gateway's page with ?stream=NAME or ?recording=FILE. */
   src: string;
   /** Default: textured. Any other text is that. */
   mode: Mode;
@@ -43,11 +43,14 @@ export interface RelievoPlayerElement extends HTMLElement {
   /** For a person; empty while all is well. Also why a surface is shown without its texture. */
   readonly message: string;
   readonly paused: boolean;
-  /** Seconds: of a recording from its start, of a live stream from the oldest frame kept. Setting it seeks. */
+  /**
+   * Seconds: of a recording from its start, of a live stream from the oldest frame kept. Setting it seeks. What is set or asked
+   * for before there are frames is done when they come, and forgotten with another src. Throws TypeError for NaN and Infinity.
+   */
   currentTime: number;
   /** Seconds; of a live stream, of what is kept; of a recording that a gateway is still writing it grows. 0 before the first frame. */
   readonly duration: number;
-  /** 0.1 to 8. */
+  /** 0.1 to 8. Throws as above. */
   playbackRate: number;
   play(): void;
   pause(): void;

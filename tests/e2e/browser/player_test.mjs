@@ -4,24 +4,21 @@
 // Run as: in_own_domain node player_test.mjs RELIEVO_SERVER RELIEVO PACKAGE, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { createReadStream, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from 'node:fs';
-import { createServer } from 'node:http';
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { tmpdir } from 'node:os';
-import { extname, join, normalize } from 'node:path';
+import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
+import { packed, serveSite } from './site.mjs';
 
 const { McapStreamReader } = createRequire(join(process.cwd(), 'package.json'))('@mcap/core');
 
 const [serverPath, relievoPath, packagePath] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-player-'));
 const site = join(scratch, 'site'); // what the other site serves
-const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
 const kWorkers = 2; // of a player: one decodes, one draws
-const kPolicy =
-  "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; worker-src 'self'; connect-src 'self' http://127.0.0.1:* ws://127.0.0.1:*";
 
 /** When a recording's frames were recorded, in nanoseconds. */
 function frameTimes(file) {
@@ -33,37 +30,11 @@ function frameTimes(file) {
   return out;
 }
 
-/** Files with ranges, as a recording needs them. */
-function serveSite() {
-  const server = createServer((request, response) => {
-    const file = join(site, normalize(new URL(request.url, 'http://site').pathname));
-    if (!existsSync(file) || !statSync(file).isFile()) return response.writeHead(404).end();
-    const { size, mtimeMs } = statSync(file);
-    const headers = { 'content-type': kTypes[extname(file)] ?? 'application/octet-stream', 'content-security-policy': kPolicy, etag: `"${mtimeMs}"` };
-    const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
-    if (range === null) {
-      response.writeHead(200, { ...headers, 'content-length': size });
-      createReadStream(file).pipe(response);
-      return;
-    }
-    const [start, end] = [Number(range[1]), Math.min(Number(range[2]), size - 1)];
-    response.writeHead(206, { ...headers, 'content-length': end - start + 1, 'content-range': `bytes ${start}-${end}/${size}` });
-    createReadStream(file, { start, end }).pipe(response);
-  });
-  return new Promise((resolve) => server.listen(0, '127.0.0.1', () => resolve(server)));
-}
-
-function packed() {
-  const listed = JSON.parse(execFileSync('npm', ['pack', '--json', '--pack-destination', scratch], { cwd: packagePath, encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] }));
-  execFileSync('tar', ['xzf', join(scratch, listed[0].filename), '-C', scratch]);
-  return listed[0].files.map(({ path }) => path);
-}
-
 const kSource = 'sim:object,width=320,height=240,stripes=60,rate=6';
-const files = packed();
+const files = packed(packagePath, scratch);
 mkdirSync(site);
 execFileSync('cp', ['-r', join(scratch, 'package'), join(site, 'relievo-player')]);
-const web = await serveSite();
+const web = await serveSite(site);
 const origin = `http://127.0.0.1:${web.address().port}`;
 const rig = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--allow-origin', origin]);
 const folder = join(scratch, 'folder');

@@ -5,6 +5,8 @@ import { make } from '../../viewer/src/dom';
 import { listenToKeys } from '../../viewer/src/keys';
 import { LiveSource } from '../../viewer/src/liveSource';
 import { openRemote, type OpenedRecording } from '../../viewer/src/openFile';
+import { wantedQuality } from '../../viewer/src/protocol';
+import { NoGraphics } from '../../viewer/src/resolution';
 import { Session } from '../../viewer/src/session';
 import { present } from '../../viewer/src/state';
 import { ServerList } from '../../viewer/src/streamList';
@@ -18,6 +20,7 @@ import playerCss from './player.css?inline';
 
 const kRefreshMs = 250;
 const kFlags = ['controls', 'grid', 'loop'] as const;
+const kSet = ['src', 'mode', 'theme', ...kFlags, 'currentTime', 'playbackRate'] as const; // properties of a page to set
 
 const kStates: Record<ReturnType<typeof present>['state'], PlayerState> = {
   unsupported: 'failed',
@@ -42,11 +45,49 @@ interface Parts {
   timer: number;
 }
 
+/** What a page asks for, also before there is a frame to do it with. */
+interface Wishes {
+  playing?: boolean;
+  time?: number; // seconds
+  rate?: number;
+}
+
 /** A recording that a gateway is still writing. */
 interface Written {
   readonly file: string;
   readonly recording: OpenedRecording;
   readonly server: ServerList;
+}
+
+/** As <video> has it: what is no number is a mistake of the page. */
+function finite(value: number): number {
+  if (!Number.isFinite(value)) throw new TypeError(`${value} is no finite number`);
+  return value;
+}
+
+function fileOf({ pathname }: URL): string {
+  const name = pathname.slice(pathname.lastIndexOf('/') + 1);
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name; // '%' as it stands
+  }
+}
+
+/** What a src is of: a stream of the gateway whose page `url` is, or, `stream` null, the recording at `url`. Throws. */
+function addressed(src: string): { url: URL; stream: string | null } {
+  if (!URL.canParse(src, document.baseURI)) throw new Error(text.player.noAddress);
+  const url = new URL(src, document.baseURI);
+  url.hash = '';
+  if (/\.mcap$/i.test(url.pathname)) return { url, stream: null };
+  const stream = url.searchParams.get('stream') ?? '';
+  const recording = url.searchParams.get('recording') ?? '';
+  if (stream !== '') return { url, stream };
+  if (recording === '') throw new Error(text.player.noStream);
+  const at = new URL(`recordings/${encodeURIComponent(recording)}`, url); // as the viewer's own page has it
+  const token = url.searchParams.get('token');
+  if (token !== null) at.searchParams.set('token', token);
+  return { url: at, stream: null };
 }
 
 /** A page's colours, as an element's own: dark unless its theme says otherwise. */
@@ -66,6 +107,9 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   private stream: string | null = null;
   private written: Written | null = null;
   private notice = ''; // on the frame shown
+  private opened = false; // what plays may be driven
+  private wishes: Wishes = {}; // for when it is
+  private contextLost = false;
   private saidDuration = 0;
   private opening = 0; // counts what was opened, so that a late answer is known
   private state_: PlayerState = 'idle';
@@ -143,34 +187,34 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     return this.message_;
   }
   get paused(): boolean {
-    return this.playback?.playing !== true;
+    return !(this.wishes.playing ?? this.playback?.playing === true);
   }
   get currentTime(): number {
-    const { playback } = this;
-    return playback === null || playback.times.length === 0 ? 0 : (playback.position - playback.times[0]!) / 1000;
+    const { driven } = this;
+    return driven === null ? (this.wishes.time ?? 0) : (driven.position - driven.times[0]!) / 1000;
   }
   set currentTime(seconds: number) {
-    const { playback } = this;
-    if (playback !== null && playback.times.length > 0) playback.seek(playback.times[0]! + seconds * 1000);
+    this.wish({ time: finite(seconds) });
   }
   get duration(): number {
     const times = this.playback?.times;
     return times === undefined || times.length === 0 ? 0 : (times[times.length - 1]! - times[0]!) / 1000;
   }
   get playbackRate(): number {
-    return this.playback?.speed ?? 1;
+    return this.wishes.rate ?? this.playback?.speed ?? 1;
   }
   set playbackRate(rate: number) {
-    this.playback?.setSpeed(rate);
+    this.wish({ rate: finite(rate) });
   }
 
   play(): void {
-    this.playback?.play();
+    this.wish({ playing: true });
   }
   pause(): void {
-    this.playback?.pause();
+    this.wish({ playing: false });
   }
   goLive(): void {
+    this.wishes = {};
     this.playback?.follow();
   }
   resetView(): void {
@@ -186,6 +230,8 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   }
 
   connectedCallback(): void {
+    if (this.parts !== null) return; // it was moved
+    this.takeProperties();
     const canvas = make('canvas', { className: 'view', tabIndex: 0 });
     canvas.setAttribute('role', 'img');
     canvas.setAttribute('aria-label', text.player.canvas);
@@ -193,14 +239,14 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     overlay.setAttribute('aria-hidden', 'true');
     this.box.replaceChildren(canvas, overlay, this.messageLine, this.timelineBox);
     try {
-      const events = { beforeDraw: () => this.draw(), contextLost: () => undefined, failed: (why: string) => this.fail(text.notDrawn(why)), way: () => undefined };
+      const events = { beforeDraw: () => this.draw(), contextLost: (lost: boolean) => this.loseContext(lost), failed: (why: string) => this.fail(text.notDrawn(why)), way: () => undefined };
       const view = new View(canvas, overlay, events, this.box);
       const session = this.makeSession(view);
       this.timelineBox.replaceChildren();
       const timeline = new Timeline(this.timelineBox);
       this.parts = { view, session, timeline, timer: window.setInterval(() => this.refresh(), kRefreshMs) };
-    } catch {
-      this.failure = text.noWebGl;
+    } catch (error) {
+      this.failure = error instanceof NoGraphics ? text.noWebGl : text.player.notStarted(error instanceof Error ? error.message : String(error));
       return this.refresh();
     }
     this.applyDisplay();
@@ -208,6 +254,25 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   }
 
   disconnectedCallback(): void {
+    // What a page moves from one place to another it takes out and puts back at once.
+    queueMicrotask(() => {
+      if (!this.isConnected) this.rest();
+    });
+  }
+
+  adoptedCallback(): void {
+    this.rest(); // another document draws at its own beat
+  }
+
+  attributeChangedCallback(name: string, before: string | null, now: string | null): void {
+    if (name === 'src' && before !== now) this.wishes = {};
+    if (this.parts === null) return;
+    if (name === 'src') void this.open();
+    else if (name === 'loop') this.applyLoop();
+    else this.applyDisplay();
+  }
+
+  private rest(): void {
     const { parts } = this;
     this.parts = null;
     ++this.opening;
@@ -216,17 +281,49 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     parts.timeline.stop();
     parts.session.end();
     parts.view.end();
+    this.contextLost = this.opened = false;
+    this.refresh();
   }
 
-  attributeChangedCallback(name: string): void {
-    if (this.parts === null) return;
-    if (name === 'src') void this.open();
-    else if (name === 'loop') this.applyLoop();
-    else this.applyDisplay();
+  // Set before the browser knew what this element is, they would hide those of the class.
+  private takeProperties(): void {
+    for (const name of kSet) {
+      if (!Object.hasOwn(this, name)) continue;
+      const value = this[name];
+      delete (this as Partial<Record<typeof name, unknown>>)[name];
+      Object.assign(this, { [name]: value });
+    }
   }
 
   private get playback() {
     return this.parts?.session.source?.playback ?? null;
+  }
+
+  /** What plays, once it has frames. */
+  private get driven() {
+    const { playback } = this;
+    return this.opened && playback !== null && playback.times.length > 0 ? playback : null;
+  }
+
+  private wish(wishes: Wishes): void {
+    this.wishes = { ...this.wishes, ...wishes };
+    this.applyWishes();
+  }
+
+  private applyWishes(): void {
+    const { driven } = this;
+    if (driven === null) return;
+    const { rate, time, playing } = this.wishes;
+    this.wishes = {};
+    if (playing === false) driven.pause(); // first: it is at the time that was asked for then
+    if (rate !== undefined) driven.setSpeed(rate);
+    if (time !== undefined) driven.seek(driven.times[0]! + time * 1000);
+    if (playing === true) driven.play();
+  }
+
+  private loseContext(lost: boolean): void {
+    this.contextLost = lost;
+    this.refresh();
   }
 
   private makeSession(view: View): Session {
@@ -246,32 +343,48 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     this.stream = null;
     this.written = null;
     this.notice = '';
+    this.opened = false;
     session.watch(null);
+    view.clear();
     view.restart(null, false);
     this.showTimeline();
     if (this.src === '') return this.refresh();
     try {
-      const url = new URL(this.src, document.baseURI);
-      if (/\.mcap$/i.test(url.pathname)) {
-        const opened = await openRemote(url);
+      const { url, stream } = addressed(this.src);
+      if (stream === null) {
+        const opened = await openRemote(url).catch((error: unknown) => {
+          throw error instanceof TypeError ? new Error(text.player.noAnswer) : error; // the browser says no more
+        });
         if (opening !== this.opening) return; // something else is to be shown meanwhile
         session.watch(opened.source);
-        const file = decodeURIComponent(url.pathname.slice(url.pathname.lastIndexOf('/') + 1));
+        const file = fileOf(url);
         // A gateway's recordings are in a folder beside its list of streams.
-        if (opened.isGrowing()) this.written = { file, recording: opened, server: new ServerList(new URL('..', url).href) };
+        const list = new URL('..', url);
+        list.search = url.search; // its token
+        if (opened.isGrowing()) this.written = { file, recording: opened, server: new ServerList(list.href) };
         this.applyLoop();
+        queueMicrotask(() => this.becomeOpened(opening)); // it has begun to play then
       } else {
-        const stream = url.searchParams.get('stream') ?? '';
-        if (stream === '') throw new Error(text.player.noStream);
-        url.search = url.hash = '';
         this.stream = stream;
-        session.watch((events) => new LiveSource(stream, events, url.href));
+        session.watch((events) => {
+          const source = new LiveSource(stream, events, url.href);
+          const quality = wantedQuality(url.search);
+          if (quality !== null) source.want(quality);
+          return source;
+        });
+        this.opened = true;
       }
     } catch (error) {
       if (opening === this.opening) this.fail(error instanceof Error ? error.message : String(error));
     }
     this.showTimeline();
     this.refresh();
+  }
+
+  private becomeOpened(opening: number): void {
+    if (opening !== this.opening) return;
+    this.opened = true;
+    this.applyWishes();
   }
 
   private fail(why: string): void {
@@ -323,6 +436,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   private refresh(): void {
     void this.follow();
+    this.applyWishes();
     const { duration } = this;
     if (duration !== this.saidDuration) {
       this.saidDuration = duration;
@@ -341,8 +455,14 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     if (this.failure !== null) return { state: 'failed', message: this.failure };
     const session = this.parts?.session;
     if (!session || this.src === '') return { state: 'idle', message: '' };
+    if (this.contextLost) return { state: 'failed', message: text.contextLost };
     if (session.source === null) return { state: 'loading', message: '' };
     const told = present({ ...session.facts, problem: null, stream: this.stream, hint: '' });
+    const { connected, everConnected, retryInS, refusal } = session.facts;
+    // What the viewer says then is of its own page.
+    if (refusal === 'name') return { state: 'failed', message: text.player.noName };
+    if (!connected && !everConnected && retryInS !== null && refusal === null)
+      return { state: 'lost', message: `${text.player.noAnswer} ${text.states.again(retryInS)}` };
     return { state: kStates[told.state], message: told.title === '' ? this.notice : `${told.title}. ${told.text}` };
   }
 }

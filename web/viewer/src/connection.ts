@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One WebSocket to one stream, kept up: clock exchange, silence as loss, retries with backoff.
-import { openSocket, socketUrl, take } from './early';
+import { openSocket, socketUrl, streamUrl, take } from './early';
 import { parseFramePrefix, parseServerMessage, type Quality } from './protocol';
 import type { SourceEvents } from './source';
 import { backoffS, type Refusal } from './state';
@@ -12,14 +12,15 @@ const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
-const kRefusals: Record<number, Refusal> = { 400: 'name', 503: 'places' };
+const kRefusals: Record<number, Refusal> = { 400: 'name', 401: 'token', 503: 'places' };
 
 /** A WebSocket that is refused does not say why; who asks for the same without one is told. */
 async function refusalOf(stream: string, server: string): Promise<Refusal | null> {
-  if (server !== document.baseURI) return null; // a page that embeds a stream of elsewhere stays
-  const response = await fetch(new URL(`ws/${encodeURIComponent(stream)}`, server), { cache: 'no-store' }).catch(() => null);
+  const own = server === document.baseURI; // a page that embeds a stream of elsewhere stays
+  const credentials = own ? 'same-origin' : 'include'; // as with a WebSocket
+  const response = await fetch(streamUrl(stream, server), { cache: 'no-store', credentials }).catch(() => null);
   // It wants a token that the page does not have (any more): the page that it answers with asks for it.
-  if (response?.status === 401) location.reload();
+  if (own && response?.status === 401) location.reload();
   return kRefusals[response?.status ?? 0] ?? null;
 }
 

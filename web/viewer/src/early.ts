@@ -45,7 +45,7 @@ export function endHeld(): void {
 
 /** Throws where the server does not answer in time, or with something else. `server`: the address of its page. */
 export async function fetchList(server: string): Promise<StreamList> {
-  const response = await fetch(new URL('api/streams', server), { cache: 'no-store', signal: AbortSignal.timeout(kListPatienceMs) });
+  const response = await fetch(urlOf('api/streams', server), { cache: 'no-store', signal: AbortSignal.timeout(kListPatienceMs) });
   if (!response.ok) throw new Error(`HTTP ${response.status}`);
   return (await response.json()) as StreamList;
 }
@@ -63,11 +63,21 @@ export function takeList(): Promise<StreamList> | null {
   return taken;
 }
 
-/** Of a stream's WebSocket. `server`: the address of its page. */
+/** Of something of a server. Of another site than the page's it gets no cookie: the token in the address of its page goes along. */
+function urlOf(path: string, server: string): URL {
+  const url = new URL(path, server);
+  const token = new URL(server).searchParams.get('token');
+  if (token !== null) url.searchParams.set('token', token);
+  return url;
+}
+
+/** Where a stream is. `server`: the address of its page. */
+export const streamUrl = (stream: string, server: string): URL => urlOf(`ws/${encodeURIComponent(stream)}`, server);
+
+/** Of its WebSocket. */
 export function socketUrl(stream: string, server: string): string {
-  const url = new URL(`ws/${encodeURIComponent(stream)}`, server);
+  const url = streamUrl(stream, server);
   url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
-  url.search = url.hash = '';
   return url.href;
 }
 

@@ -53,6 +53,8 @@ export class Fly {
     };
     keys.addEventListener('keydown', onKeyDown, { signal });
     keys.addEventListener('keyup', onKeyUp, { signal });
+    // Where keys are listened to in a part of a page, those that are let go elsewhere are not heard.
+    keys.addEventListener('focusout', () => this.held.clear(), { signal });
     window.addEventListener('blur', () => this.held.clear(), { signal });
     canvas.addEventListener('pointerdown', (event) => {
       this.pointer = event.button === 0 ? event.pointerId : null;

@@ -82,6 +82,8 @@ class FarPainter implements Painter {
   }
   end(): void {
     this.worker.terminate();
+    for (const answer of this.asked.values()) answer(null); // it gives none any more
+    this.asked.clear();
   }
 
   private ask(type: 'read' | 'png', drawing: Drawing): Promise<unknown> {

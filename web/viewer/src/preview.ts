@@ -65,6 +65,18 @@ export class Preview {
     window.clearTimeout(this.timer);
   }
 
+  /** Holds none of the frames any more. */
+  leave(): void {
+    this.forget();
+    this.store = null;
+  }
+
+  /** For good. */
+  end(): void {
+    this.leave();
+    this.videos.end();
+  }
+
   private forget(): void {
     for (const { bitmap } of this.kept.values()) bitmap?.close();
     this.kept.clear();

@@ -41,6 +41,9 @@ export interface Graphics {
   ofWorkers: boolean; // workers may draw
 }
 
+/** There is no WebGL 2. */
+export class NoGraphics extends Error {}
+
 /** Null: there is no WebGL 2. */
 export function findGraphics(): Graphics | null {
   const far = hasOffscreen() ? new OffscreenCanvas(1, 1).getContext('webgl2') : null;

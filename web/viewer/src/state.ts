@@ -16,8 +16,8 @@ export type State =
   | 'stalled'
   | 'ended';
 
-/** Why a server lets a page not watch: it has as many as it may, or no stream can have such a name. */
-export type Refusal = 'places' | 'name';
+/** Why a server lets a page not watch: it has as many as it may, no stream can have such a name, or it wants a token. */
+export type Refusal = 'places' | 'name' | 'token';
 
 export interface Facts {
   problem: string | null; // why nothing can be shown here at all
@@ -84,6 +84,7 @@ export function present(facts: Facts): Presentation {
       return make('connecting', say.connecting[0], { title: say.connecting[1], text: say.connecting[2] });
     }
     if (facts.refusal === 'name') return make('refused', say.noName[0], { title: say.noName[1], text: say.noName[2], dim: true });
+    if (facts.refusal === 'token') return make('refused', say.noToken[0], { title: say.noToken[1], text: say.noToken[2], dim: true });
     if (facts.refusal === 'places') {
       return make('lost', say.full[0], { title: say.full[1], text: say.full[2] + say.again(facts.retryInS), dim: true });
     }

@@ -293,6 +293,10 @@ export const text = {
   player: {
     canvas: '3D video. Arrow keys turn it, shift and arrow keys move it, plus and minus zoom, R resets the view.',
     noStream: 'src names no stream: give the address of a recording (.mcap), or of a gateway with ?stream=NAME',
+    noAddress: 'src is no address: give that of a recording (.mcap), or of a gateway with ?stream=NAME',
+    noName: 'No stream can have the name that src gives. Names are of 1 to 64 letters, digits, _ . and -, with no dot first.',
+    noAnswer: 'The server does not answer, or does not let pages of this site in (--allow-origin).',
+    notStarted: (why: string) => `The player cannot start: ${why}. Its files must come from the page's own site.`,
   },
   shifted: { playing: 'Behind live', paused: 'Paused', over: (how: string, live: string) => `${how} · ${live}` },
   timeline: {
@@ -387,6 +391,7 @@ export const text = {
     lost: ['Offline', 'Connection lost'],
     full: ['Full', 'All places are taken', 'The server lets no more pages watch now. '],
     noName: ['No such name', 'No stream can have this name', 'Names are of 1 to 64 letters, digits, _ . and -, with no dot first. Choose one of the streams above, if there are any.'],
+    noToken: ['Token needed', 'A token is needed', 'Open the page of that server once in this browser, and give it the token that it asks for.'],
     again: (s: number | null) => (s === null || s <= 0 ? 'Trying again now.' : `Trying again in ${s} s.`),
     filesOpen: 'Recordings and surfaces of this device open all the same. ',
     lastPicture: 'What you see is the last picture that arrived. ',

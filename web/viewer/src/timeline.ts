@@ -26,6 +26,7 @@ export class Timeline {
   private absolute = false;
   private dirty = false;
   private readonly timer: number;
+  private readonly sizes = new ResizeObserver(() => (this.dirty = true));
   private marksAt = 0; // when they were drawn
   private preview: Preview | null = null; // loaded when it is first wanted
   private pointedX: number | null = null; // of the cursor, on the page
@@ -49,13 +50,15 @@ export class Timeline {
     this.live.id = 'follow';
     this.time.className = 'time';
     this.box.append(this.streams, this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
-    new ResizeObserver(() => (this.dirty = true)).observe(this.track);
+    this.sizes.observe(this.track);
     this.timer = window.setInterval(() => this.refresh(), kRefreshMs);
   }
 
   /** For good. */
   stop(): void {
     window.clearInterval(this.timer);
+    this.sizes.disconnect();
+    this.preview?.end();
   }
 
   /** The streams that it can be of, by name, and how each is called, the first one first; none: there is no choice. `chosen` null: the first. */
@@ -78,6 +81,7 @@ export class Timeline {
     this.dirty = true;
     this.marksAt = 0;
     this.unpoint();
+    this.preview?.leave();
     this.refresh();
   }
 

@@ -75,6 +75,13 @@ export class VideoTextures {
     }
   }
 
+  /** For good: a decoder may be a part of the card, of which there are few. */
+  end(): void {
+    this.waiting?.reject(new Error('nobody waits for it any more'));
+    if (this.decoder !== null && this.decoder.state !== 'closed') this.decoder.close();
+    this.decoder = null;
+  }
+
   private async begin(unit: Uint8Array): Promise<void> {
     const config: VideoDecoderConfig = { codec: codecName(unit), optimizeForLatency: true };
     if (!(await VideoDecoder.isConfigSupported(config)).supported) {

@@ -15,7 +15,7 @@ import { decodeVertexQuality } from './quality';
 import { around, between, placed, type Placement } from './placement';
 import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
-import { Resolution, findGraphics } from './resolution';
+import { NoGraphics, Resolution, findGraphics } from './resolution';
 import type { Stage } from './stage';
 import { text } from './strings';
 import type { Extent } from './surface';
@@ -105,7 +105,7 @@ export class View {
     keys: EventTarget = window,
   ) {
     const graphics = findGraphics();
-    if (graphics === null) throw new Error('there is no WebGL 2');
+    if (graphics === null) throw new NoGraphics('there is no WebGL 2');
     this.inSoftware = graphics.inSoftware;
     this.painter = makePainter(canvas, graphics, {
       ready: () => this.painted(),
@@ -165,6 +165,17 @@ export class View {
   restart(camera: Pinhole | null, keep: boolean): void {
     this.navigator.restart(camera, keep);
     if (!keep) this.extent = null;
+  }
+
+  /** The first surface is seen no more. */
+  clear(): void {
+    const { surface } = this;
+    if (surface.frame === null) return;
+    this.painter.remove(surface.id);
+    this.headset?.remove(surface.id);
+    surface.picture?.close();
+    surface.frame = surface.picture = null;
+    this.invalidate();
   }
 
   show(frame: DecodedFrame): void {
