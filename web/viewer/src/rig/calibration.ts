@@ -15,6 +15,7 @@ export interface ColourResult {
 
 export interface GeometryResult {
   stereo_rms_px: number;
+  stereo_rms_all_corners_px: number;
   plane_rms_mm: number;
   square_error_mm: number;
   baseline_mm: number;

@@ -9,6 +9,7 @@ const say = text.calibration.result;
 const kResidualMost = 12; // of 255: more is stray light, or a curved response (docs/CALIBRATION.md)
 const kStereoMost_px = 0.5;
 const kDepthMost = 1; // mm a metre
+const kAllMost_px = 5; // with the corners left out: more is no noise, but a pattern laid over another size than was projected
 
 function figures(rows: readonly (readonly [key: string, name: string, value: string, bad?: boolean])[]): HTMLElement {
   const list = make('dl', { className: 'figures' });
@@ -23,11 +24,19 @@ function figures(rows: readonly (readonly [key: string, name: string, value: str
 const paletteOf = ({ colours }: ColourResult) => colours.filter(({ margin }) => margin !== undefined);
 const weakOf = (result: ColourResult) => paletteOf(result).filter(({ margin }) => margin! <= 0);
 const fits = (result: GeometryResult): boolean => result.stereo_rms_px <= kStereoMost_px;
+const isWhole = (result: GeometryResult): boolean => result.stereo_rms_all_corners_px <= kAllMost_px;
 const isExact = (result: GeometryResult): boolean => result.depth_sigma_mm <= kDepthMost * result.distance_m;
 
 /** Whether it should be kept; else more should be taken. */
 export const isGood = (result: ColourResult | GeometryResult): boolean =>
-  isGeometry(result) ? fits(result) && isExact(result) : weakOf(result).length === 0 && result.residual <= kResidualMost;
+  isGeometry(result) ? fits(result) && isWhole(result) && isExact(result) : weakOf(result).length === 0 && result.residual <= kResidualMost;
+
+/** What a person should know of it first. */
+export function verdictOf(result: GeometryResult): string {
+  if (!fits(result)) return say.stereoHigh;
+  if (!isWhole(result)) return say.leftOutHigh(result.stereo_rms_all_corners_px.toFixed(1));
+  return isExact(result) ? say.good : say.depthOpen;
+}
 
 function colours(result: ColourResult): HTMLElement[] {
   const palette = paletteOf(result);
@@ -61,9 +70,10 @@ function geometry(result: GeometryResult): HTMLElement[] {
     return make('tr', {}, make('th', { scope: 'row' }, name), value);
   });
   return [
-    make('p', { className: isGood(result) ? 'used' : 'bad' }, !fits(result) ? say.stereoHigh : isExact(result) ? say.good : say.depthOpen),
+    make('p', { className: isGood(result) ? 'used' : 'bad' }, verdictOf(result)),
     figures([
       ['stereo', say.stereo, `${result.stereo_rms_px.toFixed(3)} px`, !fits(result)],
+      ['all', say.all, `${result.stereo_rms_all_corners_px.toFixed(3)} px`, !isWhole(result)],
       ['depth', say.depth, `± ${result.depth_sigma_mm.toFixed(1)} mm`, !isExact(result)],
       ['plane', say.plane, `${result.plane_rms_mm.toFixed(2)} mm`],
       ['squares', say.squares, `${result.square_error_mm.toFixed(2)} mm`],

@@ -93,7 +93,7 @@ export class MarginsCard {
   private readonly table = make(
     'table',
     {},
-    make('thead', {}, make('tr', {}, ...text.margins.columns.map((name) => make('th', { scope: 'col' }, name)))),
+    make('thead', {}, make('tr', {}, ...text.margins.columns.map((name) => (name === '' ? make('td') : make('th', { scope: 'col' }, name))))),
     this.rows,
   );
   readonly root = card('margins', text.margins.title, this.table, this.about);

@@ -4,6 +4,7 @@
 // hidden.
 import { loadDisplay } from '../display';
 import { button, element, make, setText } from '../dom';
+import { sentence } from '../sentence';
 
 import { calibrationPicture, type Calibration } from './calibration';
 import { CalibrationCard } from './calibrationCard';
@@ -95,7 +96,7 @@ class RigPage {
       return kEveryMs;
     } catch (error) {
       this.streams.dataset['listed'] = '';
-      this.say(error instanceof Refused ? text.state.refused(error.message) : text.state.lost, 'bad');
+      this.say(error instanceof Refused ? sentence(error.message) : text.state.lost, 'bad');
       return kAgainMs;
     }
   }

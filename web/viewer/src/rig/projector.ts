@@ -2,6 +2,7 @@
 // The projector: what it shows, and buttons where the server drives it.
 import { button, chooser, make, setText } from '../dom';
 
+import { sentence } from '../sentence';
 import { card } from './cards';
 import { ask, Refused } from './look';
 import { text } from './strings';
@@ -76,7 +77,7 @@ export class ProjectorCard {
     this.root.dataset['state'] = told.state;
     const show = say.shows[told.show as Show] ?? told.show;
     setText(this.state, on ? say.on(told.output, show) : say.states[told.state]);
-    setText(this.message, told.message);
+    setText(this.message, sentence(told.message));
     this.state.hidden = told.state === 'none'; // the message says it
     this.controls.hidden = told.state === 'none';
     this.stop.disabled = !on;

@@ -20,7 +20,6 @@ export const text = {
     live: (frame: number) => `Frame ${frame}`,
     lost: 'The server does not answer: trying again',
     noStream: 'The server has no streams yet',
-    refused: (why: string) => why,
   },
   advice: { title: 'What to do', none: 'Nothing to mend in this frame.' },
   exposure: {
@@ -118,10 +117,13 @@ export const text = {
         `${colours.join(', ')}: hardly told from other colours. Check the projector's colours and the exposure.`,
       residualHigh: 'Far off: is there other light, or does the camera change its exposure by itself?',
       stereoHigh: 'Far off: is the board flat, and does it match what was typed? Take more views.',
+      leftOutHigh: (px: string) =>
+        `The corners left out are far off, ${px} px with them: does the projector show the pattern that the server was given, in the size that it was told?`,
       depthOpen: 'Not exact yet: take more views, tilted otherwise and in other parts of the picture.',
       residual: 'residual, of 255 (RMS)',
       columns: ['Colour', 'Margin', 'Residual'],
       stereo: 'corners from where the rig puts them (RMS)',
+      all: 'the same with the corners left out',
       depth: 'depths there are known to',
       plane: 'corners from a plane (RMS)',
       squares: 'length of the squares (RMS)',
