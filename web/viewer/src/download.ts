@@ -23,9 +23,13 @@ export async function copy(text: string): Promise<boolean> {
   }
 }
 
-/** "relievo-face-000123.ply" */
-export function fileName(stream: string | null, number: number | null, extension: string): string {
-  const safe = (stream ?? 'surface').replace(/[^\w.-]+/g, '_');
+const kMostOfName = 64; // letters, as of a stream: systems allow 255 bytes for all of a name
+
+/** "relievo-face-000123.ply". `shown`: a stream, or the name of a file, in any script. */
+export function fileName(shown: string | null, number: number | null, extension: string): string {
+  const bare = (shown ?? '').replace(/\.(mcap|ply|glb)$/i, '').normalize();
+  const letters = Array.from(bare.replace(/[^\p{L}\p{M}\p{N}_.-]+/gu, '_')).slice(0, kMostOfName);
+  const safe = letters.join('').replace(/^[_.]+|[_.]+$/g, '') || 'surface';
   const frame = number === null ? '' : `-${String(number).padStart(6, '0')}`;
   return `relievo-${safe}${frame}.${extension}`;
 }

@@ -72,7 +72,7 @@ export class RangeCard {
         cancelled: job.signal,
       });
       job.signal.throwIfAborted();
-      const name = fileName(this.of.name()?.replace(/\.mcap$/, '') ?? null, null, say.rangeEndings[format]);
+      const name = fileName(this.of.name(), null, say.rangeEndings[format]);
       download(name, content);
       this.told(say.rangeSaved(name, frames, content.size, damaged));
     } catch (error) {

@@ -3,6 +3,7 @@
 import { describe, expect, it } from 'vitest';
 import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
 import { kDefaultDisplay } from '../src/display';
+import { fileName } from '../src/download';
 import { writeGlb } from '../src/exportGlb';
 import { writePly } from '../src/exportPly';
 import type { Surface } from '../src/pick';
@@ -17,6 +18,23 @@ const surface: Surface = {
   quality: { sigmas: new Float32Array([1e-4, 2e-4, 0]), interpolated: new Uint8Array([0, 1, 0]) },
 };
 const picture = { width: 2, height: 1, rgba: new Uint8ClampedArray([255, 0, 0, 255, 0, 0, 255, 255]) };
+
+describe('the name of what is saved', () => {
+  it('is of what is shown, in any script, without what names a kind of file', () => {
+    expect(fileName('face', 123, 'ply')).toBe('relievo-face-000123.ply');
+    expect(fileName('face.v2.mcap', 7, 'png')).toBe('relievo-face.v2-000007.png');
+    expect(fileName('קובץ 12.mcap', null, 'mcap')).toBe('relievo-קובץ_12.mcap');
+    expect(fileName('顔.PLY', null, 'csv')).toBe('relievo-顔.csv');
+    expect(fileName('cafe\u0301.glb', null, 'png')).toBe('relievo-caf\u00e9.png');
+  });
+
+  it('has nothing in it that no file may have', () => {
+    expect(fileName('a/b\\c:"d"<e>\u202e.mcap', null, 'png')).toBe('relievo-a_b_c_d_e.png');
+    for (const nothing of [null, '', '.mcap', '???']) expect(fileName(nothing, null, 'png')).toBe('relievo-surface.png');
+    expect(new TextEncoder().encode(fileName('顔'.repeat(300), 1, 'ply')).length).toBeLessThan(256);
+    expect(fileName('a'.repeat(300), 1, 'ply').length).toBeLessThan(128);
+  });
+});
 
 describe('a link', () => {
   const display = { ...kDefaultDisplay, mode: 'depth' as const, grid: false, fov: 30, theme: 'light' as const };
