@@ -134,7 +134,7 @@ export class StreamsPanel {
     const now = performance.now();
     if (now - row.pictureAt < kFreshMs) return;
     row.pictureAt = now;
-    this.thumbnails.ask({ name, recording, onto: row.picture });
+    this.thumbnails.ask({ stream: name, recording, onto: row.picture });
   }
 
   private add(name: string): Row {
@@ -165,7 +165,7 @@ export class StreamsPanel {
       if (state === say.cut) row.about.title = say.cutTitle;
       this.folder.append(row.item);
       this.recordings.set(file, row);
-      this.thumbnails.ask({ name: file, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
+      this.thumbnails.ask({ stream: null, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
     }
     this.markRecording();
   }

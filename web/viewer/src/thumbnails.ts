@@ -11,8 +11,8 @@ const kPatienceMs = 5000; // with a stream that sends nothing
 const kTries = 3; // of a recording, each twice as long, behind the others: a slow page may need it
 
 interface Job {
-  name: string;
-  recording: string | null;
+  stream: string | null; // null: a recording of the folder
+  recording: string | null; // that the stream is played from
   onto: HTMLCanvasElement;
   tries?: number; // in vain
 }
@@ -46,11 +46,13 @@ export class Thumbnails {
       unusable: () => this.stop(),
     }));
     window.clearTimeout(this.timer);
-    const { name, recording, tries = 0 } = job;
+    const { stream, recording, tries = 0 } = job;
     this.timer = window.setTimeout(() => this.giveUp({ ...job, tries: tries + 1 }), kPatienceMs * 2 ** tries);
     const opened = recording === null ? null : await openRemote(new URL(recording, document.baseURI)).catch(() => null);
     if (this.jobs[0] !== job) return;
-    session.watch(opened === null ? (events) => pictureAlone(name, events) : opened.source);
+    if (opened !== null) session.watch(opened.source);
+    else if (stream !== null) session.watch((events) => pictureAlone(stream, events));
+    // Else it waits: what did not come may come later.
   }
 
   private take(): void {
@@ -81,8 +83,8 @@ export class Thumbnails {
 }
 
 /** In the lowest quality that the stream has. */
-function pictureAlone(name: string, events: SourceEvents): LiveSource {
-  const source = new LiveSource(name, events);
+function pictureAlone(stream: string, events: SourceEvents): LiveSource {
+  const source = new LiveSource(stream, events);
   source.want('texture');
   return source;
 }
