@@ -115,6 +115,19 @@ const checks = {
     const [names, cells] = (await page.evaluate(() => navigator.clipboard.readText())).trim().split('\n').map((line) => line.split('\t'));
     assert.equal(cells[0], 'point');
     assert.ok(Math.abs(Number(cells[names.findIndex((n) => /^value/.test(n))]) - value) < 1e-5, `${names}: ${cells}`);
+  },
+
+  async 'what goes takes the focus nowhere'(page) {
+    const focused = () => page.evaluate(() => document.activeElement.closest('#panel-measure, #view')?.id ?? document.activeElement.outerHTML.slice(0, 80));
+    await page.focus('#panel-measure .measurements button');
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => window.relievo.diagnostics().measurements.length === 0);
+    assert.equal(await focused(), 'panel-measure');
+    await page.keyboard.press('h');
+    await page.waitForSelector('#panel-measure', { state: 'hidden' });
+    assert.equal(await focused(), 'view');
+    await page.keyboard.press('h');
+    await page.waitForSelector('#panel-measure', { state: 'visible' });
     await page.keyboard.press('Escape');
   },
 
@@ -139,13 +152,15 @@ const checks = {
     assert.equal(new Set(chosen).size, 1, `${chosen}`);
     assert.ok(!others.includes(chosen[0]), `${chosen[0]} is that of ${others}, too`);
     assert.ok(kept.every((adjust) => adjust === 'none'), `${kept}`);
+    await page.focus('#view');
+    assert.equal(await page.evaluate(() => getComputedStyle(document.querySelector('#view')).outlineStyle), 'solid', 'shadows are not drawn');
     await page.close();
   },
 
   async 'in small windows no part lies over another or is cut off'() {
     feeder.say('also a-stream-whose-name-is-as-long-as-a-name-of-a-stream-can-be-here');
     const streams = ['ball', 'a-stream-whose-name-is-as-long-as-a-name-of-a-stream-can-be-here'];
-    for (const [width, height] of [[360, 640], [650, 700], [700, 500], [740, 360]]) {
+    for (const [width, height] of [[360, 640], [650, 700], [700, 500], [740, 360], [568, 320], [320, 256]]) {
       const page = await open(`/?stream=${streams[width === 700 ? 1 : 0]}`, { viewport: { width, height } });
       await shownPast(page, 2);
       await page.keyboard.press('6');
@@ -154,17 +169,29 @@ const checks = {
       const wrong = () => page.evaluate(() => {
         const box = (e) => e.getBoundingClientRect();
         const parts = [...document.querySelectorAll('header > *, footer > *, #rail, #legend')].filter((e) => e.getClientRects().length > 0);
-        const name = (e) => e.id || e.tagName;
+        const name = (e) => e.id || e.textContent || e.tagName;
+        // What lies in a row that is scrolled is brought into sight first.
+        const isCut = (e) => {
+          e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+          return box(e).right > innerWidth + 0.5 || box(e).bottom > innerHeight + 0.5;
+        };
+        const isCovered = (e) => {
+          e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+          const { left, top, width: across, height: high } = box(e);
+          return !e.contains(document.elementFromPoint(left + across / 2, top + high / 2));
+        };
+        const buttons = [...document.querySelectorAll('header button, footer button, #rail button')].filter((e) => e.getClientRects().length > 0);
         const overlap = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
         return {
-          cut: [...parts, ...document.querySelectorAll('header button')].filter((e) => box(e).right > innerWidth + 0.5 || box(e).bottom > innerHeight + 0.5).map(name),
+          cut: [...parts, ...buttons].filter(isCut).map(name),
+          covered: buttons.filter(isCovered).map(name),
           over: parts.flatMap((a, i) => parts.slice(i + 1).filter((b) => overlap(box(a), box(b))).map((b) => `${name(a)}, ${name(b)}`)),
         };
       });
       let found;
       await eventually(() => `${width}x${height}: ${JSON.stringify(found)}`, async () => {
         found = await wrong(); // parts follow the header
-        return found.cut.length + found.over.length === 0;
+        return found.cut.length + found.covered.length + found.over.length === 0;
       });
       await page.close();
     }

@@ -160,7 +160,7 @@ const checks = {
       const nothing = await page.evaluate(() => document.querySelector('relievo-player').screenshot().then(() => false, () => true));
       assert.ok(nothing, `the picture of before is there with "${src}"`);
     }
-    await says(page, /it is not there/);
+    await says(page, /is not there/);
   }),
 
   'a gateway\'s address of a recording, and the quality of an address': on('/page.html', {}, async (page) => {
@@ -191,7 +191,7 @@ const checks = {
 
   'what cannot be shown says why': on('/page.html', {}, async (page) => {
     await set(page, { src: 'http://' });
-    await says(page, /src is no address/);
+    await says(page, /src” is no address/);
     await set(page, { src: `${rig.address}/?stream=one,two` });
     await says(page, /No stream can have the name/);
     assert.equal(await player(page, (p) => p.state), 'failed');

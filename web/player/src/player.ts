@@ -7,6 +7,7 @@ import { LiveSource } from '../../viewer/src/liveSource';
 import { openRemote, type OpenedRecording } from '../../viewer/src/openFile';
 import { wantedQuality } from '../../viewer/src/protocol';
 import { NoGraphics } from '../../viewer/src/resolution';
+import { sentence } from '../../viewer/src/sentence';
 import { Session } from '../../viewer/src/session';
 import { present } from '../../viewer/src/state';
 import { ServerList } from '../../viewer/src/streamList';
@@ -388,7 +389,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   }
 
   private fail(why: string): void {
-    this.failure = why;
+    this.failure = sentence(why);
     this.refresh();
   }
 

@@ -43,7 +43,10 @@ function command(viewer: Commanded, key: string): boolean {
   const commands: Record<string, () => void> = {
     r: () => view?.navigator.reset(),
     f: toggleFullscreen,
-    h: () => document.body.classList.toggle('bare'),
+    h: () => {
+      // What had the focus may be hidden.
+      if (document.body.classList.toggle('bare') && document.activeElement !== document.body) view?.canvas.focus();
+    },
     g: () => viewer.change({ grid: !display.grid }),
     v: () => viewer.change({ split: kSplits[(kSplits.indexOf(display.split) + 1) % kSplits.length]! }),
     b: () => panels.toggle('display'),

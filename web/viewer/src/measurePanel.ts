@@ -69,6 +69,7 @@ export class MeasurePanel {
   private readonly list = make('ol', { className: 'measurements' });
   private readonly plot = make('canvas', { className: 'plot', hidden: true });
   private readonly readout = element('cursor');
+  private readonly clearing = button(say.clear, say.clear, () => this.clear());
 
   /** `pointed`: where in the camera's picture the cursor is; `described`: what is known of a stream. */
   constructor(
@@ -93,8 +94,7 @@ export class MeasurePanel {
     });
     const csv = button(say.csv, say.csvTitle, () => this.save('measurements', measurementsCsv(this.measurements)));
     const section = button(say.sectionCsv, say.sectionCsvTitle, () => this.save('section', sectionCsv(this.lastSection?.profile ?? [])));
-    const clear = button(say.clear, say.clear, () => this.clear());
-    const buttons = make('div', { className: 'buttons' }, copied, csv, section, clear);
+    const buttons = make('div', { className: 'buttons' }, copied, csv, section, this.clearing);
     body.append(group, this.hint, snapping.row, this.list, buttons, this.plot, this.sigmas); // what is read once, last
     this.listen(view.canvas);
     const others = view.overlay.marks; // loaded before or behind this
@@ -262,6 +262,9 @@ export class MeasurePanel {
         const remove = button('×', say.remove, () => {
           this.measurements.splice(i, 1);
           this.refresh();
+          // The button that had the focus is gone: the next one has it, or what is behind the last.
+          const others = this.list.querySelectorAll('button');
+          (others[Math.min(i, others.length - 1)] ?? this.clearing).focus();
         });
         const on = say.spots(m.spots.map(({ kind }) => kind));
         const what = make('span', { className: 'quiet' }, say.tools[m.tool], ...(on === '' ? [] : [make('small', {}, on)]));

@@ -292,8 +292,8 @@ export const text = {
   },
   player: {
     canvas: '3D video. Arrow keys turn it, shift and arrow keys move it, plus and minus zoom, R resets the view.',
-    noStream: 'src names no stream: give the address of a recording (.mcap), or of a gateway with ?stream=NAME',
-    noAddress: 'src is no address: give that of a recording (.mcap), or of a gateway with ?stream=NAME',
+    noStream: '“src” names no stream: give the address of a recording (.mcap), or of a gateway with ?stream=NAME',
+    noAddress: '“src” is no address: give that of a recording (.mcap), or of a gateway with ?stream=NAME',
     noName: 'No stream can have the name that src gives. Names are of 1 to 64 letters, digits, _ . and -, with no dot first.',
     noAnswer: 'The server does not answer, or does not let pages of this site in (--allow-origin).',
     notStarted: (why: string) => `The player cannot start: ${why}. Its files must come from the page's own site.`,

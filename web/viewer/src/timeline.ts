@@ -182,6 +182,7 @@ export class Timeline {
     const time = this.timeText(p, p.following === true ? this.end : position);
     this.slider.setAttribute('aria-valuetext', say.at(time, frame + 1, p.times.length));
     setText(this.time, time);
+    this.time.setAttribute('aria-label', `${time}. ${say.time}`); // who speaks to the page says what is seen
     const label = p.playing ? say.pause : say.play;
     setText(this.playButton, p.playing ? '❚❚' : '▶');
     this.playButton.title = label;
