@@ -7,6 +7,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "base/html.h"
 #include "web/gateway/assets.h"
@@ -38,7 +39,11 @@ or in their token file.</p>
 )html";
 
 /// The token that came, where that is none here.
-enum class Unknown { kNone, kSent, kKept };
+enum class Unknown { kNone, kSent, kKept, kNotKept };
+
+/// Of the address that a browser with a right token is sent to: the next request shows whether it keeps
+/// cookies.
+constexpr std::string_view kSignedIn = "signed-in";
 
 // Other servers on this host, on other ports, get the same cookies: each has a name of its own.
 std::string cookie_name(std::uint16_t port) {
@@ -70,14 +75,15 @@ std::string trimmed(const std::string& text) {
   return text.substr(first, text.find_last_not_of(kSpaces) + 1 - first);
 }
 
-/// The token of "/?stream=a&token=T", and the target without it.
+/// The token of "/?stream=a&token=T", and the target without it and without kSignedIn.
 struct TokenInTarget {
   std::string token;
   std::string rest;
+  bool signed_in = false;
 };
 
 TokenInTarget token_in(std::string_view target) {
-  TokenInTarget out{{}, std::string(target.substr(0, target.find('?')))};
+  TokenInTarget out{.token = {}, .rest = std::string(target.substr(0, target.find('?')))};
   std::string_view query = query_of(target);
   char joint = '?';
   while (!query.empty()) {
@@ -86,6 +92,8 @@ TokenInTarget token_in(std::string_view target) {
     query = end == std::string_view::npos ? std::string_view() : query.substr(end + 1);
     if (one.starts_with("token=")) {
       out.token = trimmed(percent_decoded(one.substr(6)));
+    } else if (one == kSignedIn) {
+      out.signed_in = true;
     } else {
       out.rest += joint;
       out.rest += one;
@@ -95,11 +103,17 @@ TokenInTarget token_in(std::string_view target) {
   return out;
 }
 
-HttpReply keep_as_cookie(const TokenInTarget& asked, bool tls, std::uint16_t port) {
+HttpReply see(std::string address) {
   HttpReply reply;
   reply.status = 303;
   reply.headers.emplace_back("Cache-Control", "no-store");
-  reply.headers.emplace_back("Location", asked.rest);
+  reply.headers.emplace_back("Location", std::move(address));
+  return reply;
+}
+
+HttpReply keep_as_cookie(const TokenInTarget& asked, bool tls, std::uint16_t port) {
+  const char joint = asked.rest.find('?') == std::string::npos ? '?' : '&';
+  HttpReply reply = see(asked.rest + joint + std::string(kSignedIn));
   // Lax: with Strict it would not come along on the way here from a link in somebody's mail. What other sites
   // could do with it needs a WebSocket, which their pages are refused.
   reply.headers.emplace_back("Set-Cookie", cookie_name(port) + "=" + asked.token +
@@ -131,6 +145,9 @@ std::string_view refusal(Unknown unknown) {
       return "This token is not known here: please check it.";
     case Unknown::kKept:
       return "The token that this browser kept is not known here any more.";
+    case Unknown::kNotKept:
+      return "The token is right, but this browser did not keep it: allow cookies for this address, and "
+             "enter it again.";
   }
   return "";
 }
@@ -192,8 +209,10 @@ std::optional<HttpReply> sign_in(const HttpRequest& request, const Tokens& token
     return is_page ? std::optional(keep_as_cookie(asked, request.tls, port)) : std::nullopt;
   const std::string_view sent = bearer(request.authorization);
   const std::string_view kept = cookie_value(request.cookie, cookie_name(port));
-  if (tokens.accepts(sent) || tokens.accepts(kept)) return std::nullopt;
+  if (tokens.accepts(sent) || tokens.accepts(kept))
+    return is_page && asked.signed_in ? std::optional(see(asked.rest)) : std::nullopt;
   const Unknown unknown = !asked.token.empty() || !sent.empty() ? Unknown::kSent
+                          : is_page && asked.signed_in          ? Unknown::kNotKept
                           : !kept.empty()                       ? Unknown::kKept
                                                                 : Unknown::kNone;
   return token_needed(is_page, asked.rest, unknown);

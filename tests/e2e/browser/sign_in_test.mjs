@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: who has no token is asked for it by a page that looks like the viewer, light and dark, on
-// a phone too; a wrong one is said to be wrong, without being shown or kept; a right one leads to what was asked for.
+// a phone too; a wrong one is said to be wrong, without being shown or kept; a right one leads to what was asked for,
+// and a browser that keeps no cookies is told of it.
 // Run as: in_own_domain node sign_in_test.mjs RELIEVO_SERVER [FOLDER for screenshots], in web/viewer. Exit 77: no Chromium
 // here.
 import assert from 'node:assert/strict';
@@ -92,6 +93,21 @@ checks['a right one leads to what was asked for, in the view of the link'] = asy
   await shownPast(page, 1);
   assert.match(page.url(), /\/\?stream=object(#mode=normals)?$/); // the page may write its own
   assert.equal(await page.evaluate(() => window.relievo.diagnostics().mode), 'normals');
+};
+
+checks['a browser that keeps no cookies is told so'] = async () => {
+  const strict = await browser.newPage();
+  await strict.route(/token=/, async (route) => {
+    const response = await route.fetch({ maxRedirects: 0 });
+    const { 'set-cookie': refused, ...headers } = response.headers();
+    assert.ok(refused !== undefined);
+    await strict.context().clearCookies(); // which this request has kept
+    await route.fulfill({ response, headers });
+  });
+  await strict.goto(`${server.address}/?stream=object&token=${kToken}#mode=normals`);
+  assert.match(await strict.textContent('[role=alert]'), /did not keep it: allow cookies/);
+  assert.equal(await strict.locator('input[name=stream]').getAttribute('value'), 'object');
+  await strict.close();
 };
 
 checks['one that was kept, and is not known any more, is asked for anew, also in the page of the rig'] = async () => {

@@ -112,12 +112,16 @@ TEST_F(GatewayTokens, WhereOthersReachItNoneIsNotMadeLater) {
 TEST_F(GatewayTokens, ABrowserKeepsItAsACookieAndNotInTheAddress) {
   const auto sent = request(port, "GET", "/?stream=face&token=" + kToken + "&x=1");
   ASSERT_EQ(sent.status, 303);
-  EXPECT_EQ(sent.headers.at("location"), "/?stream=face&x=1");
+  const std::string next = sent.headers.at("location");
+  EXPECT_EQ(next.find(kToken), std::string::npos) << next;
   const std::string cookie = sent.headers.at("set-cookie");
   EXPECT_NE(cookie.find("; HttpOnly"), std::string::npos);
   EXPECT_NE(cookie.find("; SameSite=Lax"), std::string::npos);
   const std::string header = "Cookie: a=b; " + cookie.substr(0, cookie.find(';')) + "; c=d\r\n";
-  EXPECT_EQ(request(port, "GET", "/", header).status, 200);
+  const auto led = request(port, "GET", next, header);
+  ASSERT_EQ(led.status, 303);
+  EXPECT_EQ(led.headers.at("location"), "/?stream=face&x=1");
+  EXPECT_EQ(request(port, "GET", "/?stream=face&x=1", header).status, 200);
   EXPECT_EQ(WsClient(port, "face", header).status(), 101);
   EXPECT_EQ(WsClient(port, "face", header + "Origin: http://evil.example\r\n").status(), 403)
       << "a cookie comes along with whatever page asks";
@@ -127,12 +131,24 @@ TEST_F(GatewayTokens, ABrowserKeepsItAsACookieAndNotInTheAddress) {
 TEST_F(GatewayTokens, TheRigsPageTakesATokenAsTheViewersDoes) {
   const auto sent = request(port, "GET", "/rig?token=" + kToken + "&stream=face");
   ASSERT_EQ(sent.status, 303);
-  EXPECT_EQ(sent.headers.at("location"), "/rig?stream=face");
   const std::string cookie = sent.headers.at("set-cookie");
+  const std::string header = "Cookie: " + cookie.substr(0, cookie.find(';')) + "\r\n";
+  EXPECT_EQ(request(port, "GET", sent.headers.at("location"), header).headers.at("location"),
+            "/rig?stream=face");
   EXPECT_NE(cookie.find("; Path=/;"), std::string::npos) << "what the page loads needs it, too";
-  EXPECT_EQ(
-      request(port, "GET", "/api/streams", "Cookie: " + cookie.substr(0, cookie.find(';')) + "\r\n").status,
-      200);
+  EXPECT_EQ(request(port, "GET", "/api/streams", header).status, 200);
+}
+
+TEST_F(GatewayTokens, ABrowserThatKeepsNoCookiesIsToldSo) {
+  for (const std::string address : {"/", "/rig?stream=face"}) {
+    const auto sent = request(port, "GET", address + (address == "/" ? "?" : "&") + "token=" + kToken);
+    ASSERT_EQ(sent.status, 303);
+    const auto form = request(port, "GET", sent.headers.at("location"));
+    EXPECT_EQ(form.status, 401);
+    EXPECT_NE(form.body.find("allow cookies"), std::string::npos) << form.body;
+    EXPECT_EQ(form.body.find("signed-in"), std::string::npos) << "the form leads to what was asked for";
+    EXPECT_EQ(request(port, "GET", address).body.find("allow cookies"), std::string::npos);
+  }
 }
 
 TEST_F(GatewayTokens, TheFormLeadsToWhatWasAskedFor) {
