@@ -151,6 +151,23 @@ const checks = {
     await when(page, (p) => p.state === 'live');
   }),
 
+  'moved into another document, as into a window of its own, it looks and shows as before': on('/page.html', {}, async (page) => {
+    const styled = (of) => page.evaluate(`(() => {
+      const { shadowRoot } = ${of};
+      const style = (e) => { const { position, width, color, borderRadius } = getComputedStyle(e); return [position, width, color, borderRadius]; };
+      return [shadowRoot.host, shadowRoot.querySelector('.view'), shadowRoot.querySelector('#timeline')].map(style);
+    })()`);
+    await page.evaluate(() => {
+      window.moved_ = document.querySelector('relievo-player');
+      Object.assign(window.moved_, { src: 'take.mcap' }).style.width = '280px';
+    });
+    await when(page, (p) => p.state === 'file');
+    const before = await styled('window.moved_');
+    await page.evaluate(() => document.body.appendChild(document.createElement('iframe')).contentDocument.body.append(window.moved_));
+    await page.waitForFunction(() => window.moved_.state === 'file');
+    assert.deepEqual(await styled('window.moved_'), before);
+  }),
+
   'without a src, or with one that fails, nothing of before is seen': on('/page.html', {}, async (page) => {
     for (const src of ['', 'there-is-none.mcap']) {
       await set(page, { src: 'take.mcap' });
@@ -195,10 +212,19 @@ const checks = {
     await set(page, { src: `${rig.address}/?stream=one,two` });
     await says(page, /No stream can have the name/);
     assert.equal(await player(page, (p) => p.state), 'failed');
+    await page.evaluate(() => {
+      window.told_ = [];
+      const line = document.querySelector('relievo-player').shadowRoot.querySelector('.message');
+      const say = () => line.getAttribute('aria-live') !== 'off' && window.told_.push(line.textContent);
+      new MutationObserver(say).observe(line, { childList: true });
+    });
     for (const src of ['http://127.0.0.1:9/?stream=object', 'http://127.0.0.1:9/recordings/take.mcap']) {
       await set(page, { src });
       await says(page, /does not answer, or does not let pages of this site in/);
+      if (/stream/.test(src)) await says(page, /again in [34] s/); // the third attempt
     }
+    const told = await page.evaluate(() => window.told_.filter((words) => /does not answer/.test(words)));
+    assert.ok(told.length <= 2, `who listens hears of each second: ${told.join(' | ')}`);
   }),
 
   'files of another site: it says that they must be of the page\'s own': on('/elsewhere.html', { at: `http://127.0.0.1:${lax.address().port}` }, async (page) => {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // <relievo-player>: a stream or a recording in any page, with the viewer's own parts (relievo-player.d.ts is its API).
 import { kDefaultDisplay, kModes, kThemes, type Mode, type Theme } from '../../viewer/src/display';
-import { make } from '../../viewer/src/dom';
+import { make, setText } from '../../viewer/src/dom';
 import { listenToKeys } from '../../viewer/src/keys';
 import { LiveSource } from '../../viewer/src/liveSource';
 import { openRemote, type OpenedRecording } from '../../viewer/src/openFile';
@@ -112,6 +112,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   private wishes: Wishes = {}; // for when it is
   private contextLost = false;
   private saidDuration = 0;
+  private saidNews = '';
   private opening = 0; // counts what was opened, so that a late answer is known
   private state_: PlayerState = 'idle';
   private message_ = '';
@@ -119,12 +120,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   constructor() {
     super();
     const root = this.attachShadow({ mode: 'open' });
-    // Not <style>, which a page's policy may forbid.
-    root.adoptedStyleSheets = [ofHost(themeCss), playerCss, timelineCss].map((css) => {
-      const sheet = new CSSStyleSheet();
-      sheet.replaceSync(css);
-      return sheet;
-    });
+    this.dress(root);
     this.timelineBox.setAttribute('role', 'group');
     this.timelineBox.setAttribute('aria-label', text.timeline.slider);
     this.messageLine.setAttribute('role', 'status');
@@ -263,6 +259,17 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   adoptedCallback(): void {
     this.rest(); // another document draws at its own beat
+    this.dress(this.shadowRoot!);
+  }
+
+  // Not by <style>, which a page's policy may forbid. Such sheets are of one document alone.
+  private dress(root: ShadowRoot): void {
+    const { CSSStyleSheet: Sheet } = (this.ownerDocument.defaultView ?? window) as typeof globalThis;
+    root.adoptedStyleSheets = [ofHost(themeCss), playerCss, timelineCss].map((css) => {
+      const sheet = new Sheet();
+      sheet.replaceSync(css);
+      return sheet;
+    });
   }
 
   attributeChangedCallback(name: string, before: string | null, now: string | null): void {
@@ -444,7 +451,12 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
       this.dispatchEvent(new Event('durationchange'));
     }
     const { state, message } = this.judge();
-    this.messageLine.textContent = message;
+    const retryInS = this.parts?.session.facts.retryInS ?? null;
+    // Who listens is told of what is new, not of each second until the next attempt.
+    const news = message.replace(text.states.again(retryInS), '');
+    this.messageLine.setAttribute('aria-live', news === this.saidNews ? 'off' : 'polite');
+    this.saidNews = news;
+    setText(this.messageLine, message);
     this.messageLine.hidden = message === '';
     if (state === this.state_ && message === this.message_) return;
     this.state_ = state;
