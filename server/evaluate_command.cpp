@@ -14,6 +14,7 @@
 #include "base/time.h"
 #include "capture/evaluate/score.h"
 #include "capture/pattern/schedule.h"
+#include "capture/reconstruct/join_exposures.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
 #include "capture/source/npy.h"
@@ -42,6 +43,13 @@ fs::path truth_of(const fs::path& take, std::uint64_t number) {
   char name[32];
   std::snprintf(name, sizeof name, "%06llu.npy", static_cast<unsigned long long>(number));
   return take / "truth" / name;
+}
+
+Result<ImageF> read_truth(const fs::path& file, const PinholeModel& camera) {
+  auto truth = read_npy(file);
+  if (truth && (truth->width() != camera.width || truth->height() != camera.height))
+    return Error{file.string() + " is not of the camera's size"};
+  return truth;
 }
 
 void print(const Score& s, const FilterCounts& filters, bool json) {
@@ -74,10 +82,25 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
 
 /// Of a frame.
 struct Truths {
-  bool decodable;        // it should give a surface
-  const ImageF& before;  // the frame's before, empty where it is not known
-  const ImageF& now;
+  bool decodable;       // it should give a surface
+  ImageF now;           // at its first exposure, on the rows of geometry
+  ImageF between = {};  // white-field: at the second one of the frame before; empty where it is not known
 };
+
+/// `before`: the truth of the frame before, empty where it is not known. A frame that was regrouped begins
+/// with the second exposure of the frame before; a progressive take has no truth of that time.
+Truths truths_of(const CapturedFrame& frame, bool regrouped, const ImageF& before, const ImageF& now) {
+  const bool interlaced = frame.scan == Scan::kInterlaced;
+  Truths out{true, now.clone()};
+  if (before.empty()) return out;
+  if (regrouped) {
+    out.now = interlaced ? truth_of_field(before, 1) : truth_between(before, now);
+    out.between = before.clone();
+  } else if (interlaced) {
+    out.between = truth_of_field(before, 1);
+  }
+  return out;
+}
 
 /// What is scored and drawn.
 struct Judges {
@@ -93,24 +116,34 @@ struct Judges {
   }
 };
 
-/// White-field: two surfaces a frame, each against the truth of its own field. A progressive take has none of
-/// the times of its second pictures.
+/// White-field: two surfaces a frame, each against the truth of its own time.
 Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, Reconstructor& reconstructor,
                   const Truths& truths, Judges& judges) {
   const int slide = reconstructor.report().slide;
-  const bool interlaced = frame.scan == Scan::kInterlaced;
-  const auto at = [&](const ImageF& truth, int half) {
-    return interlaced ? truth_of_field(truth, half) : truth.clone();
-  };
   if (completed && completed->between) {
-    if (interlaced && !truths.before.empty()) {
-      if (auto s = judges.judge(frame, slide, at(truths.before, 1), &*completed); !s) return s;
+    if (!truths.between.empty()) {
+      if (auto s = judges.judge(frame, slide, truths.between, &*completed); !s) return s;
     }
     completed = reconstructor.next();
   }
   if (!completed && !truths.decodable) return {};
-  return judges.judge(frame, slide, at(truths.now, 0), completed ? &*completed : nullptr);
+  return judges.judge(frame, slide, truths.now, completed ? &*completed : nullptr);
 }
+
+/// The exposures that a frame was decoded by, as the camera gave them.
+class AsDecoded {
+ public:
+  const CapturedFrame& of(const CapturedFrame& frame, bool regrouped) {
+    if (regrouped) join_exposures(before_, frame, joined_);
+    joined_.number = frame.number;
+    before_ = frame.scan == Scan::kInterlaced ? frame.picture.clone() : frame.complement.clone();
+    return regrouped ? joined_ : frame;
+  }
+
+ private:
+  Image8 before_;
+  CapturedFrame joined_;
+};
 
 /// What was projected follows from the time stamp, independently of the decoder, so that what that takes for
 /// something else counts as missing. `lead`: frames by which the projector was ahead of the take's first one.
@@ -170,6 +203,7 @@ Status run(const Options& options, StopSignal& stop) {
   FilterCounts filters;  // of the frames scored
   std::optional<int> previous_slide;
   ImageF previous_truth;
+  AsDecoded as_decoded;
   std::uint64_t done = 0;
   while (!stop.stopped()) {
     auto next = (*source)->next();
@@ -177,30 +211,36 @@ Status run(const Options& options, StopSignal& stop) {
     if (!*next) break;
     const CapturedFrame& frame = **next;
     const Exposure exposure = shown_in(frame, info, *lead);
-    const bool decodable =
-        exposure.light == Light::kSlide &&
-        (info.pattern.slides == 1 || (previous_slide && *previous_slide != exposure.slide));
+    bool decodable = exposure.light == Light::kSlide &&
+                     (info.pattern.slides == 1 || (previous_slide && *previous_slide != exposure.slide));
     if (exposure.light == Light::kSlide) previous_slide = exposure.slide;
     auto result = reconstructor->add(frame);
     if (!result) return result.error();
     progress.update(++done);
+    const bool regrouped = reconstructor->report().step.regrouped;
+    // The first two frames are one pair then.
+    decodable = decodable && !(regrouped && done == 2 && info.pattern.slides > 1);
+    const CapturedFrame& shown = as_decoded.of(frame, regrouped);
     const fs::path file = truth_of(options.take, frame.number);
     if (frame.number < options.skip || !fs::exists(file)) {
       previous_truth = ImageF();
       continue;
     }
-    auto truth = read_npy(file);
+    auto truth = read_truth(file, info.rig.camera);
     if (!truth) return truth.error();
-    if (truth->width() != info.rig.camera.width || truth->height() != info.rig.camera.height) {
-      return Error{file.string() + " is not of the camera's size"};
+    if (regrouped && previous_truth.empty() && fs::exists(truth_of(options.take, frame.number - 1))) {
+      auto before = read_truth(truth_of(options.take, frame.number - 1), info.rig.camera);
+      if (!before) return before.error();
+      previous_truth = *std::move(before);
     }
+    Truths truths = truths_of(frame, regrouped, previous_truth, *truth);
+    truths.decodable = decodable;
     filters += reconstructor->report().filters;
     Status judged;
     if (info.pattern.scheme == Scheme::kWhiteField) {
-      judged =
-          judge_both(frame, std::move(*result), *reconstructor, {decodable, previous_truth, *truth}, judges);
+      judged = judge_both(shown, std::move(*result), *reconstructor, truths, judges);
     } else if (decodable) {
-      judged = judges.judge(frame, reconstructor->report().slide, *truth, *result ? &**result : nullptr);
+      judged = judges.judge(shown, reconstructor->report().slide, truths.now, *result ? &**result : nullptr);
     }
     if (!judged) return judged.error();
     previous_truth = *std::move(truth);

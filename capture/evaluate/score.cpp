@@ -43,6 +43,16 @@ ImageF truth_of_field(const ImageF& truth, int half) {
   return out;
 }
 
+ImageF truth_between(const ImageF& before, const ImageF& after) {
+  ImageF out = after.clone();
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const float a = before.data()[i];
+    float& b = out.data()[i];
+    if (a > 0 && b > 0 && std::fabs(a - b) < kDepthStep * a) b = 0.5F * (a + b);
+  }
+  return out;
+}
+
 Scorer::Scorer(const Rig& rig, const Pattern& pattern) : rig_(rig), pattern_(pattern) {
   const int width = rig.camera.width;
   const int height = rig.camera.height;

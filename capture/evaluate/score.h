@@ -34,6 +34,10 @@ struct Score {
 /// the odd rows above and below. Odd rows stay as they are.
 ImageF truth_of_field(const ImageF& truth, int half);
 
+/// The truth half way in time between two frames', of the same size; where they are of two surfaces, the
+/// later one's.
+ImageF truth_between(const ImageF& before, const ImageF& after);
+
 /// Collects frames of one take. One thread.
 class Scorer {
  public:

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "capture/pattern/schedule.h"
+#include "capture/reconstruct/join_exposures.h"
 #include "capture/reconstruct/texture.h"
 
 namespace relievo {
@@ -125,7 +126,9 @@ const CapturedFrame* StepKeeper::read(const CapturedFrame& frame) {
   settled_ = report_.phase.has_value();
   report_.restarted = late != late_;
   late_ = late;
-  return late_ ? regroup_and_keep(frame) : &frame;
+  if (late_) return regroup_and_keep(frame);
+  if (!settled_) keep_second(frame);  // the next frame may tell that this one is late
+  return &frame;
 }
 
 void StepKeeper::exchange(const CapturedFrame& frame) {
@@ -150,16 +153,7 @@ const CapturedFrame* StepKeeper::regroup(const CapturedFrame& frame) {
     return nullptr;
   made_.number = frame.number;
   made_.time_ns = *second_time_ns_ + frame_ns_ / 2;
-  made_.scan = frame.scan;
-  if (frame.scan == Scan::kProgressive) {
-    copy_picture(second_, made_.picture);
-    copy_picture(frame.picture, made_.complement);
-  } else {
-    copy_picture(second_, made_.picture);
-    made_.field_order = other(frame.field_order);
-    for (int y = first_row(frame.field_order, 0); y < made_.picture.height(); y += 2)
-      std::copy_n(frame.picture.row(y), made_.picture.stride(), made_.picture.row(y));
-  }
+  join_exposures(second_, frame, made_);
   report_.regrouped = true;
   return &made_;
 }

@@ -3,11 +3,14 @@
 // programs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "capture/picture_file.h"
 
 #include "tests/support/process.h"
 #include "tests/support/temp_folder.h"
@@ -35,6 +38,17 @@ std::pair<int, int> png_size(const fs::path& file) {
   return {number(16), number(20)};
 }
 
+json json_of(const std::vector<std::string>& arguments) {
+  std::vector<std::string> command = {program("relievo-server").string()};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  command.emplace_back("--json");
+  const Finished done = run(command, kLongPatience);
+  EXPECT_EQ(done.status, 0) << done.err;
+  const json parsed = json::parse(done.out, nullptr, false);
+  EXPECT_TRUE(parsed.is_object()) << done.out;
+  return parsed.is_object() ? parsed : json::object();
+}
+
 class SmallTake : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -44,15 +58,7 @@ class SmallTake : public ::testing::Test {
             kLongPatience);
     ASSERT_EQ(made.status, 0) << made.err;
   }
-  json server_json(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), program("relievo-server").string());
-    arguments.emplace_back("--json");
-    const Finished done = run(arguments, kLongPatience);
-    EXPECT_EQ(done.status, 0) << done.err;
-    const json parsed = json::parse(done.out, nullptr, false);
-    EXPECT_TRUE(parsed.is_object()) << done.out;
-    return parsed.is_object() ? parsed : json::object();
-  }
+  json server_json(const std::vector<std::string>& arguments) const { return json_of(arguments); }
 
   const TempFolder folder_;
   const fs::path take_ = folder_.path() / "take";
@@ -110,6 +116,36 @@ TEST_F(SmallTake, DenseSurfacesAreMarkedAndCounted) {
                               (folder_.path() / "no").string(), "--fill-holes", "17"},
                              kLongPatience);
   EXPECT_EQ(wrong.status, 2);
+}
+
+bool same(const Result<Image8>& a, const Result<Image8>& b) {
+  return a && b && a->size() == b->size() && std::equal(a->data(), a->data() + a->size(), b->data());
+}
+
+TEST(ProjectorAFieldAhead, IsScoredAndShownByTheExposuresThatWereDecoded) {
+  const TempFolder folder;
+  for (const std::string scan : {"interlaced", "progressive"}) {
+    SCOPED_TRACE(scan);
+    json scores[2];
+    for (const int phase : {0, 1}) {
+      const std::string name = scan + std::to_string(phase);
+      const std::string take = (folder / name).string();
+      json_of({"simulate", "--scene",
+               "walk,width=320,height=240,stripes=40,scan=" + scan + ",phase=" + std::to_string(phase),
+               "--frames", "6", "--out", take});
+      scores[phase] = json_of({"evaluate", take, "--pictures", (folder / (name + "_pictures")).string()});
+      EXPECT_EQ(scores[phase].value("frames", 0), 5 - phase);  // the first pair takes two frames then
+      EXPECT_EQ(scores[phase].value("of", 0), 5 - phase);
+    }
+    EXPECT_GT(scores[1].value("completeness", 0.0), scores[0].value("completeness", 1.0) - 0.02);
+    EXPECT_LT(scores[1].value("rms_um_per_m", 1e9), 1.15 * scores[0].value("rms_um_per_m", 0.0));
+    EXPECT_LT(scores[1].value("outliers", 1.0), scores[0].value("outliers", 1.0) + 0.003);
+  }
+  const auto picture = [&](const char* file) { return read_rgb(folder / file); };
+  EXPECT_TRUE(
+      same(picture("progressive1_pictures/000003-slide.png"), picture("progressive1/frames/000005.png")));
+  EXPECT_TRUE(same(picture("progressive1_pictures/000003-complement.png"),
+                   picture("progressive1/frames/000006.png")));
 }
 
 }  // namespace
