@@ -98,6 +98,7 @@ Status CalibrationSession::order(const std::string& action) {
   } else if (action == "take") {
     state_.armed = true;
     armed_ns_ = watched_ns_;
+    armed_frames_ = frames_;
   } else {
     state_.automatic = action == "automatic";
   }
@@ -232,6 +233,7 @@ Status CalibrationSession::go_on(CalibrationTask& task, StillCollector& collecto
   const bool rests = collector.at_rest() >= task.cycle();
   std::unique_lock lock(mutex_);
   state_.at_rest = collector.at_rest();
+  ++frames_;
   if (state_.phase == CalibrationPhase::kSolved) {
     if (wish_ != Wish::kMore) return {};
     wish_ = Wish::kNone;
@@ -241,7 +243,8 @@ Status CalibrationSession::go_on(CalibrationTask& task, StillCollector& collecto
     return {};
   }
   const bool takes = rests && (state_.armed || (state_.automatic && came_to_rest));
-  const bool too_late = state_.armed && !rests && steady_now_ns() - armed_ns_ > place_.rest_within.count();
+  const bool too_late = state_.armed && !rests && steady_now_ns() - armed_ns_ > place_.rest_within.count() &&
+                        frames_ - armed_frames_ >= place_.rest_cycles * task.cycle();
   const bool solves = std::exchange(wish_, wish_ == Wish::kSolve ? Wish::kNone : wish_) == Wish::kSolve;
   if (takes || too_late) state_.armed = false;
   if (too_late)

@@ -39,7 +39,10 @@ struct CalibrationPlace {
   ProjectorDriver& projector;
   const ProjectorConfig& config;
   std::chrono::nanoseconds unwatched_for = std::chrono::seconds(20);  // then it is given up
-  std::chrono::nanoseconds rest_within = std::chrono::seconds(20);    // of a view that is to be taken
+  // Of a view that is to be taken; and in so many of the projector's cycles, where the camera's frames come
+  // slowly.
+  std::chrono::nanoseconds rest_within = std::chrono::seconds(20);
+  std::uint64_t rest_cycles = 10;
 };
 
 /// Every function may be called from any thread.
@@ -92,9 +95,11 @@ class CalibrationSession {
   Wish wish_ = Wish::kNone;
   bool cancelled_ = false;
   bool ended_ = false;
-  std::int64_t armed_ns_ = 0;      // when a view was asked for
-  std::int64_t watched_ns_;        // when somebody watched last
-  FieldSource* source_ = nullptr;  // while it is watched
+  std::int64_t armed_ns_ = 0;       // when a view was asked for
+  std::uint64_t frames_ = 0;        // seen
+  std::uint64_t armed_frames_ = 0;  // of them, when a view was asked for
+  std::int64_t watched_ns_;         // when somebody watched last
+  FieldSource* source_ = nullptr;   // while it is watched
   std::thread thread_;
 };
 

@@ -107,6 +107,18 @@ TEST_F(CalibrationSessionTest, InTheDarkNothingIsTaken) {
   EXPECT_FALSE(session->state().armed);
 }
 
+TEST_F(CalibrationSessionTest, WhereFramesComeSlowlyTimeAloneRefusesNothing) {
+  place_.rest_within = std::chrono::nanoseconds(1);
+  const auto session = start("colour", ",rate=4");  // eight frames are needed
+  ASSERT_TRUE(reaches(*session, CalibrationPhase::kWatching));
+  ASSERT_TRUE(session->order("take"));
+  ASSERT_TRUE(eventually([&] {
+    const CalibrationState state = session->state();
+    return state.phase == CalibrationPhase::kSolved || !state.message.empty();
+  }));
+  EXPECT_EQ(session->state().message, "");
+}
+
 TEST_F(CalibrationSessionTest, AnOverexposedBoardIsNotUsed) {
   const auto session = start("geometry", ",exposure=6");
   ASSERT_TRUE(reaches(*session, CalibrationPhase::kWatching));
