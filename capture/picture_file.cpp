@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/whole_file.h"
+#include "capture/picture_decode.h"
 #include "capture/png_check.h"
 
 namespace relievo {
@@ -35,6 +36,7 @@ class Numbers {
   bool little_endian_;
 };
 
+constexpr std::string_view kJpeg = "\xFF\xD8\xFF";
 constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n";
 
 bool begins_with(Bytes file, std::string_view magic) {
@@ -126,7 +128,7 @@ std::optional<std::uint64_t> declared_pixels(Bytes file) {
   std::uint64_t found = 0;
   if (begins_with(file, kPng)) {
     found = png_pixels(file);
-  } else if (begins_with(file, "\xFF\xD8\xFF")) {
+  } else if (begins_with(file, kJpeg)) {
     found = jpeg_pixels(file);
   } else if (begins_with(file, "BM")) {
     found = bmp_pixels(file);
@@ -150,6 +152,10 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
     return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
   if (begins_with(file, kPng)) {
     if (const auto whole = check_png(file); !whole) return Error{name + " " + whole.error().message};
+  }
+  if (begins_with(file, kPng) || begins_with(file, kJpeg)) {
+    auto picture = begins_with(file, kPng) ? decode_png(file) : decode_jpeg(file);
+    return picture ? std::move(picture) : Error{name + " " + picture.error().message};
   }
   try {
     const cv::Mat bgr = cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())),

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a PNG is whole, before a decoder sees it: libpng would print to stderr and hand back half a
-// picture.
+// Whether a PNG is whole, before a decoder sees it.
 #pragma once
 
 #include <cstdint>

@@ -13,6 +13,7 @@
 #include <string>
 
 #include "base/whole_file.h"
+#include "capture/picture_decode.h"
 #include "capture/picture_file.h"
 #include "capture/png_check.h"
 
@@ -96,18 +97,8 @@ Result<Image8> read_picture(const std::filesystem::path& file, int width, int he
     return Error{name + " is " + std::to_string(header->width) + " x " + std::to_string(header->height) +
                  ", but rig.yaml says " + std::to_string(width) + " x " + std::to_string(height)};
   }
-  try {
-    const cv::Mat bgr = cv::imdecode(cv::_InputArray(bytes.data(), static_cast<int>(bytes.size())),
-                                     cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    if (bgr.cols != width || bgr.rows != height || bgr.type() != CV_8UC3)
-      return Error{name + " cannot be decoded"};
-    Image8 image(width, height, 3);
-    cv::Mat rgb(height, width, CV_8UC3, image.data());
-    cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
-    return image;
-  } catch (const std::exception&) {
-    return Error{name + " cannot be decoded"};
-  }
+  auto picture = decode_png(bytes);
+  return picture ? std::move(picture) : Error{name + " " + picture.error().message};
 }
 
 Status write_picture(const std::filesystem::path& file, const Image8& image) {

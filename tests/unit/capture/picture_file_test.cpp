@@ -84,6 +84,58 @@ TEST_F(PictureFile, ADamagedPngIsRefusedInOneLine) {
   EXPECT_THAT(cut.error().message, HasSubstr("is cut short"));
 }
 
+std::uint32_t crc32(const std::uint8_t* data, std::size_t size) {
+  std::uint32_t c = ~0U;
+  for (std::size_t i = 0; i < size; ++i) {
+    c ^= data[i];
+    for (int bit = 0; bit < 8; ++bit) c = (c & 1) != 0 ? (c >> 1) ^ 0xEDB88320U : c >> 1;
+  }
+  return ~c;
+}
+
+/// Whose checksums are right: the program that wrote it was at fault.
+TEST_F(PictureFile, APngOfBrokenDataIsRefusedInOneLine) {
+  Bytes broken = encoded(".png");
+  constexpr std::array<std::uint8_t, 4> kData = {'I', 'D', 'A', 'T'};
+  const auto found = std::search(broken.begin(), broken.end(), kData.begin(), kData.end());
+  ASSERT_NE(found, broken.end());
+  const auto at = static_cast<std::size_t>(found - broken.begin());
+  std::size_t length = 0;
+  for (std::size_t i = at - 4; i < at; ++i) length = length << 8 | broken[i];
+  std::fill_n(broken.begin() + static_cast<std::ptrdiff_t>(at + 6), length - 2, 0xEE);
+  const std::uint32_t crc = crc32(&broken[at], 4 + length);
+  for (std::size_t i = 0; i < 4; ++i)
+    broken[at + 4 + length + i] = static_cast<std::uint8_t>(crc >> (24 - 8 * i));
+  testing::internal::CaptureStderr();
+  const auto picture = read(broken);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(picture.ok());
+  EXPECT_THAT(picture.error().message, HasSubstr("is damaged: "));
+}
+
+TEST_F(PictureFile, AJpegThatIsCutShortIsRefusedInOneLine) {
+  const Bytes whole = encoded(".jpg");
+  testing::internal::CaptureStderr();
+  const auto cut = read({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(whole.size() * 3 / 4)});
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(cut.ok());
+  EXPECT_THAT(cut.error().message, HasSubstr("is damaged: "));
+}
+
+TEST_F(PictureFile, PngsOfOtherKindsBecomeRgb) {
+  const cv::Mat grey16(2, 3, CV_16UC1, cv::Scalar(0x1234));
+  const cv::Mat alpha(2, 3, CV_8UC4, cv::Scalar(3, 2, 1, 77));  // BGR and alpha
+  Bytes file;
+  ASSERT_TRUE(cv::imencode(".png", grey16, file));
+  const auto grey = read(file);
+  ASSERT_TRUE(grey.ok()) << grey.error().message;
+  EXPECT_EQ(std::vector<int>(grey->data(), grey->data() + 3), (std::vector<int>{0x12, 0x12, 0x12}));
+  ASSERT_TRUE(cv::imencode(".png", alpha, file));
+  const auto colours = read(file);
+  ASSERT_TRUE(colours.ok()) << colours.error().message;
+  EXPECT_EQ(std::vector<int>(colours->data(), colours->data() + 3), (std::vector<int>{1, 2, 3}));
+}
+
 /// A file of each format that says it has 65,500 x 65,500 pixels: 13 GB.
 TEST_F(PictureFile, WhatIsTooLargeToBeTrueIsRefused) {
   const auto put = [](Bytes file, std::size_t at, std::initializer_list<std::uint8_t> bytes) {
