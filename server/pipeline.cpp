@@ -231,7 +231,7 @@ class ThreadedPipeline final : public Pipeline {
     std::optional<std::uint64_t> previous;
     std::uint64_t without_surface = 0;  // frames, before the first surface
     bool any_surface = false;
-    StepWatch steps(source_.info().rig.frame_rate);
+    StepWatch steps(source_.info().pattern, source_.info().rig.frame_rate);
     SlidesSeen slides;
     const bool dropping = !options_.lossless && source_.info().pattern.scheme == Scheme::kComplementary;
     const auto not_alone = [&](const Captured& item) {
@@ -242,7 +242,7 @@ class ThreadedPipeline final : public Pipeline {
       if (!item) break;
       if (next) {
         if (auto seen = paced_.now().observe(item->frame); !seen) fail(seen.error());
-        steps.add(item->frame.time_ns, paced_.now().report().step);
+        steps.add(item->frame.time_ns, paced_.now().report());
         slides.add(item->number, item->frame.time_ns);
         previous = item->number;
         ++observed_;
@@ -259,7 +259,7 @@ class ThreadedPipeline final : public Pipeline {
       // source has counted it, or a take starts again.
       const auto pass = source_.info().frames;
       const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
-      steps.add(item->frame.time_ns, paced_.now().report().step);
+      steps.add(item->frame.time_ns, paced_.now().report());
       say_step(steps);
       if (!*result) offer(item->frame, nullptr, steps);
       if (paced_.now().report().step.mixed) {

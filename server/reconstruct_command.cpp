@@ -182,7 +182,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (!numbers) return numbers.error();
   remove_earlier(options.out, *numbers);
 
-  StepWatch steps((*source)->info().rig.frame_rate);
+  StepWatch steps((*source)->info().pattern, (*source)->info().rig.frame_rate);
   Totals totals;
   totals.scheme = (*source)->info().pattern.scheme;
   Error last_error;
@@ -202,7 +202,7 @@ Status run(const Options& options, StopSignal& stop) {
     auto frame = reconstructor->add(**next);
     if (!frame) return frame.error();
     const double ms = milliseconds(steady_now_ns() - begin);
-    steps.add((*next)->time_ns, reconstructor->report().step);
+    steps.add((*next)->time_ns, reconstructor->report());
     totals.same_slide += reconstructor->report().same_slide;
     totals.white += reconstructor->report().white;
     progress.update(totals.frames);
@@ -222,6 +222,8 @@ Status run(const Options& options, StopSignal& stop) {
   progress.finish();
   if (made && totals.reconstructed == 0) fs::remove(options.out, failed);
   print(totals, steps, options);
+  if (totals.scheme == Scheme::kWhiteFrame && totals.white == 0 && !steps.message().empty())
+    log_warning(steps.message());
   if (totals.unreadable > 0) {
     return Error{std::to_string(totals.unreadable) + " of " + std::to_string(totals.frames) +
                  " frames could not be read (the last: " + last_error.message +

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "capture/pattern/schedule.h"
+
 namespace relievo {
 namespace {
 
@@ -11,10 +13,30 @@ constexpr std::uint64_t kMany = 10;     // % of them: worth a word
 constexpr std::uint64_t kFew = 2;       // % of them: all is well again
 constexpr std::uint64_t kLeast = 15;    // frames before anything is said
 constexpr std::uint64_t kRenewed = 30;  // frames, after which what is said is brought up to date
+constexpr std::uint64_t kCyclesWithoutWhite = 4;
 
 }  // namespace
 
-StepWatch::StepWatch(double frame_rate) : frame_rate_(frame_rate), lately_(kLately) {}
+StepWatch::StepWatch(const Pattern& pattern, double frame_rate)
+    : frame_rate_(frame_rate),
+      white_every_(pattern.scheme == Scheme::kWhiteFrame ? static_cast<std::uint64_t>(cycle_frames(pattern))
+                                                         : 0),
+      lately_(kLately) {}
+
+void StepWatch::add(std::int64_t time_ns, const ReconstructReport& report) {
+  if (white_every_ > 0) return look_for_white(report.white);
+  add(time_ns, report.step);
+}
+
+void StepWatch::look_for_white(bool white) {
+  without_white_ = white ? 0 : without_white_ + 1;
+  if (white) message_.clear();
+  if (without_white_ == kCyclesWithoutWhite * white_every_)
+    message_ =
+        "no frame is white, as one of " + std::to_string(white_every_) +
+        " must be under white-frame: both exposures of each must lie within one slide's time, in step with "
+        "the projector (genlock); or does it show another scheme?";
+}
 
 void StepWatch::add(std::int64_t time_ns, const StepReport& step) {
   if (step.phase) {

@@ -16,12 +16,14 @@ using namespace test;
 
 constexpr double kRate = 29.97;
 
-StepReport at(float phase, bool mixed) {
-  return {.phase = phase, .mixed = mixed};
+ReconstructReport at(float phase, bool mixed) {
+  ReconstructReport report;
+  report.step = {.phase = phase, .mixed = mixed};
+  return report;
 }
 
 TEST(StepWatch, SpeaksOnceManyAreDroppedAndNoMoreWhenFewAre) {
-  StepWatch watch(kRate);
+  StepWatch watch(Pattern{}, kRate);
   std::int64_t frame = 0;
   const auto add = [&](int count, float phase, bool mixed) {
     for (int i = 0; i < count; ++i) watch.add(frame++ * 33'366'700, at(phase, mixed));
@@ -38,6 +40,25 @@ TEST(StepWatch, SpeaksOnceManyAreDroppedAndNoMoreWhenFewAre) {
   EXPECT_EQ(watch.message(), "");
   EXPECT_NE(watch.advice(), "");
   EXPECT_EQ(watch.status().mixed, 28U);
+}
+
+TEST(StepWatch, SpeaksWhereNoFrameIsWhiteThatShouldBe) {
+  Pattern pattern;
+  pattern.slides = 2;
+  pattern.scheme = Scheme::kWhiteFrame;
+  StepWatch watch(pattern, kRate);
+  const auto add = [&](bool white) {
+    ReconstructReport report;
+    report.white = white;
+    watch.add(0, report);
+  };
+  for (int i = 0; i < 11; ++i) add(false);
+  EXPECT_EQ(watch.message(), "");
+  add(false);
+  EXPECT_NE(watch.message().find("no frame is white, as one of 3 must be"), std::string::npos)
+      << watch.message();
+  add(true);
+  EXPECT_EQ(watch.message(), "");
 }
 
 struct Served {
@@ -81,6 +102,15 @@ TEST(ServedOutOfStep, InStepNothingIsSaid) {
   ASSERT_TRUE(served.done) << served.done.error().message;
   EXPECT_EQ(served.status.drops_capture, 0U);
   EXPECT_EQ(served.status.message, "");
+}
+
+TEST(ServedOutOfStep, WhiteFrameThatShowsNoWhiteIsSaid) {
+  const Served in_step = serve(",frames=18,scheme=white-frame");
+  ASSERT_TRUE(in_step.done) << in_step.done.error().message;
+  EXPECT_EQ(in_step.status.message, "");
+  const Served out_of_step = serve(",frames=18,scheme=white-frame,phase=0.5");
+  EXPECT_NE(out_of_step.status.message.find("no frame is white"), std::string::npos)
+      << out_of_step.status.message;
 }
 
 TEST(ServedOutOfStep, ALoopOfMixedExposuresAloneEndsWithAdvice) {
