@@ -42,11 +42,12 @@ class RenderedSource final : public FieldSource {
     frame.number = number_++;
     frame.time_ns = std::llround(static_cast<double>(index) * 1e9 / info_.rig.frame_rate);
     frame.scan = info_.rig.scan;
+    frame.field_order = info_.rig.field_order;
     frame.picture = std::move(pair.lit);
     if (frame.scan == Scan::kProgressive) {
       frame.complement = std::move(pair.complement);
     } else {
-      for (int y = 1; y < frame.picture.height(); y += 2)
+      for (int y = first_row(frame.field_order, 1); y < frame.picture.height(); y += 2)
         std::copy_n(pair.complement.row(y), pair.complement.stride(), frame.picture.row(y));
     }
     return std::optional(std::move(frame));

@@ -65,6 +65,7 @@ TEST_P(SourceCompliance, FramesFitTheRigAndComeInOrder) {
     ASSERT_TRUE(*frame) << "ended after " << got;
     const CapturedFrame& f = **frame;
     EXPECT_EQ(f.scan, info.rig.scan);
+    EXPECT_EQ(f.field_order, info.rig.field_order);
     EXPECT_EQ(f.picture.width(), info.rig.camera.width);
     EXPECT_EQ(f.picture.height(), info.rig.camera.height);
     EXPECT_EQ(f.picture.channels(), 3);

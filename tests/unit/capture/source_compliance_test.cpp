@@ -24,6 +24,8 @@ const SourceCase kCases[] = {
     {"SimProgressiveLoop", true,
      [](const auto&) { return "sim:plane,width=64,height=48,scan=progressive,period=6,drop=4" + kSmall; }},
     {"Board", false, [](const auto&) { return "sim:board,width=64,height=48,frames=7" + kSmall; }},
+    {"BoardBottomFirst", false,
+     [](const auto&) { return "sim:board,width=64,height=48,frames=7,field_order=bottom" + kSmall; }},
     {"BoardProgressiveLoop", true,
      [](const auto&) { return "sim:board,width=64,height=48,scan=progressive,drop=5" + kSmall; }},
     {"Sheet", false, [](const auto&) { return "sim:sheet,width=64,height=48,frames=9" + kSmall; }},
