@@ -18,6 +18,7 @@
 #include "cli/checks.h"
 #include "server/calibrate_commands.h"
 #include "server/calibrate_live.h"
+#include "server/calibrate_views.h"
 #include "server/calibration_report.h"
 #include "server/camera_flags.h"
 
@@ -144,7 +145,7 @@ void warn(const ColourCalibration& c) {
 Status run(const Options& options, StopSignal& stop) {
   RigPart before;
   if (!options.update.empty()) {
-    auto part = read_rig_part(options.update);
+    auto part = rig_to_update(options.update);
     if (!part) return part.error();
     before = *part;
   }

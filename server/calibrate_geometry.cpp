@@ -199,7 +199,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (!board) return board.error();
   RigPart before;
   if (!options.update.empty()) {
-    auto part = read_rig_part(options.update);
+    auto part = rig_to_update(options.update);
     if (!part) return part.error();
     before = *part;
   }

@@ -80,6 +80,13 @@ OneView measure_one(const fs::path& folder, const ViewCode& code, const Board& b
 
 }  // namespace
 
+Result<RigPart> rig_to_update(const std::string& file) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored))
+    return Error{file + " is missing, which --update is to add to: --out " + file + " begins a new one"};
+  return read_rig_part(file);
+}
+
 Result<std::optional<Pattern>> stripes_of(const std::string& folder, const std::string& pattern) {
   if (pattern == "gray") return std::optional<Pattern>();
   const fs::path file = pattern.empty() ? fs::path(folder) / "pattern.yaml" : fs::path(pattern);

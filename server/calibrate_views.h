@@ -10,6 +10,7 @@
 #include "base/result.h"
 #include "base/rig.h"
 #include "capture/calibrate/measure_view.h"
+#include "capture/calibrate/rig_part.h"
 #include "cli/size_option.h"
 #include "cli/stop_signal.h"
 
@@ -28,6 +29,9 @@ struct MeasuredViews {
   PinholeModel camera;     // its size
   bool of_fields = false;  // some are an interlaced camera's frames
 };
+
+/// What the rig.yaml that --update names says so far; where there is none, the error says how to begin one.
+Result<RigPart> rig_to_update(const std::string& file);
 
 /// `pattern`: "gray", or the file of the stripes' pattern; empty: FOLDER/pattern.yaml where it is there, Gray
 /// code otherwise.

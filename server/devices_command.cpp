@@ -124,7 +124,8 @@ void print(const Control& c) {
 
 void print(const DeviceDescription& d) {
   std::printf("%s  %s (%s, %s)\n", d.path.c_str(), d.label.c_str(), d.driver.c_str(), d.bus.c_str());
-  std::printf("  now      %s%s\n", d.now.c_str(), joined(d.current_standards).c_str());
+  std::printf("  now      %s%s\n", d.now.empty() ? "no format yet" : d.now.c_str(),
+              joined(d.current_standards).c_str());
   for (const Input& input : d.inputs) {
     std::printf("  input    %u: %s%s%s%s\n", input.number, input.name.c_str(),
                 static_cast<int>(input.number) == d.current_input ? ", selected" : "",

@@ -200,7 +200,12 @@ Status read_files(const CameraOptions& options, SourceInfo& info) {
   }
   if (pattern.empty()) return {};
   auto read = read_pattern(pattern);
-  if (!read) return options.pattern.empty() ? read.error().in("--pattern names another file") : read.error();
+  if (!read && options.pattern.empty() && !std::filesystem::exists(pattern))
+    return Error{
+        pattern.string() +
+        " is missing, which says what is projected: copy the one that relievo-server pattern wrote, or "
+        "name it with --pattern"};
+  if (!read) return read.error();
   info.pattern = *std::move(read);
   return {};
 }

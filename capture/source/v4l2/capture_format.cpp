@@ -120,6 +120,8 @@ Result<const PixelFormat*> choose_pixels(const Device& device, const CameraOptio
   const auto has = [&](const PixelFormat& format) {
     return std::find(there.begin(), there.end(), format.fourcc) != there.end();
   };
+  if (there.empty())
+    return Error{device.path() + ": offers no format yet: a loopback device has one once a program feeds it"};
   if (options.format.empty()) {
     for (const PixelFormat& format : pixel_formats()) {
       if (has(format)) return &format;

@@ -327,6 +327,10 @@ TEST(CalibrationExample, RefusalsAreOneLineAndExitOne) {
   refused({"calibrate", "geometry", empty, "--board", "chessboard:9x7:25mm", "--projector", "1024x768",
            "--out", rig},
           "has no folders");
+  refused({"calibrate", "colour", empty, "--update", rig}, "--out " + rig + " begins a new one");
+  refused({"calibrate", "geometry", empty, "--board", "chessboard:9x7:25mm", "--projector", "1024x768",
+           "--update", rig},
+          "--out " + rig + " begins a new one");
   refused({"import", "gray", empty, "--out", empty + "/o", "--projector", "64x48"}, "has 0 pictures");
   EXPECT_FALSE(fs::exists(rig));
 }

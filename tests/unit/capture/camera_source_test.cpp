@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <climits>
+#include <fstream>
 
 #include "capture/source/v4l2/driver_clock.h"
 #include "fake_camera.h"
+#include "tests/support/striped_scene.h"
+#include "tests/support/temp_folder.h"
 
 namespace relievo {
 namespace {
@@ -204,6 +207,8 @@ TEST(CameraSource, RefusalsSayWhatToDo) {
   EXPECT_SAYS(refusal(camera, {.field = "interlaced"}), "gives progressive instead of interlaced");
   EXPECT_SAYS(refusal(camera, {.controls = {{"gain", "1"}}}), "has no control \"gain\"");
   EXPECT_SAYS(refusal(camera, {.dmabuf = true}), "leave --dmabuf out");
+  camera.errors[VIDIOC_ENUM_FMT] = {EINVAL};
+  EXPECT_SAYS(refusal(camera), "offers no format yet");
   camera.fourcc = V4L2_PIX_FMT_H264;
   EXPECT_SAYS(refusal(camera), "only H264");
   camera.fourcc = V4L2_PIX_FMT_RGB24;
@@ -213,6 +218,15 @@ TEST(CameraSource, RefusalsSayWhatToDo) {
   EXPECT_SAYS(refusal(camera), "is no camera");
   camera.capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_READWRITE;
   EXPECT_SAYS(refusal(camera), "cannot stream");
+}
+
+TEST(CameraSource, ARigWithoutWhatIsProjectedIsSaid) {
+  const test::TempFolder folder;
+  const auto rig = folder / "rig.yaml";
+  std::ofstream(rig) << to_yaml(test::striped_scene().rig);
+  FakeCamera camera;
+  EXPECT_SAYS(refusal(camera, {.rig = rig.string()}),
+              "pattern.yaml is missing, which says what is projected");
 }
 
 TEST(CameraSource, ADriverThatLiesAboutItsRowsIsRefused) {
