@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/json_text.h"
+#include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
@@ -99,7 +100,9 @@ Status write_gray(const Options& options, StopSignal& stop) {
   };
   if (const Status written = write_gray_slides(options.out, options.size.width, options.size.height, go_on);
       !written) {
-    return written;
+    if (!stop.stopped()) return written;
+    log_info(written.error().message);
+    return {};
   }
   progress.finish();
   if (options.json) {

@@ -129,6 +129,18 @@ Status report(const ShowReport& shown, const Options& options, const DisplayOutp
   return {};
 }
 
+Status report_still(const Options& options, const DisplayOutput& output) {
+  const DisplayMode& mode = output.mode;
+  if (options.json) {
+    const nlohmann::json json = {
+        {"output", output.name}, {"width", mode.width}, {"height", mode.height}, {"still", options.still}};
+    std::puts(json_text(json).c_str());
+  } else {
+    std::printf("%s on %s, %dx%d\n", options.still.c_str(), output.name.c_str(), mode.width, mode.height);
+  }
+  return {};
+}
+
 Status project(const Options& options, StopSignal& stop) {
   auto pattern = pattern_of(options.pattern);
   if (!pattern) return pattern.error();
@@ -157,7 +169,12 @@ Status project(const Options& options, StopSignal& stop) {
   log_info("projecting on " + output.name + ", " + std::to_string(output.mode.width) + "x" +
            std::to_string(output.mode.height) + "; Escape or Ctrl-C ends");
   const auto stopped = [&stop] { return stop.stopped(); };
-  if (still) return show_still(**display, draw(*still, *pattern, output.mode), stopped);
+  if (still) {
+    const Status shown = show_still(**display, draw(*still, *pattern, output.mode), stopped);
+    if (!shown) return shown;
+    display->reset();
+    return report_still(options, output);
+  }
   const auto cycle = cycle_of(options.cycle, *pattern, output.mode);
   if (!cycle) return cycle.error();
   Progress progress("project", "pictures", options.pictures.value_or(0));

@@ -2,6 +2,7 @@
 // docs/CALIBRATION.md's worked example, from nothing to a reconstruction, and how the commands refuse.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <filesystem>
 #include <fstream>
@@ -12,6 +13,8 @@
 #include "capture/picture_file.h"
 #include "capture/rig_file.h"
 #include "tests/e2e/calibrate/calibrate_report.h"
+#include "tests/support/patience.h"
+#include "tests/support/process.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo::test {
@@ -212,6 +215,17 @@ TEST(CalibrationExample, GraySlidesAreImportedBack) {
       {"import", "gray", slides, "--projector", "128x96", "--out", (folder / "maps").string(), "--json"});
   EXPECT_EQ(imported.at("decoded_pixels"), 128 * 96);
   EXPECT_TRUE(fs::exists(folder / "maps/columns.npy"));
+}
+
+TEST(CalibrationExample, InterruptedSlidesAreNoFailure) {
+  const TempFolder folder;
+  const std::string out = (folder / "gray").string();
+  Process pattern(
+      {program("relievo-server").string(), "pattern", "--gray", "--size", "4096x2160", "--out", out});
+  ASSERT_TRUE(eventually([&] { return fs::exists(out + "/gray_00.png"); })) << pattern.err();
+  pattern.signal(SIGINT);
+  EXPECT_EQ(pattern.wait(), 0) << pattern.err();
+  EXPECT_THAT(pattern.err(), HasSubstr(" of 50 slides are in " + out));
 }
 
 TEST(CalibrationExample, AnImportMayWriteAmongThePicturesAgainAndAgain) {

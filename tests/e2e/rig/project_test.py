@@ -62,10 +62,11 @@ class Project(ScreenTest):
         for name, picture in (("slide1", first), ("slide1_complement", complement),
                               ("white", np.full((HEIGHT, WIDTH, 3), 255, np.uint8)),
                               ("black", np.zeros((HEIGHT, WIDTH, 3), np.uint8))):
-            child = self.start("--still", name)
+            child = self.start("--still", name, "--json")
             self.assertIn("projecting on", child.stderr.readline())
             self.expect_on_screen(child, picture)
-            self.interrupt(child)
+            report = json.loads(self.interrupt(child))
+            self.assertEqual((report["still"], report["width"], report["height"]), (name, WIDTH, HEIGHT))
 
     def test_every_slide_is_exact_and_in_turn(self):
         for options in ([], ["--interlaced"], ["--scheme", "white-field"]):
