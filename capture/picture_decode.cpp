@@ -78,10 +78,15 @@ Result<Image8> decode_jpeg(std::span<const std::uint8_t> file) {
   if (tjDecompressHeader3(turbo.get(), file.data(), size, &width, &height, &subsampling, &colours) != 0)
     return damaged();
   Image8 out(width, height, 3);
-  // A warning is damage too: the rest of such a picture is grey.
-  if (tjDecompress2(turbo.get(), file.data(), size, out.data(), width, static_cast<int>(out.stride()), height,
-                    TJPF_RGB, TJFLAG_ACCURATEDCT) != 0)
-    return damaged();
+  const auto decode = [&](int flags) {
+    return tjDecompress2(turbo.get(), file.data(), size, out.data(), width, static_cast<int>(out.stride()),
+                         height, TJPF_RGB, TJFLAG_ACCURATEDCT | flags) == 0;
+  };
+  // A warning is damage too, the rest of such a picture is grey; but for bytes too many between the parts of
+  // a file, which some cameras write.
+  if (decode(TJFLAG_STOPONWARNING)) return out;
+  if (std::strstr(tjGetErrorStr2(turbo.get()), "extraneous bytes") == nullptr) return damaged();
+  if (!decode(0) && tjGetErrorCode(turbo.get()) != TJERR_WARNING) return damaged();
   return out;
 }
 

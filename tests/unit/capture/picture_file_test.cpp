@@ -122,6 +122,16 @@ TEST_F(PictureFile, AJpegThatIsCutShortIsRefusedInOneLine) {
   EXPECT_THAT(cut.error().message, HasSubstr("is damaged: "));
 }
 
+/// As some cameras write them.
+TEST_F(PictureFile, AJpegWithAByteTooManyIsRead) {
+  const Bytes whole = encoded(".jpg");
+  Bytes longer = whole;
+  longer.insert(longer.end() - 2, 0);  // before the end's marker
+  const auto expected = read(whole), picture = read(longer);
+  ASSERT_TRUE(expected.ok() && picture.ok()) << picture.error().message;
+  EXPECT_TRUE(std::equal(picture->data(), picture->data() + picture->size(), expected->data()));
+}
+
 TEST_F(PictureFile, PngsOfOtherKindsBecomeRgb) {
   const cv::Mat grey16(2, 3, CV_16UC1, cv::Scalar(0x1234));
   const cv::Mat alpha(2, 3, CV_8UC4, cv::Scalar(3, 2, 1, 77));  // BGR and alpha
