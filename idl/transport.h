@@ -94,8 +94,8 @@ class RungPublisher {
   virtual bool due() = 0;
 };
 
-/// Writes recorded samples unchanged: the bytes readers get are the recorded ones. Any thread, one call at a
-/// time.
+/// Writes recorded samples unchanged: the bytes readers get are the recorded ones. But a server's status
+/// comes without the qualities that it offered then. Any thread, one call at a time.
 class RawPublisher {
  public:
   /// Fails as Publisher::create() does.

@@ -121,7 +121,8 @@ void Hub::announce(const StreamInfo& info, ServerClock clock) {
   auto& entry = streams_[info.stream];
   if (!entry) entry = std::make_unique<Entry>();
   if (entry->live && *entry->info_text == *text) return;  // DDS repeats it to every late joiner
-  if (entry->live) forget_frames(*entry);                 // a server that was replaced before anyone noticed
+  // A server that was replaced before anyone noticed; one that goes on may have been told where it stands.
+  if (entry->live && entry->facts.info.started_ns != info.started_ns) forget_frames(*entry);
   entry->facts.info = info;
   entry->clock = clock;
   entry->info_text = std::move(text);

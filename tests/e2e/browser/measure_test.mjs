@@ -321,9 +321,9 @@ let failed = 1;
 let server;
 let web;
 const folder = mkdtempSync(join(tmpdir(), 'relievo-measure-'));
-/** On a server of its own. */
+/** On a server of its own, which decodes as exactly as it can however busy the machine is. */
 async function checkOn(source, checks, page = kPage) {
-  server = await Server.start(serverPath, ['--source', source]);
+  server = await Server.start(serverPath, ['--source', source, '--decoder', 'ordered']);
   const opened = await pagesOf(browser, server.address, complaints).open('/', page);
   opened.setDefaultTimeout(kLongPatienceMs); // with each frame, which is computed for what is drawn of it
   failed += await runChecks(checks, opened);

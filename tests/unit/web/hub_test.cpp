@@ -151,6 +151,16 @@ TEST_F(AnotherServer, OldFramesDoNotComeWithItsDescription) {
   EXPECT_TRUE(gets_a_frame(*late));
 }
 
+TEST_F(AnotherServer, TheSameOneThatIsToldWhereItStandsKeepsItsFrames) {
+  hub.publish("face", encode(true, TextureCodec::kJpeg));
+  StreamInfo info = make_info();
+  info.rig.world_from_camera.emplace();
+  hub.announce(info);
+  const auto late = hub.watch("face", [] {});
+  EXPECT_TRUE(gets_a_frame(*watcher));
+  EXPECT_TRUE(gets_a_frame(*late));
+}
+
 TEST_F(AnotherServer, WhatBuildsOnOldFramesGoesToNobody) {
   EXPECT_EQ(through(encode(true, TextureCodec::kJpeg)), 0U);
   takes_its_place();
