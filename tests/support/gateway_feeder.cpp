@@ -99,7 +99,6 @@ StreamInfo make_info(const std::string& name) {
   StreamInfo info;
   info.stream = name;
   info.source = "feeder:ball";
-  info.started_ns = utc_now_ns();
   info.rig.frame_rate = 30;
   info.rig.camera.width = kWidth;
   info.rig.camera.height = kHeight;
@@ -217,6 +216,7 @@ int feed(std::uint16_t port, double rate) {
   FrameEncoder encoder(make_info("").rig, make_info("").pattern);
   FrameEncoder also_encoder(make_info("").rig, make_info("").pattern);
   std::uint64_t sequence = 0;
+  std::int64_t started_ns = utc_now_ns();
   auto next = std::chrono::steady_clock::now();
   for (;;) {
     next += std::chrono::microseconds(static_cast<int>(1e6 / rate));
@@ -225,6 +225,7 @@ int feed(std::uint16_t port, double rate) {
     if (orders.quit) return 0;
     if (std::exchange(orders.announce, false)) {
       const auto announce = [&](StreamInfo info) {
+        info.started_ns = started_ns;  // another one is another server's
         if (const auto at = orders.places.find(info.stream); at != orders.places.end())
           info.rig.world_from_camera = at->second;
         gateway.announce(info);
@@ -232,7 +233,10 @@ int feed(std::uint16_t port, double rate) {
       announce(orders.quality ? make_info(orders.stream, *orders.quality) : make_info(orders.stream));
       if (!orders.also.empty()) announce(make_info(orders.also));
     }
-    if (std::exchange(orders.withdraw, false)) gateway.withdraw(orders.stream);
+    if (std::exchange(orders.withdraw, false)) {
+      gateway.withdraw(orders.stream);
+      started_ns = utc_now_ns();
+    }
     if (!orders.state.empty()) {
       ServerStatus status;
       status.stream = orders.stream;
