@@ -297,7 +297,8 @@ TEST(RecordingFormats, RecordingsThatWereJoinedAreAllReadAndMadeOne) {
   if (!std::filesystem::exists(js / "node_modules/@mcap/core")) return;
   const auto checked = run({"/usr/bin/env", "node", js / "validate.mjs", one});
   ASSERT_EQ(checked.status, 0) << checked.err;
-  for (const auto& topic : nlohmann::json::parse(checked.out)["topics"]) {
+  const auto read = nlohmann::json::parse(checked.out);
+  for (const auto& topic : read["topics"]) {
     if (topic["topic"] == "relievo/frame") {
       EXPECT_EQ(topic["count"], 21);
     }
