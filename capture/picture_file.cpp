@@ -150,13 +150,14 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
   if (!declared) return Error{name + " cannot be read as a picture: it is no PNG, JPEG, BMP, PNM or TIFF"};
   if (*declared > kMostPicturePixels || *declared > kMostPicturePixelsPerByte * file.size())
     return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
-  if (begins_with(file, kPng)) {
-    if (const auto whole = check_png(file); !whole) return Error{name + " " + whole.error().message};
-  }
-  if (begins_with(file, kPng) || begins_with(file, kJpeg)) {
-    auto picture = begins_with(file, kPng) ? decode_png(file) : decode_jpeg(file);
+  const auto named = [&](Result<Image8> picture) {
     return picture ? std::move(picture) : Error{name + " " + picture.error().message};
+  };
+  if (begins_with(file, kPng)) {
+    const auto whole = check_png(file);
+    return named(whole ? decode_png(file) : whole.error());
   }
+  if (begins_with(file, kJpeg)) return named(decode_jpeg(file));
   try {
     const cv::Mat bgr = cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())),
                                      cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);

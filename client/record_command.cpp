@@ -47,10 +47,6 @@ std::string lost_note(std::uint64_t lost) {
   return lost > 0 ? std::to_string(lost) + " lost" : std::string();
 }
 
-Rung rung_of(const Options& options) {
-  return rung_named(options.quality).value_or(Rung::kFull);
-}
-
 /// Whether a stream has the quality that is recorded, as its status says.
 bool has_quality(const ServerStatus& status, Rung rung) {
   return rung == Rung::kFull ||
@@ -137,7 +133,7 @@ Status run(Options options, StopSignal& stop) {
                      .max_s = options.seconds,
                      .foxglove = options.foxglove,
                      .recording = *recording});
-  const Rung rung = rung_of(options);
+  const Rung rung = rung_named(options.quality).value_or(Rung::kFull);
   std::atomic<bool> misses{false};
   auto callbacks = recorder.callbacks();
   callbacks.status = [&](const ServerStatus& status) { misses = !has_quality(status, rung); };

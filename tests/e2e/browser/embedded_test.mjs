@@ -10,7 +10,7 @@ import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
-import { packed, serveSite } from './site.mjs';
+import { packed, player, serveSite, shot } from './site.mjs';
 import { withoutWebGl } from './web.mjs';
 
 const [serverPath, packagePath] = process.argv.slice(2);
@@ -58,7 +58,6 @@ async function newPage(path = '/page.html', { at = origin, before } = {}) {
   return page;
 }
 
-const player = (page, read) => page.evaluate(`(${read})(document.querySelector('relievo-player'))`);
 const when = async (page, condition) => {
   const holds = () => player(page, condition);
   await eventually(`not: ${condition}`, holds).catch(async (error) => {
@@ -67,14 +66,7 @@ const when = async (page, condition) => {
 };
 const set = (page, properties) => page.evaluate((all) => void Object.assign(document.querySelector('relievo-player'), all), properties);
 /** Opaque share of what the player shows. */
-const opaque = (page) =>
-  page.evaluate(async () => {
-    const bitmap = await createImageBitmap(await document.querySelector('relievo-player').screenshot());
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-    context.drawImage(bitmap, 0, 0);
-    const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-    return rgba.filter((v, i) => i % 4 === 3 && v > 128).length / (bitmap.width * bitmap.height);
-  });
+const opaque = async (page) => (await shot(page)).opaque;
 /** What is said in the player, where it matches. */
 const says = (page, what) => eventually(`it does not say ${what}`, async () => what.test(await page.textContent('relievo-player .message')));
 /** With a page of its own, which is closed behind it. */

@@ -11,7 +11,7 @@ import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
-import { packed, serveSite } from './site.mjs';
+import { packed, player, serveSite, shot } from './site.mjs';
 
 const { McapStreamReader } = createRequire(join(process.cwd(), 'package.json'))('@mcap/core');
 
@@ -45,18 +45,7 @@ recordObject(serverPath, join(site, 'take.mcap'), { rate: 6, frames: 13, options
 const browser = await launchChromium();
 const complaints = [];
 
-const player = (page, read) => page.evaluate(`(${read})(document.querySelector('relievo-player'))`);
 const when = (page, condition) => eventually(`not: ${condition}`, () => player(page, condition));
-/** Opaque share of a picture that the player takes of itself, and a sum of its pixels. */
-const shot = (page) =>
-  page.evaluate(async () => {
-    const bitmap = await createImageBitmap(await document.querySelector('relievo-player').screenshot());
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
-    context.drawImage(bitmap, 0, 0);
-    const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
-    const opaque = rgba.filter((v, i) => i % 4 === 3 && v > 128).length / (bitmap.width * bitmap.height);
-    return { opaque, sum: rgba.reduce((a, b) => a + b, 0) };
-  });
 const forget = (page) =>
   page.evaluate(() => {
     window.frames_ = [];

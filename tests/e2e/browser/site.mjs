@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Another site, which embeds <relievo-player>: the package as `npm pack` makes it, its files, and its content policy.
+// Another site, which embeds <relievo-player>: the package as `npm pack` makes it, its files, its content policy, and what a page's player says and shows.
 import { execFileSync } from 'node:child_process';
 import { createReadStream, existsSync, statSync } from 'node:fs';
 import { createServer } from 'node:http';
@@ -35,3 +35,17 @@ export function serveSite(site, headers = {}) {
   });
   return new Promise((resolve) => server.listen(0, '127.0.0.1', () => resolve(server)));
 }
+
+/** What `read` makes of the page's player. */
+export const player = (page, read) => page.evaluate(`(${read})(document.querySelector('relievo-player'))`);
+
+/** Opaque share of a picture that the player takes of itself, and a sum of its pixels. */
+export const shot = (page) =>
+  page.evaluate(async () => {
+    const bitmap = await createImageBitmap(await document.querySelector('relievo-player').screenshot());
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+    context.drawImage(bitmap, 0, 0);
+    const rgba = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+    const opaque = rgba.filter((v, i) => i % 4 === 3 && v > 128).length / (bitmap.width * bitmap.height);
+    return { opaque, sum: rgba.reduce((a, b) => a + b, 0) };
+  });
