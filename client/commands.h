@@ -18,5 +18,6 @@ Command web_command();
 Command keys_command();
 Command doctor_command();
 Command shot_command();
+Command measure_command();
 
 }  // namespace relievo

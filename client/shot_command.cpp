@@ -3,12 +3,10 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <map>
-#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
@@ -19,13 +17,13 @@
 #include "cli/size_option.h"
 #include "client/commands.h"
 #include "client/input.h"
+#include "client/latest_frame.h"
 #include "client/options.h"
 #include "client/range_frames.h"
 #include "client/recorded_stream.h"
 #include "client/shot/output.h"
 #include "client/shot/render.h"
 #include "client/time_range.h"
-#include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -119,51 +117,6 @@ Result<std::uint64_t> draw_recording(const Options& options, Camera& camera, Sho
   return left_out.frames();
 }
 
-/// The latest frame of a live stream: a renderer that is slower than the camera leaves frames out.
-class LatestFrame {
- public:
-  struct Taken {
-    Frame3D frame;
-    std::optional<PinholeModel> rig;
-  };
-
-  Subscriber::Callbacks callbacks() {
-    Subscriber::Callbacks callbacks;
-    callbacks.info = [this](const StreamInfo& info) {
-      std::lock_guard lock(mutex_);
-      rig_ = info.rig.camera;
-    };
-    callbacks.frame = [this](const std::string&, const FrameMessage& message) {
-      if (!decoder_.can_decode(*message.data)) return;
-      auto frame = decoder_.decode(*message.data);
-      std::lock_guard lock(mutex_);
-      if (!rig_ || !frame || frame->surface.positions.empty()) return;
-      frame_ = *std::move(frame);
-      changed_.notify_all();
-    };
-    return callbacks;
-  }
-
-  /// Nothing where none comes in time.
-  std::optional<Taken> take(std::chrono::duration<double> patience, StopSignal& stop) {
-    std::unique_lock lock(mutex_);
-    const auto end = std::chrono::steady_clock::now() + patience;
-    while (!frame_ && !stop.stopped() && std::chrono::steady_clock::now() < end)
-      changed_.wait_for(lock, std::chrono::milliseconds(100));
-    if (!frame_) return std::nullopt;
-    Taken taken{*std::move(frame_), rig_};
-    frame_.reset();
-    return taken;
-  }
-
- private:
-  FrameDecoder decoder_;  // of the subscriber's thread alone
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::optional<PinholeModel> rig_;
-  std::optional<Frame3D> frame_;
-};
-
 Status draw_live(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
   LatestFrame latest;
   auto subscriber = Subscriber::create(*options.domain, options.input, latest.callbacks());
@@ -175,7 +128,8 @@ Status draw_live(const Options& options, Camera& camera, ShotOutput& output, Sto
     if (!taken || taken->frame.time_ns > end_ns) break;
     if (output.count() == 0)
       end_ns = taken->frame.time_ns + std::llround(options.seconds * kNanosecondsPerSecond);
-    if (auto status = output.add(taken->frame, camera.take(taken->frame, taken->rig)); !status) return status;
+    if (auto status = output.add(taken->frame, camera.take(taken->frame, taken->camera)); !status)
+      return status;
     progress.update(output.count());
   }
   if (output.count() == 0 && !stop.stopped())

@@ -10,6 +10,7 @@
 #include "base/json_text.h"
 #include "base/lens.h"
 #include "base/whole_file.h"
+#include "codec/depth_picture.h"
 #include "codec/export.h"
 #include "codec/surface_check.h"
 #include "codec/texture_png.h"
@@ -17,71 +18,7 @@
 namespace relievo {
 namespace {
 
-constexpr double kNearest_m = 1e-6;  // of a vertex before the camera
 constexpr double kMostUnits = 65'535;
-
-struct Corner {
-  double column, row, inverse_z;
-};
-
-/// z at each pixel's centre, infinite where nothing is. 1/z is linear in the picture.
-class DepthPicture {
- public:
-  explicit DepthPicture(const PinholeModel& camera)
-      : camera_(camera),
-        z_m_(static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height),
-             std::numeric_limits<double>::infinity()) {}
-
-  void draw(const Surface& surface) {
-    std::vector<Corner> corners;
-    corners.reserve(surface.positions.size());
-    for (const Vec3f& p : surface.positions) corners.push_back(seen(p));
-    for (const Triangle& t : surface.triangles) draw(corners[t[0]], corners[t[1]], corners[t[2]]);
-  }
-  double at(std::size_t pixel) const { return z_m_[pixel]; }
-  std::size_t size() const { return z_m_.size(); }
-
- private:
-  Corner seen(const Vec3f& p) const {
-    const double z = static_cast<double>(p[2]);
-    if (!(z > kNearest_m)) return {0, 0, -1};
-    const double x = static_cast<double>(p[0]) / z;
-    const double y = static_cast<double>(p[1]) / z;
-    const auto& k = camera_.matrix;
-    return {k[0] * x + k[1] * y + k[2], k[4] * y + k[5], 1 / z};
-  }
-
-  void draw(const Corner& a, const Corner& b, const Corner& c) {
-    if (std::min({a.inverse_z, b.inverse_z, c.inverse_z}) <= 0) return;
-    const double area = (b.column - a.column) * (c.row - a.row) - (c.column - a.column) * (b.row - a.row);
-    if (area == 0) return;
-    const int first_row = first(std::min({a.row, b.row, c.row}));
-    const int last_row = last(std::max({a.row, b.row, c.row}), camera_.height);
-    const int first_column = first(std::min({a.column, b.column, c.column}));
-    const int last_column = last(std::max({a.column, b.column, c.column}), camera_.width);
-    for (int row = first_row; row <= last_row; ++row) {
-      for (int column = first_column; column <= last_column; ++column) {
-        const double wb =
-            ((column - a.column) * (c.row - a.row) - (c.column - a.column) * (row - a.row)) / area;
-        const double wc =
-            ((b.column - a.column) * (row - a.row) - (column - a.column) * (b.row - a.row)) / area;
-        if (wb < 0 || wc < 0 || wb + wc > 1) continue;
-        const double z =
-            1 / (a.inverse_z + wb * (b.inverse_z - a.inverse_z) + wc * (c.inverse_z - a.inverse_z));
-        double& nearest = z_m_[static_cast<std::size_t>(row) * static_cast<std::size_t>(camera_.width) +
-                               static_cast<std::size_t>(column)];
-        nearest = std::min(nearest, z);
-      }
-    }
-  }
-  static int first(double lowest) { return static_cast<int>(std::ceil(std::clamp(lowest, 0.0, 1e9))); }
-  static int last(double highest, int count) {
-    return static_cast<int>(std::floor(std::clamp(highest, -1.0, count - 1.0)));
-  }
-
-  const PinholeModel& camera_;
-  std::vector<double> z_m_;
-};
 
 }  // namespace
 

@@ -2,16 +2,22 @@
 #include "capture/reconstruct/smooth_columns.h"
 
 #include <cstring>
+#include <limits>
 
 #include "capture/reconstruct/eight.h"
 
 namespace relievo {
 namespace {
 
-// In standard deviations of a column: a straight line fits to within the first (root mean square), a
-// quadratic to within the second (the worst of its lines).
-constexpr float kStraightFit = 1.4F;
-constexpr float kBentFit = 3.F;
+// A quadratic along a boundary fits where the worst of its lines is within so many standard deviations.
+constexpr float kFit = 3.F;
+// What a quadratic's middle lies below the straight line's through the same seven lines, by its bend; its
+// variance, of a column's; and how many of its standard deviations, squared, may still be noise.
+constexpr float kDip = 4;
+constexpr float kDipVariance = 16.F / 84;
+constexpr float kMaybeNoise = 4;
+constexpr int kBeside = 4;  // boundaries to each side that may share a bend
+constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 // Across boundaries. Farther off the cubic than both is the surface itself.
 constexpr float kMost_px = 0.1F;
@@ -25,9 +31,10 @@ RELIEVO_INLINE void take(const Eight& off, Eight& worst) {
   worst = worst < size ? size : worst;
 }
 
-/// Missing neighbours are NaN, which no comparison lets through.
-RELIEVO_INLINE void smooth_body(const std::array<const float*, 7>& rows, const float* noises, int count,
-                                float usual_px, float* out) {
+/// Missing neighbours are NaN, which no comparison lets through. `bends` becomes those of the quadratics over
+/// seven lines, NaN where none fits.
+RELIEVO_INLINE void along_body(const std::array<const float*, 7>& rows, const float* noises, int count,
+                               float usual_px, float* bends, float* out) {
   for (int i = 0; i < count; i += 8) {
     Eight a, c, d, e, f, g, h, noise;
     load(rows[0] + i, a);
@@ -40,7 +47,7 @@ RELIEVO_INLINE void smooth_body(const std::array<const float*, 7>& rows, const f
     load(noises + i, noise);
     const Eight usual = Eight{} + usual_px;
     noise = usual < noise ? noise : usual;
-    const Eight limit = kBentFit * noise;
+    const Eight limit = kFit * noise;
 
     const Eight five = (17 * e + 12 * (d + f) - 3 * (c + g)) * (1.F / 35);
     const Eight slope5 = (2 * (g - c) + (f - d)) * 0.1F;
@@ -64,20 +71,56 @@ RELIEVO_INLINE void smooth_body(const std::array<const float*, 7>& rows, const f
     take(seven - 3 * slope7 + 9 * bend7 - a, worst7);
     take(seven + 3 * slope7 + 9 * bend7 - h, worst7);
 
-    const Eight line7 = (a + c + d + e + f + g + h) * (1.F / 7);
-    const Eight square7 = (a - line7 + 3 * slope7) * (a - line7 + 3 * slope7) +
-                          (c - line7 + 2 * slope7) * (c - line7 + 2 * slope7) +
-                          (d - line7 + slope7) * (d - line7 + slope7) + (e - line7) * (e - line7) +
-                          (f - line7 - slope7) * (f - line7 - slope7) +
-                          (g - line7 - 2 * slope7) * (g - line7 - 2 * slope7) +
-                          (h - line7 - 3 * slope7) * (h - line7 - 3 * slope7);
-    const EightInts straight7 = square7 <= 7 * kStraightFit * kStraightFit * noise * noise;
     // take() keeps a value where it meets a NaN second, so the values themselves are asked.
     const EightInts good5 = (worst5 <= limit) & (five == five);
     const EightInts good7 = (worst7 <= limit) & (seven == seven);
-    const Eight smooth = straight7 ? line7 : good7 ? seven : good5 ? five : e;
-    std::memcpy(out + i, &smooth, sizeof smooth);
+    store(good7 ? bend7 : Eight{} + kNone, bends + i);
+    store(good7 ? seven : good5 ? five : e, out + i);
   }
+}
+
+/// `value` less what may be noise of it, after James and Stein.
+RELIEVO_INLINE void take_noise(const Eight& variance, Eight& value) {
+  const Eight square = value * value;
+  const Eight noise = kMaybeNoise * variance;
+  value = square > noise ? value - value * (noise / square) : Eight{};
+}
+
+/// From quadratics' middles to those of lines, less as much of their dips as is no noise: of the mean of the
+/// dips around, and of the own one's difference from that. A line through noise is exact to .38 of a column,
+/// a quadratic to .58, but a line alone would make what is bent flatter, the more so the stronger noise is.
+RELIEVO_INLINE void share_bends_body(const float* noises, int count, float usual_px, const float* bends,
+                                     float* out) {
+  for (int i = 0; i < count; i += 8) {
+    Eight noise, own, column;
+    load(noises + i, noise);
+    load(bends + i, own);
+    load(out + i, column);
+    const Eight usual = Eight{} + usual_px;
+    noise = usual < noise ? noise : usual;
+    Eight sum = {}, known = {};
+    for (int beside = -kBeside; beside <= kBeside; ++beside) {
+      Eight bend;
+      load(bends + i + beside, bend);
+      const EightInts there = bend == bend;
+      sum += there ? bend : Eight{};
+      known += there ? Eight{} + 1 : Eight{};
+    }
+    own *= kDip;
+    const Eight variance = kDipVariance * noise * noise;
+    Eight shared = kDip * sum / known;
+    take_noise(variance / known, shared);
+    Eight beyond = own - shared;
+    take_noise(variance, beyond);
+    const Eight smooth = column + own - shared - beyond;
+    store(smooth == smooth ? smooth : column, out + i);
+  }
+}
+
+RELIEVO_INLINE void smooth_body(const std::array<const float*, 7>& rows, const float* noises, int count,
+                                float usual_px, float* bends, float* out) {
+  along_body(rows, noises, count, usual_px, bends, out);
+  share_bends_body(noises, count, usual_px, bends, out);
 }
 
 /// A row's numbers at one place and at the two on either side of it.
@@ -120,16 +163,16 @@ RELIEVO_INLINE void across_body(float* column_px, float* sigma_px, int count) {
 }
 
 void smooth_portable(const std::array<const float*, 7>& rows, const float* noises, int count, float usual_px,
-                     float* out) {
-  smooth_body(rows, noises, count, usual_px, out);
+                     float* bends, float* out) {
+  smooth_body(rows, noises, count, usual_px, bends, out);
 }
 void across_portable(float* column_px, float* sigma_px, int count) {
   across_body(column_px, sigma_px, count);
 }
 #if defined(__x86_64__)
 [[gnu::target("avx2")]] void smooth_avx2(const std::array<const float*, 7>& rows, const float* noises,
-                                         int count, float usual_px, float* out) {
-  smooth_body(rows, noises, count, usual_px, out);
+                                         int count, float usual_px, float* bends, float* out) {
+  smooth_body(rows, noises, count, usual_px, bends, out);
 }
 [[gnu::target("avx2")]] void across_avx2(float* column_px, float* sigma_px, int count) {
   across_body(column_px, sigma_px, count);
