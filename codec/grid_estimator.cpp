@@ -171,7 +171,9 @@ void GridEstimator::estimate(const Surface& measured, StripeGrid& grid,
     const float sigma = std::sqrt(1 / weight);
     grid.columns[i] = static_cast<std::int32_t>(std::floor(column * steps + 0.5F));
     tolerance[i] = static_cast<std::uint8_t>(std::min(kToleranceShare * sigma * steps, 255.F));
-    if (!grid.sigmas.empty() && grid.sigmas[i] != 0) grid.sigmas[i] = sigma_px_code(sigma);
+    const float step_px = static_cast<float>(2 * tolerance[i] + 1) / steps;
+    if (!grid.sigmas.empty() && grid.sigmas[i] != 0)
+      grid.sigmas[i] = sigma_px_code(sigma_of_rounded_px(sigma, step_px));
   }
 }
 

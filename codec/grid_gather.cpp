@@ -158,10 +158,15 @@ void Gather::quality() {
   if (!surface_.interpolated.empty() &&
       std::ranges::count(surface_.interpolated, 0) != std::ssize(surface_.interpolated))
     out_.interpolated.assign(out_.columns.size(), 0);
+  const auto steps = static_cast<float>(1 << out_.step_bits);
   for (std::size_t i = 0; i < surface_.grid.size(); ++i) {
     const GridPoint& p = surface_.grid[i];
     const std::size_t place = at(place_key(p));
-    if (!out_.sigmas.empty()) out_.sigmas[place] = sigma_px_code(p.sigma_px);
+    if (!out_.sigmas.empty()) {
+      // What was rounded before, as a stream that is sent on, is not rounded again.
+      const bool rounded = p.column_px * steps != static_cast<float>(out_.columns[place]);
+      out_.sigmas[place] = sigma_px_code(rounded ? sigma_of_rounded_px(p.sigma_px, 1 / steps) : p.sigma_px);
+    }
     if (!out_.interpolated.empty()) out_.interpolated[place] = surface_.interpolated[i] != 0;
   }
 }

@@ -85,6 +85,10 @@ void keep_copies(std::span<const std::size_t> copies, StripeGrid& grid,
   }
 }
 
+float sigma_of_rounded_px(float sigma_px, float step_px) {
+  return sigma_px > 0 ? std::sqrt(sigma_px * sigma_px + step_px * step_px * (1.F / 12)) : 0;
+}
+
 /// By the bits of the number: its octave, and which quarter of it.
 std::uint8_t sigma_px_code(float sigma_px) {
   if (!(sigma_px > 0)) return 0;

@@ -79,6 +79,9 @@ std::vector<std::size_t> copies_of(const StripeGrid& grid);
 /// (GridEncoder::encode) lets neither them nor what they are copies of be moved apart.
 void keep_copies(std::span<const std::size_t> copies, StripeGrid& grid, std::vector<std::uint8_t>& tolerance);
 
+/// Standard deviation of a column of `sigma_px` once it is rounded to multiples of `step_px`. Not known (0)
+/// stays so.
+float sigma_of_rounded_px(float sigma_px, float step_px);
 /// Steps of a quarter octave from a ten-thousandth of a pixel; 0: not known.
 std::uint8_t sigma_px_code(float sigma_px);
 float sigma_px_of_code(std::uint8_t code);
