@@ -96,7 +96,11 @@ class ViewTaker {
     if (coverage_.repeats(view)) return not_used("the board is where it was in a view before; move it");
     const fs::path folder = fs::path(options_.folder) / name;
     if (const Status made = make_folder(folder); !made) return made.error();
-    if (const Status written = write_stripe_view(folder, *stack); !written) return written.error();
+    if (const Status written = write_stripe_view(folder, *stack); !written) {
+      std::error_code ignored;
+      fs::remove_all(folder, ignored);  // this run's own: a part of it would be no view
+      return written.error();
+    }
     ++next_;
     ++taken_;
     log_info(name + " taken (" + std::to_string(taken_) + " of " + std::to_string(options_.views) +
@@ -203,9 +207,14 @@ Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
       log_info("at rest, but not used: " + colours.error().message);
       return false;
     }
+    std::vector<fs::path> files;
     for (std::size_t i = 0; i < pictures.size(); ++i) {
-      const fs::path file = fs::path(options.folder) / (primary_name((*colours)[i]) + ".png");
-      if (const Status written = write_png(file, pictures[i]); !written) return written.error();
+      files.push_back(fs::path(options.folder) / (primary_name((*colours)[i]) + ".png"));
+      if (const Status written = write_png(files.back(), pictures[i]); !written) {
+        std::error_code ignored;
+        for (const fs::path& file : files) fs::remove(file, ignored);  // some of them would be no captures
+        return written.error();
+      }
     }
     done = true;
     return true;

@@ -80,27 +80,39 @@ void print(const Score& s, const FilterCounts& filters, bool json) {
   print_filters(filters, s.frames);
 }
 
-/// Of a frame.
-struct Truths {
-  bool decodable;       // it should give a surface
-  ImageF now;           // at its first exposure, on the rows of geometry
-  ImageF between = {};  // white-field: at the second one of the frame before; empty where it is not known
-};
+/// Of a frame. What is of another time than the frames' own truths is made, the rest lent.
+class Truths {
+ public:
+  bool decodable = false;  // it should give a surface
 
-/// `before`: the truth of the frame before, empty where it is not known. A frame that was regrouped begins
-/// with the second exposure of the frame before; a progressive take has no truth of that time.
-Truths truths_of(const CapturedFrame& frame, bool regrouped, const ImageF& before, const ImageF& now) {
-  const bool interlaced = frame.scan == Scan::kInterlaced;
-  Truths out{true, now.clone()};
-  if (before.empty()) return out;
-  if (regrouped) {
-    out.now = interlaced ? truth_of_field(before, 1) : truth_between(before, now);
-    out.between = before.clone();
-  } else if (interlaced) {
-    out.between = truth_of_field(before, 1);
+  /// `before`: the truth of the frame before, empty where it is not known. A frame that was regrouped begins
+  /// with the second exposure of the frame before; a progressive take has no truth of that time. Both outlive
+  /// this.
+  Truths(const CapturedFrame& frame, bool regrouped, const ImageF& before, const ImageF& now) : now_(&now) {
+    const bool interlaced = frame.scan == Scan::kInterlaced;
+    if (before.empty()) return;
+    if (regrouped) {
+      made_ = interlaced ? truth_of_field(before, 1) : truth_between(before, now);
+      now_ = &made_;
+      between_ = &before;
+    } else if (interlaced) {
+      made_ = truth_of_field(before, 1);
+      between_ = &made_;
+    }
   }
-  return out;
-}
+  Truths(const Truths&) = delete;
+  Truths& operator=(const Truths&) = delete;
+
+  /// At its first exposure, on the rows of geometry.
+  const ImageF& now() const { return *now_; }
+  /// White-field: at the second one of the frame before; null where it is not known.
+  const ImageF* between() const { return between_; }
+
+ private:
+  ImageF made_;
+  const ImageF* now_;
+  const ImageF* between_ = nullptr;
+};
 
 /// What is scored and drawn.
 struct Judges {
@@ -121,13 +133,13 @@ Status judge_both(const CapturedFrame& frame, std::optional<Frame3D> completed, 
                   const Truths& truths, Judges& judges) {
   const int slide = reconstructor.report().slide;
   if (completed && completed->between) {
-    if (!truths.between.empty()) {
-      if (auto s = judges.judge(frame, slide, truths.between, &*completed); !s) return s;
+    if (truths.between() != nullptr) {
+      if (auto s = judges.judge(frame, slide, *truths.between(), &*completed); !s) return s;
     }
     completed = reconstructor.next();
   }
   if (!completed && !truths.decodable) return {};
-  return judges.judge(frame, slide, truths.now, completed ? &*completed : nullptr);
+  return judges.judge(frame, slide, truths.now(), completed ? &*completed : nullptr);
 }
 
 /// The exposures that a frame was decoded by, as the camera gave them.
@@ -136,8 +148,11 @@ class AsDecoded {
   const CapturedFrame& of(const CapturedFrame& frame, bool regrouped) {
     if (regrouped) join_exposures(before_, frame, joined_);
     joined_.number = frame.number;
-    before_ = frame.scan == Scan::kInterlaced ? frame.picture.clone() : frame.complement.clone();
     return regrouped ? joined_ : frame;
+  }
+  /// Takes what the next one may need.
+  void keep(CapturedFrame&& frame) {
+    before_ = std::move(frame.scan == Scan::kInterlaced ? frame.picture : frame.complement);
   }
 
  private:
@@ -174,6 +189,90 @@ Result<std::uint64_t> find_lead(const Options& options, const SourceInfo& info) 
   return static_cast<std::uint64_t>(std::ranges::max_element(fitting) - fitting.begin());
 }
 
+/// Scores the frames of a take, one after the other.
+class Evaluation {
+ public:
+  Evaluation(const Options& options, const SourceInfo& info, Reconstructor& reconstructor, Judges& judges)
+      : options_(options), info_(info), reconstructor_(reconstructor), judges_(judges) {}
+
+  /// Of the frames scored.
+  const FilterCounts& filters() const { return filters_; }
+  std::uint64_t done() const { return done_; }
+
+  Status add(CapturedFrame&& frame, const Exposure& exposure) {
+    bool decodable = exposure.light == Light::kSlide &&
+                     (info_.pattern.slides == 1 || (previous_slide_ && *previous_slide_ != exposure.slide));
+    if (exposure.light == Light::kSlide) previous_slide_ = exposure.slide;
+    auto result = reconstructor_.add(frame);
+    if (!result) return result.error();
+    ++done_;
+    const bool regrouped = reconstructor_.report().step.regrouped;
+    // The first two frames are one pair then.
+    decodable = decodable && !(regrouped && done_ == 2 && info_.pattern.slides > 1);
+    const CapturedFrame& shown = as_decoded_.of(frame, regrouped);
+    if (auto s = score(frame, shown, decodable, std::move(*result)); !s) return s;
+    as_decoded_.keep(std::move(frame));
+    return {};
+  }
+
+ private:
+  Status score(const CapturedFrame& frame, const CapturedFrame& shown, bool decodable,
+               std::optional<Frame3D> completed) {
+    const fs::path file = truth_of(options_.take, frame.number);
+    if (frame.number < options_.skip || !fs::exists(file)) {
+      previous_truth_ = ImageF();
+      return {};
+    }
+    auto truth = read_truth(file, info_.rig.camera);
+    if (!truth) return truth.error();
+    const bool regrouped = reconstructor_.report().step.regrouped;
+    if (regrouped && previous_truth_.empty() && fs::exists(truth_of(options_.take, frame.number - 1))) {
+      auto before = read_truth(truth_of(options_.take, frame.number - 1), info_.rig.camera);
+      if (!before) return before.error();
+      previous_truth_ = *std::move(before);
+    }
+    const bool white_field = info_.pattern.scheme == Scheme::kWhiteField;
+    const ImageF none;  // other schemes need the frame before where the exposures are of two frames
+    Truths truths(frame, regrouped, white_field || regrouped ? previous_truth_ : none, *truth);
+    truths.decodable = decodable;
+    filters_ += reconstructor_.report().filters;
+    Status judged;
+    if (white_field) {
+      judged = judge_both(shown, std::move(completed), reconstructor_, truths, judges_);
+    } else if (decodable) {
+      judged = judges_.judge(shown, reconstructor_.report().slide, truths.now(),
+                             completed ? &*completed : nullptr);
+    }
+    previous_truth_ = *std::move(truth);
+    return judged;
+  }
+
+  const Options& options_;
+  const SourceInfo& info_;
+  Reconstructor& reconstructor_;
+  Judges& judges_;
+  FilterCounts filters_;
+  std::optional<int> previous_slide_;
+  ImageF previous_truth_;
+  AsDecoded as_decoded_;
+  std::uint64_t done_ = 0;
+};
+
+/// Until the take ends, something fails or the command is stopped.
+Status score_frames(FieldSource& source, std::uint64_t lead, Evaluation& evaluation, StopSignal& stop) {
+  Progress progress("evaluate", "frames", source.info().frames.value_or(0));
+  while (!stop.stopped()) {
+    auto next = source.next();
+    if (!next) return next.error();
+    if (!*next) break;
+    const Exposure exposure = shown_in(**next, source.info(), lead);
+    if (auto s = evaluation.add(*std::move(*next), exposure); !s) return s;
+    progress.update(evaluation.done());
+  }
+  progress.finish();
+  return {};
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
@@ -199,62 +298,24 @@ Status run(const Options& options, StopSignal& stop) {
     judges.pictures = *std::move(made);
   }
 
-  Progress progress("evaluate", "frames", info.frames.value_or(0));
-  FilterCounts filters;  // of the frames scored
-  std::optional<int> previous_slide;
-  ImageF previous_truth;
-  AsDecoded as_decoded;
-  std::uint64_t done = 0;
-  while (!stop.stopped()) {
-    auto next = (*source)->next();
-    if (!next) return next.error();  // a score over part of a take would not be comparable
-    if (!*next) break;
-    const CapturedFrame& frame = **next;
-    const Exposure exposure = shown_in(frame, info, *lead);
-    bool decodable = exposure.light == Light::kSlide &&
-                     (info.pattern.slides == 1 || (previous_slide && *previous_slide != exposure.slide));
-    if (exposure.light == Light::kSlide) previous_slide = exposure.slide;
-    auto result = reconstructor->add(frame);
-    if (!result) return result.error();
-    progress.update(++done);
-    const bool regrouped = reconstructor->report().step.regrouped;
-    // The first two frames are one pair then.
-    decodable = decodable && !(regrouped && done == 2 && info.pattern.slides > 1);
-    const CapturedFrame& shown = as_decoded.of(frame, regrouped);
-    const fs::path file = truth_of(options.take, frame.number);
-    if (frame.number < options.skip || !fs::exists(file)) {
-      previous_truth = ImageF();
-      continue;
-    }
-    auto truth = read_truth(file, info.rig.camera);
-    if (!truth) return truth.error();
-    if (regrouped && previous_truth.empty() && fs::exists(truth_of(options.take, frame.number - 1))) {
-      auto before = read_truth(truth_of(options.take, frame.number - 1), info.rig.camera);
-      if (!before) return before.error();
-      previous_truth = *std::move(before);
-    }
-    Truths truths = truths_of(frame, regrouped, previous_truth, *truth);
-    truths.decodable = decodable;
-    filters += reconstructor->report().filters;
-    Status judged;
-    if (info.pattern.scheme == Scheme::kWhiteField) {
-      judged = judge_both(shown, std::move(*result), *reconstructor, truths, judges);
-    } else if (decodable) {
-      judged = judges.judge(shown, reconstructor->report().slide, truths.now, *result ? &**result : nullptr);
-    }
-    if (!judged) return judged.error();
-    previous_truth = *std::move(truth);
-  }
-  progress.finish();
-  if (stop.stopped()) return {};  // nor would what was scored until now
+  Evaluation evaluation(options, info, *reconstructor, judges);
+  const Status scored = score_frames(**source, *lead, evaluation, stop);
   const Score score = judges.scorer.score();
+  if (!scored || stop.stopped()) {
+    // A score of a part would not be comparable, but the pictures that there are want their page.
+    if (!judges.pictures || score.frames == 0) return scored;
+    const Status shown = judges.pictures->finish(
+        options.take + ": its first " + std::to_string(evaluation.done()) + " frames, broken off", score,
+        evaluation.filters());
+    return scored ? shown : scored;
+  }
   if (score.frames == 0)
     return Error{"no frame of " + options.take + " could be scored: none with truth was reconstructed"};
   if (judges.pictures) {
-    const Status written = judges.pictures->finish(options.take, score, filters);
+    const Status written = judges.pictures->finish(options.take, score, evaluation.filters());
     if (!written) return written.error();
   }
-  print(score, filters, options.json);
+  print(score, evaluation.filters(), options.json);
   return {};
 }
 

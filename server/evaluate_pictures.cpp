@@ -5,11 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string_view>
 #include <utility>
 
 #include "base/html.h"
+#include "base/whole_file.h"
 #include "capture/camera_response.h"
 #include "codec/export.h"
 
@@ -171,12 +171,7 @@ Status EvaluationPictures::finish(const std::string& title, const Score& score,
     html += "</div>\n";
   }
   html += "</body></html>\n";
-  const auto path = folder_ / "index.html";
-  std::ofstream out(path);
-  out << html;
-  out.close();
-  if (!out) return Error{"cannot write " + path.string() + ": is the disk full?"};
-  return {};
+  return write_whole_file(folder_ / "index.html", html);
 }
 
 }  // namespace relievo

@@ -73,6 +73,20 @@ TEST(LiveCalibration, InterruptedItKeepsWhatItTook) {
   EXPECT_FALSE(fs::exists(rig));
 }
 
+TEST(LiveCalibration, AFullDiskLeavesNoPartOfAView) {
+  const TempFolder folder;
+  const std::string views = (folder / "views").string();
+  // A limit on the size of files stands for a full disk: coverage.png fits in, a camera's picture does not.
+  std::string script = "trap '' XFSZ; ulimit -f 64; exec";
+  for (const std::string& word : command(views, (folder / "rig.yaml").string(), 6, 4))
+    script += " '" + word + "'";
+  const Finished done = run({"/bin/bash", "-c", script});
+  EXPECT_EQ(done.status, 1);
+  EXPECT_THAT(done.err, HasSubstr("view_00/columns_slide1.png"));
+  EXPECT_TRUE(fs::exists(views + "/coverage.png"));
+  EXPECT_FALSE(fs::exists(views + "/view_00"));
+}
+
 TEST(LiveCalibration, ColoursAreTakenAndCalibrated) {
   const TempFolder folder;
   const std::string captures = (folder / "captures").string();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -85,6 +86,36 @@ TEST_F(SmallTake, EvaluationShowsEveryStageOnOnePage) {
   EXPECT_NE(page.find("completeness"), std::string::npos);
   // The pictures change nothing of the figures.
   EXPECT_EQ(server_json({"evaluate", take_.string()}), score);
+}
+
+TEST_F(SmallTake, AnEvaluationThatIsBrokenOffLeavesThePageOfItsPictures) {
+  const auto shown = [](const fs::path& pictures) {
+    const std::string page = text_of(pictures / "index.html");
+    EXPECT_NE(page.find("000001-texture.png"), std::string::npos) << page.substr(0, 300);
+    EXPECT_NE(page.find("broken off"), std::string::npos) << page.substr(0, 300);
+  };
+  const fs::path pictures = folder_.path() / "pictures";
+  // By a frame that cannot be read.
+  fs::resize_file(take_ / "frames" / "000003.png", 100);
+  const Finished failed =
+      run({program("relievo-server").string(), "evaluate", take_.string(), "--pictures", pictures.string()},
+          kLongPatience);
+  EXPECT_EQ(failed.status, 1);
+  EXPECT_EQ(failed.out, "") << "a score of a part";
+  shown(pictures);
+  // By a signal.
+  const fs::path longer = folder_.path() / "longer", others = folder_.path() / "others";
+  ASSERT_EQ(run({program("relievo-server").string(), "simulate", "--scene",
+                 "object,width=320,height=240,stripes=45", "--frames", "100", "--out", longer.string()},
+                kLongPatience)
+                .status,
+            0);
+  Process stopped(
+      {program("relievo-server").string(), "evaluate", longer.string(), "--pictures", others.string()});
+  ASSERT_TRUE(eventually([&] { return fs::exists(others / "000001-texture.png"); }));
+  stopped.signal(SIGTERM);
+  ASSERT_EQ(stopped.wait(), 0) << stopped.err();
+  shown(others);
 }
 
 TEST_F(SmallTake, PicturesThatCannotBeWrittenAreSaid) {
