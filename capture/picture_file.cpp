@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cstring>
+#include <iostream>
+#include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <streambuf>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -122,6 +125,32 @@ std::uint64_t tiff_pixels(Bytes file, bool little_endian) {
                   pixels(found[kTileWidth].value_or(0), found[kTileHeight].value_or(0)));
 }
 
+bool is_tiff(Bytes file) {
+  return begins_with(file, std::string_view("II*\0", 4)) || begins_with(file, std::string_view("MM\0*", 4));
+}
+
+bool is_pnm(Bytes file) {
+  return file.size() > 2 && file[0] == 'P' && file[1] >= '1' && file[1] <= '6' && std::isspace(file[2]) != 0;
+}
+
+/// OpenCV's decoders write lines of their own to std::cerr, which nothing here writes to: nowhere, for its
+/// life.
+class QuietDecoders {
+ public:
+  QuietDecoders() : lock_(one_at_a_time()), before_(std::cerr.rdbuf(nullptr)) {}
+  QuietDecoders(const QuietDecoders&) = delete;
+  QuietDecoders& operator=(const QuietDecoders&) = delete;
+  ~QuietDecoders() { std::cerr.rdbuf(before_); }
+
+ private:
+  static std::mutex& one_at_a_time() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  const std::lock_guard<std::mutex> lock_;
+  std::streambuf* const before_;
+};
+
 }  // namespace
 
 std::optional<std::uint64_t> declared_pixels(Bytes file) {
@@ -132,10 +161,9 @@ std::optional<std::uint64_t> declared_pixels(Bytes file) {
     found = jpeg_pixels(file);
   } else if (begins_with(file, "BM")) {
     found = bmp_pixels(file);
-  } else if (file.size() > 2 && file[0] == 'P' && file[1] >= '1' && file[1] <= '6') {
+  } else if (is_pnm(file)) {
     found = pnm_pixels(file);
-  } else if (begins_with(file, std::string_view("II*\0", 4)) ||
-             begins_with(file, std::string_view("MM\0*", 4))) {
+  } else if (is_tiff(file)) {
     found = tiff_pixels(file, file[0] == 'I');
   }
   return found > 0 ? std::optional(found) : std::nullopt;
@@ -147,9 +175,11 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
   if (!content) return content.error();
   const std::span file(reinterpret_cast<const std::uint8_t*>(content->data()), content->size());
   const auto declared = declared_pixels(file);
+  if (!declared && (begins_with(file, "BM") || is_pnm(file) || is_tiff(file)))
+    return Error{name + " does not say how large it is: is it cut short or damaged?"};
   if (!declared) return Error{name + " cannot be read as a picture: it is no PNG, JPEG, BMP, PNM or TIFF"};
   if (*declared > kMostPicturePixels || *declared > kMostPicturePixelsPerByte * file.size())
-    return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it damaged?"};
+    return Error{name + " says it has " + std::to_string(*declared) + " pixels: is it cut short or damaged?"};
   const auto named = [&](Result<Image8> picture) {
     return picture ? std::move(picture) : Error{name + " " + picture.error().message};
   };
@@ -159,9 +189,10 @@ Result<Image8> read_rgb(const std::filesystem::path& path) {
   }
   if (begins_with(file, kJpeg)) return named(decode_jpeg(file));
   try {
+    const QuietDecoders quiet;
     const cv::Mat bgr = cv::imdecode(cv::_InputArray(file.data(), static_cast<int>(file.size())),
                                      cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    if (bgr.empty()) return Error{name + " cannot be read as a picture: is it damaged?"};
+    if (bgr.empty()) return Error{name + " cannot be read as a picture: is it cut short or damaged?"};
     Image8 rgb(bgr.cols, bgr.rows, 3);
     cv::Mat out(rgb.height(), rgb.width(), CV_8UC3, rgb.data());
     cv::cvtColor(bgr, out, cv::COLOR_BGR2RGB);

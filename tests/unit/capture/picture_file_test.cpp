@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <iostream>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
@@ -113,6 +114,22 @@ TEST_F(PictureFile, APngOfBrokenDataIsRefusedInOneLine) {
   EXPECT_THAT(picture.error().message, HasSubstr("is damaged: "));
 }
 
+TEST_F(PictureFile, OtherFormatsThatAreCutShortAreRefusedInOneLine) {
+  for (const char* ending : {".bmp", ".ppm", ".tiff"}) {
+    const Bytes whole = encoded(ending);
+    for (const std::size_t size : {whole.size() / 50, whole.size() / 2, whole.size() - 1}) {
+      testing::internal::CaptureStderr();
+      const auto cut = read({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)});
+      EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << ending << " " << size;
+      ASSERT_FALSE(cut.ok()) << ending << " " << size;
+      EXPECT_THAT(cut.error().message, HasSubstr("cut short")) << ending << " " << size;
+    }
+  }
+  testing::internal::CaptureStderr();
+  std::cerr << "of others";
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "of others");
+}
+
 TEST_F(PictureFile, AJpegThatIsCutShortIsRefusedInOneLine) {
   const Bytes whole = encoded(".jpg");
   testing::internal::CaptureStderr();
@@ -179,12 +196,13 @@ TEST_F(PictureFile, MorePixelsThanItsBytesCanHoldAreRefused) {
 
 TEST_F(PictureFile, OtherFormatsAreNotHandedToAnyDecoder) {
   for (const std::string& text :
-       {std::string("RIFF1234WEBPVP8 "), std::string("#?RADIANCE\n"), std::string("P7\n"), std::string("BM"),
-        std::string("P6"), std::string("II*"), std::string()}) {
+       {std::string("RIFF1234WEBPVP8 "), std::string("#?RADIANCE\n"), std::string("P7\n"), std::string("P6"),
+        std::string("II*"), std::string()}) {
     EXPECT_EQ(declared_pixels({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}),
               std::nullopt);
     EXPECT_THAT(read({text.begin(), text.end()}).error().message, HasSubstr("it is no PNG")) << text;
   }
+  EXPECT_THAT(read({'B', 'M'}).error().message, HasSubstr("does not say how large it is"));
   EXPECT_THAT(read_rgb(folder_ / "none").error().message, HasSubstr("is missing"));
 }
 
