@@ -10,6 +10,7 @@
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/whole_file.h"
+#include "capture/calibrate/gray_beyond.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/ray_pairs.h"
@@ -143,6 +144,10 @@ void warn_of_pictures(const GrayStack& stack, const GrayMaps& maps, const Option
   for (const GraySlide& slide : flat) {
     log_warning("the pictures of " + to_string(slide) +
                 " and of its inverse hardly differ: is one a copy of the other, or are they out of focus?");
+  }
+  if (const std::string beyond = beyond_projector(stack, options.decode); !beyond.empty()) {
+    log_warning(beyond);
+    return;
   }
   if (!flat.empty() || 10 * maps.decoded >= maps.lit) return;
   log_warning(

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "capture/calibrate/gray_beyond.h"
 #include "capture/calibrate/local_homography.h"
 
 namespace relievo {
@@ -118,6 +119,9 @@ MeasuredView measure_view(const std::string& name, const GrayStack& stack, const
       std::clamp(brightest_change(stack) * 3 / 20, std::min(6, options.min_contrast), options.min_contrast);
   auto maps = decode_gray(stack, whole, pool);
   if (!maps) return without(name, maps.error().message);
+  // Its corners would fit: they are where they were projected. The stripes of the running system would not
+  // be.
+  if (std::string why = beyond_projector(stack, whole); !why.empty()) return without(name, std::move(why));
   return with_projector(
       name, seen, board,
       {stack.width(), stack.height(), std::move(maps->column_edges), std::move(maps->row_edges)});
