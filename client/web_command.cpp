@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -10,6 +9,7 @@
 
 #include "base/log.h"
 #include "base/time.h"
+#include "cli/announce.h"
 #include "cli/checks.h"
 #include "cli/listen_address.h"
 #include "cli/service_manager.h"
@@ -205,10 +205,8 @@ Status run(const Options& options, StopSignal& stop) {
   for (auto& [file, recorded] : inputs->files) {
     files.push_back(std::make_unique<LoopedFile>(file, std::move(recorded), **gateway, stop));
   }
-  std::printf("viewer %s\n", browser_address({address->host, (*gateway)->port()},
-                                             !options.web->tls_cert.empty(), (*gateway)->made_token())
-                                 .c_str());
-  std::fflush(stdout);  // whoever waits for the address reads a pipe
+  announce("viewer " + browser_address({address->host, (*gateway)->port()}, !options.web->tls_cert.empty(),
+                                       (*gateway)->made_token()));
   tell_ready();
   while (!stop.wait_for(kTick)) {
     relay.update();

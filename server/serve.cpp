@@ -2,7 +2,6 @@
 #include "server/serve.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "base/log.h"
+#include "cli/announce.h"
 #include "cli/listen_address.h"
 #include "cli/service_manager.h"
 #include "codec/video_encoder_kind.h"
@@ -52,14 +52,12 @@ Result<std::unique_ptr<Gateway>> start_gateway(const ServeConfig& config, KeyFra
 void print_addresses(const ServeConfig& config, const std::vector<std::string>& streams,
                      const Gateway* gateway) {
   for (const std::string& name : streams)
-    std::printf("stream %s on DDS domain %d\n", name.c_str(), config.domain);
+    announce("stream " + name + " on DDS domain " + std::to_string(config.domain));
   if (gateway != nullptr) {
     const std::string host = parse_listen_address(config.web).value().host;
-    std::printf("viewer %s\n", browser_address({host, gateway->port()}, !config.gateway.tls_cert.empty(),
-                                               gateway->made_token())
-                                   .c_str());
+    announce("viewer " + browser_address({host, gateway->port()}, !config.gateway.tls_cert.empty(),
+                                         gateway->made_token()));
   }
-  std::fflush(stdout);  // whoever waits for the address reads a pipe
 }
 
 /// Where the hardware was to make the pictures, if it could.

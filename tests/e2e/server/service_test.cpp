@@ -23,6 +23,17 @@ TEST(Service, SaysThatItIsReadyAliveAndStopping) {
   EXPECT_TRUE(manager.hears("STOPPING=1"));
 }
 
+// Both outputs are one journal there.
+TEST(Service, WithJsonLinesEveryLineOfEitherOutputIsOne) {
+  Process serving(serve("sim:plane,width=160,height=120",
+                        {"--frames", "3", "--fast", "--log-json", "--web", "127.0.0.1:0"}));
+  EXPECT_EQ(serving.wait(), 0) << serving.err();
+  const std::string all = serving.out() + serving.err();
+  EXPECT_NE(all.find("\"message\":\"stream "), std::string::npos) << all;
+  EXPECT_NE(all.find("\"message\":\"viewer http"), std::string::npos) << all;
+  for (const std::string& line : lines(all)) EXPECT_TRUE(line.starts_with("{\"time\":\"")) << line;
+}
+
 // It hung for ever, deaf to SIGTERM: sd_notify(3) waits for room.
 TEST(Service, AManagerThatReadsNothingKeepsNobodyWaiting) {
   const TempFolder folder;

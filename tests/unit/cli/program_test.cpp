@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "base/log_format.h"
+#include "cli/announce.h"
 #include "cli/progress.h"
 
 namespace relievo {
@@ -79,6 +80,19 @@ TEST(Program, SaysFailuresToProgramsToo) {
   EXPECT_EQ(o.code, 1);
   EXPECT_THAT(o.err, HasSubstr(R"("level":"error","message":"tool work: no such file"})"));
   EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1);
+}
+
+TEST(Program, AnnouncesToProgramsToo) {
+  const auto say = one_command([](int, StopSignal&) {
+    announce("viewer http://localhost/");
+    return Status();
+  });
+  EXPECT_EQ(run(say, {"work", "-q"}).out, "viewer http://localhost/\n");
+  const auto o = run(say, {"work", "--log-json"});
+  set_log_format(LogFormat::kText);  // of this process, for the tests after this one
+  EXPECT_THAT(o.out, HasSubstr(R"("level":"info","message":"viewer http://localhost/"})"));
+  EXPECT_EQ(o.out.front(), '{');
+  EXPECT_EQ(o.err, "");
 }
 
 TEST(Program, RunsTheCommandWithItsOptions) {
