@@ -14,6 +14,7 @@
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
 #include "capture/camera_response.h"
+#include "capture/field_order_file.h"
 #include "capture/picture_file.h"
 #include "cli/checks.h"
 #include "server/calibrate_commands.h"
@@ -168,7 +169,8 @@ Status run(const Options& options, StopSignal& stop) {
 
   const std::string out = options.out.empty() ? options.update : options.out;
   before.colours = calibration->camera;
-  if (const Status written = write_whole_file(out, to_yaml(before)); !written) return written;
+  const std::string yaml = keeping_field_order(to_yaml(before), options.update);
+  if (const Status written = write_whole_file(out, yaml); !written) return written;
   if (options.json) {
     print_json(*calibration, out);
   } else {

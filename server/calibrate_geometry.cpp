@@ -16,6 +16,7 @@
 #include "capture/calibrate/geometry.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/rig_part.h"
+#include "capture/field_order_file.h"
 #include "capture/rig_file.h"
 #include "capture/upright.h"
 #include "cli/checks.h"
@@ -55,15 +56,20 @@ struct Options {
 struct Scanning {
   std::optional<Scan> scan;
   std::optional<FieldOrder> field_order;
+  bool states_field_order = false;  // by more than what a driver or nothing says
   std::optional<double> frame_rate;
 };
 
 /// What is asked for, else as the rig of before has it.
 Scanning scanning_of(const Options& options, const RigPart& before) {
-  Scanning out{before.scan, {}, before.frame_rate};
+  Scanning out{.scan = before.scan, .frame_rate = before.frame_rate};
   if (before.whole) out.field_order = before.whole->field_order;
+  if (before.whole) out.states_field_order = states_field_order(options.update);
   if (!options.scan.empty()) out.scan = options.scan == "interlaced" ? Scan::kInterlaced : Scan::kProgressive;
-  if (!options.camera.field_order.empty()) out.field_order = field_order_named(options.camera.field_order);
+  if (!options.camera.field_order.empty()) {
+    out.field_order = field_order_named(options.camera.field_order);
+    out.states_field_order = true;
+  }
   if (options.frame_rate) out.frame_rate = options.frame_rate;
   return out;
 }
@@ -221,6 +227,7 @@ Status run(const Options& options, StopSignal& stop) {
     if (options.pattern != "gray") camera.pattern = options.pattern;
     camera.projector_width = options.projector.width;
     camera.projector_height = options.projector.height;
+    if (scanning.states_field_order) camera.field_order = to_string(*scanning.field_order);
     const auto taken = take_board_views({.source = options.source,
                                          .camera = camera,
                                          .folder = options.views,
@@ -275,7 +282,8 @@ Status run(const Options& options, StopSignal& stop) {
     difference = *compared;
   }
   // Last: what fails before it leaves the rig of before.
-  if (const Status written = write_whole_file(out, to_yaml(rig)); !written) return written;
+  const std::string yaml = scanning.states_field_order ? with_field_order(to_yaml(rig), rig) : to_yaml(rig);
+  if (const Status written = write_whole_file(out, yaml); !written) return written;
   if (const auto seen = upright(rig, {}); !seen) log_warning(seen.error().message);
   const Outcome outcome{*geometry, rig, assumed(scanning), difference, out};
   if (options.json) {

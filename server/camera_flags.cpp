@@ -53,7 +53,7 @@ void add_camera_flags(CLI::App& app, CameraOptions& camera) {
       ->type_name("NAME")
       ->group(kGroup);
   app.add_option("--field-order", camera.field_order,
-                 "The field exposed first, where the device's statement is wrong")
+                 "The field exposed first (default: as the rig says, or else the device)")
       ->check(CLI::IsMember(kFieldOrders))
       ->type_name("NAME")
       ->group(kGroup);

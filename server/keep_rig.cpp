@@ -7,6 +7,7 @@
 
 #include "base/time.h"
 #include "base/whole_file.h"
+#include "capture/field_order_file.h"
 
 namespace relievo {
 namespace {
@@ -59,7 +60,8 @@ Result<std::string> keep_rig(const fs::path& file, std::string_view text, const 
   if (!fs::exists(beside, failed)) {
     if (const Status written = write_whole_file(beside, to_yaml(pattern)); !written) return written.error();
   }
-  if (const Status written = write_whole_file(file, text); !written) return written.error();
+  const std::string kept = keeping_field_order(std::string(text), file);
+  if (const Status written = write_whole_file(file, kept); !written) return written.error();
   return old.filename().string();
 }
 

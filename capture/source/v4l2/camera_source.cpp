@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "base/log.h"
+#include "capture/field_order_file.h"
 #include "capture/rig_file.h"
 #include "capture/source/v4l2/buffer_stream.h"
 #include "capture/source/v4l2/capture_format.h"
@@ -224,6 +226,22 @@ void set_plain_matrix(PinholeModel& lens) {
       1.2 * lens.width, 0, 0.5 * (lens.width - 1), 0, 1.2 * lens.width, 0.5 * (lens.height - 1), 0, 0, 1};
 }
 
+/// Which field is exposed first is said by --field-order, else by rig.yaml, else by the driver, whose
+/// statement is often none but a standard's.
+void settle_field_order(const std::string& device, CameraOptions& options, CaptureFormat& format, Rig& rig) {
+  const std::string driver(to_string(format.order)), file(to_string(rig.field_order));
+  const bool overruled = format.scan() == Scan::kInterlaced && options.field_order.empty() &&
+                         driver != file && !options.rig.empty() && states_field_order(options.rig);
+  if (overruled) {
+    log_warning(device + " says that the " + driver + " field is exposed first, and " + options.rig +
+                " field_order: " + file + ", which holds; where the device is right, give --field-order " +
+                driver + " (field_order of [camera])");
+    options.field_order = file;  // also where the camera comes back
+    format.order = rig.field_order;
+  }
+  rig.field_order = format.order;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<FieldSource>> open_camera(Io& io, const std::string& device,
@@ -245,7 +263,7 @@ Result<std::unique_ptr<FieldSource>> open_camera(Io& io, const std::string& devi
   if (!opened) return opened.error();
   auto session = settle(*std::move(opened), options);
   if (!session) return session.error();
-  const CaptureFormat& format = (*session)->format;
+  CaptureFormat& format = (*session)->format;
   PinholeModel& camera = info.rig.camera;
   if (calibrated && (camera.width != format.width || camera.height != format.frame_height()))
     return Error{options.rig + " is calibrated for pictures of " + std::to_string(camera.width) + "x" +
@@ -262,8 +280,8 @@ Result<std::unique_ptr<FieldSource>> open_camera(Io& io, const std::string& devi
     set_plain_matrix(camera);
     set_plain_matrix(info.rig.projector);
   }
+  settle_field_order(device, options, format, info.rig);
   info.rig.scan = format.scan();
-  info.rig.field_order = format.order;
   info.rig.frame_rate = format.frame_rate();
   if (const Status started = (*session)->start(options); !started) return started.error();
   // Coming back, the camera must give the same.

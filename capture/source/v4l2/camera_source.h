@@ -16,8 +16,9 @@ namespace relievo::v4l2 {
 /// sequence numbers, so that a lost frame leaves a gap. Damaged pictures are left out.
 ///
 /// next() fails once when the camera is unplugged, shows no signal or gives up, and then waits until it works
-/// again, as it was set before; numbers go on without a gap. Its rig is the file's, with the scan, field
-/// order and rate that the driver states; without a file, one of the right sizes and nothing else.
+/// again, as it was set before; numbers go on without a gap. Its rig is the file's, with the scan and
+/// rate that the driver states, and its field order where the file states none; without a file, one of the
+/// right sizes and nothing else.
 Result<std::unique_ptr<FieldSource>> open_camera(const std::string& device, const SourceOptions& options);
 
 /// The same through other system calls, which must outlive the source.

@@ -192,9 +192,9 @@ Result<Settled> set_format(const Device& device, const PixelFormat& pixels, cons
     if (const int error = exchange(device, VIDIOC_G_FMT, s); error != 0)
       return device.refused("say its format", error);
   }
-  const auto size = [](const Settled& of) {
-    return std::to_string(of.width) + "x" +
-           std::to_string(of.height * (of.field == V4L2_FIELD_ALTERNATE ? 2 : 1));
+  const auto rows = [](const Settled& of) { return of.height * (of.field == V4L2_FIELD_ALTERNATE ? 2 : 1); };
+  const auto size = [&](const Settled& of) {
+    return std::to_string(of.width) + "x" + std::to_string(rows(of));
   };
   if (s.fourcc != asked.fourcc)
     return not_given(device, "gives " + fourcc_text(s.fourcc) + " instead of " + std::string(pixels.name),
@@ -204,7 +204,7 @@ Result<Settled> set_format(const Device& device, const PixelFormat& pixels, cons
   if (asked.field != V4L2_FIELD_ANY && s.field != asked.field && !interlaced_kind)
     return not_given(device, "gives " + field_name(s.field) + " instead of " + options.field + " pictures",
                      "--field");
-  if (options.width > 0 && (s.width != asked.width || s.height != asked.height))
+  if (options.width > 0 && (s.width != asked.width || rows(s) != rows(asked)))
     return not_given(device, "gives " + size(s) + " instead of " + size(asked), "--size");
   return s;
 }

@@ -8,6 +8,7 @@
 
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/stripe_stack.h"
+#include "capture/field_order_file.h"
 #include "capture/pattern/schedule.h"
 #include "capture/picture_file.h"
 #include "capture/rig_file.h"
@@ -82,12 +83,17 @@ TEST_F(FieldOrders, TheFlagIsWrittenWhereViewsAreWholePictures) {
   make_example("", 3);
   report(geometry({"--out", rig_}));
   EXPECT_EQ(written().field_order, FieldOrder::kTop);
+  EXPECT_FALSE(states_field_order(rig_)) << "it was assumed: a driver may know better";
   report(geometry({"--update", rig_, "--field-order", "bottom"}));
   EXPECT_EQ(written().field_order, FieldOrder::kBottom);
   report(geometry({"--update", rig_}));
   EXPECT_EQ(written().field_order, FieldOrder::kBottom);
   report(geometry({"--update", rig_, "--field-order", "top"}));
   EXPECT_EQ(written().field_order, FieldOrder::kTop);
+  EXPECT_TRUE(states_field_order(rig_));
+  report(geometry({"--update", rig_}));
+  report({"calibrate", "colour", example_ + "/colours", "--update", rig_, "--json"});
+  EXPECT_TRUE(states_field_order(rig_));
 }
 
 TEST_F(FieldOrders, ALiveSourceSaysItsOwn) {

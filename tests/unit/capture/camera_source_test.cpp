@@ -229,6 +229,80 @@ TEST(CameraSource, ARigWithoutWhatIsProjectedIsSaid) {
               "pattern.yaml is missing, which says what is projected");
 }
 
+/// What a rig.yaml and a flag say of the field order, the driver of an alternating camera, and what holds.
+struct Orders {
+  std::string rig;  // a line of rig.yaml, or none
+  std::string flag;
+  FieldOrder held;
+  bool told;
+};
+
+class FieldOrderOf : public testing::TestWithParam<Orders> {};
+
+TEST_P(FieldOrderOf, TheFlagThenTheRigThenTheDriver) {
+  const Orders& orders = GetParam();
+  const test::TempFolder folder;
+  test::StripedScene scene = test::striped_scene();
+  scene.rig.camera.width = 8;
+  scene.rig.camera.height = 8;
+  std::string yaml = to_yaml(scene.rig);
+  yaml.insert(yaml.find("frame_rate"), orders.rig);
+  std::ofstream(folder / "rig.yaml") << yaml;
+  std::ofstream(folder / "pattern.yaml") << to_yaml(scene.pattern);
+  FakeCamera camera;  // which says that its top field comes first
+  camera.field = V4L2_FIELD_ALTERNATE;
+  testing::internal::CaptureStderr();
+  const auto source = open(camera, {.rig = folder / "rig.yaml", .field_order = orders.flag});
+  const std::string told = testing::internal::GetCapturedStderr();
+  ASSERT_TRUE(source);
+  EXPECT_EQ(source->info().rig.field_order, orders.held);
+  EXPECT_EQ(told.find("/dev/video0 says that the top field is exposed first") != std::string::npos,
+            orders.told)
+      << told;
+  // Frames are put together so.
+  const bool top_first = orders.held == FieldOrder::kTop;
+  const auto field = [&](std::uint32_t number, bool top) {
+    camera.shots.push_back({.sequence = number,
+                            .field = top ? V4L2_FIELD_TOP : V4L2_FIELD_BOTTOM,
+                            .value = static_cast<std::uint8_t>(number)});
+  };
+  field(0, top_first);
+  field(1, !top_first);
+  const CapturedFrame frame = next(*source);
+  EXPECT_EQ(frame.field_order, orders.held);
+  EXPECT_EQ(frame.slide_field().row(0)[0], 0);
+  EXPECT_EQ(frame.complement_field().row(0)[0], 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(CameraSource, FieldOrderOf,
+                         testing::Values(Orders{"", "", FieldOrder::kTop, false},
+                                         Orders{"field_order: bottom\n", "", FieldOrder::kBottom, true},
+                                         Orders{"field_order: top\n", "", FieldOrder::kTop, false},
+                                         Orders{"field_order: bottom\n", "top", FieldOrder::kTop, false},
+                                         Orders{"", "bottom", FieldOrder::kBottom, false}));
+
+TEST(CameraSource, ARigsFieldOrderHoldsWhereTheCameraComesBack) {
+  const test::TempFolder folder;
+  test::StripedScene scene = test::striped_scene();
+  scene.rig.camera.width = 8;
+  scene.rig.camera.height = 8;
+  scene.rig.field_order = FieldOrder::kBottom;
+  std::ofstream(folder / "rig.yaml") << to_yaml(scene.rig);
+  std::ofstream(folder / "pattern.yaml") << to_yaml(scene.pattern);
+  FakeCamera camera;
+  camera.field = V4L2_FIELD_INTERLACED;
+  camera.height = 8;
+  const auto source = open(camera, {.rig = folder / "rig.yaml"});
+  ASSERT_TRUE(source);
+  camera.film(0, 1);
+  EXPECT_EQ(next(*source).field_order, FieldOrder::kBottom);
+  camera.unplugged = true;
+  EXPECT_SAYS(failure(*source), "unplugged");
+  camera.unplugged = false;
+  camera.film(0, 1);
+  EXPECT_EQ(next(*source).field_order, FieldOrder::kBottom);
+}
+
 TEST(CameraSource, ADriverThatLiesAboutItsRowsIsRefused) {
   FakeCamera camera;
   camera.bytes_a_pixel = 2;  // rows shorter than their pixels

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include "capture/field_order_file.h"
 #include "small_take.h"
 
 namespace relievo {
@@ -212,6 +213,26 @@ TEST(RigFile, FieldOrderIsTopUnlessItSaysOtherwise) {
   const Result<Rig> read = read_rig(file);
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().message, HasSubstr("field_order must be top or bottom"));
+}
+
+TEST(RigFile, ItsFieldOrderIsStatedOrNot) {
+  const test::TempFolder folder;
+  const auto file = folder.path() / "rig.yaml", other = folder.path() / "other.yaml";
+  Rig rig = test::small_rig(Scan::kInterlaced);
+  test::write_text(file, to_yaml(rig));
+  EXPECT_FALSE(states_field_order(file));
+  EXPECT_EQ(keeping_field_order(to_yaml(rig), file), to_yaml(rig));
+  EXPECT_FALSE(states_field_order(folder.path() / "none.yaml"));
+  const std::string stated = with_field_order(to_yaml(rig), rig);
+  test::write_text(other, stated);
+  EXPECT_TRUE(states_field_order(other));
+  EXPECT_EQ(read_rig(other)->field_order, FieldOrder::kTop);
+  EXPECT_EQ(keeping_field_order(to_yaml(rig), other), stated);
+  rig.field_order = FieldOrder::kBottom;
+  EXPECT_EQ(keeping_field_order(to_yaml(rig), other), to_yaml(rig)) << "what is newly said holds";
+  rig.scan = Scan::kProgressive;
+  rig.field_order = FieldOrder::kTop;
+  EXPECT_EQ(with_field_order(to_yaml(rig), rig), to_yaml(rig));
 }
 
 TEST(RigFile, SaysHowGoodItsCalibrationFoundItWhereThatIsKnown) {

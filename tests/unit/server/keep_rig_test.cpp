@@ -72,6 +72,13 @@ TEST_F(KeepRig, WhatWasThereStaysEachTime) {
   EXPECT_EQ(text_of(folder_ / "pattern.yaml"), "own") << "a pattern that is there is another's";
 }
 
+TEST_F(KeepRig, AFieldOrderThatSomebodyStatedStays) {
+  ASSERT_TRUE(
+      write_whole_file(file_, "%YAML:1.0\n---\nscan: interlaced\nfield_order: top\nframe_rate: 25\n"));
+  ASSERT_TRUE(keep_rig(file_, "%YAML:1.0\n---\nscan: interlaced\nframe_rate: 29.97\n", pattern_, kNow_ns));
+  EXPECT_EQ(text_of(file_), "%YAML:1.0\n---\nscan: interlaced\nfield_order: top\nframe_rate: 29.97\n");
+}
+
 TEST_F(KeepRig, WhereItCannotBeWrittenItSaysSo) {
   const auto kept = keep_rig(folder_ / "missing" / "rig.yaml", "text", pattern_, kNow_ns);
   ASSERT_FALSE(kept);
