@@ -48,7 +48,8 @@ class Package(unittest.TestCase):
                               'usr/lib/systemd/system/relievo-server.service',
                               'usr/lib/systemd/system/relievo-web.service', 'usr/lib/sysusers.d/relievo.conf',
                               'usr/lib/sysctl.d/60-relievo.conf', 'usr/share/doc/relievo/docs/OPERATION.md',
-                              'usr/share/doc/relievo/codec/FORMAT.md'}, files)
+                              'usr/share/doc/relievo/codec/FORMAT.md', 'usr/share/doc/relievo/idl/relievo.idl'},
+                             files)
         self.assertEqual([f for f in files if not re.match('usr/(bin|lib|share)/|etc/relievo/', f)], [])
         for name in self.packages:
             self.assertIn(f'usr/share/doc/{name}/copyright', files)

@@ -166,7 +166,7 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
       [asked = Asked{.recording = *std::move(recording),
                      .of_folder = of_folder,
                      .needs_token = context.tokens.needed(),
-                     .range = std::string(request.range),
+                     .range = std::string(request.method == "GET" ? request.range : ""),  // RFC 9110, 14.2
                      .if_range = std::string(request.if_range),
                      .if_match = std::string(request.if_match),
                      .if_none_match = std::string(request.if_none_match)}] { return reply_to(asked); });

@@ -90,6 +90,11 @@ TEST_F(OpenApi, EveryAddressAnswersAsDescribed) {
       EXPECT_FALSE(described["description"].get<std::string>().empty());
       const std::string type = response.headers.at("content-type");
       EXPECT_TRUE(described["content"].contains(type.substr(0, type.find(';')))) << path << ' ' << type;
+      // What any address may answer, as to more than one host's name.
+      const auto refused = request(port, "GET", target, "Host: other.example\r\n");
+      EXPECT_EQ(refused.status, 400) << path;
+      EXPECT_TRUE(responses.contains("400") || responses.contains("default")) << path;
+      EXPECT_TRUE(refused.headers.at("content-type").starts_with("text/plain")) << path;
     }
   }
 }
