@@ -199,7 +199,7 @@ void ConsistencyCheck::bends_of_line(int line, int worker) {
 void ConsistencyCheck::smooth_line(int line, float usual_px) {
   std::array<const float*, 7> rows{};
   for (int i = -3; i <= 3; ++i) rows[static_cast<std::size_t>(i + 3)] = row(measured_, line + i);
-  // Nothing is settled yet.
+  // Nothing is settled yet. Beside the row are its margin and its neighbour's, which hold nothing.
   float* scratch = row(settled_, line);
   smoothers().back().smooth(rows, row(noise_, line), boundaries_, usual_px, scratch, row(smooth_, line));
 }
