@@ -76,6 +76,31 @@ const on = (path, options, check) => async () => {
   await page.close();
 };
 
+/** Counts frames as the page gets them. */
+const countFrames = (page) =>
+  page.addInitScript(() => {
+    window.received_ = 0;
+    const { WebSocket } = window;
+    window.WebSocket = class extends WebSocket {
+      constructor(...rest) {
+        super(...rest);
+        this.addEventListener('message', ({ data }) => (window.received_ += typeof data === 'string' ? 0 : 1));
+      }
+    };
+  });
+/** Until the page has drawn itself twice, and knows what of it is in sight. */
+const turned = (page) => page.evaluate(() => new Promise((resolve) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve))))));
+const publishedOf = async ({ address }) => (await (await fetch(`${address}/api/streams`)).json()).streams[0]?.status?.frames_published ?? 0;
+/** A tab in the background, as far as a page is told of it; pages without a window are never hidden. */
+const kHide = () => {
+  Object.defineProperty(document, 'hidden', { configurable: true, get: () => true });
+  document.dispatchEvent(new Event('visibilitychange'));
+};
+const kShow = () => {
+  delete document.hidden;
+  document.dispatchEvent(new Event('visibilitychange'));
+};
+
 const checks = {
   'what a page sets before the element is defined holds': on('/early.html', {}, async (page) => {
     await when(page, (p) => p.state === 'file' && p.getAttribute('mode') === 'depth' && p.controls);
@@ -279,6 +304,79 @@ const checks = {
     // It comes to rest before the surface is behind it.
     await eventually('it flies on', async () => (await pixels()) === (await pixels()));
     assert.ok((await opaque(page)) > 0.1);
+  }),
+
+  'out of sight, however that comes about, it receives and draws next to nothing, and then goes on at once': on('/page.html', { before: countFrames }, async (page) => {
+    await set(page, { src: `${rig.address}/?stream=object` });
+    await when(page, (p) => p.state === 'live' && p.duration > 1);
+    const count = () => page.evaluate(() => ({ received: window.received_, drawn: window.drawn_ }));
+    await page.evaluate(() => {
+      window.states_ = [];
+      window.drawn_ = window.number_ = 0;
+      const element = document.querySelector('relievo-player');
+      element.addEventListener('statechange', ({ detail }) => window.states_.push(detail.state));
+      element.addEventListener('frame', ({ detail }) => {
+        ++window.drawn_;
+        window.number_ = detail.number;
+      });
+      document.body.style.height = '5000px';
+    });
+    for (const [away, back] of [
+      [(p) => (p.style.display = 'none'), (p) => (p.style.display = '')],
+      [(p) => (p.style.marginTop = '3000px'), (p) => (p.style.marginTop = '')],
+      [kHide, kShow],
+    ]) {
+      await page.waitForFunction((before) => window.number_ > before, await page.evaluate(() => window.number_));
+      await player(page, away);
+      await turned(page);
+      const before = await count();
+      const published = await publishedOf(rig);
+      await eventually('the stream stands still', async () => (await publishedOf(rig)) > published + 20); // well above any patience of the page
+      const after = await count();
+      const least = await page.evaluate(() => window.number_ + 12);
+      assert.ok(after.received - before.received <= 2, `${away}: received ${after.received - before.received}`); // its credit
+      assert.ok(after.drawn - before.drawn <= 1, `${away}: drew ${after.drawn - before.drawn}`);
+      await player(page, back);
+      await page.waitForFunction((number) => window.number_ > number, least);
+    }
+    assert.deepEqual(await page.evaluate(() => window.states_), []);
+  }),
+
+  'out of sight from the start, it has a picture and says so': on('/page.html', { before: countFrames }, async (page) => {
+    await player(page, (p) => (p.style.display = 'none'));
+    for (const [src, state] of [[`${rig.address}/?stream=object`, 'live'], ['take.mcap', 'file']]) {
+      await set(page, { src });
+      await page.waitForFunction((wanted) => document.querySelector('relievo-player').state === wanted, state);
+    }
+    await player(page, (p) => (p.style.display = ''));
+    await eventually('there is no picture', async () => (await opaque(page).catch(() => 0)) > 0.15);
+  }),
+
+  'a recording goes on out of sight without being drawn, as a <video> does, to its end; what is asked for then is done': on('/page.html', {}, async (page) => {
+    await page.evaluate(() => {
+      window.frames_ = [];
+      document.querySelector('relievo-player').addEventListener('frame', ({ detail }) => window.frames_.push(detail.number));
+    });
+    const drawn = () => page.evaluate(() => window.frames_.length);
+    await set(page, { src: 'take.mcap', loop: true });
+    await when(page, (p) => p.state === 'file' && p.duration > 1);
+    await eventually('nothing is drawn', async () => (await drawn()) > 1);
+    await player(page, (p) => (p.style.display = 'none'));
+    await turned(page);
+    const before = await drawn();
+    for (let round = 0; round < 2; ++round) {
+      await when(page, (p) => p.currentTime > 1);
+      await when(page, (p) => p.currentTime < 1);
+    }
+    assert.ok((await drawn()) - before <= 1, `drew ${(await drawn()) - before}`);
+    await set(page, { loop: false });
+    await when(page, (p) => p.paused && p.currentTime === p.duration);
+    const last = await page.evaluate(() => window.frames_.at(-1));
+    await set(page, { currentTime: 0.5 });
+    await page.waitForFunction((number) => window.frames_.at(-1) < number, last);
+    await player(page, (p) => p.play());
+    await player(page, (p) => (p.style.display = ''));
+    await eventually('it does not go on', async () => (await drawn()) > before + 4);
   }),
 
   'thirty that come and go leave no worker, socket or clock behind': on('/page.html', {}, async (page) => {

@@ -17,9 +17,11 @@ import timelineCss from '../../viewer/src/timeline.css?inline';
 import { Timeline } from '../../viewer/src/timeline';
 import { View } from '../../viewer/src/view';
 import type { PlayerState, RelievoPlayerElement } from '../relievo-player';
+import { addressed, fileOf } from './address';
 import playerCss from './player.css?inline';
 
 const kRefreshMs = 250;
+const kNear = '100px'; // of what is seen of the page: it is made ready there
 const kFlags = ['controls', 'grid', 'loop'] as const;
 const kSet = ['src', 'mode', 'theme', ...kFlags, 'currentTime', 'playbackRate'] as const; // properties of a page to set
 
@@ -66,31 +68,6 @@ function finite(value: number): number {
   return value;
 }
 
-function fileOf({ pathname }: URL): string {
-  const name = pathname.slice(pathname.lastIndexOf('/') + 1);
-  try {
-    return decodeURIComponent(name);
-  } catch {
-    return name; // '%' as it stands
-  }
-}
-
-/** What a src is of: a stream of the gateway whose page `url` is, or, `stream` null, the recording at `url`. Throws. */
-function addressed(src: string): { url: URL; stream: string | null } {
-  if (!URL.canParse(src, document.baseURI)) throw new Error(text.player.noAddress);
-  const url = new URL(src, document.baseURI);
-  url.hash = '';
-  if (/\.mcap$/i.test(url.pathname)) return { url, stream: null };
-  const stream = url.searchParams.get('stream') ?? '';
-  const recording = url.searchParams.get('recording') ?? '';
-  if (stream !== '') return { url, stream };
-  if (recording === '') throw new Error(text.player.noStream);
-  const at = new URL(`recordings/${encodeURIComponent(recording)}`, url); // as the viewer's own page has it
-  const token = url.searchParams.get('token');
-  if (token !== null) at.searchParams.set('token', token);
-  return { url: at, stream: null };
-}
-
 /** A page's colours, as an element's own: dark unless its theme says otherwise. */
 const ofHost = (css: string): string =>
   css
@@ -111,6 +88,14 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   private opened = false; // what plays may be driven
   private wishes: Wishes = {}; // for when it is
   private contextLost = false;
+  private inSight = true;
+  private readonly sight = new IntersectionObserver(
+    (changes) => {
+      this.inSight = changes[changes.length - 1]!.isIntersecting;
+      this.rouse();
+    },
+    { rootMargin: kNear },
+  );
   private saidDuration = 0;
   private saidNews = '';
   private opening = 0; // counts what was opened, so that a late answer is known
@@ -213,6 +198,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   goLive(): void {
     this.wishes = {};
     this.playback?.follow();
+    this.rouse();
   }
   resetView(): void {
     this.parts?.view.navigator.reset();
@@ -246,6 +232,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
       this.failure = error instanceof NoGraphics ? text.noWebGl : text.player.notStarted(error instanceof Error ? error.message : String(error));
       return this.refresh();
     }
+    this.sight.observe(canvas);
     this.applyDisplay();
     void this.open();
   }
@@ -286,6 +273,8 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     ++this.opening;
     if (parts === null) return;
     window.clearInterval(parts.timer);
+    this.sight.disconnect();
+    this.inSight = true;
     parts.timeline.stop();
     parts.session.end();
     parts.view.end();
@@ -320,13 +309,33 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   private applyWishes(): void {
     const { driven } = this;
-    if (driven === null) return;
+    if (driven === null) return this.rouse();
     const { rate, time, playing } = this.wishes;
     this.wishes = {};
     if (playing === false) driven.pause(); // first: it is at the time that was asked for then
     if (rate !== undefined) driven.setSpeed(rate);
     if (time !== undefined) driven.seek(driven.times[0]! + time * 1000);
     if (playing === true) driven.play();
+    this.rouse();
+  }
+
+  /** Nobody sees it. Its first picture it gets all the same, as a <video> does. */
+  private get isUnseen(): boolean {
+    return (!this.inSight || document.hidden) && this.parts?.session.seen === true;
+  }
+
+  /** What plays goes on without being drawn; what was asked for is drawn. */
+  private get isIdle(): boolean {
+    const { playback } = this;
+    if (!this.isUnseen || playback?.playing !== true) return false;
+    return playback.following === true || playback.loop !== null || playback.position < playback.times[playback.times.length - 1]!;
+  }
+
+  private rouse(): void {
+    if (this.parts === null) return;
+    const { session, view } = this.parts;
+    session.rest(this.isUnseen);
+    if (session.isBusy && !this.isIdle) view.invalidate();
   }
 
   private loseContext(lost: boolean): void {
@@ -338,7 +347,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     return new Session({
       changed: () => this.refresh(),
       described: (info, seen) => view.restart(info.camera, seen),
-      ready: () => view.invalidate(),
+      ready: () => this.isIdle || view.invalidate(),
       hint: () => undefined,
       unusable: (message) => this.fail(text.noDecoder(message)),
     });
@@ -419,7 +428,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   // On the screen's beat.
   private draw(): void {
-    if (this.parts === null) return;
+    if (this.parts === null || this.isIdle) return;
     const { session, view } = this.parts;
     const frame = session.take();
     if (frame === null) return;
@@ -434,7 +443,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   /** What is written on grows here, too, until it is whole. */
   private async follow(): Promise<void> {
     const { written } = this;
-    if (written === null || !(await written.server.refresh()) || !written.server.arrived || written !== this.written) return;
+    if (written === null || this.isUnseen || !(await written.server.refresh()) || !written.server.arrived || written !== this.written) return;
     const writing = written.server.streams.find(({ recorder }) => recorder?.file === written.file);
     await this.parts?.session.source?.told?.(writing?.recorder ?? undefined);
     if (written !== this.written || written.recording.isGrowing()) return;

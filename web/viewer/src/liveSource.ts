@@ -19,6 +19,7 @@ export class LiveSource implements FrameSource, Playback {
   private returning = false; // the player catches up
   private readonly underWay = new Credit();
   private withServer = 0; // frames that the server may send
+  private resting = false; // nothing more is asked for
   private withPage = 0; // frames that the page has not shown yet
   changed: () => void = () => undefined;
   /** Gets each message that comes from now on, to be read only. */
@@ -143,6 +144,11 @@ export class LiveSource implements FrameSource, Playback {
     this.connection.want(quality);
   }
 
+  rest(resting: boolean): void {
+    this.resting = resting;
+    this.topUp();
+  }
+
   retryNow(): void {
     this.connection.retryNow();
   }
@@ -211,7 +217,7 @@ export class LiveSource implements FrameSource, Playback {
 
   private topUp(): void {
     const more = this.underWay.frames - this.withServer - (this.live ? this.withPage : 0);
-    if (more <= 0 || !this.connected) return;
+    if (more <= 0 || !this.connected || this.resting) return;
     if (this.withServer === 0) this.underWay.asked(performance.now());
     this.withServer += more;
     this.connection.credit(more);

@@ -42,7 +42,11 @@ export class Session {
   private taken: DecodedFrame | null = null; // drawn now
   private live = false; // the frame that came last
   private readonly serverDrops = new ServerDrops();
-  private readonly pause = (): void => this.meter.pause();
+  private resting = false; // nobody sees the picture
+  private readonly onHidden = (): void => {
+    this.interrupt();
+    this.events.changed();
+  };
 
   constructor(private readonly events: SessionEvents) {
     this.decoder = new Decoder({
@@ -50,14 +54,14 @@ export class Session {
       failed: (id, message) => this.onFailed(id, message),
       unusable: (message) => events.unusable(message),
     });
-    document.addEventListener('visibilitychange', this.pause);
+    document.addEventListener('visibilitychange', this.onHidden);
   }
 
   /** For good. */
   end(): void {
     this.watch(null);
     this.decoder.stop();
-    document.removeEventListener('visibilitychange', this.pause);
+    document.removeEventListener('visibilitychange', this.onHidden);
   }
 
   /** Whether a frame that has come is on its way to the screen. */
@@ -79,7 +83,7 @@ export class Session {
       seen: this.seen,
       serverState: status?.state ?? null,
       serverMessage: status?.message ?? '',
-      quietMs: performance.now() - this.lastFrameAt,
+      quietMs: document.hidden || this.resting ? 0 : performance.now() - this.lastFrameAt, // else nothing is asked for
       frameRate: info?.frame_rate ?? 0,
       file: following === null ? playing : null,
       shifted: following === false ? playing : null,
@@ -97,6 +101,7 @@ export class Session {
     this.serverDrops.restart();
     this.meter.begin();
     this.source = null;
+    this.resting = false;
     if (open === null) return;
     this.source = open({
       open: () => {
@@ -115,6 +120,14 @@ export class Session {
       clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
       nonsense: (message) => this.meter.failed(message),
     });
+  }
+
+  /** Whether nobody sees the picture: then as little as can be is to come. */
+  rest(resting: boolean): void {
+    if (resting === this.resting) return;
+    this.resting = resting;
+    this.interrupt();
+    this.source?.rest?.(resting);
   }
 
   /** The frame to draw now instead of the one before, whose memory is used again, if there is one. Its credit goes back only here, so a hidden page receives nothing. */
@@ -184,6 +197,12 @@ export class Session {
   private forget(): void {
     this.underway.clear();
     this.discard();
+  }
+
+  // Neither is what does not come meanwhile lost, nor is the source silent.
+  private interrupt(): void {
+    this.meter.pause();
+    this.lastFrameAt = performance.now();
   }
 
   private discard(): boolean {

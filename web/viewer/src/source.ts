@@ -32,6 +32,8 @@ export interface FrameSource {
   /** This many frames more may come: so many were shown, or not even that. */
   credit(n?: number, shown?: boolean): void;
   retryNow(): void;
+  /** Nobody sees the picture: what is not asked for yet need not come, until it is to again. A recording comes by credit alone. */
+  rest?(resting: boolean): void;
   /**
    * Of a recording of the server: what the server says of it now, so that what it wrote since is shown, too; undefined:
    * it writes another, or none.
