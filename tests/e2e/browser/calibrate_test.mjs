@@ -213,6 +213,33 @@ const checks = {
     });
   },
 
+  async 'a picture that is asked for when a calibration ends is not missed'() {
+    await withRig(['--source', kSource], async (server) => {
+      const page = await open(server.address);
+      await page.evaluate(() => {
+        window.bad_ = [];
+        const say = () => document.body.dataset.state === 'bad' && window.bad_.push(document.querySelector('#state').textContent);
+        new MutationObserver(say).observe(document.body, { attributes: true });
+      });
+      await choose(page, 'colour');
+      let late = 0;
+      await page.route('**/api/calibration/camera.jpg', async (route) => {
+        ++late;
+        await reaches(page, 'off'); // the server has none any more
+        await route.continue();
+      });
+      const asked = page.waitForRequest('**/api/calibration/camera.jpg');
+      const answered = page.waitForResponse('**/api/calibration/camera.jpg');
+      await asked;
+      await press(page, 'cancel');
+      assert.equal((await answered).status(), 503);
+      await page.waitForFunction(() => document.body.dataset.state === 'live' && document.querySelector('#picture').dataset.shows === 'camera');
+      assert.deepEqual(await page.evaluate(() => window.bad_), []);
+      assert.equal(late, 1);
+      await page.context().close();
+    });
+  },
+
   async 'a server that goes away in the middle is missed, and one that was started again has lost it'() {
     await withRig(['--source', kSource], async (server, _, rig) => {
       const page = await open(server.address);

@@ -66,6 +66,7 @@ export class Stripes {
     const look = await lookAt(stream, 'camera');
     if (look?.pictures.includes('camera') !== true) return kEveryMs;
     const bitmap = await pictureOf(stream, 'camera');
+    if (bitmap === null) return kEveryMs;
     if (stream !== this.stream) {
       bitmap.close();
       return 0;

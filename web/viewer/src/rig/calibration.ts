@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the server says of a calibration, and orders to it: /api/calibration (docs/WEB.md).
-import { ask } from './look';
+import { ask, pictureAt } from './look';
 
 export const kSides = ['left', 'right', 'upper', 'lower'] as const;
 export type Side = (typeof kSides)[number];
@@ -65,6 +65,5 @@ export const startCalibration = (stream: string, kind: Kind, board: string): Pro
 
 export const orderCalibration = (action: Action): Promise<Calibration> => post({ action });
 
-export async function calibrationPicture(name: 'camera' | 'coverage'): Promise<ImageBitmap> {
-  return createImageBitmap(await (await ask(`api/calibration/${name}.jpg`)).blob());
-}
+export const calibrationPicture = (name: 'camera' | 'coverage'): Promise<ImageBitmap | null> =>
+  pictureAt(`api/calibration/${name}.jpg`);

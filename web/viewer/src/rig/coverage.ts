@@ -22,13 +22,14 @@ export class CoverageFigure {
   }
 
   async show({ coverage, tilts }: Calibration): Promise<void> {
-    if (coverage) draw(element<HTMLCanvasElement>('coverage'), await calibrationPicture('coverage'));
+    const picture = coverage ? await calibrationPicture('coverage') : null;
+    if (picture !== null) draw(element<HTMLCanvasElement>('coverage'), picture);
     for (const [side, row] of this.tilts) {
       row.dataset['side'] = side;
       row.dataset['seen'] = String(tilts.includes(side));
       setText(row, say.tilt(say.sides[side], tilts.includes(side)));
     }
-    this.root.hidden = !coverage;
+    this.root.hidden = picture === null;
   }
 
   hide(): void {

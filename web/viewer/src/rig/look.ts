@@ -35,7 +35,14 @@ export interface Look {
 }
 
 /** The server said no, and why. */
-export class Refused extends Error {}
+export class Refused extends Error {
+  constructor(
+    why: string,
+    readonly status: number,
+  ) {
+    super(why);
+  }
+}
 
 const address = (path: string): URL => new URL(path, document.baseURI);
 
@@ -46,10 +53,18 @@ export async function lookAt(stream: string, picture: PictureName): Promise<Look
   return look.state === 'measured' ? look : null;
 }
 
-export async function pictureOf(stream: string, picture: PictureName): Promise<ImageBitmap> {
-  const response = await ask(`api/rig/${encodeURIComponent(stream)}/${picture}.jpg`);
-  return createImageBitmap(await response.blob());
+/** Null: there is none now, as while what it is of begins or ends. */
+export async function pictureAt(path: string): Promise<ImageBitmap | null> {
+  try {
+    return await createImageBitmap(await (await ask(path)).blob());
+  } catch (error) {
+    if (error instanceof Refused && error.status === 503) return null;
+    throw error;
+  }
 }
+
+export const pictureOf = (stream: string, picture: PictureName): Promise<ImageBitmap | null> =>
+  pictureAt(`api/rig/${encodeURIComponent(stream)}/${picture}.jpg`);
 
 export async function streamNames(): Promise<string[]> {
   const list = (await (await ask('api/streams')).json()) as { streams: { name: string }[] };
@@ -59,6 +74,6 @@ export async function streamNames(): Promise<string[]> {
 export async function ask(path: string, init: RequestInit = {}): Promise<Response> {
   const response = await fetch(address(path), { cache: 'no-store', signal: AbortSignal.timeout(5000), ...init });
   if (response.status === 401) location.reload(); // the page that the server answers with asks for a token
-  if (!response.ok) throw new Refused((await response.text()).trim() || `HTTP ${response.status}`);
+  if (!response.ok) throw new Refused((await response.text()).trim() || `HTTP ${response.status}`, response.status);
   return response;
 }

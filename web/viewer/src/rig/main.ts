@@ -151,7 +151,8 @@ class RigPage {
     return false;
   }
 
-  private draw(bitmap: ImageBitmap, picture: PictureName | 'calibration'): void {
+  private draw(bitmap: ImageBitmap | null, picture: PictureName | 'calibration'): void {
+    if (bitmap === null) return; // that before stays
     draw(this.canvas, bitmap);
     this.canvas.dataset['shows'] = picture;
   }
