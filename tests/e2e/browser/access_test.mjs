@@ -62,6 +62,28 @@ const checks = {
     assert.deepEqual([...reached].sort(), ['modes', 'rail', 'timeline', 'ways']);
   },
 
+  async 'the tabulator goes from where a panel is opened into it, and escape back'(page) {
+    const focused = () => page.evaluate(() => document.activeElement.closest('#panels aside, #view, button, select')?.id ?? document.activeElement.outerHTML.slice(0, 80));
+    for (const [from, key, name] of [['#view', 'b', 'display'], ['#view', 'n', 'streams'], ['#tool-measure', 'Enter', 'measure'], ['#modes button:first-child', 't', 'take']]) {
+      await page.focus(from);
+      const before = await focused();
+      await page.keyboard.press(key);
+      await page.waitForSelector(`#panel-${name}`, { state: 'visible' });
+      assert.equal(await focused(), before, `${name} takes the focus by itself`);
+      await page.keyboard.press('Tab');
+      assert.equal(await page.evaluate(() => document.activeElement.closest('aside')?.id), `panel-${name}`, `from ${from}`);
+      await page.keyboard.press('Escape');
+      await page.waitForSelector(`#panel-${name}`, { state: 'hidden' });
+      assert.ok(await page.evaluate((of) => document.activeElement.matches(of), from), `not back at ${from}, but at ${await focused()}`);
+    }
+    // From elsewhere it goes on as the page is made, so that nothing is out of reach while a panel is open.
+    await page.keyboard.press('b');
+    await page.focus('#ways button:last-child');
+    await page.keyboard.press('Tab');
+    assert.equal(await page.evaluate(() => document.activeElement.parentElement.id), 'rail');
+    await page.keyboard.press('Escape');
+  },
+
   async 'a mode is chosen by the keyboard alone'(page) {
     await page.focus('#modes button:nth-child(5)');
     await page.keyboard.press('Enter');

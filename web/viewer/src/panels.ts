@@ -31,9 +31,21 @@ interface Panel {
 export class Panels {
   private readonly panels = new Map<RailName, Panel>();
   private opened: RailName | null = null;
+  private isEntered = false; // or the keyboard was moved elsewhere
+  private from: Element | null = null; // had the keyboard when it was opened
 
   /** `made`: told of each panel's box, closed. */
-  constructor(private readonly made: (box: HTMLElement) => void) {}
+  constructor(private readonly made: (box: HTMLElement) => void) {
+    // Whoever opens a panel by keys goes into it next, not through the other tools before.
+    document.addEventListener('keydown', (event) => {
+      if (event.key !== 'Tab' || this.opened === null || this.isEntered) return;
+      const isNext = document.activeElement === this.from && !event.shiftKey;
+      this.isEntered = true;
+      if (!isNext) return;
+      event.preventDefault();
+      this.panels.get(this.opened)!.box.querySelector<HTMLElement>('button, input, select, a[href]')?.focus();
+    });
+  }
 
   /** A button that does something at once. */
   action(name: RailName, act: () => void): HTMLButtonElement {
@@ -79,7 +91,14 @@ export class Panels {
     const panel = this.panels.get(name)!;
     this.opened = open ? name : null;
     document.body.classList.toggle('with-panel', open);
-    if (!open && panel.box.contains(document.activeElement)) panel.button.focus(); // keys go on from where they began
+    if (open) {
+      this.from = document.activeElement;
+      this.isEntered = false;
+    } else if (panel.box.contains(document.activeElement)) {
+      const { from } = this;
+      const isThere = from instanceof HTMLElement && from !== document.body && from.checkVisibility();
+      (isThere ? from : panel.button).focus(); // keys go on from where they began
+    }
     panel.box.hidden = !open;
     panel.button.setAttribute('aria-expanded', String(open));
     this.load(panel, open);
