@@ -7,7 +7,9 @@ import { writtenOf, type ListedStream, type Quality, type StreamInfo } from './p
 import { Session } from './session';
 import type { Playback, SourceEvents } from './source';
 import { isOver, present, type Presentation } from './state';
-import type { Beside, View } from './view';
+import { text } from './strings';
+import type { Beside } from './surfaces';
+import type { View } from './view';
 
 interface Companion {
   session: Session;
@@ -151,3 +153,13 @@ export class Companions {
     if (opened !== null && !grows) this.repeat(session.source!.playback, false); // it plays by itself
   }
 }
+
+// Those that are gone, or never were there.
+const isMissing = (told: Presentation): boolean => isOver(told) || told.state === 'waiting';
+
+/** Its name, and a word where it is not there. */
+export const called = (name: string, told: Presentation): string => text.streams.withWord(name, isMissing(told) ? told.label : '');
+
+/** Which are not there, in words. */
+export const besidesText = (besides: ReadonlyMap<string, Presentation>): string =>
+  [...besides].flatMap(([name, told]) => (isMissing(told) ? [called(name, told)] : [])).join(', ');

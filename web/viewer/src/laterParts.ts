@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts of the page that are loaded when they are needed first, or behind the first picture: measuring, what is taken away,
-// statistics, headsets.
+// Parts of the page that are loaded when they are needed first, or behind the first picture: the list of streams, measuring,
+// what is taken away, statistics, headsets.
 import type { Measurement } from './measure';
 import type { MeasurePanel } from './measurePanel';
 import type { Meter } from './meter';
@@ -8,6 +8,7 @@ import type { Panels } from './panels';
 import type { StreamInfo, StreamStatus } from './protocol';
 import type { Kept } from './source';
 import type { StatisticsPanel } from './statisticsPanel';
+import type { StreamsPanel, StreamsPanelEvents } from './streamsPanel';
 import { text } from './strings';
 import type { Takeable, TakePanel } from './takePanel';
 import type { View } from './view';
@@ -37,6 +38,20 @@ export function addTake(panels: Panels, of: Takeable): void {
     const { TakePanel } = await import('./takePanel');
     panel ??= new TakePanel(body, of);
   });
+}
+
+export class Streams {
+  panel: StreamsPanel | null = null; // once it was opened
+
+  /** `changed`: told that there is more, or less, to be shown. */
+  constructor(panels: Panels, events: StreamsPanelEvents, view: View | null, changed: () => void) {
+    const body = panels.panel('streams', text.streams.title, async (open) => {
+      const { StreamsPanel } = await import('./streamsPanel');
+      this.panel ??= new StreamsPanel(body, events, view);
+      this.panel.open = open;
+      changed();
+    });
+  }
 }
 
 export interface Measured {

@@ -2,31 +2,30 @@
 // The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
 import { loadDisplay, storeDisplay, type Display } from './display';
 import { listenToCommands, toggleFullscreen } from './commands';
-import { Companions } from './companions';
+import { besidesText, called, Companions } from './companions';
 import { DisplayPanel } from './displayPanel';
 import { element } from './dom';
 import { endHeld } from './early';
 import { FilePicker } from './files';
 import { fillHelp } from './helpPanel';
-import { addImmersive, addStatistics, addTake, Measuring, Rest } from './laterParts';
+import { addImmersive, addStatistics, addTake, Measuring, Rest, Streams } from './laterParts';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
 import { openFile, openRemote, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame, Notice } from './messages';
-import { rigPlace } from './placement';
+import { rigPlace, type Placement } from './placement';
 import { wantedQuality, writtenOf, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
-import { address, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
+import { address, goTo, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { sentence } from './sentence';
 import { Session } from './session';
-import { isOver, present, type Presentation } from './state';
+import { present, type Presentation } from './state';
 import { text } from './strings';
 import { ServerList } from './streamList';
-import type { StreamsPanel } from './streamsPanel';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
 import { View } from './view';
@@ -43,7 +42,7 @@ class Viewer {
   private readonly measure: Measuring | null;
   private readonly rest: Rest;
   private readonly companions: Companions | null;
-  private streamsPanel: StreamsPanel | null = null; // loaded when it is opened first
+  private readonly streams: Streams;
   readonly timeline = new Timeline(
     element('timeline'),
     (name) => {
@@ -107,7 +106,7 @@ class Viewer {
     this.panels.action('open', () => picker.ask());
     this.record = new RecordControl(this.panels.action('record', () => undefined));
     this.companions = this.view === null ? null : new Companions(this.view, () => this.refresh());
-    this.makeStreams();
+    this.streams = this.makeStreams();
     const displayBody = this.panels.panel('display', text.display.title);
     this.displayPanel = new DisplayPanel(displayBody, (part) => this.change(part));
     this.qualityControl = new QualityControl(displayBody, (quality) => this.chooseQuality(quality));
@@ -166,10 +165,7 @@ class Viewer {
     const navigator = this.view?.navigator;
     if (pose !== null && navigator?.isRigView === false) navigator.pose = pose;
     const playback = this.session.source?.playback;
-    if (moment === null || playback === undefined) return;
-    playback.seek(moment.atMs - (moment.utc ? playback.startMs : 0));
-    if (moment.playing) playback.play();
-    else playback.pause();
+    if (moment !== null && playback !== undefined) goTo(playback, moment);
   }
 
   /** From now on; kept for the next visit. */
@@ -233,34 +229,27 @@ class Viewer {
     });
   }
 
-  private makeStreams(): void {
-    const body = this.panels.panel('streams', text.streams.title, (open) => this.openStreams(body, open));
-  }
-
-  private async openStreams(body: HTMLElement, open: boolean): Promise<void> {
-    const { StreamsPanel } = await import('./streamsPanel');
-    this.streamsPanel ??= new StreamsPanel(body, {
-      choose: (name) => this.choose(name),
-      beside: (name, on) => {
+  private makeStreams(): Streams {
+    const events = {
+      choose: (name: string) => this.choose(name),
+      beside: (name: string, on: boolean) => {
         if (on) this.companions?.add(name, this.server.find(name));
         else this.companions?.remove(name);
         this.writeAddress();
       },
-      recording: (file) => void this.openServerFile(file, null),
-      placement: (placement) => {
+      recording: (file: string) => void this.openServerFile(file, null),
+      placement: (placement: Placement) => {
         if (this.view !== null) this.view.placement = placement;
       },
-    }, this.view);
-    this.streamsPanel.open = open;
-    this.refresh();
+    };
+    return new Streams(this.panels, events, this.view, () => this.refresh());
   }
 
   /** To what is seen now. */
   link(): string {
     const navigator = this.view?.navigator;
     const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
-    const playback = this.session.source?.playback;
-    const moment = playback === undefined || playback.times.length === 0 ? null : momentOf(playback);
+    const moment = momentOf(this.session.source?.playback ?? null);
     const names = this.companions?.names ?? [];
     const places = [...(this.view?.placedByHand ?? [])].filter(([name]) => names.includes(name));
     return shareLink(location.href, this.addressed, this.display, pose, moment, new Map(places));
@@ -479,8 +468,9 @@ class Viewer {
     }
     this.ui.showState(this.presentation, seen, this.fileProblem !== null);
     this.showNotice();
-    this.streamsPanel?.show(this.server.streams, this.stream, this.companions?.names ?? [], this.server.arrived && (!offline || facts.refusal !== null));
-    this.streamsPanel?.showRecordings(this.server.streams, this.serverFile);
+    const { streams, arrived } = this.server;
+    this.streams.panel?.show(streams, this.stream, this.companions?.names ?? [], arrived && (!offline || facts.refusal !== null));
+    this.streams.panel?.showRecordings(streams, this.serverFile);
     const besides = this.companions?.tell() ?? new Map<string, Presentation>();
     this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
     this.qualityControl.show(this.offered);
@@ -516,11 +506,5 @@ class Viewer {
     endHeld();
   }
 }
-
-// Of what is beside the first one: those that are gone, or never were there.
-const isMissing = (told: Presentation): boolean => isOver(told) || told.state === 'waiting';
-const called = (name: string, told: Presentation): string => text.streams.withWord(name, isMissing(told) ? told.label : '');
-const besidesText = (besides: ReadonlyMap<string, Presentation>): string =>
-  [...besides].flatMap(([name, told]) => (isMissing(told) ? [called(name, told)] : [])).join(', ');
 
 report(new Viewer());

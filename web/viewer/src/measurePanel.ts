@@ -23,7 +23,8 @@ import { inverse, moved } from './rigid';
 import { rigErrorOf } from './rigError';
 import { Snapper, type Caught } from './snapper';
 import { text } from './strings';
-import type { Hit, View } from './view';
+import type { Hit } from './surfaces';
+import type { View } from './view';
 
 const kStill_px = 5; // a click moves no further
 const kSlack_px = 10; // from an edge or corner that is meant

@@ -30,12 +30,20 @@ export interface Shared {
   readonly places: ReadonlyMap<string, Rigid>;
 }
 
-/** The time that is shown. Of a live stream: none, or that of day where a person went back in it. */
-export function momentOf(playback: Playback): Moment | 'live' {
+/** The time that is shown. Of a live stream: none, or that of day where a person went back in it. Null: there is none yet. */
+export function momentOf(playback: Playback | null): Moment | 'live' | null {
+  if (playback === null || playback.times.length === 0) return null;
   const { position, startMs, following, playing } = playback;
   if (following === true) return 'live';
   const utc = following === false;
   return { atMs: position + (utc ? startMs : 0), utc, playing };
+}
+
+/** To what a link says of time, also where something is shown already. */
+export function goTo(playback: Playback, { atMs, utc, playing }: Moment): void {
+  playback.seek(atMs - (utc ? playback.startMs : 0));
+  if (playing) playback.play();
+  else playback.pause();
 }
 
 /** Over the address of the page; `pose` null: the first view. */

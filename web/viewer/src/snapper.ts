@@ -7,7 +7,8 @@ import type { StreamInfo } from './protocol';
 import { lensOf } from './rigCamera';
 import { inverse, moved, turned } from './rigid';
 import { snap, type Seen as SeenByCamera, type Snapped } from './snap';
-import type { Hit, Seen, View } from './view';
+import type { Hit, Seen } from './surfaces';
+import type { View } from './view';
 
 export interface Caught extends Pick<Seen, 'stream' | 'surface' | 'pose'> {
   readonly snapped: Snapped;

@@ -9,49 +9,16 @@ import { Navigator } from './navigator';
 import { Overlay } from './overlay';
 import { loadStage, makePainter } from './painter';
 import { steadyRange, type Range } from './palette';
-import { pick, type Picked } from './pick';
 import type { Pixels } from './pixels';
 import { decodeVertexQuality } from './quality';
-import { around, between, placed, type Placement } from './placement';
-import { inverse, kNowhere, moved, turned, type Rigid } from './rigid';
+import type { Placement } from './placement';
+import { kNowhere, type Rigid } from './rigid';
 import type { Pinhole } from './protocol';
 import { NoGraphics, Resolution, findGraphics } from './resolution';
 import type { Stage } from './stage';
-import { text } from './strings';
-import type { Extent } from './surface';
+import { pickOf, Surfaces, type Beside, type Hit, type Seen, type Shown } from './surfaces';
 
 const kStill_ms = 1000; // without a drawing: the picture stands still and can be as fine as the screen
-const kFirst = 0; // number of the first surface, for the painter
-
-/** A surface, in a frame of its own camera. */
-interface Shown {
-  readonly id: number; // for the painter
-  frame: DecodedFrame | null;
-  picture: ImageBitmap | null; // the last there was: to be closed when another takes its place
-}
-
-/** A surface beside the first one. */
-export interface Beside extends Shown {
-  readonly name: string;
-  extent: Extent | null; // of its first frame
-  readonly comesQuietly: boolean; // the eye stays where it is
-  word: string; // what is said of it where it is not of now; empty: it is
-}
-
-/** A place of one of the surfaces, in the frame of its own camera. */
-export interface Hit extends Picked {
-  readonly stream: string;
-  readonly surface: DecodedFrame;
-  readonly pose: Rigid; // of that frame in the scene's
-}
-
-/** A stream's surface as it is shown. */
-export interface Seen {
-  readonly stream: string;
-  readonly surface: DecodedFrame;
-  readonly pose: Rigid; // of its camera in the scene
-  readonly picture: ImageBitmap | null; // of that surface; open until the next is shown
-}
 
 export interface ViewEvents {
   /** Called right before a drawing; may call show(). */
@@ -72,17 +39,8 @@ export class View {
   private ended = false;
   private readonly painter: Painter;
   private headset: Stage | null = null; // draws while a person wears one, instead
-  private readonly surface: Shown = { id: kFirst, frame: null, picture: null };
-  private nextId = kFirst + 1;
+  private readonly surfaces = new Surfaces();
   private readonly ground = new Ground();
-  private readonly besides: Beside[] = [];
-  private placement_: Placement = 'beside';
-  private extent: Extent | null = null; // of the first surface
-  private poses: Rigid[] = [kNowhere]; // of the first surface and those beside it
-  private readonly known = new Map<string, Rigid>(); // where a person has placed streams, by name
-  private readonly rigPlaces = new Map<string, Rigid>(); // where their rigs say that they stand
-  /** Of the first surface, where there are others beside it. */
-  name = '';
   private scheduled = false;
   private readonly resolution = new Resolution();
   private painting = true; // until who draws is ready for the next
@@ -127,6 +85,14 @@ export class View {
     this.resize();
   }
 
+  /** Of the first surface, where there are others beside it. */
+  get name(): string {
+    return this.surfaces.name;
+  }
+  set name(name: string) {
+    this.surfaces.name = name;
+  }
+
   set display(display: Display) {
     this.mode_ = display.mode;
     this.grid = display.grid;
@@ -146,12 +112,12 @@ export class View {
     return this.mode_;
   }
   get wants(): Wants {
-    const { frame } = this.surface;
+    const { frame } = this.surfaces.first;
     const wants = wantsOf(this.mode_, frame !== null && hasPicture(frame));
     return { ...wants, rims: wants.rims && this.drawsSmooth };
   }
   get shown(): DecodedFrame | null {
-    return this.surface.frame;
+    return this.surfaces.first.frame;
   }
   /** Of the depth mode's colours. */
   get depthRange(): Range | null {
@@ -164,12 +130,12 @@ export class View {
   /** The rig of the stream; the next surface sets the view, unless the view is to be kept. */
   restart(camera: Pinhole | null, keep: boolean): void {
     this.navigator.restart(camera, keep);
-    if (!keep) this.extent = null;
+    if (!keep) this.surfaces.extent = null;
   }
 
   /** The first surface is seen no more. */
   clear(): void {
-    const { surface } = this;
+    const { first: surface } = this.surfaces;
     if (surface.frame === null) return;
     this.painter.remove(surface.id);
     this.headset?.remove(surface.id);
@@ -179,23 +145,22 @@ export class View {
   }
 
   show(frame: DecodedFrame): void {
-    this.paint(this.surface, frame);
+    const { surfaces } = this;
+    this.paint(surfaces.first, frame);
     if (frame.extent === null) return;
-    const isFirst = this.extent === null;
-    this.extent = frame.extent;
-    if (isFirst && this.besides.length > 0) this.arrange();
+    const isFirst = surfaces.extent === null;
+    surfaces.extent = frame.extent;
+    if (isFirst && !surfaces.isAlone) this.arrange();
     this.useExtent();
   }
 
   /** The surface of another stream; what it shows comes by showBeside(). All are seen when it appears, unless it `comesQuietly`. */
   addBeside(name: string, comesQuietly = false): Beside {
-    const beside: Beside = { id: this.nextId++, name, frame: null, picture: null, extent: null, comesQuietly, word: '' };
-    this.besides.push(beside);
-    return beside;
+    return this.surfaces.add(name, comesQuietly);
   }
 
   removeBeside(beside: Beside): void {
-    this.besides.splice(this.besides.indexOf(beside), 1);
+    this.surfaces.remove(beside);
     this.painter.remove(beside.id);
     this.headset?.remove(beside.id);
     beside.picture?.close();
@@ -218,54 +183,41 @@ export class View {
   }
 
   set placement(placement: Placement) {
-    if (placement === this.placement_) return;
-    this.placement_ = placement;
+    if (placement === this.surfaces.placement) return;
+    this.surfaces.placement = placement;
     this.arrange();
   }
 
   /** Where streams stand in the first one's frame, by name, as a person has placed them. */
   get placedByHand(): ReadonlyMap<string, Rigid> {
-    return this.known;
+    return this.surfaces.known;
   }
 
   /** From now on; null: as others without a place. */
   place(name: string, pose: Rigid | null): void {
-    if (pose === null) this.known.delete(name);
-    else this.known.set(name, pose);
+    if (pose === null) this.surfaces.known.delete(name);
+    else this.surfaces.known.set(name, pose);
     this.arrange();
   }
 
   /** Where the rig of a stream says that its camera stands in the frame of all rigs; null: it does not say. */
   setRigPlace(name: string, place: Rigid | null): void {
-    if (JSON.stringify(place) === JSON.stringify(this.rigPlaces.get(name) ?? null)) return;
-    if (place === null) this.rigPlaces.delete(name);
-    else this.rigPlaces.set(name, place);
-    if (this.besides.length > 0) this.arrange(true);
+    if (this.surfaces.setRigPlace(name, place) && !this.surfaces.isAlone) this.arrange(true);
   }
 
   /** Where a stream stands in the first one's frame, by a person's hand or else by both rigs; null: nothing says it. */
   placeOf(name: string): Rigid | null {
-    return this.known.get(name) ?? between(this.rigPlaces.get(this.name), this.rigPlaces.get(name));
-  }
-
-  private get surfaces(): Shown[] {
-    return [this.surface, ...this.besides];
-  }
-  private get names(): string[] {
-    return [this.name, ...this.besides.map(({ name }) => name)];
-  }
-  private get extents(): (Extent | null)[] {
-    return [this.extent, ...this.besides.map(({ extent }) => extent)];
+    return this.surfaces.placeOf(name);
   }
 
   private arrange(quietly = false): void {
-    this.poses = placed(this.extents, this.placement_, [null, ...this.besides.map(({ name }) => this.placeOf(name))]);
+    this.surfaces.arrange();
     this.useExtent();
     if (!quietly) this.navigator.reset();
   }
 
   private useExtent(): void {
-    const all = this.besides.length === 0 ? this.extent : around(this.extents, this.poses);
+    const all = this.surfaces.around;
     if (all === null) return;
     this.ground.setExtent(all);
     this.range = steadyRange(all.min[2], all.max[2], this.range);
@@ -276,43 +228,27 @@ export class View {
   pick(at: { x: number; y: number }): Hit | null {
     const ray = this.navigator.ray(at);
     if (ray === null) return null;
-    let first: Hit | null = null;
-    for (const { stream, surface, pose } of this.seen) {
-      const back = inverse(pose);
-      const picked = pick(surface, moved(back, ray.origin), turned(back, ray.direction));
-      if (picked !== null && (first === null || picked.along < first.along)) first = { ...picked, stream, surface, pose };
-    }
-    return first;
+    return pickOf(this.seen, ray);
   }
 
   /** All surfaces that are to be seen. */
   get seen(): Seen[] {
-    return this.surfaces.flatMap(({ frame: surface, picture }, i) => {
-      const stream = this.names[i]!;
-      const pose = this.poseOf(stream);
-      return surface === null || pose === null ? [] : [{ stream, surface, pose, picture }];
-    });
+    return this.surfaces.seen(this.isRigView);
   }
 
   /** Of a stream's camera in the scene; null: its surface is not to be seen. */
   poseOf(stream: string): Rigid | null {
-    const i = this.names.indexOf(stream);
-    return i < 0 || (i > 0 && this.isRigView) ? null : (this.poses[i] ?? kNowhere);
+    return this.surfaces.poseOf(stream, this.isRigView);
   }
 
   /** Whether there is none beside the first. */
   get isAlone(): boolean {
-    return this.besides.length === 0;
+    return this.surfaces.isAlone;
   }
 
-  /**
-   * Whether lengths from this stream to another such one mean something: it stands where both rigs say, or in the first
-   * one's frame because a person has put all there. Places clicked by hand are too inexact, side by side means nothing.
-   */
+  /** Whether lengths from this stream to another such one mean something. */
   standsTrue(name: string): boolean {
-    if (name === this.name) return true;
-    if (this.known.has(name)) return false;
-    return this.placement_ === 'together' || this.placeOf(name) !== null;
+    return this.surfaces.standsTrue(name);
   }
 
   /** For good: gives back what it holds of the card. */
@@ -323,7 +259,7 @@ export class View {
     this.navigator.end();
     this.painter.end();
     this.headset?.end();
-    for (const { picture } of this.surfaces) picture?.close();
+    for (const { picture } of this.surfaces.all) picture?.close();
   }
 
   /** Draws for a headset until its session ends. Its origin, where the person is now, is the rig's camera. */
@@ -341,11 +277,11 @@ export class View {
         stage.end(); // behind what else hears of the session's end
         canvas.remove();
       });
-      for (const shown of this.surfaces) this.repaint(shown, this.painter);
+      for (const shown of this.surfaces.all) this.repaint(shown, this.painter);
       this.resize();
       this.invalidate();
     });
-    for (const shown of this.surfaces) this.repaint(shown, stage);
+    for (const shown of this.surfaces.all) this.repaint(shown, stage);
     this.headset = stage;
     await stage.immerse(session, () => {
       if (!this.ended) this.events.beforeDraw();
@@ -414,7 +350,7 @@ export class View {
 
   // The rig's camera sees none.
   private get showsGround(): boolean {
-    return this.grid && this.surface.frame !== null && !this.isRigView;
+    return this.grid && this.surfaces.first.frame !== null && !this.isRigView;
   }
 
   // Where numbers are read, and in the picture of the rig's camera, all is drawn that there is.
@@ -439,7 +375,7 @@ export class View {
 
   // Of the frames at hand, which came before anybody wanted it: where a stream stands still no other comes.
   private tellQuality(): void {
-    for (const shown of this.surfaces) {
+    for (const shown of this.surfaces.all) {
       const { frame } = shown;
       if (frame?.codedQuality == null || frame.coordinates === null) continue;
       try {
@@ -460,7 +396,7 @@ export class View {
     const { camera, size, rigCamera } = this.navigator;
     const poses: (Rigid | null)[] = [kNowhere];
     // Another rig's camera sees something else.
-    for (const [i, { id }] of this.besides.entries()) poses[id] = this.isRigView ? null : (this.poses[i + 1] ?? kNowhere);
+    for (const [i, { id }] of this.surfaces.besides.entries()) poses[id] = this.isRigView ? null : this.surfaces.pose(i + 1);
     camera.updateMatrixWorld();
     return {
       ...size,
@@ -472,7 +408,7 @@ export class View {
       range: this.range,
       ground: this.showsGround ? this.ground.ranges : null,
       poses,
-      dimmed: this.besides.flatMap(({ id, word }) => (word === '' ? [] : [id])),
+      dimmed: this.surfaces.besides.flatMap(({ id, word }) => (word === '' ? [] : [id])),
       background: this.background_,
       smooth: this.drawsSmooth,
       timed,
@@ -505,15 +441,8 @@ export class View {
 
   private get labels(): readonly Label[] {
     const ground = this.showsGround ? this.ground.labels : [];
-    if (this.besides.length === 0 || this.navigator.isRigView) return ground;
-    const names = [this.name, ...this.besides.map(({ name, word }) => text.streams.withWord(name, word))];
-    const above = this.extents.flatMap((extent, i): Label[] => {
-      if (extent === null) return [];
-      const { min, max } = extent;
-      const at: Label['at'] = [(min[0] + max[0]) / 2, min[1] - 0.1 * (max[1] - min[1]), (min[2] + max[2]) / 2];
-      return [{ at: moved(this.poses[i]!, at), text: names[i]!, colour: '--text' }];
-    });
-    return [...above, ...ground]; // the first ones have their place
+    if (this.isAlone || this.navigator.isRigView) return ground;
+    return [...this.surfaces.labels, ...ground]; // the first ones have their place
   }
 
   private resize(): void {

@@ -74,10 +74,11 @@ describe('a link', () => {
   });
 
   it('says the time of day where a person went back in a live stream', () => {
-    const playback = { position: 500, startMs: 1_795_338_300_000, playing: true } as Playback;
+    const playback = { times: Float64Array.of(0, 500), position: 500, startMs: 1_795_338_300_000, playing: true } as unknown as Playback;
     expect(momentOf({ ...playback, following: true })).toBe('live');
     expect(momentOf({ ...playback, following: false })).toEqual({ atMs: 1_795_338_300_500, utc: true, playing: true });
     expect(momentOf({ ...playback, following: null })).toEqual({ atMs: 500, utc: false, playing: true });
+    expect(momentOf({ ...playback, times: new Float64Array(), following: null })).toBeNull();
   });
 
   it.each(['', 'time=', 'time=live', 'time=-1', 'time=1e9', 'time=NaN', 'time=2026-13-45T00:00:00Z', 'time=12345678'])(
