@@ -39,6 +39,21 @@ async function steady(page) {
   });
 }
 
+/** As a browser treats a tab in the background: its pages have no screen to draw for. */
+const hide = () => {
+  window.later_ = [];
+  window.atOnce_ = window.requestAnimationFrame;
+  window.requestAnimationFrame = (call) => window.later_.push(call);
+  Object.defineProperty(document, 'hidden', { configurable: true, get: () => true });
+  document.dispatchEvent(new Event('visibilitychange'));
+};
+const show = () => {
+  window.requestAnimationFrame = window.atOnce_;
+  for (const call of window.later_) window.requestAnimationFrame(call);
+  delete document.hidden;
+  document.dispatchEvent(new Event('visibilitychange'));
+};
+
 const kCovered = 0.1; // of the page at least, by a surface that is seen whole in what the page's parts leave free
 
 const checks = {
@@ -190,6 +205,32 @@ const checks = {
     await more(page, 4);
     assert.match((await look(page)).lastError, /frame is cut short/);
     await page.waitForFunction(() => /errors\d/.test(document.querySelector('#statistics')?.textContent));
+  },
+
+  async 'in the background it receives nothing, is not called stalled, and records on'(page) {
+    const other = await open(); // says how much time passes
+    await shownPast(other, 1);
+    const received = async () => (await look(page)).received;
+    await more(page, 2);
+    await page.evaluate(hide);
+    await more(other, 4); // what was on its way has come
+    const before = await received();
+    await more(other, 25); // longer than a stream may be silent
+    assert.ok((await received()) - before <= 1, `received ${(await received()) - before}`);
+    assert.equal((await look(page)).state, 'live');
+    await page.evaluate(show);
+    await more(page, 3);
+    await page.keyboard.press('x');
+    await page.waitForFunction(() => /\d MB/.test(document.querySelector('#recording').textContent));
+    await page.evaluate(hide);
+    const start = await received();
+    await eventually('what is recorded does not come', async () => (await received()) > start + 20);
+    await page.evaluate(show);
+    const saved = page.waitForEvent('download');
+    await page.keyboard.press('x');
+    await saved;
+    await more(page, 2);
+    await other.close();
   },
 
   async 'an ended and a vanished stream are told apart from a stall'(page) {

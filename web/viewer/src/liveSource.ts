@@ -216,8 +216,9 @@ export class LiveSource implements FrameSource, Playback {
   }
 
   private topUp(): void {
-    const more = this.underWay.frames - this.withServer - (this.live ? this.withPage : 0);
-    if (more <= 0 || !this.connected || this.resting) return;
+    const waits = this.resting ? 1 : 0; // a frame that is not drawn is replaced by the next one
+    const more = this.underWay.frames + waits - this.withServer - (this.live ? this.withPage : 0);
+    if (more <= 0 || !this.connected || (this.resting && this.tap === null)) return;
     if (this.withServer === 0) this.underWay.asked(performance.now());
     this.withServer += more;
     this.connection.credit(more);

@@ -42,7 +42,7 @@ export class Session {
   private taken: DecodedFrame | null = null; // drawn now
   private live = false; // the frame that came last
   private readonly serverDrops = new ServerDrops();
-  private resting = false; // nobody sees the picture
+  private unseen = false; // nobody sees the picture, though the page is seen
   private readonly onHidden = (): void => {
     this.interrupt();
     this.events.changed();
@@ -83,7 +83,7 @@ export class Session {
       seen: this.seen,
       serverState: status?.state ?? null,
       serverMessage: status?.message ?? '',
-      quietMs: document.hidden || this.resting ? 0 : performance.now() - this.lastFrameAt, // else nothing is asked for
+      quietMs: this.rests ? 0 : performance.now() - this.lastFrameAt, // else nothing is asked for
       frameRate: info?.frame_rate ?? 0,
       file: following === null ? playing : null,
       shifted: following === false ? playing : null,
@@ -101,7 +101,7 @@ export class Session {
     this.serverDrops.restart();
     this.meter.begin();
     this.source = null;
-    this.resting = false;
+    this.unseen = false;
     if (open === null) return;
     this.source = open({
       open: () => {
@@ -120,17 +120,21 @@ export class Session {
       clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
       nonsense: (message) => this.meter.failed(message),
     });
+    this.source.rest?.(this.rests);
   }
 
-  /** Whether nobody sees the picture: then as little as can be is to come. */
-  rest(resting: boolean): void {
-    if (resting === this.resting) return;
-    this.resting = resting;
+  /** Whether nobody sees the picture: then as little as can be is to come. A page in the background knows it by itself. */
+  rest(unseen: boolean): void {
+    if (unseen === this.unseen) return;
+    this.unseen = unseen;
     this.interrupt();
-    this.source?.rest?.(resting);
   }
 
-  /** The frame to draw now instead of the one before, whose memory is used again, if there is one. Its credit goes back only here, so a hidden page receives nothing. */
+  private get rests(): boolean {
+    return this.unseen || document.hidden;
+  }
+
+  /** The frame to draw now instead of the one before, whose memory is used again, if there is one. */
   take(): DecodedFrame | null {
     if (this.waiting === null) return null;
     const { frame, prefix } = this.waiting;
@@ -203,6 +207,7 @@ export class Session {
   private interrupt(): void {
     this.meter.pause();
     this.lastFrameAt = performance.now();
+    this.source?.rest?.(this.rests);
   }
 
   private discard(): boolean {
