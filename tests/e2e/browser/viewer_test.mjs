@@ -180,6 +180,20 @@ const checks = {
     await steady(page);
   },
 
+  async 'on a screen of other pixels what stands still is drawn anew'(page) {
+    feeder.say('stop');
+    await steady(page);
+    const { width, height } = page.viewportSize();
+    const screen = await page.context().newCDPSession(page);
+    for (const deviceScaleFactor of [2, 1]) {
+      const { drawn } = await look(page);
+      await screen.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor, mobile: false });
+      await page.waitForFunction((n) => window.relievo.diagnostics().drawn > n, drawn);
+      await page.waitForFunction((pixels) => document.querySelector('#overlay').width === pixels, width * deviceScaleFactor);
+    }
+    await screen.detach();
+  },
+
   async 'a silent stream is called stalled and dimmed'(page) {
     await inState(page, 'stalled');
     await cardSays(page, /stalled/);

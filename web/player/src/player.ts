@@ -454,6 +454,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   private refresh(): void {
     void this.follow();
     this.applyWishes();
+    if (!this.isUnseen) this.parts?.view.refresh();
     const { duration } = this;
     if (duration !== this.saidDuration) {
       this.saidDuration = duration;

@@ -475,6 +475,7 @@ class Viewer {
     this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
     this.qualityControl.show(this.offered);
     this.pictures.watch(this.liveCamera);
+    this.view?.refresh();
     this.showTimeline(besides);
     this.ui.showStatistics(seen ? this.session.meter.statistics(performance.now(), status) : []);
   }

@@ -37,6 +37,7 @@ export class View {
   readonly inSoftware: boolean;
   private readonly sizes = new ResizeObserver(() => this.resize());
   private ended = false;
+  private ratio = window.devicePixelRatio; // of what was drawn last
   private readonly painter: Painter;
   private headset: Stage | null = null; // draws while a person wears one, instead
   private readonly surfaces = new Surfaces();
@@ -290,6 +291,11 @@ export class View {
     });
   }
 
+  /** To be called now and then: a window that is moved to another screen keeps its size on the page, and not every browser tells of it. */
+  refresh(): void {
+    if (window.devicePixelRatio !== this.ratio) this.invalidate();
+  }
+
   invalidate(): void {
     // A headset draws at its own beat, and the page's stands still.
     if (this.scheduled || this.ended || this.headset !== null) return;
@@ -426,6 +432,7 @@ export class View {
     const drawing = this.drawing(scale, !document.hidden && !this.isFilmed);
     this.painting = true;
     this.timing ||= drawing.timed;
+    this.ratio = window.devicePixelRatio;
     this.painter.draw(drawing);
     ++this.drawn;
     this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
