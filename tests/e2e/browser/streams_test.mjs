@@ -4,7 +4,7 @@
 // or stands where a person has placed it by what both see, also turned. One that is gone is dimmed and named, and can be taken away.
 // Run as: node streams_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
-import { launchChromium } from './chromium.mjs';
+import { eventually, launchChromium } from './chromium.mjs';
 import { colourAt, Feeder, freeMiddle, inState, isRim, kJitter_px, kPicture, look, pagesOf, pickAt, pointOf, restingPlace, runChecks, shownPast, still, toPage } from './feeder.mjs';
 
 const feeder = await Feeder.start(process.argv[2]);
@@ -181,6 +181,14 @@ const checks = {
     await shownPast(page, (await look(page)).shown + 6);
     const choice = page.getByLabel('Stream that the time line is of');
     assert.deepEqual(await choice.locator('option').allTextContents(), ['ball', 'other']);
+    const wide = page.viewportSize();
+    await page.setViewportSize({ width: 390, height: 844 });
+    const top = async (of) => (await page.locator(`#timeline ${of}`).boundingBox()).y;
+    await eventually('its buttons stand in two rows on a phone', async () => {
+      const [track, play, back] = [await top('.track'), await top('button[title^="Pause"]'), await top('button[title^="A frame back"]')];
+      return play > track && Math.abs(play - back) < 3;
+    });
+    await page.setViewportSize(wide);
     await choice.selectOption('other');
     await page.click('#timeline button[title^="Pause"]');
     await page.waitForFunction(() => window.relievo.diagnostics().besides[0].following === false);

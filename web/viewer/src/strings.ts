@@ -363,6 +363,7 @@ export const text = {
     ],
   },
   product: 'Relievo',
+  chooseStream: 'Choose…',
   badge: {
     frame: ['frame', 'Number of the camera frame that completed this surface'],
     rate: ['rate', 'Surfaces drawn a second'],

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page around the picture: badge, card, list of streams, statistics line.
-import { element, setText } from './dom';
+import { element, make, setText } from './dom';
 import { kClear, withPanel, type Insets } from './insets';
 import { rigPage, type ListedStream } from './protocol';
 import type { Presentation } from './state';
@@ -110,6 +110,7 @@ export class Ui {
     const shown = chosen ?? source;
     document.title = shown === '' ? text.product : `${text.product} · ${shown}`;
     setText(element('source'), note === '' ? source : text.file.note(source, note));
+    element('source').classList.toggle('matters', note !== '' || (chosen === null && source !== '')); // no list says it
     if (key === this.shownStreams) return;
     this.shownStreams = key;
     element('picker').hidden = names.length === 0;
@@ -122,7 +123,11 @@ export class Ui {
         return option;
       }),
     );
-    if (chosen === null) select.value = ''; // a file is shown: any stream may be chosen
+    if (chosen === null) {
+      // A file is shown: any stream may be chosen.
+      select.prepend(make('option', { value: '', disabled: true, hidden: true }, text.chooseStream));
+      select.value = '';
+    }
     select.disabled = names.length < 2 && chosen !== null;
   }
 
