@@ -197,7 +197,12 @@ class Walk {
     const std::uint64_t begin = chunk.offset + chunk.length;
     std::uint64_t at = begin;
     auto next = extent(at);
-    for (; next && next->op == Op::kMessageIndex; next = extent(at)) at = next->end();
+    for (; next && next->op == Op::kMessageIndex; next = extent(at)) {
+      const auto channel = file_.read(next->content(), std::min<std::uint64_t>(next->length, 2));
+      if (!channel || channel->size() < 2) return false;
+      with_index.message_index_offsets.emplace_back(ByteReader(*channel).read<std::uint16_t>(), at);
+      at = next->end();
+    }
     if (!next || next->op > Op::kDataEnd || at == begin) return false;
     with_index.message_index_length = at - begin;
     const auto places = read_message_places(file_, with_index);

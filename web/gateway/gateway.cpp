@@ -19,6 +19,7 @@
 #include "base/time.h"
 #include "web/gateway/access.h"
 #include "web/gateway/connection.h"
+#include "web/gateway/cut_recordings.h"
 #include "web/gateway/foxglove_feed.h"
 #include "web/gateway/hub.h"
 #include "web/gateway/limits.h"
@@ -138,6 +139,7 @@ class Server : public Gateway, private ConnectionHost {
   Hub hub_;
   AddressLimits limits_, own_limits_;
   net::io_context io_{1};
+  CutRecordings cuts_;                   // outlives what reads them
   net::thread_pool disk_{kDiskThreads};  // waits for slow disks, so that the loop does not
   std::unique_ptr<Listener> listener_;
   net::steady_timer shutdown_deadline_{io_};
@@ -163,6 +165,7 @@ HttpReply Server::answer(const HttpRequest& request, const Peer& peer) {
                                    .counts = counts_,
                                    .tokens = credentials_.tokens,
                                    .options = web_,
+                                   .cuts = cuts_,
                                    .recordings = options_.recordings,
                                    .rigs = options_.rigs,
                                    .calibrations = options_.calibrations,

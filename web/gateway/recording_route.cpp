@@ -13,6 +13,7 @@
 #include <string>
 
 #include "web/gateway/byte_range.h"
+#include "web/gateway/cut_recordings.h"
 #include "web/gateway/entity_tag.h"
 #include "web/gateway/recording_api.h"
 
@@ -31,40 +32,58 @@ std::string etag_of(const struct stat& file) {
   return text;
 }
 
-/// Of what was whole of a file when it was `bytes` long.
-std::string growing_etag(const struct stat& file, std::uint64_t bytes) {
+constexpr const char* kGrowing = "growing";
+constexpr const char* kCut = "cut";  // short, and read with an index that is not in it
+
+/// Of what is whole of a file, or was when it was `bytes` long.
+std::string whole_etag(const char* kind, const struct stat& file, std::uint64_t bytes) {
   char text[48];
-  std::snprintf(text, sizeof text, "\"growing-%llx-%llx\"", static_cast<unsigned long long>(file.st_ino),
+  std::snprintf(text, sizeof text, "\"%s-%llx-%llx\"", kind, static_cast<unsigned long long>(file.st_ino),
                 static_cast<unsigned long long>(bytes));
   return text;
 }
 
-/// The `bytes` of growing_etag(); 0 where it is another file's, or none.
+/// The `bytes` of whole_etag(); 0 where it is another file's, or none.
 std::uint64_t growing_bytes(std::string_view etag, const struct stat& file) {
   const std::size_t dash = etag.rfind('-');
   if (dash == std::string_view::npos) return 0;
   std::uint64_t bytes = 0;
   std::from_chars(etag.data() + dash + 1, etag.data() + etag.size(), bytes, 16);
-  return growing_etag(file, bytes) == etag ? bytes : 0;
+  return whole_etag(kGrowing, file, bytes) == etag ? bytes : 0;
 }
+
+/// What a request says of a recording, and what holds for it.
+struct Asked {
+  OfferedRecording recording;
+  CutRecordings& cuts;
+  bool of_folder = false;
+  bool needs_token = false;
+  std::string range, if_range, if_match, if_none_match;
+};
 
 struct Version {
   FilePart::Whole whole;
   std::string etag;
-  bool finished = false;
+  bool finished = false;  // nobody changes it any more
 };
 
 /// What is to be read of a recording; nothing where it has only just been begun.
-std::optional<Version> version_of(const OfferedRecording& recording, const struct stat& file,
-                                  std::string_view if_range) {
+std::optional<Version> version_of(const Asked& asked, const struct stat& file) {
+  const OfferedRecording& recording = asked.recording;
   const auto as_of = [&](std::uint64_t bytes) -> std::optional<Version> {
     auto end = recording.growing && bytes > 0 ? recording.growing->end_at(bytes) : nullptr;
     if (!end) return std::nullopt;
-    return Version{{bytes, std::move(end)}, growing_etag(file, bytes)};
+    return Version{{bytes, std::move(end)}, whole_etag(kGrowing, file, bytes)};
   };
-  if (auto version = as_of(growing_bytes(if_range, file))) return version;
+  if (auto version = as_of(growing_bytes(asked.if_range, file))) return version;
   if (!recording.has_index) return as_of(recording.growing ? recording.growing->bytes() : 0);
-  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), recording.whole};
+  const bool ended = has_end(recording.file);
+  if (const auto index = ended ? nullptr : asked.cuts.index_of(recording.file, file)) {
+    const std::uint64_t bytes = index->bytes();
+    return Version{{bytes, index->end_at(bytes)}, whole_etag(kCut, file, bytes)};
+  }
+  const bool finished = recording.whole && (ended || !asked.of_folder);
+  return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), finished};
 }
 
 /// A cache may keep it and asks here each time whether it still is the same. One that many share need not,
@@ -104,14 +123,6 @@ std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) c
 
 namespace {
 
-/// What a request says of a recording, and what holds for it.
-struct Asked {
-  OfferedRecording recording;
-  bool of_folder = false;
-  bool needs_token = false;
-  std::string range, if_range, if_match, if_none_match;
-};
-
 HttpReply reply_to(const Asked& asked) {
   const int follow = asked.of_folder ? O_NOFOLLOW : 0;  // what somebody links to from there is none of ours
   const int descriptor = open(asked.recording.file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
@@ -120,7 +131,7 @@ HttpReply reply_to(const Asked& asked) {
     if (descriptor >= 0) close(descriptor);
     return text_reply(404, "the recording is gone");
   }
-  const auto version = version_of(asked.recording, status, asked.if_range);
+  const auto version = version_of(asked, status);
   if (!version) {
     close(descriptor);
     return text_reply(404, "the recording has only just begun: ask again in a second");
@@ -133,8 +144,7 @@ HttpReply reply_to(const Asked& asked) {
   RangeKind kind = RangeKind::kWhole;
   if (asked.if_range.empty() || asked.if_range == etag) kind = parse_range(asked.range, size, range);
   const std::string of = "/" + std::to_string(size);
-  const bool finished = version->finished && kind != RangeKind::kUnsatisfiable &&
-                        (!asked.of_folder || has_end(asked.recording.file));
+  const bool finished = version->finished && kind != RangeKind::kUnsatisfiable;
   reply.headers = {{"Accept-Ranges", "bytes"},
                    {"Cache-Control", std::string(cache_control(finished, asked.needs_token))},
                    {"ETag", etag}};
@@ -164,6 +174,7 @@ HttpReply recording_reply(std::string_view name, const HttpRequest& request, con
   if (!recording) return text_reply(404, "there is no such recording");
   return reply_from_disk(
       [asked = Asked{.recording = *std::move(recording),
+                     .cuts = context.cuts,
                      .of_folder = of_folder,
                      .needs_token = context.tokens.needed(),
                      .range = std::string(request.method == "GET" ? request.range : ""),  // RFC 9110, 14.2

@@ -45,7 +45,8 @@ struct WsTarget {
   std::string subprotocol;  // of those the client offered; empty: none
 };
 
-class FilePart;  // web/gateway/recording_route.h
+class CutRecordings;  // web/gateway/cut_recordings.h
+class FilePart;       // web/gateway/recording_route.h
 
 struct HttpReply {
   int status = 200;
@@ -80,6 +81,7 @@ struct RouteContext {
   const GatewayCounts& counts;
   const Tokens& tokens;
   const WebOptions& options;
+  CutRecordings& cuts;
   RecordingControl* recordings = nullptr;         // none: nothing is recorded here
   RigControl* rigs = nullptr;                     // none: no camera is here
   CalibrationControl* calibrations = nullptr;     // likewise

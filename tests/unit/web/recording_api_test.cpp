@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -19,6 +20,7 @@ namespace {
 using Json = nlohmann::json;
 using testing::EndsWith;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 constexpr const char* kFace = "/api/recording/face";
 constexpr const char* kStart = R"({"action":"start"})";
@@ -238,6 +240,49 @@ TEST_F(RecordingApi, WhatACrashCutShortIsListedSoAndNoCacheKeepsIt) {
   std::ofstream(folder / "cut.mcap", std::ios::binary) << content;
   EXPECT_EQ(cut("cut.mcap"), false) << "mended";
   EXPECT_EQ(kept("cut.mcap"), "max-age=0, s-maxage=300");
+}
+
+TEST_F(RecordingApi, WhatACrashCutShortIsReadWithAnIndexThatIsNotInIt) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(control.grow());
+  ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
+  const std::string content = content_of(folder / "face-1.mcap");
+  const std::string cut = content.substr(0, content.size() / 2);
+  const auto left = [&](std::chrono::seconds ago) {
+    std::filesystem::last_write_time(folder / "cut.mcap",
+                                     std::filesystem::file_time_type::clock::now() - ago);
+  };
+  const auto get_cut = [&](const std::string& headers = {}) {
+    return request(port, "GET", "/recordings/cut.mcap", headers);
+  };
+  std::ofstream(folder / "cut.mcap", std::ios::binary) << cut;
+  EXPECT_EQ(get_cut().body, cut) << "another program may be writing it";
+  left(10s);
+  const auto got = get_cut();
+  ASSERT_EQ(got.status, 200);
+  const std::uint64_t messages = messages_in(got.body);
+  EXPECT_GE(messages, 1u);
+  EXPECT_LT(messages, 5u);
+  EXPECT_EQ(content_of(folder / "cut.mcap"), cut) << "it was written to";
+  EXPECT_EQ(got.headers.at("cache-control"), "no-cache");
+  EXPECT_THAT(got.headers.at("etag"), StartsWith("\"cut-"));
+  const std::string same = "If-Range: " + got.headers.at("etag") + "\r\n";
+  std::string parts;
+  while (parts.size() < got.body.size()) {
+    const auto part = get_cut("Range: bytes=" + std::to_string(parts.size()) + "-" +
+                              std::to_string(parts.size() + 499) + "\r\n" + same);
+    ASSERT_EQ(part.status, 206);
+    parts += part.body;
+  }
+  EXPECT_EQ(parts, got.body);
+  EXPECT_EQ(get_cut("If-None-Match: " + got.headers.at("etag") + "\r\n").status, 304);
+
+  std::ofstream(folder / "cut.mcap", std::ios::binary) << content;
+  left(10s);
+  EXPECT_EQ(get_cut("Range: bytes=0-9\r\n" + same).body, content) << "mended, it is another";
+  std::ofstream(folder / "cut.mcap", std::ios::binary) << "no recording at all";
+  left(10s);
+  EXPECT_EQ(get_cut().body, "no recording at all");
 }
 
 // Where the chunks end in a recording that has its index: the index, and what says that the data ends, is

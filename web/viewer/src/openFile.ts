@@ -3,6 +3,7 @@
 import { FileError, fileError } from './fileError';
 import type { Bytes } from './mcap';
 import type { DecodedFrame } from './messages';
+import type { Fetch } from './remoteFile';
 import type { FrameSource, Moment, SourceEvents } from './source';
 import { text } from './strings';
 
@@ -21,17 +22,17 @@ export type Opened =
   | OpenedRecording
   | { kind: 'surface'; frame: DecodedFrame };
 
-async function openRecording(bytes: Bytes, isGrowing = (): boolean => false): Promise<OpenedRecording> {
+async function openRecording(bytes: Bytes, isGrowing = (): boolean => false, note: string | null = null): Promise<OpenedRecording> {
   const [{ Recording }, { RecordingSource }] = await Promise.all([import('./recording'), import('./recordingSource')]);
   const recording = await Recording.open(bytes);
-  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage, isGrowing };
+  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage ?? note, isGrowing };
 }
 
 /** A recording of the server. Throws with what a person should know. */
-export async function openRemote(url: URL): Promise<OpenedRecording> {
+export async function openRemote(url: URL, fetch?: Fetch): Promise<OpenedRecording> {
   const { RemoteFile } = await import('./remoteFile');
-  const file = await RemoteFile.open(url);
-  return openRecording(file, () => file.isGrowing);
+  const file = await RemoteFile.open(url, fetch);
+  return openRecording(file, () => file.isGrowing, file.isCut ? text.file.wasCut : null);
 }
 
 /** Throws a FileError. */

@@ -26,6 +26,11 @@ export class RemoteFile implements Bytes {
     return this.etag.startsWith('"growing-');
   }
 
+  /** Whether what wrote it did not come to its end. */
+  get isCut(): boolean {
+    return this.etag.startsWith('"cut-');
+  }
+
   get size(): number {
     return this.size_;
   }

@@ -7,9 +7,10 @@ import { writeFrame } from '../src/cdrWriter';
 import { writeGlb } from '../src/exportGlb';
 import { writePly } from '../src/exportPly';
 import { FileError } from '../src/fileError';
-import { kMaxSurfaceBytes, openFile, type Opened } from '../src/openFile';
+import { kMaxSurfaceBytes, openFile, openRemote, type Opened } from '../src/openFile';
 import { bytesOf } from '../src/mcap';
 import { Recording } from '../src/recording';
+import type { Fetch } from '../src/remoteFile';
 import { text } from '../src/strings';
 
 const say = text.file;
@@ -93,6 +94,19 @@ describe('a recording', () => {
     expect(count).toBeLessThan(25);
     await refused('a.mcap', say.noWholeFrame, whole.subarray(0, 1000)); // cut within its first chunk
     await refused('a.mcap', say.noWholeFrame, whole.subarray(0, 8));
+  });
+  it('that was cut short says so also where the server gives it an index', async () => {
+    const whole = await recording(10);
+    const noteOf = async (etag: string): Promise<string | null> => {
+      const fetch: Fetch = async (_, init) => {
+        const [from, to] = /(\d+)-(\d+)/.exec(new Headers(init.headers).get('range')!)!.slice(1).map(Number) as [number, number];
+        const headers = { 'content-range': `bytes ${from}-${to}/${whole.length}`, etag };
+        return new Response(whole.slice(from, to + 1), { status: 206, headers });
+      };
+      return (await openRemote(new URL('http://host/a.mcap'), fetch)).note;
+    };
+    expect(await noteOf('"cut-1-2"')).toBe(say.wasCut);
+    expect(await noteOf('"1-2-3"')).toBeNull();
   });
   it('of something else says so', async () => {
     await refused('a.mcap', say.noFrames, await recording(0));

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "web/gateway/cut_recordings.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+
+#include "base/log.h"
+#include "base/time.h"
+#include "codec/cut_recording.h"
+
+namespace relievo {
+namespace {
+
+constexpr std::size_t kMostKept = 8;                          // of twelve hours 8 MB each
+constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a file that long unchanged
+
+std::int64_t modified_ns(const struct stat& file) {
+  return file.st_mtim.tv_sec * kNanosecondsPerSecond + file.st_mtim.tv_nsec;
+}
+
+bool is_same(const struct stat& a, const struct stat& b) {
+  return a.st_dev == b.st_dev && a.st_ino == b.st_ino && a.st_size == b.st_size &&
+         modified_ns(a) == modified_ns(b);
+}
+
+}  // namespace
+
+std::shared_ptr<CutRecordings::Entry> CutRecordings::entry_of(const struct stat& status) {
+  const std::lock_guard lock(mutex_);
+  const auto found =
+      std::ranges::find_if(entries_, [&](const auto& entry) { return is_same(entry->status, status); });
+  if (found != entries_.end()) {
+    entries_.splice(entries_.begin(), entries_, found);
+  } else {
+    entries_.push_front(std::make_shared<Entry>());
+    entries_.front()->status = status;
+    if (entries_.size() > kMostKept) entries_.pop_back();
+  }
+  return entries_.front();
+}
+
+std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::filesystem::path& file,
+                                                                const struct stat& status) {
+  if (std::abs(utc_now_ns() - modified_ns(status)) < kLeft_ns) return nullptr;
+  const auto entry = entry_of(status);
+  const std::lock_guard lock(entry->making);
+  if (entry->made) return entry->index;
+  entry->made = true;
+  if (auto index = index_cut_recording(file)) entry->index = *std::move(index);
+  const std::string advice = "; `relievo recover` makes a sound copy";
+  if (entry->index)
+    log_warning(file.string() + " was cut short: pages are given what is whole of it, " +
+                std::to_string(entry->index->bytes()) + " of " + std::to_string(status.st_size) +
+                " bytes, with an index that is not in it" + advice);
+  else
+    log_warning(file.string() + " was cut short, or is damaged: pages read all of it to open it" + advice);
+  return entry->index;
+}
+
+}  // namespace relievo

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recordings that a crash cut short, with an index in memory: pages open them as if they were whole, and the
+// files stay as they are.
+#pragma once
+
+#include <sys/stat.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <list>
+#include <memory>
+#include <mutex>
+
+#include "base/growing_recording.h"
+
+namespace relievo {
+
+/// Any thread.
+class CutRecordings {
+ public:
+  /// Of a file without an end, which is `status` now. Null where it may still be written (it was so in the
+  /// last 5 s), or an index would leave out what is in it. Of the last few files they are kept, so that one
+  /// is made once, and said in the log; that may wait for the disk, as long as reading the file does.
+  std::shared_ptr<const GrowingRecording> index_of(const std::filesystem::path& file,
+                                                   const struct stat& status);
+
+ private:
+  struct Entry {
+    struct stat status {};
+    std::mutex making;
+    bool made = false;
+    std::shared_ptr<const GrowingRecording> index;
+  };
+  std::shared_ptr<Entry> entry_of(const struct stat& status);
+
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Entry>> entries_;  // the one asked for last is the first
+};
+
+}  // namespace relievo
