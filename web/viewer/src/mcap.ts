@@ -35,6 +35,8 @@ export interface McapFile {
   messages: McapMessage[]; // by time
   /** Of its chunks, where more may follow while it is written; null: there is no index. */
   end: number | null;
+  /** Bytes that its index takes to name its chunks; those of more follow. */
+  listed: number;
   /** Why only the beginning is there; null: all is. */
   damage: string | null;
 }
@@ -49,7 +51,9 @@ const kTogether = 16; // reads at a time
 const kWindow = 2 ** 20; // read at once while looking for a recording
 const kFarBytes = 2 ** 24; // of a remote file, up to which all of it may be read to open it
 const kLongestChunkMs = 1000; // of those whose messages are taken for evenly apart; ours last half of it
-const kOp = { header: 1, footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, dataEnd: 15 };
+const kLastBytes = 4096; // of a file that grew, in which most often all is that is new of its index
+const kMostOffsets = 4096; // bytes of the places of the summary's groups
+const kOp = { header: 1, footer: 2, channel: 4, message: 5, chunk: 6, messageIndex: 7, chunkIndex: 8, summaryOffset: 14, dataEnd: 15 };
 
 /** Throws a FileError where the file is none of ours. */
 export async function openMcap(file: Bytes): Promise<McapFile> {
@@ -59,9 +63,12 @@ export async function openMcap(file: Bytes): Promise<McapFile> {
   return inOrder(indexed ?? (await walk(file)));
 }
 
-/** What was added behind `end` of a file that has grown. */
-export async function openAdded(file: Bytes, end: number): Promise<McapFile> {
-  const found = await readIndexed(file, end);
+/**
+ * What was added to a file that has grown, behind `end` and what its index `listed` then. Of the index that it has now
+ * no more is read than that, where it begins as it was.
+ */
+export async function openAdded(file: Bytes, end: number, listed: number): Promise<McapFile> {
+  const found = (await readAdded(file, end, listed).catch(notAddedTo)) ?? (await readIndexed(file, end));
   if (found === null) throw new Error('its index is damaged');
   return inOrder(found);
 }
@@ -150,6 +157,7 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
   if (crc !== 0 && crc32(summary) !== crc) return null;
   const topics = new Map<number, string>();
   const chunks: Chunk[] = [];
+  let listed = 0;
   try {
     for (const { op, content } of records(summary)) {
       if (op === kOp.channel) {
@@ -158,16 +166,66 @@ async function readIndexed(file: Bytes, from = 0): Promise<McapFile | null> {
         topics.set(channel.id, channel.topic);
       }
       if (op !== kOp.chunkIndex) continue;
+      listed += kRecordHead + content.length;
       const chunk = readChunkIndex(content);
       if (chunk.at >= from) chunks.push(chunk);
     }
-    const messages = (isFar(file) ? await readEnds(file, chunks) : null) ?? (await readIndices(file, chunks));
-    return { topics, messages, end: summaryAt - kDataEndBytes, damage: null };
+    const messages = await messagesOf(file, chunks);
+    return { topics, messages, end: summaryAt - kDataEndBytes, listed, damage: null };
   } catch (error) {
     if (error instanceof FileError) throw error;
     return null;
   }
 }
+
+const messagesOf = async (file: Bytes, chunks: Chunk[]): Promise<McapMessage[]> =>
+  (isFar(file) ? await readEnds(file, chunks) : null) ?? readIndices(file, chunks);
+
+/** Null where it is not the index of before with more at its end. */
+async function readAdded(file: Bytes, from: number, listed: number): Promise<McapFile | null> {
+  const lastAt = Math.max(from, file.size - kLastBytes);
+  const last = await readOnly(file, lastAt, file.size - lastAt);
+  const read = (at: number, length: number): Promise<Uint8Array> | Uint8Array =>
+    at >= lastAt ? last.subarray(at - lastAt, at - lastAt + length) : readOnly(file, at, length);
+  const summaryEnd = file.size - kFooterBytes - kMagic.length;
+  const tail = await read(summaryEnd, kFooterBytes + kMagic.length);
+  if (tail[0] !== kOp.footer || !isMagic(tail.subarray(kFooterBytes))) return null;
+  const [summaryAt, offsetsAt] = [u64(viewOf(tail), kRecordHead), u64(viewOf(tail), kRecordHead + 8)];
+  if (!(summaryAt > from && offsetsAt > summaryAt && offsetsAt >= summaryEnd - kMostOffsets)) return null;
+  const groups = new Map<number, { at: number; bytes: number }>();
+  for (const { op, content } of records(await read(offsetsAt, summaryEnd - offsetsAt))) {
+    if (op !== kOp.summaryOffset) return null;
+    groups.set(content[0]!, { at: u64(viewOf(content), 1), bytes: u64(viewOf(content), 9) });
+  }
+  const [channels, indices] = [groups.get(kOp.channel), groups.get(kOp.chunkIndex)];
+  if (channels === undefined || indices === undefined || !(listed > 0 && indices.bytes >= listed)) return null;
+
+  const topics = new Map<number, string>();
+  for (const { op, content } of records(await read(channels.at, channels.bytes))) {
+    const channel = op === kOp.channel ? readChannel(content) : null;
+    if (channel === null) return null;
+    topics.set(channel.id, channel.topic);
+  }
+  const chunks: Chunk[] = [];
+  let bytes = listed;
+  for (const { op, content } of records(await read(indices.at + listed, indices.bytes - listed))) {
+    const chunk = op === kOp.chunkIndex ? readChunkIndex(content) : null;
+    if (chunk === null || !(chunk.at >= from && chunk.indexAt + chunk.indexBytes <= summaryAt)) return null;
+    chunks.push(chunk);
+    bytes += kRecordHead + content.length;
+  }
+  if (bytes !== indices.bytes) return null;
+  return { topics, messages: await messagesOf(file, chunks), end: summaryAt - kDataEndBytes, listed: bytes, damage: null };
+}
+
+/** What makes no sense is looked at as a whole; whether the network is there is not asked twice. */
+function notAddedTo(error: unknown): null {
+  if (error instanceof RangeError) return null;
+  throw error;
+}
+
+const readOnly = (file: Bytes, at: number, length: number): Promise<Uint8Array> =>
+  file.readLittle === undefined ? file.read(at, length) : file.readLittle(at, length);
 
 interface Chunk {
   startMs: number; // of its messages
@@ -315,7 +373,7 @@ function addIndexed(index: Uint8Array, recordsAt: number, size: number, messages
 
 /** What is read of a file without its index. */
 class Walked {
-  readonly found: McapFile = { topics: new Map(), messages: [], end: null, damage: null };
+  readonly found: McapFile = { topics: new Map(), messages: [], end: null, listed: 0, damage: null };
   private readonly channels = new Map<string, number>(); // of each channel's description
   private ids = new Map<number, number>(); // of this recording's channels
   private parts = 1;

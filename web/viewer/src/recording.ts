@@ -32,6 +32,7 @@ export class Recording implements FrameStore {
     private readonly descriptions: Description[], // a server that was started again sent another
     readonly damage: string | null,
     private end_: number | null,
+    private listed: number, // as McapFile has it
   ) {
     this.bytes = file.size;
     this.startMs = frames[0]!.timeMs;
@@ -47,7 +48,7 @@ export class Recording implements FrameStore {
     const one = readFrameHead(await readMessageHead(file, frames[0]!, kFrameHeadBytes)).stream;
     // A channel is a stream's; a file of several shows the first.
     const own = frames.filter((m) => m.channel === frames[0]!.channel);
-    return new Recording(file, own, one, await readDescriptions(file, found, one), found.damage, found.end);
+    return new Recording(file, own, one, await readDescriptions(file, found, one), found.damage, found.end, found.listed);
   }
 
   /** Of the frames that were published then (ms UTC); null: the file does not have it. */
@@ -76,20 +77,22 @@ export class Recording implements FrameStore {
     await file.grow!(end);
     const bytes = file.size;
     if (bytes === this.bytes) return false;
-    const added = await openAdded(file, end);
+    const added = await openAdded(file, end, this.listed);
     const frames = ofTopic(added, kFrameTopic).filter((m) => m.channel === this.frames[0]!.channel);
     this.descriptions.push(...(await readDescriptions(file, added, this.stream)));
-    [this.bytes, this.end_] = [bytes, added.end];
+    [this.bytes, this.end_, this.listed] = [bytes, added.end, added.listed];
     if (frames.length === 0) return false;
     for (const frame of frames) this.frames.push(frame);
     this.heads.length = this.frames.length;
-    this.times = this.timesOf(this.frames);
+    const times = new Float64Array(this.frames.length);
+    times.set(this.times);
+    times.set(this.timesOf(frames, this.times[this.times.length - 1]), this.times.length);
+    this.times = times;
     return true;
   }
 
   // A server's clock that was put back since makes no frame come before one that is there.
-  private timesOf(frames: McapMessage[]): Float64Array {
-    let last = 0;
+  private timesOf(frames: McapMessage[], last = 0): Float64Array {
     return Float64Array.from(frames, (m) => (last = Math.max(last, m.timeMs - this.startMs)));
   }
 

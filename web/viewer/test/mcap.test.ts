@@ -270,6 +270,44 @@ describe('Recording', () => {
     expect(recording.count).toBe(14);
   });
 
+  it('reads of a long index what was added to it alone', async () => {
+    const of = (count: number): Promise<Memory> => write(kFrames.concat(new Array<number>(count).fill(22)), { chunkSize: 1 });
+    const [some, more] = [await of(4000), await of(4002)];
+    const file = new Memory();
+    file.bytes = some.bytes;
+    const server = new Server(file);
+    const recording = await Recording.open(await server.open());
+    expect(file.size - recording.end!).toBeGreaterThan(650_000);
+
+    file.bytes = more.bytes;
+    server.asked = 0;
+    expect(await recording.grow()).toBe(true);
+    expect(recording.count).toBe(23 + 4002);
+    expect(recording.times.length).toBe(recording.count);
+    // With the message indexes of the new chunks, which are read with what is around them.
+    expect(server.asked).toBeLessThan(600_000);
+  });
+
+  it('grows also by an index that is not the one of before with more at its end', async () => {
+    const of = (count: number, options = {}): Promise<Memory> => write(kFrames.slice(0, count), { chunkSize: 1, ...options });
+    const grown = async (now: Uint8Array<ArrayBuffer>): Promise<Recording> => {
+      const file: Memory & { grow?: () => Promise<void> } = await of(9);
+      file.grow = async () => void (file.bytes = now);
+      const recording = await Recording.open(file);
+      await recording.grow();
+      return recording;
+    };
+    expect((await grown((await of(14, { useSummaryOffsets: false })).bytes)).count).toBe(14);
+    const { bytes } = await of(14);
+    let seed = 5;
+    const random = (below: number): number => (seed = (seed * 48271) % 2147483647) % below;
+    for (let round = 0; round < 200; ++round) {
+      const broken = bytes.slice();
+      broken[broken.length - 1 - random(1500)] = random(256);
+      await grown(broken).catch((error: unknown) => expect(error).toBeInstanceOf(Error));
+    }
+  });
+
   it('asks for no frames but those that are shown where there are very many', async () => {
     const server = new Server(await write(Array.from({ length: 20_001 }, (_, i) => i % 100), { chunkSize: 10_000 }));
     const recording = await Recording.open(await server.open());
