@@ -75,7 +75,11 @@ class LoopedFile {
 
   /// To be called every few tenths of a second, on the thread that made it: offers what there is to read.
   void look() {
-    OfferedRecording offered{.file = file_, .whole = whole_};
+    std::error_code gone;
+    const auto bytes = std::filesystem::file_size(file_, gone);
+    tell_of(gone ? "is gone: " + gone.message() : bytes == 0 ? "has become empty" : "");
+    if (gone || bytes == 0) return gateway_.offer(name_, {});  // it is played on as far as it is open
+    OfferedRecording offered{.file = file_, .whole = whole_ && bytes >= bytes_};
     if (follower_) {
       const auto found = follower_->look();
       const std::int64_t now_ns = steady_now_ns();
@@ -97,6 +101,20 @@ class LoopedFile {
       log_error(file_ + ": " + status.error().message);
       gateway_.withdraw(recorded_.stream());
     }
+  }
+
+  /// Each change once; "": all is well.
+  void tell_of(const std::string& missing) {
+    if (missing == missing_) return;
+    if (!missing.empty()) log_warning(file_ + " " + missing + "; pages cannot read it");
+    if (missing.empty()) log_info(file_ + " is there again");
+    missing_ = missing;
+  }
+
+  static std::uint64_t size_of(const std::string& file) {
+    std::error_code ignored;
+    const auto bytes = std::filesystem::file_size(file, ignored);
+    return ignored ? 0 : bytes;
   }
 
   bool is_being_written() const {
@@ -134,8 +152,10 @@ class LoopedFile {
   std::uint64_t sequence_ = 0;
   const std::string name_;
   const bool whole_ = !recorded_.summary().recovered;
-  std::optional<RecordingFollower> follower_;  // of what is, or was, being written
-  std::int64_t came_ns_ = steady_now_ns();     // when it was last longer than before
+  const std::uint64_t bytes_ = size_of(file_);  // when it was opened: with less of them it is not whole
+  std::string missing_;                         // why it cannot be read, as it was told
+  std::optional<RecordingFollower> follower_;   // of what is, or was, being written
+  std::int64_t came_ns_ = steady_now_ns();      // when it was last longer than before
   bool damaged_ = false;
   std::thread thread_;
 };

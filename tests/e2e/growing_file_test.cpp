@@ -119,5 +119,35 @@ TEST_F(GrowingFile, OfAKilledRecorderAllThatIsWholeIsThereWithAnIndex) {
   expect_all();
 }
 
+TEST(FileThatIsPlayed, IsNotListedWhereItIsGone) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "face.mcap", elsewhere = folder / "elsewhere.mcap";
+  record_face(file, 2000, 60);
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  const auto listed = [&] {
+    return Json::parse(request(port, "GET", "/api/streams").body)["streams"].at(0)["recording"].is_string();
+  };
+  const auto status = [&] { return request(port, "GET", "/recordings/face.mcap").status; };
+  ASSERT_TRUE(eventually(listed));
+  std::filesystem::rename(file, elsewhere);
+  EXPECT_TRUE(eventually([&] { return !listed(); }));
+  EXPECT_EQ(status(), 404);
+  EXPECT_TRUE(eventually([&] { return web.err().find("is gone") != std::string::npos; })) << web.err();
+  WsClient client(port, "face");
+  ASSERT_TRUE(client.credit(8));
+  EXPECT_TRUE(client.next_of("frame")) << "what is open of it is played on";
+  std::filesystem::rename(elsewhere, file);
+  EXPECT_TRUE(eventually(listed));
+  EXPECT_EQ(status(), 200);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  EXPECT_TRUE(eventually([&] {
+    return request(port, "GET", "/recordings/face.mcap").headers.at("cache-control") == "no-cache";
+  })) << "it is not whole any more";
+  std::filesystem::resize_file(file, 0);
+  EXPECT_TRUE(eventually([&] { return !listed(); }));
+}
+
 }  // namespace
 }  // namespace relievo::test
