@@ -16,6 +16,7 @@ namespace {
 
 // How far into a file a description is looked for: it is received with the first frames.
 constexpr int kInfoWithinSamples = 1000;
+constexpr std::size_t kMostSaid = 20;  // damaged parts: a long file can have tens of thousands
 
 std::optional<Topic> topic_of(const RecordingChannel& channel) {
   if (channel.message_encoding != "cdr") return std::nullopt;
@@ -130,13 +131,20 @@ std::uint64_t RecordedStream::frames() const {
   return count;
 }
 
+void RecordedStream::tell_of_damage(const std::string& what) {
+  if (said_.size() > kMostSaid || !said_.insert(what).second) return;
+  if (said_.size() <= kMostSaid)
+    log_warning("skipped a damaged part of the recording: " + what);
+  else
+    log_warning("more damaged parts are not told of one by one");
+}
+
 Result<std::optional<RawSample>> RecordedStream::next() {
   for (;;) {
     auto message = reader_->next();
     if (!message) {
       ++damaged_;
-      if (said_.insert(message.error().message).second)
-        log_warning("skipped a damaged part of the recording: " + message.error().message);
+      tell_of_damage(message.error().message);
       continue;
     }
     if (!*message) return std::optional<RawSample>();

@@ -51,7 +51,7 @@ class RecordedStream {
   std::uint64_t frames() const;
 
   /// The next sample in the order they were received (RawSample::receive_time_ns is the log time); nothing at
-  /// the end. A damaged part of the file is skipped, counted and logged.
+  /// the end. A damaged part of the file is skipped and counted, and the first ones are logged.
   Result<std::optional<RawSample>> next();
   /// Whether more was written since, with which next() goes on: of a file that is still without its index.
   Result<bool> read_on();
@@ -80,6 +80,7 @@ class RecordedStream {
   Result<std::vector<std::int64_t>> times_of(Topic topic);
   Result<std::vector<RawSample>> info_samples();
   std::vector<RawSample> attached_infos() const;
+  void tell_of_damage(const std::string& what);
 
   std::filesystem::path file_;
   std::string stream_;

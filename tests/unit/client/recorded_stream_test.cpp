@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <set>
 #include <sstream>
@@ -175,6 +176,27 @@ TEST_F(RecordedStreamTest, WhatIsDamagedIsSaidOnceHoweverOftenItIsPlayed) {
   EXPECT_FALSE(lines.empty());
   const std::uint64_t parts = lines.size();
   EXPECT_LE(stream_->damaged(), 4 * parts) << "a pass a second";
+}
+
+// Proves: nor does a long one, of which very many parts are damaged.
+TEST_F(RecordedStreamTest, OfManyDamagedPartsTheFirstAreSaidOneByOne) {
+  constexpr int kParts = 60;  // each a chunk
+  {
+    test::MadeRecording recording(folder_ / "long.mcap");
+    for (int i = 0; i < kParts; ++i)
+      recording.add(static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(i),
+                    kStart_ns + i * kNanosecondsPerSecond);
+    recording.finish();
+  }
+  auto stream = RecordedStream::open(folder_ / "long.mcap", "");
+  ASSERT_TRUE(stream.ok());
+  std::filesystem::resize_file(folder_ / "long.mcap", 100);
+  testing::internal::CaptureStderr();
+  for (auto sample = stream->next(); sample.ok() && *sample;) sample = stream->next();
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(stream->damaged(), static_cast<std::uint64_t>(kParts));
+  EXPECT_EQ(std::ranges::count(said, '\n'), 21) << said;
+  EXPECT_THAT(said, HasSubstr("more damaged parts are not told of one by one"));
 }
 
 }  // namespace
