@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -62,7 +63,8 @@ std::string codec_name(GeometryCodec codec) {
 struct FramePlace {
   std::uint64_t sequence = 0;
   std::int64_t time_ns = 0;
-  bool begins = false;  // another session than the frame before: between them nothing was lost or late
+  bool begins = false;  // of another session or recording than the frame before: between them nothing was
+                        // lost or late
 };
 
 void add_frame(FrameTotals& totals, const FramePlace& at, std::span<const std::uint8_t> data) {
@@ -198,6 +200,13 @@ Status describe_file(const Options& options, StopSignal& stop) {
   FrameTotals totals;
   std::vector<std::uint64_t> session_frames(infos->size());
   const RecordedInfo* last_session = nullptr;
+  std::int64_t last_received_ns = 0;
+  // Where files of one session were joined, what was published between them was not recorded.
+  const auto begins_recording = [&](std::int64_t since_ns, std::int64_t received_ns) {
+    return std::ranges::any_of(recorded->summary().starts_ns, [&](std::int64_t start_ns) {
+      return since_ns < start_ns && start_ns <= received_ns;
+    });
+  };
   Progress progress("read", "frames", recorded->frames());
   while (!stop.stopped()) {
     auto sample = recorded->next();
@@ -212,10 +221,12 @@ Status describe_file(const Options& options, StopSignal& stop) {
       ++totals.frames;
       continue;
     }
+    const std::int64_t received_ns = (*sample)->receive_time_ns;
+    const bool begins = begins_recording(std::exchange(last_received_ns, received_ns), received_ns);
     add_frame(totals,
               {.sequence = frame->sequence,
                .time_ns = frame->publish_time_ns,
-               .begins = std::exchange(last_session, session) != session},
+               .begins = std::exchange(last_session, session) != session || begins},
               frame->data);
     progress.update(totals.frames);
   }

@@ -95,7 +95,8 @@ struct RecordingSummary {
   std::vector<std::string> damage;  // a line for each part left out because its bytes are wrong
   bool recovered = false;           // its index was rebuilt from what is whole
   std::size_t recordings = 1;       // that the file was joined of, one behind the other: all of them are read
-  std::uint64_t lost_bytes = 0;     // that are no records: at its end where it was cut short
+  std::vector<std::int64_t> starts_ns;  // log time of the first message of each of them that has one
+  std::uint64_t lost_bytes = 0;         // that are no records: at its end where it was cut short
 };
 
 /// Reads a file, whole, cut short or damaged (never changing it). One thread.

@@ -168,6 +168,7 @@ class Reader final : public RecordingReader {
           is_first ? to_ns(statistics.start_time) : std::min(summary_.start_ns, to_ns(statistics.start_time));
       summary_.end_ns = std::max(summary_.end_ns, to_ns(statistics.end_time));
       summary_.messages += statistics.messages;
+      summary_.starts_ns.push_back(to_ns(statistics.start_time));
     }
     summary_.recovered = summary_.recovered || recording.recovered;
     for (const mcap::Gap& gap : recording.gaps) {

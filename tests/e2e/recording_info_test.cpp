@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 
@@ -62,6 +64,7 @@ class Received {
     }
   }
   void finish() { ASSERT_TRUE(writer_->finish().ok()); }
+  void of_the_session_of(const Received& other) { std::filesystem::copy_file(other.part_, part_); }
 
   std::int64_t now_ns = 1'700'000'000 * kNanosecondsPerSecond;
   std::int64_t behind_ns = 0;  // what was published was so by the stream's clock
@@ -100,6 +103,30 @@ TEST(RecordingInfo, TheRateOfALoopIsThatOfWhatIsPlayed) {
   received.finish();
   const auto said = info(file);
   EXPECT_EQ(said["frames"], 15);
+  EXPECT_EQ(said["lost"], 0);
+  EXPECT_NEAR(said["frame_rate"].get<double>(), 10, 1e-6);
+}
+
+TEST(RecordingInfo, NothingIsLostBetweenFilesThatWereJoined) {
+  const TempFolder folder;
+  const auto first = folder / "a.mcap", second = folder / "b.mcap", joined = folder / "joined.mcap";
+  {
+    Received received(first);
+    ASSERT_NO_FATAL_FAILURE(received.session(0, 2));
+    received.finish();
+    Received later(second);
+    later.now_ns = received.now_ns + 3600 * kNanosecondsPerSecond;
+    later.of_the_session_of(received);
+    ASSERT_NO_FATAL_FAILURE(later.again(4, 6));
+    later.finish();
+  }
+  std::ofstream out(joined, std::ios::binary);
+  for (const auto& part : {first, second}) out << std::ifstream(part, std::ios::binary).rdbuf();
+  out.close();
+  const auto said = info(joined);
+  EXPECT_EQ(said["recordings"], 2);
+  EXPECT_EQ(said["sessions"].size(), 1u);
+  EXPECT_EQ(said["frames"], 6);
   EXPECT_EQ(said["lost"], 0);
   EXPECT_NEAR(said["frame_rate"].get<double>(), 10, 1e-6);
 }
