@@ -2,18 +2,37 @@
 #include "client/input.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <filesystem>
+#include <fstream>
 
 #include "base/stream.h"
+#include "codec/mcap_records.h"
 
 namespace relievo {
+
+namespace {
+
+/// By its first bytes, which are read of a file alone: a pipe would wait for who writes it.
+bool is_recording(const std::string& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  std::array<char, mcap::kMagic.size()> start{};
+  std::ifstream in(path, std::ios::binary);
+  return in.read(start.data(), start.size()) &&
+         std::equal(start.begin(), start.end(), mcap::kMagic.begin(),
+                    [](char c, std::uint8_t magic) { return static_cast<std::uint8_t>(c) == magic; });
+}
+
+}  // namespace
 
 Result<bool> is_file(const std::string& input) {
   std::error_code ignored;
   const bool may_be_stream = valid_stream_name(input) && !input.ends_with(".mcap");
-  if (may_be_stream && std::filesystem::is_directory(input, ignored)) return false;
+  if (may_be_stream) return is_recording(input);
   if (std::filesystem::exists(input, ignored)) return true;
-  return may_be_stream ? Result<bool>(false) : Error{"there is no file " + input};
+  return Error{"there is no file " + input};
 }
 
 void check_given(const CLI::App& app, const std::string& input, const OptionsOfInputs& options) {

@@ -13,8 +13,8 @@ class App;
 
 namespace relievo {
 
-/// Whether it is a file, else a live stream. A folder is no recording: where a stream may be called so, it is
-/// the stream. Fails where it can be neither.
+/// Whether it is a file, else a live stream. Where a stream may be called so, only a file that begins as a
+/// recording does is one (`./name` is a file in any case). Fails where it can be neither.
 Result<bool> is_file(const std::string& input);
 
 /// Options that say nothing of the other kind of input.

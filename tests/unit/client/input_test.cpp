@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proves: of what may be a file and a live stream, a folder hides no stream, and no stream a file.
+// Proves: of what may be a file and a live stream, what is no recording hides no stream, and no stream a
+// recording.
 #include "client/input.h"
 
 #include <gtest/gtest.h>
@@ -14,13 +15,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(Input, FilesAreFilesAndFoldersHideNoStream) {
+TEST(Input, RecordingsAreFilesAndNothingElseHidesAStream) {
   const test::TempFolder folder;
   const fs::path before = fs::current_path();
   fs::current_path(folder.path());
   fs::create_directory("face");
   fs::create_directory("face.mcap");
-  std::ofstream("recorded") << "";
+  std::ofstream("recorded") << "\x89MCAP0\r\nand more";
+  std::ofstream("notes") << "of somebody";
+  std::ofstream("empty") << "";
   std::ofstream("face/a.mcap") << "";
   const auto says = [](const std::string& input) {
     const auto file = is_file(input);
@@ -30,6 +33,9 @@ TEST(Input, FilesAreFilesAndFoldersHideNoStream) {
   EXPECT_STREQ(says("nothing-here"), "stream");
   EXPECT_STREQ(says("recorded"), "file");
   EXPECT_STREQ(says("./recorded"), "file");
+  EXPECT_STREQ(says("notes"), "stream") << "what is no recording hides none";
+  EXPECT_STREQ(says("empty"), "stream");
+  EXPECT_STREQ(says("./notes"), "file");
   EXPECT_STREQ(says("face/a.mcap"), "file");
   EXPECT_STREQ(says("./face"), "file") << "which then is no recording";
   EXPECT_STREQ(says("face.mcap"), "file") << "likewise";
