@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Frames that can be read in any order: those of a recording, or the last ones of a live stream.
-import type { FramePrefix } from './protocol';
+import type { FramePrefix, StreamInfo } from './protocol';
 
 export interface StoredFrame {
   prefix: FramePrefix;
@@ -36,6 +36,8 @@ export interface FrameStore {
   sample(index: number): Promise<Sample>;
   /** What describes the stream's frames that were published then (ms UTC), likewise; null: the store does not have it. */
   describing(publishMs: number): Uint8Array | null;
+  /** The same of a frame, where it came with it and not as a recording has it. */
+  infoOf?(index: number): StreamInfo | null;
   /** These frames, which stay there while others come. */
   held(): FrameStore;
 }

@@ -2,7 +2,7 @@
 // The last frames of a live stream as they came, so that a person can go back to them. Bounded in time and in bytes.
 import { kTextureH264, parseFrame } from './frame';
 import type { FrameStore, Sample, StoredFrame } from './frameStore';
-import type { FramePrefix } from './protocol';
+import type { FramePrefix, StreamInfo } from './protocol';
 import { videoTextureIsKey } from './videoTexture';
 
 export interface HistoryLimits {
@@ -20,12 +20,15 @@ interface Kept {
   atMs: number; // from startMs
   isKey: boolean;
   onBefore: boolean; // builds on the frame before it, not only on the key frame
+  info: StreamInfo | null;
 }
 
 export class History implements FrameStore {
   startMs = 0;
   first = 0;
   bytes = 0;
+  /** What describes the frames that come from now on. */
+  info: StreamInfo | null = null;
   private kept: Kept[] = [];
   private times_: Float64Array | null = null; // made when asked for
 
@@ -43,6 +46,9 @@ export class History implements FrameStore {
   }
   describing(): null {
     return null;
+  }
+  infoOf(index: number): StreamInfo | null {
+    return this.at(index)?.info ?? null;
   }
 
   /** From the oldest to the newest. */
@@ -71,7 +77,7 @@ export class History implements FrameStore {
     }
     const atMs = this.kept.length === 0 ? 0 : Math.max(utcMs - this.startMs, last!.atMs + 1e-3);
     const copy = message.slice(0);
-    this.kept.push({ prefix, message: copy, atMs, ...dependence });
+    this.kept.push({ prefix, message: copy, atMs, info: this.info, ...dependence });
     this.bytes += message.byteLength;
     this.trim();
     this.times_ = null;

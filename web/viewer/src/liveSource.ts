@@ -37,6 +37,10 @@ export class LiveSource implements FrameSource, Playback {
       lost: () => {
         if (this.live) events.lost(); // what was is still there to be seen
       },
+      message: (message) => {
+        if (message.type === 'info') this.history.info = message;
+        events.message(message);
+      },
       frame: (prefix, message) => this.onFrame(prefix, message),
     };
     this.history = new History(undefined, stream);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A range of frames as one file: a recording, or a ZIP file of surfaces. Nothing is there before it is whole.
+import { writeStreamInfo } from './cdrWriter';
 import { Decoder } from './decoder';
 import { kTextureJpeg, parseFrame } from './frame';
 import { closePictures } from './frameMemory';
 import { publishMsOf, type FrameStore } from './frameStore';
 import type { DecodedFrame } from './messages';
+import type { StreamInfo } from './protocol';
 import type { RangeFormat } from './rangeFrames';
 import { writeRecording, type DescribedSample } from './recordingFile';
 import { framesBefore } from './storePlayer';
@@ -41,13 +43,20 @@ export async function exportRange(order: RangeOrder): Promise<RangeFile> {
 
 async function asRecording({ store, description, progress, cancelled }: RangeOrder, indices: number[]): Promise<RangeFile> {
   let bytes = 0;
+  // A server that was started again meanwhile sent another one than is there now.
+  let [told, written]: [StreamInfo | null, Uint8Array | null] = [null, null];
+  const descriptionOf = (index: number): Uint8Array | null => {
+    const info = store.infoOf?.(index) ?? null;
+    if (info !== told) [told, written] = [info, info === null ? null : writeStreamInfo(info)];
+    return written ?? description;
+  };
   async function* samples(): AsyncGenerator<DescribedSample> {
     for (const [done, index] of indices.entries()) {
       cancelled.throwIfAborted();
       const sample = await store.sample(index);
       bytes += sample.data.length;
       if (bytes > kMostBytes) throw new Error(text.take.tooLarge(done, kMostBytes));
-      yield { sample, description: store.describing(publishMsOf(sample)) ?? description };
+      yield { sample, description: store.describing(publishMsOf(sample)) ?? descriptionOf(index) };
       progress(done + 1);
     }
   }

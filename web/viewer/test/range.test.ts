@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Proves: a range has the frames that are seen in it, and a ZIP file no more than it may.
+// Proves: a range has the frames that are seen in it, described as they were, and a ZIP file no more than it may.
 import { describe, expect, it } from 'vitest';
+import { writeStreamInfo } from '../src/cdrWriter';
+import { History } from '../src/history';
+import { bytesOf } from '../src/mcap';
+import { exportRange } from '../src/rangeExport';
 import { framesBetween } from '../src/rangeFrames';
+import { Recording } from '../src/recording';
 import { ZipWriter } from '../src/zip';
+import { kInfo } from './streamInfo';
 
 describe('framesBetween', () => {
   const store = { times: Float64Array.from([0, 100, 200, 300]), first: 7 };
@@ -13,6 +19,39 @@ describe('framesBetween', () => {
     [150, 250, [8, 9]], // what was on the screen then
     [210, 220, [9, 9]],
   ])('%d to %d', (from, to, wanted) => expect(framesBetween(store, from, to)).toEqual(wanted));
+});
+
+describe('a range of a live stream', () => {
+  /** A whole message: a key frame without vertices, published at so many seconds. */
+  function message(seconds: number): ArrayBuffer {
+    const view = new DataView(new ArrayBuffer(48 + 64 + 8 + 1));
+    view.setUint32(0, 48, true);
+    view.setBigUint64(8, BigInt(seconds), true);
+    for (const at of [16, 24, 32]) view.setBigInt64(at, BigInt(seconds) * 1_000_000_000n, true);
+    new Uint8Array(view.buffer).set([0x52, 0x4c, 0x56, 0x46, 1, 1, 72, 0], 48);
+    view.setUint32(48 + 40, 1, true); // vertices
+    new Uint8Array(view.buffer).set([1, 8, 64, 0], 48 + 56);
+    new Uint8Array(view.buffer).set([1, 2, 0, 0, 1], 48 + 64); // a grid
+    return view.buffer;
+  }
+
+  it('is described as its frames were when they came', async () => {
+    const history = new History({ ms: 1e9, bytes: 1e9 }, 'face');
+    for (let i = 0; i < 6; ++i) {
+      if (i % 3 === 0) history.info = { ...kInfo, stripes: 3, source: `sim:${i}` }; // a server that was started again
+      const ms = (1000 + i) * 1000;
+      const kept = history.add({ bytes: 48, sequence: i, captureMs: ms, publishMs: ms, sentMs: ms, drops: 0 }, message(1000 + i));
+      expect(kept).not.toBeNull();
+    }
+    const sources = async (range: [number, number]): Promise<(string | undefined)[]> => {
+      const order = { store: history.held(), range, format: 'mcap' as const, description: writeStreamInfo({ ...kInfo, source: 'now' }) };
+      const { content, frames } = await exportRange({ ...order, progress: () => undefined, cancelled: new AbortController().signal });
+      const recording = await Recording.open(bytesOf(content));
+      return Array.from({ length: frames }, (_, i) => recording.infoAt((1000 + range[0] + i) * 1000)?.source);
+    };
+    expect(await sources([0, 1])).toEqual(['sim:0', 'sim:0']);
+    expect(await sources([1, 4])).toEqual(['sim:0', 'sim:0', 'sim:3', 'sim:3']);
+  });
 });
 
 describe('ZipWriter', () => {
