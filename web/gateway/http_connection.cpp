@@ -53,6 +53,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   void on_head();
   void on_bad_request(ErrorCode error);
   void on_request();
+  std::string list_of(http::field name) const;
   void upgrade(const HttpReply& granted);
   void answer(HttpReply content, bool head, unsigned version, bool keep_alive);
   void reply(HttpReply content, bool head, unsigned version, bool keep_alive);
@@ -160,17 +161,28 @@ void HttpSession::on_bad_request(ErrorCode error) {
   reply(std::move(content), false, 11, false);
 }
 
+/// A header whose value is a list may be given several times (RFC 9110, 5.3).
+std::string HttpSession::list_of(http::field name) const {
+  std::string list;
+  const auto range = parser_->get().equal_range(name);
+  for (auto field = range.first; field != range.second; ++field)
+    list.append(list.empty() ? "" : ", ").append(view(field->value()));
+  return list;
+}
+
 void HttpSession::on_request() {
   any_request_ = true;
   const auto& request = parser_->get();
   const auto value = [&](http::field name) { return view(request[name]); };
+  const std::string if_match = list_of(http::field::if_match);
+  const std::string if_none_match = list_of(http::field::if_none_match);
   const std::string_view method = view(request.method_string());
   HttpReply content = host_.answer({.method = method,
                                     .target = target_.path,
                                     .host = target_.host,
                                     .origin = value(http::field::origin),
-                                    .if_match = value(http::field::if_match),
-                                    .if_none_match = value(http::field::if_none_match),
+                                    .if_match = if_match,
+                                    .if_none_match = if_none_match,
                                     .authorization = value(http::field::authorization),
                                     .cookie = value(http::field::cookie),
                                     .range = value(http::field::range),

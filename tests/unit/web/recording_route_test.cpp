@@ -200,6 +200,9 @@ TEST_F(Recordings, AFileThatChangedIsAnotherOne) {
 TEST_F(Recordings, AreComparedByAnyOfTheirTags) {
   const std::string etag = get().headers.at("etag");
   EXPECT_EQ(get("If-None-Match: W/\"other\", W/" + etag + "\r\n").status, 304);
+  EXPECT_EQ(get("If-None-Match: \"other\"\r\nIf-None-Match: " + etag + "\r\n").status, 304)
+      << "a list in two lines";
+  EXPECT_EQ(get("If-Match: \"other\"\r\nIf-Match: " + etag + "\r\n").status, 200);
   EXPECT_EQ(get("If-None-Match: *\r\nRange: bytes=2000000-\r\n").status, 304)
       << "before ranges are looked at";
   EXPECT_EQ(get("If-Match: " + etag + "\r\n").status, 200);
