@@ -7,6 +7,7 @@
 #include "base/log.h"
 #include "fuzz/fuzz.h"
 #include "web/gateway/byte_range.h"
+#include "web/gateway/cut_recordings.h"
 #include "web/gateway/foxglove_feed.h"
 #include "web/gateway/sign_in.h"
 #include "web/gateway/stream_feed.h"
@@ -121,6 +122,7 @@ void request(std::string_view rest, bool with_tokens) {
   static Recordings recordings;
   static Rigs rigs;
   static Calibrations calibrations;
+  static CutRecordings cuts;
   const GatewayCounts counts;
   const WebOptions options{.origins = {"https://viewer.example"}};
   HttpRequest request;
@@ -134,6 +136,7 @@ void request(std::string_view rest, bool with_tokens) {
                              .counts = counts,
                              .tokens = with_tokens ? made : none,
                              .options = options,
+                             .cuts = cuts,
                              .recordings = &recordings,
                              .rigs = &rigs,
                              .calibrations = &calibrations,
