@@ -16,7 +16,6 @@ constexpr float kModel_px = 0.003F;  // of any place: an edge is not quite what 
 constexpr float kAtStep_px = 0.1F;   // and where it lies on a step of the scene
 constexpr float kSteep = 0.15F;      // slope of the luma ratio that places a boundary well, a pixel
 constexpr float kWideStripe_px = 12.F;
-constexpr float kShifting = 0.04F;    // contrast from which on zero crossings are put back
 constexpr float kNoEnd_px = 1e4F;     // of a stripe that ends nowhere near
 constexpr float kFarApart_px = 1.5F;  // colour and luma that do not tell the blur of chroma
 constexpr float kMostCost_px = 0.5F;
@@ -299,8 +298,11 @@ void Refiner::refine(const DifferenceImage& image, View8 slide, const SequenceRe
            e < edges.line_start[static_cast<std::size_t>(line) + 1]; ++e) {
         if (result.boundary[e] < 0) continue;
         Edge& edge = edges.edges[e];
-        if (edge.contrast > kShifting && result.still[e] != 0)
-          edge.column_px -= shift_.shift_px(shift_query(image, line, result, colours, edges, e), blur_);
+        const float noise =
+            image.noise / (image.white_line(line)[column_of(edge.column_px)] + kDarkSum);  // a contrast, too
+        if (edge.contrast > noise && result.still[e] != 0)
+          edge.column_px -= (1 - squared(noise / edge.contrast)) *
+                            shift_.shift_px(shift_query(image, line, result, colours, edges, e), blur_);
         scatter_.apart(edge, seen_[e], result.still[e] != 0, worker);
       }
   });

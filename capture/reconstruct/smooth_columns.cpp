@@ -23,7 +23,7 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 constexpr float kMost_px = 0.1F;
 constexpr float kSigmas = 4;
 // Standard deviations say more than errors are, the more so the smoother what they are of is.
-constexpr float kSaid = 0.95F;
+constexpr float kSaid = 0.92F;
 
 /// `worst` becomes |off| where that is greater; a NaN that is there first stays.
 RELIEVO_INLINE void take(const Eight& off, Eight& worst) {
