@@ -239,7 +239,8 @@ void Refiner::look_at_line(const DifferenceImage& image, int line, const Sequenc
   }
   for (std::uint32_t e = begin; e < end; ++e) {
     const Edge& edge = edges.edges[e];
-    if (seen_[e].found && edge.contrast > kContrasty &&
+    // What moves is off for other reasons.
+    if (seen_[e].found && result.still[e] != 0 && edge.contrast > kContrasty &&
         std::fabs(seen_[e].column_px - edge.column_px) < kFarApart_px)
       scratch.tell_blur.push_back({line, e});
   }

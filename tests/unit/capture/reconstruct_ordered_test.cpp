@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "capture/pattern/bcsl.h"
@@ -266,6 +267,33 @@ TEST(Refiner, TakesASharpLumaStepOverABlurredColour) {
     EXPECT_EQ(e.contrast, 0);
     EXPECT_FALSE(e.at_step);
   }
+}
+
+/// What a frame tells of chroma's blur whose boundaries lie 0.8 px from where luma has them, on shading.
+float blur_told(bool still) {
+  const Pattern pattern = sixty_stripes();
+  DifferenceImage image = picture_of(pattern, 0, {{10, 150}, {11, 250}});
+  for (int l = 0; l < kLines; ++l) {
+    for (int x = 0; x < kWidth; ++x)
+      image.white[static_cast<std::size_t>(l * kWidth + x)] =
+          100 + 60 * std::sin(0.02F * std::numbers::pi_v<float> * static_cast<float>(x - 150));
+  }
+  EdgeImage edges = edges_of(pattern, 0, {{10, 148.7F}, {11, 248.7F}});
+  SequenceResult result;
+  for (int l = 0; l < kLines; ++l) result.boundary.insert(result.boundary.end(), {10, 11});
+  result.still.assign(result.boundary.size(), still ? 1 : 0);
+  WorkerPool pool(1);
+  const SequenceDecoder decoder(pattern);
+  Refiner refiner(kPlain);
+  refiner.refine(image, grey_slide().view(), result, decoder.shown_colours(SlideOrder::kNewerIsFirst), pool,
+                 edges);
+  return refiner.blur_px();
+}
+
+TEST(Refiner, WhatMovesDoesNotTellTheBlurOfChroma) {
+  const float as_it_was = Refiner(kPlain).blur_px();
+  EXPECT_GT(blur_told(true), as_it_was);
+  EXPECT_EQ(blur_told(false), as_it_was);
 }
 
 TEST(Refiner, SaysWhereTheSceneItselfHasAStep) {
