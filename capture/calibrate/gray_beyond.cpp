@@ -49,7 +49,7 @@ std::string beyond_projector(const GrayStack& stack, const GrayDecodeOptions& op
   if (kNoise * beyond <= seen) return {};
   return std::to_string(beyond) + " of " + std::to_string(seen) + " pixels see columns or rows outside of " +
          std::to_string(stack.projector_width) + "x" + std::to_string(stack.projector_height) +
-         ": is --projector right?";
+         ": is --projector right, and are the pictures in the order of projection?";
 }
 
 }  // namespace relievo

@@ -169,7 +169,7 @@ TEST(GrayDecode, AProjectorThatWasLargerThanIsSaidIsTold) {
   const auto maps = decode_gray(stack, {}, pool);
   ASSERT_TRUE(maps.ok()) << maps.error().message;
   EXPECT_GT(maps->decoded, 0u);
-  EXPECT_NE(beyond_projector(stack, {}).find("outside of 75x45: is --projector right?"), std::string::npos)
+  EXPECT_NE(beyond_projector(stack, {}).find("outside of 75x45: is --projector right,"), std::string::npos)
       << beyond_projector(stack, {});
 }
 
