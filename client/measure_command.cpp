@@ -1,24 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
-#include <chrono>
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
 #include "base/log.h"
-#include "base/time.h"
 #include "cli/checks.h"
-#include "cli/progress.h"
 #include "client/commands.h"
-#include "client/input.h"
-#include "client/latest_frame.h"
+#include "client/frame_input.h"
 #include "client/measure/shape_meter.h"
-#include "client/options.h"
-#include "client/range_frames.h"
-#include "client/recorded_stream.h"
-#include "client/time_range.h"
 #include "codec/export.h"
 
 namespace relievo {
@@ -28,12 +19,9 @@ constexpr double kMostOff = 0.2;  // of the points: then it is doubtful that the
 constexpr double kLeastFull_m = 1e-6;
 
 struct Options {
-  std::shared_ptr<DomainOptions> domain;
-  std::shared_ptr<RangeOptions> range;
-  std::string input, stream, picture, region;
+  std::shared_ptr<FrameInput> input;
+  std::string picture, region;
   std::string shape = "plane";
-  double wait_s = 10;
-  double seconds = 2;
   bool json = false;
 };
 
@@ -79,53 +67,6 @@ class Meter {
   PictureRegion region_;
   std::optional<ShapeMeter> meter_;
 };
-
-Status measure_recording(const Options& options, Meter& meter, StopSignal& stop) {
-  auto recorded = RecordedStream::open(options.input, options.stream);
-  if (!recorded) return recorded.error();
-  if (!options.picture.empty()) {
-    if (const Status free = recorded->check_output(options.picture); !free) return free;
-  }
-  recorded->warn_if_cut();
-  const auto range = find_range(*options.range, *recorded);
-  if (!range) return range.error().in(options.input);
-  const auto infos = recorded->read_infos();
-  if (!infos) return infos.error();
-  if (infos->empty()) return Error{options.input + " says nothing of the rig's camera, which this needs"};
-  auto frames = RangeFrames::open(*recorded, *range);
-  if (!frames) return frames.error();
-  Progress progress("measure", "frames", range->frames);
-  std::uint64_t count = 0;
-  while (!stop.stopped()) {
-    const auto next = frames->next();
-    if (!next) return next.error();
-    if (!*next) break;
-    if (Status added = meter.add((*next)->frame, info_of((*next)->sample, *infos)->info.rig.camera); !added)
-      return added;
-    progress.update(++count);
-  }
-  if (meter.empty() && !stop.stopped())
-    return Error{options.input + ": no frame in that range can be decoded"};
-  if (frames->left_out().frames() > 0) log_warning(frames->left_out().text());
-  return {};
-}
-
-Status measure_live(const Options& options, Meter& meter, StopSignal& stop) {
-  LatestFrame latest;
-  auto subscriber = Subscriber::create(*options.domain, options.input, latest.callbacks());
-  if (!subscriber) return subscriber.error();
-  std::int64_t end_ns = std::numeric_limits<std::int64_t>::max();
-  while (!stop.stopped()) {
-    const auto taken = latest.take(std::chrono::duration<double>(options.wait_s), stop);
-    if (!taken || taken->frame.time_ns > end_ns) break;
-    if (meter.empty()) end_ns = taken->frame.time_ns + std::llround(options.seconds * kNanosecondsPerSecond);
-    if (Status added = meter.add(taken->frame, taken->camera); !added) return added;
-  }
-  if (meter.empty() && !stop.stopped())
-    return Error{"no frame of a stream '" + options.input + "' came in " + duration_text(options.wait_s) +
-                 ": is its server running? `relievo streams` lists what there is"};
-  return {};
-}
 
 nlohmann::json json_of(const Spread& spread, double unit) {
   return {{"median", spread.median * unit}, {"sd", spread.deviation * unit}};
@@ -175,12 +116,18 @@ void print_text(const Options& options, const ShapeReport& r) {
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  const auto file = is_file(options.input);
-  if (!file) return file.error();
   Meter meter(options);
-  const Status measured =
-      *file ? measure_recording(options, meter, stop) : measure_live(options, meter, stop);
-  if (!measured) return measured;
+  const auto measured = visit_frames(
+      *options.input,
+      {.verb = "measure",
+       .out = options.picture,
+       .frame = [&](const Frame3D& frame, const PinholeModel* camera) -> Status {
+         if (camera == nullptr)
+           return Error{options.input->input + " says nothing of the rig's camera, which this needs"};
+         return meter.add(frame, *camera);
+       }},
+      stop);
+  if (!measured) return measured.error();
   if (meter.empty()) return Error{"stopped before a frame was measured"};
   const ShapeReport report = meter.meter().report();
   if (report.frames == 0)
@@ -214,8 +161,8 @@ Command measure_command() {
   return {
       "measure", "How exactly a flat wall or a ball is seen: error, form, noise, holes", [](CLI::App& app) {
         auto o = std::make_shared<Options>();
-        o->domain = add_domain_options(app);
-        app.add_option("input", o->input, "Recording, or live stream")->type_name("FILE|STREAM")->required();
+        o->input = add_frame_input(app);
+        o->input->seconds = 2;
         app.add_option("--shape", o->shape, "plane or sphere: what is there")
             ->check(one_of({"plane", "sphere"}))
             ->type_name("NAME")
@@ -230,20 +177,10 @@ Command measure_command() {
         app.add_option("--picture", o->picture,
                        "Draw how far what is seen lies before (red) or behind (blue)")
             ->type_name("NAME.png");
-        app.add_option("--stream", o->stream, "Which stream, where the file holds several")
-            ->type_name("NAME");
-        o->range = add_range_options(app);
-        app.add_option("--seconds", o->seconds, "Of a live stream")
-            ->check(number(0, 1e9))
-            ->capture_default_str();
-        app.add_option("--wait", o->wait_s, "Seconds to wait for a live stream")
+        app.add_option("--seconds", o->input->seconds, "Of a live stream")
             ->check(number(0, 1e9))
             ->capture_default_str();
         app.add_flag("--json", o->json, "Print the result as JSON");
-        app.final_callback([o, &app] {
-          check_given(app, o->input,
-                      {.of_files = {"--stream", "--from", "--to", "--frames"}, .of_streams = {"--seconds"}});
-        });
         app.footer(
             "The shape is fitted to each frame's measured points; figures are medians of the frames. What is "
             "more\n"

@@ -1,43 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
 #include "base/log.h"
-#include "base/time.h"
 #include "cli/checks.h"
-#include "cli/progress.h"
 #include "cli/size_option.h"
 #include "client/commands.h"
-#include "client/input.h"
-#include "client/latest_frame.h"
-#include "client/options.h"
-#include "client/range_frames.h"
-#include "client/recorded_stream.h"
+#include "client/frame_input.h"
 #include "client/shot/output.h"
 #include "client/shot/render.h"
-#include "client/time_range.h"
-#include "idl/cdr.h"
 
 namespace relievo {
 namespace {
 
 struct Options {
-  std::shared_ptr<DomainOptions> domain;
-  std::shared_ptr<RangeOptions> range;
-  std::string input, stream, out;
+  std::shared_ptr<FrameInput> input;
+  std::string out;
   std::string mode = "textured", view = "orbit", background = "white";
   Orbit orbit;
   Size size{1280, 720};
-  double wait_s = 10;
-  double seconds = 10;
   bool json = false;
 };
 
@@ -64,10 +51,10 @@ class Camera {
     render_.background = parse_background(options.background).value_or(Rgba{});
   }
 
-  Image8 take(const Frame3D& frame, const std::optional<PinholeModel>& rig) {
+  Image8 take(const Frame3D& frame, const PinholeModel* rig) {
     const auto& [width, height] = options_.size;
     if (!view_) render_.depth = depth_range_of(frame.surface);
-    if (options_.view == "rig" && rig) {
+    if (options_.view == "rig" && rig != nullptr) {
       view_ = rig_view(*rig, width, height);  // which another session may have changed
     } else if (!view_) {
       view_ = orbit_view(extent_of(frame.surface.positions), options_.orbit, width, height);
@@ -83,78 +70,22 @@ class Camera {
   std::optional<ShotView> view_;
 };
 
-/// Returns how many frames could not be decoded.
-Result<std::uint64_t> draw_recording(const Options& options, Camera& camera, ShotOutput& output,
-                                     StopSignal& stop) {
-  auto recorded = RecordedStream::open(options.input, options.stream);
-  if (!recorded) return recorded.error();
-  if (const Status free = recorded->check_output(options.out); !free) return free.error();
-  recorded->warn_if_cut();
-  const auto range = find_range(*options.range, *recorded);
-  if (!range) return range.error().in(options.input);
-  const auto infos = recorded->read_infos();
-  if (!infos) return infos.error();
-  if (options.view == "rig" && infos->empty())
-    return Error{options.input + " says nothing of the rig's camera: use --view orbit"};
-  auto frames = RangeFrames::open(*recorded, *range);
-  if (!frames) return frames.error();
-
-  Progress progress("shot", "frames", options.out.ends_with(".png") ? 1 : range->frames);
-  while (!stop.stopped() && !output.full()) {
-    const auto next = frames->next();
-    if (!next) return next.error();
-    if (!*next) break;
-    const RecordedInfo* const info = info_of((*next)->sample, *infos);
-    const auto rig = info != nullptr ? std::optional(info->info.rig.camera) : std::nullopt;
-    if (auto status = output.add((*next)->frame, camera.take((*next)->frame, rig)); !status)
-      return status.error();
-    progress.update(output.count());
-  }
-  if (output.count() == 0 && !stop.stopped())
-    return Error{options.input + ": no frame in that range can be decoded"};
-  const LeftOut& left_out = frames->left_out();
-  if (left_out.frames() > 0) log_warning(left_out.text());
-  return left_out.frames();
-}
-
-Status draw_live(const Options& options, Camera& camera, ShotOutput& output, StopSignal& stop) {
-  LatestFrame latest;
-  auto subscriber = Subscriber::create(*options.domain, options.input, latest.callbacks());
-  if (!subscriber) return subscriber.error();
-  Progress progress("shot", "frames");
-  std::int64_t end_ns = std::numeric_limits<std::int64_t>::max();
-  while (!stop.stopped() && !output.full()) {
-    const auto taken = latest.take(std::chrono::duration<double>(options.wait_s), stop);
-    if (!taken || taken->frame.time_ns > end_ns) break;
-    if (output.count() == 0)
-      end_ns = taken->frame.time_ns + std::llround(options.seconds * kNanosecondsPerSecond);
-    if (auto status = output.add(taken->frame, camera.take(taken->frame, taken->camera)); !status)
-      return status;
-    progress.update(output.count());
-  }
-  if (output.count() == 0 && !stop.stopped())
-    return Error{"no frame of a stream '" + options.input + "' came in " + duration_text(options.wait_s) +
-                 ": is its server running? `relievo streams` lists what there is"};
-  return {};
-}
-
 Status run(const Options& options, StopSignal& stop) {
-  const auto file = is_file(options.input);
-  if (!file) return file.error();
   const auto made = ShotOutput::create(options.out);
   if (!made) return made.error();
   ShotOutput& output = **made;
   if (!output.has_transparency() && options.background == "transparent")
     return Error{"a video has no transparency: give another --background, or a folder of pictures"};
   Camera camera(options);
-  std::uint64_t left_out = 0;
-  if (*file) {
-    const auto drawn = draw_recording(options, camera, output, stop);
-    if (!drawn) return drawn.error();
-    left_out = *drawn;
-  } else if (auto drawn = draw_live(options, camera, output, stop); !drawn) {
-    return drawn;
-  }
+  FrameVisit visit{.verb = "shot", .out = options.out};
+  if (options.out.ends_with(".png")) visit.most = 1;
+  visit.frame = [&](const Frame3D& frame, const PinholeModel* rig) -> Status {
+    if (options.view == "rig" && rig == nullptr)
+      return Error{options.input->input + " says nothing of the rig's camera: use --view orbit"};
+    return output.add(frame, camera.take(frame, rig));
+  };
+  const auto left_out = visit_frames(*options.input, visit, stop);
+  if (!left_out) return left_out.error();
   if (output.count() > 0) {
     if (const Status finished = output.finish(); !finished) return finished;
   }
@@ -164,7 +95,7 @@ Status run(const Options& options, StopSignal& stop) {
     nlohmann::json j{{"pictures", output.count()},
                      {"out", options.out},
                      {"last", output.last()},
-                     {"unreadable", left_out}};
+                     {"unreadable", *left_out}};
     if (options.mode == "depth") j["depth_m"] = {camera.depth().from_m, camera.depth().to_m};
     std::puts(json_text(j).c_str());
   } else {
@@ -182,16 +113,13 @@ Command shot_command() {
   return {
       "shot", "Draw a stream or a recording into pictures, without a screen", [](CLI::App& app) {
         auto o = std::make_shared<Options>();
-        o->domain = add_domain_options(app);
-        app.add_option("input", o->input, "Recording, or live stream")->type_name("FILE|STREAM")->required();
+        o->input = add_frame_input(app);
+        o->input->seconds = 10;
         app.add_option(
                "--out", o->out,
                "NAME.png: one frame; NAME.mp4 or .mkv: a video; anything else: a folder, a picture a frame")
             ->type_name("NAME.png|NAME.mp4|DIR")
             ->required();
-        app.add_option("--stream", o->stream, "Which stream, where the file holds several")
-            ->type_name("NAME");
-        o->range = add_range_options(app);
         app.add_option("--mode", o->mode, std::string(shot_mode_names()))
             ->check([](const std::string& name) {
               return shot_mode_named(name) ? std::string() : "give " + std::string(shot_mode_names());
@@ -222,17 +150,10 @@ Command shot_command() {
             })
             ->type_name("COLOUR")
             ->capture_default_str();
-        app.add_option("--seconds", o->seconds, "Of a live stream, where not one picture is asked for")
+        app.add_option("--seconds", o->input->seconds, "Of a live stream, where not one picture is asked for")
             ->check(number(0.001, 1e9))
             ->capture_default_str();
-        app.add_option("--wait", o->wait_s, "Seconds to wait for a live stream")
-            ->check(number(0, 1e9))
-            ->capture_default_str();
         app.add_flag("--json", o->json, "Print the result as JSON");
-        app.final_callback([o, &app] {
-          check_given(app, o->input,
-                      {.of_files = {"--stream", "--from", "--to", "--frames"}, .of_streams = {"--seconds"}});
-        });
         app.footer(
             "Examples:\n  relievo shot face --out face.png\n"
             "  relievo shot face.mcap --from 3 --mode shaded --azimuth -30 --out face.png\n"
