@@ -10,7 +10,6 @@
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/whole_file.h"
-#include "capture/calibrate/gray_beyond.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/calibrate/ray_pairs.h"
@@ -145,7 +144,7 @@ void warn_of_pictures(const GrayStack& stack, const GrayMaps& maps, const Option
     log_warning("the pictures of " + to_string(slide) +
                 " and of its inverse hardly differ: is one a copy of the other, or are they out of focus?");
   }
-  if (const std::string beyond = beyond_projector(stack, options.decode); !beyond.empty()) {
+  if (const std::string beyond = beyond_projector(stack, maps); !beyond.empty()) {
     log_warning(beyond);
     return;
   }

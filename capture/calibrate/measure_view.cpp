@@ -8,7 +8,6 @@
 #include <limits>
 #include <utility>
 
-#include "capture/calibrate/gray_beyond.h"
 #include "capture/calibrate/local_homography.h"
 
 namespace relievo {
@@ -121,7 +120,7 @@ MeasuredView measure_view(const std::string& name, const GrayStack& stack, const
   if (!maps) return without(name, maps.error().message);
   // Its corners would fit: they are where they were projected. The stripes of the running system would not
   // be.
-  if (std::string why = beyond_projector(stack, whole); !why.empty()) return without(name, std::move(why));
+  if (std::string why = beyond_projector(stack, *maps); !why.empty()) return without(name, std::move(why));
   return with_projector(
       name, seen, board,
       {stack.width(), stack.height(), std::move(maps->column_edges), std::move(maps->row_edges)});

@@ -16,9 +16,10 @@ constexpr std::size_t kMinEdges = 5;
 constexpr double kFitSteepness = 2;  // projector pixels a camera pixel: farther edges are another surface
 constexpr double kInlier = 0.75;     // projector pixels from the plane
 constexpr int kRounds = 3;
-constexpr double kMaxShift = 1.5;  // of the fitted plane from the whole column read
+constexpr double kMaxShift = 1.5;    // of the fitted plane from the whole column read
+constexpr std::size_t kFewest = 50;  // one pixel in so many that are read may be read wrongly
 
-/// Whole columns (or rows) as read, -1 where not clear.
+/// Whole columns (or rows) as read, -1 where not clear or outside of the projector.
 struct Codes {
   std::vector<int> code;
   const std::vector<GrayPair>* pairs = nullptr;
@@ -34,7 +35,7 @@ double contrast_at(const GrayPair& pair, std::size_t pixel) {
   return sum > 0 ? static_cast<double>(difference(pair, pixel)) / sum : 0;
 }
 
-int read_code(const std::vector<GrayPair>& pairs, std::size_t pixel, double clear, int count) {
+int read_code(const std::vector<GrayPair>& pairs, std::size_t pixel, double clear) {
   std::uint32_t gray = 0;
   int unclear = -1;
   for (std::size_t bit = 0; bit < pairs.size(); ++bit) {
@@ -49,7 +50,7 @@ int read_code(const std::vector<GrayPair>& pairs, std::size_t pixel, double clea
     const int other = static_cast<int>(binary_from_gray(gray ^ 1u << unclear));
     if (std::abs(code - other) != 1) return -1;
   }
-  return code < count ? code : -1;
+  return code;
 }
 
 /// The edges between pixel `from` at (x, y) and its neighbour `to`, one step right or down.
@@ -259,7 +260,7 @@ Result<GrayMaps> decode_gray(const GrayStack& stack, const GrayDecodeOptions& op
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   Codes columns{std::vector<int>(pixels, -1), &stack.columns};
   Codes rows{std::vector<int>(pixels, -1), &stack.rows};
-  std::vector<std::uint8_t> lit(pixels);
+  std::vector<std::uint8_t> lit(pixels), beyond(pixels);
   pool.for_ranges(height, [&](int begin, int end, int) {
     const std::size_t last = static_cast<std::size_t>(end) * static_cast<std::size_t>(width);
     for (std::size_t i = static_cast<std::size_t>(begin) * static_cast<std::size_t>(width); i < last; ++i) {
@@ -270,8 +271,11 @@ Result<GrayMaps> decode_gray(const GrayStack& stack, const GrayDecodeOptions& op
       if (contrast < options.min_contrast) continue;
       lit[i] = 1;
       const double clear = std::max<double>(options.min_difference, options.min_share * contrast);
-      columns.code[i] = read_code(stack.columns, i, clear, stack.projector_width);
-      rows.code[i] = read_code(stack.rows, i, clear, stack.projector_height);
+      const int column = read_code(stack.columns, i, clear), row = read_code(stack.rows, i, clear);
+      const bool has_column = column < stack.projector_width, has_row = row < stack.projector_height;
+      columns.code[i] = has_column ? column : -1;
+      rows.code[i] = has_row ? row : -1;
+      beyond[i] = column >= 0 && row >= 0 && !(has_column && has_row);
     }
   });
 
@@ -283,6 +287,7 @@ Result<GrayMaps> decode_gray(const GrayStack& stack, const GrayDecodeOptions& op
   maps.rows = map_of(rows, maps.row_edges, width, height, options.window_px, stack.projector_height, pool);
   for (std::size_t i = 0; i < pixels; ++i) {
     maps.lit += lit[i];
+    maps.beyond += beyond[i];
     float& column = maps.columns.data()[i];
     float& row = maps.rows.data()[i];
     if (column >= 0 && row >= 0) {
@@ -293,6 +298,15 @@ Result<GrayMaps> decode_gray(const GrayStack& stack, const GrayDecodeOptions& op
     column = row = -1;
   }
   return maps;
+}
+
+std::string beyond_projector(const GrayStack& stack, const GrayMaps& maps) {
+  const std::size_t read = maps.lit - maps.uncertain + maps.beyond;
+  if (kFewest * maps.beyond <= read) return {};
+  return std::to_string(maps.beyond) + " of " + std::to_string(read) +
+         " pixels see columns or rows outside of " + std::to_string(stack.projector_width) + "x" +
+         std::to_string(stack.projector_height) +
+         ": is --projector right, and are the pictures in the order of projection?";
 }
 
 }  // namespace relievo

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "base/image.h"
@@ -65,12 +66,17 @@ struct GrayMaps {
   GrayEdges column_edges, row_edges;
   std::size_t lit = 0;        // pixels with enough contrast
   std::size_t decoded = 0;    // with a column and a row
-  std::size_t uncertain = 0;  // lit, but a bit was not clear
+  std::size_t uncertain = 0;  // lit, but a bit was not clear, or
+  std::size_t beyond = 0;     // (of these) all were, and say a place outside of the projector
   std::size_t lone = 0;       // read clearly, but unlike everything around: counted as not decoded
 };
 
 /// Fails where the stack is empty, pictures differ in size, or there are too few bits for the projector.
 /// Any number of threads gives the same result.
 Result<GrayMaps> decode_gray(const GrayStack& stack, const GrayDecodeOptions& options, WorkerPool& pool);
+
+/// Where more pixels than noise makes see places outside of the stack's projector, which was larger than is
+/// said: a sentence that says so. Empty else. What they see inside fits as if all were well.
+std::string beyond_projector(const GrayStack& stack, const GrayMaps& maps);
 
 }  // namespace relievo

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <functional>
 
-#include "capture/calibrate/gray_beyond.h"
 #include "capture/pattern/gray_code.h"
 #include "capture/pattern/gray_decode.h"
 
@@ -161,16 +160,16 @@ TEST(GrayDecode, UnlitAndUnclearPixelsAreNotDecoded) {
 
 TEST(GrayDecode, AProjectorThatWasLargerThanIsSaidIsTold) {
   GrayStack stack = stack_of(slanted_columns, slanted_rows, grey);
-  EXPECT_EQ(beyond_projector(stack, {}), "");
+  WorkerPool pool(1);
+  EXPECT_EQ(beyond_projector(stack, *decode_gray(stack, {}, pool)), "");
   // As many bits, the same shape: what is read inside fits.
   stack.projector_width = kProjectorWidth * 3 / 4;
   stack.projector_height = kProjectorHeight * 3 / 4;
-  WorkerPool pool(1);
   const auto maps = decode_gray(stack, {}, pool);
   ASSERT_TRUE(maps.ok()) << maps.error().message;
   EXPECT_GT(maps->decoded, 0u);
-  EXPECT_NE(beyond_projector(stack, {}).find("outside of 75x45: is --projector right,"), std::string::npos)
-      << beyond_projector(stack, {});
+  EXPECT_NE(beyond_projector(stack, *maps).find("outside of 75x45: is --projector right,"), std::string::npos)
+      << beyond_projector(stack, *maps);
 }
 
 TEST(GrayDecode, AnyNumberOfThreadsGivesTheSame) {
