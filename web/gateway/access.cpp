@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sys/random.h>
-#include <sys/stat.h>
 #include <utility>  // before Asio 1.74 in C++20
 
 #include "web/gateway/access.h"
@@ -74,10 +73,14 @@ std::string date(std::int64_t unix_s) {
 
 FileMark mark_of(const std::filesystem::path& file) {
   struct stat status {};
-  if (stat(file.c_str(), &status) != 0) return {};
-  return {.time_ns = status.st_mtim.tv_sec * kNanosecondsPerSecond + status.st_mtim.tv_nsec,
-          .bytes = static_cast<std::uint64_t>(status.st_size),
-          .inode = status.st_ino};
+  return stat(file.c_str(), &status) == 0 ? mark_of(status) : FileMark{};
+}
+
+FileMark mark_of(const struct stat& file) {
+  return {.time_ns = file.st_mtim.tv_sec * kNanosecondsPerSecond + file.st_mtim.tv_nsec,
+          .bytes = static_cast<std::uint64_t>(file.st_size),
+          .inode = file.st_ino,
+          .device = file.st_dev};
 }
 
 Result<Tokens> Tokens::load(const std::filesystem::path& file) {

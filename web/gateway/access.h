@@ -2,6 +2,8 @@
 // Who may watch: tokens, pages of which sites, and the certificate they see. One thread.
 #pragma once
 
+#include <sys/stat.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -21,10 +23,12 @@ namespace relievo {
 /// A file's content changed where this did; all 0 where there is none.
 struct FileMark {
   std::int64_t time_ns = 0;
-  std::uint64_t bytes = 0, inode = 0;  // another file moved in its place may have both its time and its size
+  // Another file moved in its place may have both its time and its size.
+  std::uint64_t bytes = 0, inode = 0, device = 0;
   bool operator==(const FileMark&) const = default;
 };
 FileMark mark_of(const std::filesystem::path& file);
+FileMark mark_of(const struct stat& file);
 
 /// Tokens that open a gateway, from a file that may change.
 class Tokens {

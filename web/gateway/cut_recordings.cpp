@@ -15,26 +15,16 @@ namespace {
 constexpr std::size_t kMostKept = 8;                          // of twelve hours 8 MB each
 constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a file that long unchanged
 
-std::int64_t modified_ns(const struct stat& file) {
-  return file.st_mtim.tv_sec * kNanosecondsPerSecond + file.st_mtim.tv_nsec;
-}
-
-bool is_same(const struct stat& a, const struct stat& b) {
-  return a.st_dev == b.st_dev && a.st_ino == b.st_ino && a.st_size == b.st_size &&
-         modified_ns(a) == modified_ns(b);
-}
-
 }  // namespace
 
-std::shared_ptr<CutRecordings::Entry> CutRecordings::entry_of(const struct stat& status) {
+std::shared_ptr<CutRecordings::Entry> CutRecordings::entry_of(const FileMark& mark) {
   const std::lock_guard lock(mutex_);
-  const auto found =
-      std::ranges::find_if(entries_, [&](const auto& entry) { return is_same(entry->status, status); });
+  const auto found = std::ranges::find_if(entries_, [&](const auto& entry) { return entry->mark == mark; });
   if (found != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, found);
   } else {
     entries_.push_front(std::make_shared<Entry>());
-    entries_.front()->status = status;
+    entries_.front()->mark = mark;
     if (entries_.size() > kMostKept) entries_.pop_back();
   }
   return entries_.front();
@@ -42,8 +32,9 @@ std::shared_ptr<CutRecordings::Entry> CutRecordings::entry_of(const struct stat&
 
 std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::filesystem::path& file,
                                                                 const struct stat& status) {
-  if (std::abs(utc_now_ns() - modified_ns(status)) < kLeft_ns) return nullptr;
-  const auto entry = entry_of(status);
+  const FileMark mark = mark_of(status);
+  if (std::abs(utc_now_ns() - mark.time_ns) < kLeft_ns) return nullptr;
+  const auto entry = entry_of(mark);
   const std::lock_guard lock(entry->making);
   if (entry->made) return entry->index;
   entry->made = true;
@@ -51,7 +42,7 @@ std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::files
   const std::string advice = "; `relievo recover` makes a sound copy";
   if (entry->index)
     log_warning(file.string() + " was cut short: pages are given what is whole of it, " +
-                std::to_string(entry->index->bytes()) + " of " + std::to_string(status.st_size) +
+                std::to_string(entry->index->bytes()) + " of " + std::to_string(mark.bytes) +
                 " bytes, with an index that is not in it" + advice);
   else
     log_warning(file.string() + " was cut short, or is damaged: pages read all of it to open it" + advice);

@@ -3,8 +3,6 @@
 // files stay as they are.
 #pragma once
 
-#include <sys/stat.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <list>
@@ -12,6 +10,7 @@
 #include <mutex>
 
 #include "base/growing_recording.h"
+#include "web/gateway/access.h"
 
 namespace relievo {
 
@@ -26,12 +25,12 @@ class CutRecordings {
 
  private:
   struct Entry {
-    struct stat status {};
+    FileMark mark;
     std::mutex making;
     bool made = false;
     std::shared_ptr<const GrowingRecording> index;
   };
-  std::shared_ptr<Entry> entry_of(const struct stat& status);
+  std::shared_ptr<Entry> entry_of(const FileMark& mark);
 
   std::mutex mutex_;
   std::list<std::shared_ptr<Entry>> entries_;  // the one asked for last is the first
