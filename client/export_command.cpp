@@ -84,7 +84,7 @@ Result<std::optional<Rig>> find_rig(RecordedStream& recorded, const TimeRange& r
     if ((*sample)->topic != Topic::kFrame || (*sample)->receive_time_ns < range.from_ns) continue;
     const Rig& its = info_of(**sample, *infos)->info.rig;
     if (rig && !are_equal(rig->camera, its.camera))
-      return two_parts("the camera was calibrated anew within the range, and camera.json describes one",
+      return two_parts("the camera was calibrated anew within the range, and what is written describes one",
                        (*sample)->receive_time_ns - recorded.summary().start_ns);
     rig = its;
   }
@@ -93,11 +93,12 @@ Result<std::optional<Rig>> find_rig(RecordedStream& recorded, const TimeRange& r
 Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, RecordedStream& recorded,
                                                   const TimeRange& range) {
   ExportTarget target{.out = options.out,
+                      .stream = recorded.stream(),
                       .rig = {},
                       .depth_unit_m = 1e-3 * options.depth_unit_mm,
                       .reencode = options.reencode,
                       .draco = options.draco};
-  if (options.format == "depth") {
+  if (options.format == "depth" || options.format == "ros2") {
     auto rig = find_rig(recorded, range);
     if (!rig) return rig.error();
     target.rig = *std::move(rig);
@@ -173,16 +174,16 @@ Command export_command() {
         app.add_option("file", options->file, "Recording")->type_name("FILE")->required();
         app.add_option(
                "--out", options->out,
-               "Folder, where files are named after their camera frames; of animation (.glb) and video "
-               "(.mp4, .mkv) the one file")
+               "Folder, where files are named after their camera frames; of animation (.glb), video (.mp4, "
+               ".mkv) and ros2 (.mcap) the one file")
             ->type_name("PATH")
             ->required();
         app.add_option(
                "--format", options->format,
                "ply, glb, obj (the textured surface), png (the texture), depth (texture and 16-bit depth "
                "as PNGs of a camera without distortion, which camera.json describes), animation (all "
-               "frames in one GLB that plays them) or video (of the texture; as recorded where it is "
-               "H.264)")
+               "frames in one GLB that plays them), video (of the texture; as recorded where it is H.264) or "
+               "ros2 (a bag: points, picture and camera as ROS 2 has them)")
             ->check(CLI::IsMember(names))
             ->capture_default_str();
         app.add_option("--depth-unit", options->depth_unit_mm, "Of depth: millimetres a step; 65,535 fit")
@@ -205,13 +206,16 @@ Command export_command() {
             throw CLI::ValidationError("--out", "a video's name ends in .mp4 or .mkv");
           if (options->format == "animation" && options->out.extension() != ".glb")
             throw CLI::ValidationError("--out", "an animation's name ends in .glb");
+          if (options->format == "ros2" && options->out.extension() != ".mcap")
+            throw CLI::ValidationError("--out", "a bag's name ends in .mcap");
         });
         app.footer(
             "Examples:\n"
             "  relievo export face.mcap --format glb --frames 30:59 --out DIR\n"
             "  relievo export face.mcap --format glb --draco --out DIR\n"
             "  relievo export face.mcap --format animation --from 1 --to 5 --out face.glb\n"
-            "  relievo export face.mcap --format video --out face.mp4");
+            "  relievo export face.mcap --format video --out face.mp4\n"
+            "  relievo export face.mcap --format ros2 --out face_ros2.mcap");
         return [options](StopSignal& stop) { return run(*options, stop); };
       }};
 }

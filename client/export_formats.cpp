@@ -5,6 +5,7 @@
 
 #include "base/whole_file.h"
 #include "client/picture_video.h"
+#include "client/ros/bag.h"
 #include "codec/export.h"
 #include "codec/frame_layout.h"
 #include "codec/frame_names.h"
@@ -186,6 +187,17 @@ class VideoWriter final : public ExportWriter {
   std::unique_ptr<ExportWriter> writer_;
 };
 
+class RosWriter final : public ExportWriter {
+ public:
+  explicit RosWriter(RosBag bag) : bag_(std::move(bag)) {}
+
+  Status add(const Frame3D& frame, std::span<const std::uint8_t>) override { return bag_.add(frame); }
+  Status finish() override { return bag_.finish(); }
+
+ private:
+  RosBag bag_;
+};
+
 template <const char* const* Ending, WriteFile Write>
 Made make_files(const ExportTarget& target) {
   return Made(std::make_unique<FileWriter>(target.out, *Ending, Write));
@@ -221,13 +233,20 @@ Made make_video(const ExportTarget& target) {
   return Made(std::make_unique<VideoWriter>(*std::move(file), target.reencode));
 }
 
+Made make_ros(const ExportTarget& target) {
+  auto bag = RosBag::create(target.out, target.stream, target.rig);
+  if (!bag) return bag.error();
+  return Made(std::make_unique<RosWriter>(*std::move(bag)));
+}
+
 constexpr ExportFormat kFormats[] = {{"ply", false, false, make_files<&kPly, ply>},
                                      {"glb", false, true, make_glb},
                                      {"obj", false, false, make_files<&kObj, write_obj>},
                                      {"png", false, false, make_files<&kPng, png>},
                                      {"depth", false, false, make_depth},
                                      {"animation", true, true, make_animation},
-                                     {"video", true, false, make_video}};
+                                     {"video", true, false, make_video},
+                                     {"ros2", true, false, make_ros}};
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "base/frame3d.h"
 #include "base/result.h"
@@ -16,6 +17,7 @@ namespace relievo {
 
 struct ExportTarget {
   std::filesystem::path out;  // the folder, which is made with the first frame, or the one file
+  std::string stream;         // its name
   std::optional<Rig> rig;     // nothing where the recording has no description
   double depth_unit_m = 1e-3;
   bool reencode = false;  // of video: even what could be copied

@@ -1,47 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/export.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <string>
 
 #include "base/whole_file.h"
 #include "codec/byte_io.h"
 #include "codec/surface_check.h"
+#include "codec/texture_colour.h"
 #include "codec/texture_png.h"
 
 namespace relievo {
 namespace {
-
-using Colour = std::array<std::uint8_t, 3>;
-constexpr Colour kNoTexture{200, 200, 200};
-
-/// Bilinear, at glTF coordinates: (0, 0) is the outer corner of the first pixel.
-Colour sample(View8 texture, const Vec2f& at) {
-  const float x = std::clamp(at[0] * static_cast<float>(texture.width) - 0.5f, 0.0f,
-                             static_cast<float>(texture.width - 1));
-  const float y = std::clamp(at[1] * static_cast<float>(texture.height) - 0.5f, 0.0f,
-                             static_cast<float>(texture.height - 1));
-  const int x0 = static_cast<int>(x);
-  const int y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, texture.width - 1);
-  const int y1 = std::min(y0 + 1, texture.height - 1);
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
-  Colour colour{};
-  for (int c = 0; c < 3; ++c) {
-    const int channel = std::min(c, texture.channels - 1);
-    const auto value = [&](int column, int row) {
-      return static_cast<float>(texture.row(row)[column * texture.channels + channel]);
-    };
-    const float top = value(x0, y0) + fx * (value(x1, y0) - value(x0, y0));
-    const float bottom = value(x0, y1) + fx * (value(x1, y1) - value(x0, y1));
-    colour[static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(std::lround(top + fy * (bottom - top)));
-  }
-  return colour;
-}
 
 void append_text(Bytes& out, std::string_view text) {
   out.insert(out.end(), text.begin(), text.end());
@@ -66,7 +37,6 @@ Status write_ply(const std::filesystem::path& path, const Surface& surface, View
   const std::vector<Vec3f> derived =
       surface.normals.empty() ? surface_normals(surface) : std::vector<Vec3f>();
   const std::vector<Vec3f>& normals = surface.normals.empty() ? derived : surface.normals;
-  const bool coloured = !texture.empty() && !surface.texture_coordinates.empty();
   Bytes out;
   const bool has_sigma = !surface.sigmas_m.empty();
   const bool has_marks = !surface.interpolated.empty();
@@ -87,7 +57,7 @@ Status write_ply(const std::filesystem::path& path, const Surface& surface, View
   for (std::size_t i = 0; i < surface.positions.size(); ++i) {
     for (const float x : surface.positions[i]) append(out, x);
     for (const float x : normals[i]) append(out, x);
-    append_bytes(out, coloured ? sample(texture, surface.texture_coordinates[i]) : kNoTexture);
+    append_bytes(out, vertex_colour(surface, texture, i));
     if (has_sigma) append(out, surface.sigmas_m[i]);
     if (has_marks) append(out, surface.interpolated[i]);
   }

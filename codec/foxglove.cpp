@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/foxglove.h"
 
-#include <algorithm>
-#include <string_view>
 #include <utility>
 
-#include "base/time.h"
-#include "codec/byte_io.h"
 #include "codec/export.h"
 #include "codec/jpeg_texture.h"
+#include "codec/message_cdr.h"
 
 namespace relievo {
 namespace {
@@ -63,47 +60,10 @@ constexpr const char* kSceneIdl = R"(module foxglove {
 };
 )";
 
-/// XCDR version 1, little endian: values are aligned to their size, counted from behind the encapsulation
-/// header.
-class Cdr {
- public:
-  template <Scalar T>
-  void put(T value) {
-    const std::size_t body = bytes_.size() - kEncapsulationBytes;
-    bytes_.resize(kEncapsulationBytes + (body + sizeof(T) - 1) / sizeof(T) * sizeof(T));
-    append(bytes_, value);
-  }
-  void text(std::string_view text) {
-    put(static_cast<std::uint32_t>(text.size() + 1));
-    bytes_.insert(bytes_.end(), text.begin(), text.end());
-    bytes_.push_back(0);
-  }
-  void octets(const Bytes& octets) {
-    put(static_cast<std::uint32_t>(octets.size()));
-    append_bytes(bytes_, octets);
-  }
-  void time(std::int64_t ns) {
-    ns = std::max<std::int64_t>(ns, 0);
-    put(static_cast<std::uint32_t>(ns / kNanosecondsPerSecond));
-    put(static_cast<std::uint32_t>(ns % kNanosecondsPerSecond));
-  }
-  void empty_sequences(int count) {
-    for (int i = 0; i < count; ++i) put(std::uint32_t{0});
-  }
-  void numbers(std::initializer_list<double> values) {
-    for (const double value : values) put(value);
-  }
-  Bytes take() { return std::move(bytes_); }
-
- private:
-  static constexpr std::size_t kEncapsulationBytes = 4;
-  Bytes bytes_{0, 1, 0, 0};
-};
-
 Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std::int64_t time_ns) {
   Bytes jpeg;
   if (auto status = append_jpeg(frame.texture.view(), kJpegQuality, jpeg); !status) return status.error();
-  Cdr cdr;
+  MessageCdr cdr;
   cdr.time(time_ns);
   cdr.text(stream);
   cdr.octets(jpeg);
@@ -114,7 +74,7 @@ Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std
 Result<Bytes> scene_message(const Frame3D& frame, const std::string& stream, std::int64_t time_ns) {
   const auto glb = encode_glb(frame, {.jpeg_quality = kJpegQuality});
   if (!glb) return glb.error();
-  Cdr cdr;
+  MessageCdr cdr;
   cdr.empty_sequences(1);  // deletions
   cdr.put(std::uint32_t{1});
   cdr.time(time_ns);

@@ -57,9 +57,9 @@ std::optional<T> if_ok(const ByteReader& reader, T&& value) {
 
 }  // namespace
 
-void append_header(Bytes& out, const std::string& library) {
+void append_header(Bytes& out, const std::string& profile, const std::string& library) {
   const RecordScope record(out, Op::kHeader);
-  append_string(out, "");
+  append_string(out, profile);
   append_string(out, library);
 }
 

@@ -122,7 +122,7 @@ struct Footer {
 };
 
 /// Each appends one whole record.
-void append_header(Bytes& out, const std::string& library);
+void append_header(Bytes& out, const std::string& profile, const std::string& library);
 void append(Bytes& out, const Schema& schema);
 void append(Bytes& out, const Channel& channel);
 void append(Bytes& out, const Message& message, std::span<const std::uint8_t> data);

@@ -58,6 +58,7 @@ class RecordingWriter {
     std::size_t chunk_bytes = 4u << 20;
     std::int64_t sync_ns = 0;  // of the messages' times; 0: each chunk; below 0: only the finished file
     bool keeps_name = false;   // where the file is renamed it fails, as where it is removed
+    std::string profile;       // of MCAP, for readers that go by one: "ros2"
   };
   /// Fails, saying why, where the file exists already or cannot be made; never touches an existing file.
   static Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& file,

@@ -36,7 +36,7 @@ class Writer final : public RecordingWriter {
 
   Status start() {
     Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
-    mcap::append_header(bytes, "relievo " RELIEVO_VERSION);
+    mcap::append_header(bytes, options_.profile, "relievo " RELIEVO_VERSION);
     if (auto status = reserve(bytes.size()); !status) return status;
     return write_whole({bytes});
   }

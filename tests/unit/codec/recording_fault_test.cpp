@@ -210,7 +210,7 @@ TEST(RecordingFault, TimesOfChunksThatLieDoNotMixMessages) {
 TEST(RecordingFault, ACompressedChunkIsRefusedInWords) {
   const test::TempFolder folder;
   Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
-  mcap::append_header(bytes, "another writer");
+  mcap::append_header(bytes, "", "another writer");
   mcap::append_chunk_header(bytes, {.start_time = 1,
                                     .end_time = 2,
                                     .uncompressed_size = 100,

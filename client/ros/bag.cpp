@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client/ros/bag.h"
+
+#include <system_error>
+#include <utility>
+
+#include "base/whole_file.h"
+
+namespace relievo {
+
+namespace fs = std::filesystem;
+
+Result<RosBag> RosBag::create(const fs::path& file, const std::string& stream, std::optional<Rig> rig) {
+  std::error_code failed;
+  if (fs::is_directory(file, failed)) return Error{file.string() + " is a folder: name a file"};
+  RosBag bag;
+  bag.file_ = file;
+  bag.name_ = ros_name(stream);
+  bag.rig_ = std::move(rig);
+  const fs::path unfinished = unfinished_name(file);
+  auto writer = RecordingWriter::create(unfinished, {.sync_ns = -1, .profile = "ros2"});
+  if (!writer) return writer.error();
+  bag.unfinished_ = unfinished;
+  bag.writer_ = *std::move(writer);
+  return bag;
+}
+
+RosBag::~RosBag() {
+  if (!writer_) return;
+  writer_.reset();
+  std::error_code ignored;
+  fs::remove(unfinished_, ignored);
+}
+
+Result<std::uint16_t> RosBag::channel_of(RosTopic topic) {
+  const auto known = channels_.find(topic);
+  if (known != channels_.end()) return known->second;
+  const RosTopicType& type = ros_topic_types()[static_cast<std::size_t>(topic)];
+  const auto added = writer_->add_channel({type.type, "ros2msg", type.definition},
+                                          {ros_topic_name(type, name_), "cdr", type.type, {}});
+  if (added) channels_[topic] = *added;
+  return added;
+}
+
+Status RosBag::add(const Frame3D& frame) {
+  auto messages = ros_messages(frame, name_, rig_ ? &*rig_ : nullptr);
+  if (!messages) return messages.error();
+  for (RosMessage& message : *messages) {
+    const auto channel = channel_of(message.topic);
+    if (!channel) return channel.error();
+    if (auto status =
+            writer_->write({*channel, frames_, frame.time_ns, frame.time_ns, std::move(message.cdr)});
+        !status)
+      return status;
+  }
+  ++frames_;
+  return {};
+}
+
+Status RosBag::finish() {
+  if (auto status = writer_->finish(); !status) return status;
+  std::error_code failed;
+  fs::rename(unfinished_, file_, failed);
+  if (failed) return Error{file_.string() + " cannot be written: " + failed.message()};
+  writer_.reset();
+  return {};
+}
+
+}  // namespace relievo
