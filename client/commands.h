@@ -19,5 +19,6 @@ Command keys_command();
 Command doctor_command();
 Command shot_command();
 Command measure_command();
+Command ros2_command();
 
 }  // namespace relievo

@@ -59,7 +59,7 @@ Result<std::uint64_t> visit_live(const FrameInput& input, const FrameVisit& visi
     const auto taken = latest.take(std::chrono::duration<double>(input.wait_s), stop);
     if (!taken || taken->frame.time_ns > end_ns) break;
     if (count == 0) end_ns = taken->frame.time_ns + std::llround(input.seconds * kNanosecondsPerSecond);
-    if (Status seen = visit.frame(taken->frame, &taken->camera); !seen) return seen.error();
+    if (Status seen = visit.frame(taken->frame, &taken->rig.camera); !seen) return seen.error();
     progress.update(++count);
   }
   if (count == 0 && !stop.stopped())

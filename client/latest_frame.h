@@ -20,7 +20,7 @@ class LatestFrame {
  public:
   struct Taken {
     Frame3D frame;
-    PinholeModel camera;
+    Rig rig;
   };
 
   Subscriber::Callbacks callbacks();
@@ -32,7 +32,7 @@ class LatestFrame {
   FrameDecoder decoder_;  // of the subscriber's thread alone
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::optional<PinholeModel> camera_;
+  std::optional<Rig> rig_;
   std::optional<Frame3D> frame_;
 };
 

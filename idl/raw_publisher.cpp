@@ -3,18 +3,14 @@
 // serialised-data interface instead of its C types.
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
-#include <dds/ddsi/ddsi_sertype.h>
-#include <unistd.h>
 
-#include <atomic>
-#include <chrono>
-#include <thread>
 #include <utility>
 
 #include "idl/cdr.h"
 #include "idl/clock.h"
 #include "idl/domain.h"
 #include "idl/live_streams.h"
+#include "idl/raw_type.h"
 #include "idl/security.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
@@ -23,25 +19,7 @@
 namespace relievo {
 namespace {
 
-// Cyclone 0.10 tells the serialiser of a topic only through a sample, so one is written to ourselves, in a
-// partition nobody else reads. The returned reference is ours.
-Result<ddsi_sertype*> sertype_of(std::int32_t participant, Topic topic) {
-  static std::atomic<unsigned> count = 0;
-  const std::string partition =
-      ".relievo-probe-" + std::to_string(getpid()) + '-' + std::to_string(count.fetch_add(1));
-  const char* partitions[] = {partition.c_str()};
-  dds_qos_t* qos = dds_create_qos();
-  dds_qset_partition(qos, 1, partitions);
-  auto publisher = take_entity(dds_create_publisher(participant, qos, nullptr), "publisher");
-  auto subscriber = take_entity(dds_create_subscriber(participant, qos, nullptr), "subscriber");
-  dds_delete_qos(qos);
-  if (!publisher) return publisher.error();
-  if (!subscriber) return subscriber.error();
-  auto reader = create_reader(participant, subscriber->get(), topic);
-  if (!reader) return reader.error();
-  auto writer = create_writer(participant, publisher->get(), topic);
-  if (!writer) return writer.error();
-
+Result<RawType> raw_type_of(std::int32_t participant, Topic topic) {
   // All topic types begin with the key, and Cyclone writes null strings as empty ones.
   static char name[] = "probe";
   relievo_StreamInfo info{};
@@ -49,19 +27,10 @@ Result<ddsi_sertype*> sertype_of(std::int32_t participant, Topic topic) {
   relievo_ServerStatus status{};
   info.stream = frame.stream = status.stream = name;
   const void* samples[] = {&info, &frame, &status};
-  const auto code = dds_write(writer->get(), samples[static_cast<std::size_t>(topic)]);
-  if (code < 0) return dds_error(code, "cannot prepare raw publishing");
-  for (int attempt = 0; attempt < 100; ++attempt) {
-    ddsi_serdata* data = nullptr;
-    dds_sample_info_t sample_info;
-    if (dds_takecdr(reader->get(), &data, 1, &sample_info, DDS_ANY_STATE) == 1) {
-      ddsi_sertype* type = sample_info.valid_data ? ddsi_sertype_ref(data->type) : nullptr;
-      ddsi_serdata_unref(data);
-      if (type != nullptr) return type;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return Error{"cannot prepare raw publishing: no sample came back within a second"};
+  return RawType::find(
+      participant, [&](std::int32_t group) { return create_reader(participant, group, topic); },
+      [&](std::int32_t group) { return create_writer(participant, group, topic); },
+      samples[static_cast<std::size_t>(topic)]);
 }
 
 Result<std::string> stream_of(const RawSample& sample) {
@@ -84,12 +53,6 @@ Result<std::string> stream_of(const RawSample& sample) {
 
 class DdsRawPublisher final : public RawPublisher {
  public:
-  ~DdsRawPublisher() override {
-    for (ddsi_sertype* type : types_) {
-      if (type != nullptr) ddsi_sertype_unref(type);
-    }
-  }
-
   static Result<std::unique_ptr<RawPublisher>> open(const DomainOptions& options, const std::string& stream) {
     if (!valid_stream_name(stream)) return Error{"'" + stream + "' cannot name a stream"};
     auto domain = Domain::open(options);
@@ -110,9 +73,9 @@ class DdsRawPublisher final : public RawPublisher {
     publisher->clock_ = create_clock_service(*publisher->domain_, stream);
     for (const Topic topic : kTopics) {
       const auto index = static_cast<std::size_t>(topic);
-      auto type = sertype_of(participant, topic);
+      auto type = raw_type_of(participant, topic);
       if (!type) return type.error();
-      publisher->types_[index] = *type;
+      publisher->types_[index] = *std::move(type);
       auto writer = create_writer(participant, publisher->group_.get(), topic);
       if (!writer) return writer.error();
       publisher->writers_[index] = std::move(writer).value();
@@ -127,10 +90,7 @@ class DdsRawPublisher final : public RawPublisher {
       return Error{"cannot publish a recorded sample of stream '" + *stream + "' as '" + stream_ + "'"};
     }
     const auto index = static_cast<std::size_t>(sample.topic);
-    ddsrt_iovec_t bytes{};
-    bytes.iov_base = const_cast<std::uint8_t*>(sample.cdr.data());  // only read
-    bytes.iov_len = sample.cdr.size();
-    ddsi_serdata* data = ddsi_serdata_from_ser_iov(types_[index], SDK_DATA, 1, &bytes, sample.cdr.size());
+    ddsi_serdata* const data = types_[index].make(sample.cdr);
     if (data == nullptr) {
       return Error{"cannot publish a recorded sample: it is not a valid " +
                    topic_type(sample.topic).type_name};
@@ -168,7 +128,7 @@ class DdsRawPublisher final : public RawPublisher {
   std::unique_ptr<ClockService> clock_;  // of times that are restamped
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
-  std::array<ddsi_sertype*, kTopics.size()> types_{};
+  std::array<RawType, kTopics.size()> types_;
 };
 
 }  // namespace

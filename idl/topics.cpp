@@ -55,26 +55,14 @@ Result<Entity> create_topic(std::int32_t participant, Topic topic) {
   return create_topic(participant, *row(topic).type, topic_type(topic).topic_name);
 }
 
-/// Says that it is the topic's own type, and nothing of how that is made: readers go by its name then.
+/// Says that it is the topic's own type, and nothing of how that is made.
 dds_topic_descriptor_t cdr1_type(Topic topic) {
   static_assert(sizeof(relievo_StreamInfo) == sizeof(relievo_cdr1_StreamInfo) &&
                 sizeof(relievo_Frame) == sizeof(relievo_cdr1_Frame) &&
                 sizeof(relievo_ServerStatus) == sizeof(relievo_cdr1_ServerStatus));
   static const dds_topic_descriptor_t* const types[] = {
       &relievo_cdr1_StreamInfo_desc, &relievo_cdr1_Frame_desc, &relievo_cdr1_ServerStatus_desc};
-  const dds_topic_descriptor_t& cdr1 = *types[static_cast<std::size_t>(topic)];
-  return {.m_size = cdr1.m_size,
-          .m_align = cdr1.m_align,
-          .m_flagset = cdr1.m_flagset & ~static_cast<std::uint32_t>(DDS_TOPIC_XTYPES_METADATA),
-          .m_nkeys = cdr1.m_nkeys,
-          .m_typename = row(topic).type->m_typename,
-          .m_keys = cdr1.m_keys,
-          .m_nops = cdr1.m_nops,
-          .m_ops = cdr1.m_ops,
-          .m_meta = cdr1.m_meta,
-          .type_information = {},
-          .type_mapping = {},
-          .restrict_data_representation = cdr1.restrict_data_representation};
+  return type_by_name(*types[static_cast<std::size_t>(topic)], row(topic).type->m_typename);
 }
 
 struct SideRow {
@@ -104,6 +92,21 @@ Qos side_qos(SideTopic topic) {
 }
 
 }  // namespace
+
+dds_topic_descriptor type_by_name(const dds_topic_descriptor& type, const char* name) {
+  return {.m_size = type.m_size,
+          .m_align = type.m_align,
+          .m_flagset = type.m_flagset & ~static_cast<std::uint32_t>(DDS_TOPIC_XTYPES_METADATA),
+          .m_nkeys = type.m_nkeys,
+          .m_typename = name,
+          .m_keys = type.m_keys,
+          .m_nops = type.m_nops,
+          .m_ops = type.m_ops,
+          .m_meta = type.m_meta,
+          .type_information = {},
+          .type_mapping = {},
+          .restrict_data_representation = type.restrict_data_representation};
+}
 
 const TopicType& topic_type(Topic topic) {
   static const TopicType types[] = {

@@ -13,6 +13,8 @@
 #include "idl/entity.h"
 #include "idl/transport.h"
 
+struct dds_topic_descriptor;
+
 namespace relievo {
 
 /// What a stream's server writes: the topics that are subscribed to, recorded and played.
@@ -46,6 +48,10 @@ Result<Entity> create_reader(std::int32_t participant, std::int32_t group, Topic
 /// The same for readers that know XCDR1 alone, such as Fast DDS 2: they find no other, and ours not this one.
 /// Takes the samples of the other writer.
 Result<Entity> create_cdr1_writer(std::int32_t participant, std::int32_t group, Topic topic);
+
+/// The type under that name, of which nothing else is said: readers that know nothing of XTypes go by the
+/// name.
+dds_topic_descriptor type_by_name(const dds_topic_descriptor& type, const char* name);
 
 /// What is said beside the streams: never recorded.
 enum class SideTopic : std::uint8_t {

@@ -32,24 +32,23 @@ RosBag::~RosBag() {
   fs::remove(unfinished_, ignored);
 }
 
-Result<std::uint16_t> RosBag::channel_of(RosTopic topic) {
-  const auto known = channels_.find(topic);
+Result<std::uint16_t> RosBag::channel_of(const RosTopicType& type) {
+  const auto known = channels_.find(type.topic);
   if (known != channels_.end()) return known->second;
-  const RosTopicType& type = ros_topic_types()[static_cast<std::size_t>(topic)];
   const auto added = writer_->add_channel({type.type, "ros2msg", type.definition},
                                           {ros_topic_name(type, name_), "cdr", type.type, {}});
-  if (added) channels_[topic] = *added;
+  if (added) channels_[type.topic] = *added;
   return added;
 }
 
 Status RosBag::add(const Frame3D& frame) {
-  auto messages = ros_messages(frame, name_, rig_ ? &*rig_ : nullptr);
-  if (!messages) return messages.error();
-  for (RosMessage& message : *messages) {
-    const auto channel = channel_of(message.topic);
+  for (const RosTopicType& type : ros_topic_types()) {
+    auto message = ros_message(type.topic, frame, name_, rig_ ? &*rig_ : nullptr);
+    if (!message) return message.error();
+    if (!*message) continue;
+    const auto channel = channel_of(type);
     if (!channel) return channel.error();
-    if (auto status =
-            writer_->write({*channel, frames_, frame.time_ns, frame.time_ns, std::move(message.cdr)});
+    if (auto status = writer_->write({*channel, frames_, frame.time_ns, frame.time_ns, **std::move(message)});
         !status)
       return status;
   }

@@ -32,7 +32,7 @@ class RosBag {
 
  private:
   RosBag() = default;
-  Result<std::uint16_t> channel_of(RosTopic topic);
+  Result<std::uint16_t> channel_of(const RosTopicType& type);
 
   std::filesystem::path file_, unfinished_;
   std::string name_;

@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "codec/jpeg_texture.h"
 #include "codec/message_cdr.h"
@@ -242,21 +243,26 @@ std::string ros_topic_name(const RosTopicType& type, const std::string& ros_name
   return type.topic == RosTopic::kTransforms ? type.name : "/" + ros_name + "/" + type.name;
 }
 
-Result<std::vector<RosMessage>> ros_messages(const Frame3D& frame, const std::string& ros_name,
-                                             const Rig* rig) {
-  if (auto status = check_surface(frame.surface); !status) return status.error();
-  std::vector<RosMessage> out;
-  if (rig != nullptr && rig->world_from_camera)
-    out.push_back({RosTopic::kTransforms, transforms_message(frame, ros_name, *rig->world_from_camera)});
-  if (rig != nullptr)
-    out.push_back({RosTopic::kCameraInfo, camera_info_message(frame, ros_name, rig->camera)});
-  if (!frame.texture.empty()) {
-    auto image = image_message(frame, ros_name);
-    if (!image) return image.error();
-    out.push_back({RosTopic::kImage, *std::move(image)});
+Result<std::optional<Bytes>> ros_message(RosTopic topic, const Frame3D& frame, const std::string& ros_name,
+                                         const Rig* rig) {
+  using Message = std::optional<Bytes>;
+  switch (topic) {
+    case RosTopic::kPoints:
+      if (auto status = check_surface(frame.surface); !status) return status.error();
+      return Message(points_message(frame, ros_name));
+    case RosTopic::kImage: {
+      if (frame.texture.empty()) return Message();
+      auto image = image_message(frame, ros_name);
+      return image ? Result<Message>(*std::move(image)) : image.error();
+    }
+    case RosTopic::kCameraInfo:
+      return rig != nullptr ? Message(camera_info_message(frame, ros_name, rig->camera)) : Message();
+    case RosTopic::kTransforms:
+      return rig != nullptr && rig->world_from_camera
+                 ? Message(transforms_message(frame, ros_name, *rig->world_from_camera))
+                 : Message();
   }
-  out.push_back({RosTopic::kPoints, points_message(frame, ros_name)});
-  return out;
+  return Message();
 }
 
 }  // namespace relievo

@@ -4,8 +4,8 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include "base/frame3d.h"
 #include "base/result.h"
@@ -31,20 +31,17 @@ std::string ros_name(const std::string& stream);
 /// "/face/points".
 std::string ros_topic_name(const RosTopicType& type, const std::string& ros_name);
 
-struct RosMessage {
-  RosTopic topic = RosTopic::kPoints;
-  Bytes cdr;  // with its encapsulation header
-};
-/// All of the frame's time stamp:
+/// A topic's message, as CDR with its encapsulation header, with the frame's time:
 /// - kPoints, sensor_msgs/PointCloud2: x y z (metres), rgb (packed as PCL has it: blue first; light grey
 /// where
 ///   there is no texture), where known sigma (metres: standard deviation of the depth, 0 not known) and
 ///   interpolated (0 or 1);
-/// - kImage, sensor_msgs/CompressedImage: the texture as a JPEG, where there is one;
-/// - kCameraInfo: the camera, at the texture's size, where `rig` is not null;
-/// - kTransforms, tf2_msgs/TFMessage: where the camera stands in the frame "world", where the rig says so.
-/// Fails on a surface that check_surface() refuses.
-Result<std::vector<RosMessage>> ros_messages(const Frame3D& frame, const std::string& ros_name,
-                                             const Rig* rig);
+/// - kImage, sensor_msgs/CompressedImage: the texture as a JPEG;
+/// - kCameraInfo: the camera, at the texture's size;
+/// - kTransforms, tf2_msgs/TFMessage: where the camera stands in the frame "world".
+/// Nothing where that is not known; `rig` is null where the camera is not. Fails on a surface that
+/// check_surface() refuses.
+Result<std::optional<Bytes>> ros_message(RosTopic topic, const Frame3D& frame, const std::string& ros_name,
+                                         const Rig* rig);
 
 }  // namespace relievo

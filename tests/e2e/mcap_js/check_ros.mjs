@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // node check_ros.mjs FILE: a bag for ROS 2, read as its readers do: by the definitions in the file, which must say the same as
 // ROS's own. Prints what is in it, with each topic's first message; of points the fields of the first one.
+// node check_ros.mjs TYPE FILE: one message as it came from the network, by ROS's own definition.
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { McapStreamReader } from "@mcap/core";
@@ -51,7 +52,18 @@ function described(type, message) {
   return out;
 }
 
-const [, , path] = process.argv;
+function checkMessage(type, bytes) {
+  const own = published[type.replace("/msg/", "/")];
+  const others = Object.values(published).filter((definition) => definition !== own);
+  const reader = new MessageReader([{ ...own, name: undefined }, ...others]);
+  process.stdout.write(JSON.stringify(described(type, reader.readMessage(bytes))));
+}
+
+const [, , path, message] = process.argv;
+if (message) {
+  checkMessage(path, await readFile(message));
+  process.exit();
+}
 const reader = new McapStreamReader({ validateCrcs: true });
 reader.append(await readFile(path));
 const schemas = new Map();

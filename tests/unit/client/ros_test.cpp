@@ -21,7 +21,7 @@ TEST(RosNames, ASurfaceThatIsNoneIsRefused) {
   Frame3D frame;
   frame.surface.positions.resize(3);
   frame.surface.triangles.push_back({0, 1, 3});
-  EXPECT_FALSE(ros_messages(frame, "face", nullptr).ok());
+  EXPECT_FALSE(ros_message(RosTopic::kPoints, frame, "face", nullptr).ok());
 }
 
 }  // namespace
