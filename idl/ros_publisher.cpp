@@ -58,7 +58,7 @@ class DdsRosPublisher final : public RosPublisher {
 
   Status publish(std::size_t index, const Bytes& cdr) override {
     ddsi_serdata* const data = topics_[index].type.make(cdr);
-    if (data == nullptr) return Error{"a message of topic " + std::to_string(index) + " is none of its type"};
+    if (data == nullptr) return Error{"a message of " + topics_[index].name + " is none of its type"};
     const auto code = dds_writecdr(topics_[index].writer.get(), data);
     // A reader that does not keep up loses it, no other.
     if (code < 0 && code != DDS_RETCODE_TIMEOUT) return dds_error(code, "cannot publish for ROS");
@@ -67,6 +67,7 @@ class DdsRosPublisher final : public RosPublisher {
 
  private:
   struct Published {
+    std::string name;
     Entity topic, writer;
     RawType type;
   };
@@ -96,7 +97,7 @@ class DdsRosPublisher final : public RosPublisher {
     if (!raw) return raw.error();
     auto writer = writer_in(participant);
     if (!writer) return writer.error();
-    topics_.push_back({*std::move(topic), *std::move(writer), *std::move(raw)});
+    topics_.push_back({publication.topic, *std::move(topic), *std::move(writer), *std::move(raw)});
     return {};
   }
 
