@@ -479,4 +479,6 @@ try {
   }
 } finally {
   await browser.close();
+  await Server.killAll(); // where a check failed, that of leaves() too, which tidies up then
+  await leaving.catch(() => undefined);
 }

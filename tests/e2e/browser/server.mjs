@@ -4,6 +4,12 @@ import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { createInterface } from 'node:readline';
 
+// Those that a test which fails has not come to end must not outlive it: an exception ends the process at once.
+const running = new Set();
+process.on('exit', () => {
+  for (const server of running) server.kill('SIGKILL');
+});
+
 export class Server {
   /** `options`: of serve, beside those for the network; `environment`: beside this process's own. */
   static start(path, options, environment = {}) {
@@ -23,6 +29,8 @@ export class Server {
       stdio: ['ignore', 'pipe', 'pipe'],
       env: { ...process.env, ...environment },
     });
+    running.add(server.process);
+    server.process.once('exit', () => running.delete(server.process));
     server.said = ''; // its log
     server.process.stderr.on('data', (text) => {
       server.said += text;
@@ -37,6 +45,13 @@ export class Server {
     });
     server.address = new URL(address).origin;
     return server;
+  }
+
+  /** All that were started and are not at their end. */
+  static async killAll() {
+    const exits = [...running].map((server) => new Promise((resolve) => server.once('exit', resolve)));
+    for (const server of running) server.kill('SIGKILL');
+    await Promise.all(exits);
   }
 
   async kill() {
