@@ -89,6 +89,28 @@ const checks = {
     await inspect('Empty', made, /No streams yet.*relievo-server serve/s);
   },
 
+  async 'opening a recording of the address, which then is not there'() {
+    let answer;
+    const asked = new Promise((resolve) => (answer = resolve));
+    const made = await pages(async (options) => {
+      const page = await newPage(options);
+      await page.route('**/recordings/none.mcap', async (route) => {
+        await asked;
+        await route.continue();
+      });
+      const listed = page.waitForResponse('**/api/streams');
+      await page.goto(`${origin}/?recording=none.mcap`);
+      await page.waitForRequest('**/recordings/none.mcap');
+      await listed;
+      return page;
+    });
+    const says = (words) => Promise.all(made.map(({ page }) => page.waitForFunction((w) => document.querySelector('#card-title').textContent === w, words)));
+    await says('Opening none.mcap');
+    answer();
+    await says('“none.mcap” cannot be shown');
+    for (const { page } of made) await page.close();
+  },
+
   async 'waiting for a stream by its name'() {
     const made = await pages(async (options) => {
       const page = await open('/?stream=later', options);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
 import { loadDisplay, storeDisplay, type Display } from './display';
+import { Choice } from './choice';
 import { listenToCommands, toggleFullscreen } from './commands';
 import { besidesText, called, Companions } from './companions';
 import { DisplayPanel } from './displayPanel';
@@ -21,7 +22,6 @@ import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { playbackReport, report } from './reports';
 import { address, goTo, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
-import { sentence } from './sentence';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
@@ -61,7 +61,7 @@ class Viewer {
   private posed = false; // the link's view is shown
 
   private problem: string | null = null;
-  private choices = 0; // of files and streams: a file that takes long to open may no longer be wanted
+  private readonly choice = new Choice();
   private chosenByPerson = false; // the stream, by the address or the picker
   private readonly server = new ServerList();
   private wantedBesides: string[] = []; // by the address, until the list says what they are
@@ -70,7 +70,6 @@ class Viewer {
   private triedRecording = false; // of that stream
   private file: string | null = null; // shown instead of a stream
   private serverFile: string | null = null; // the same where it is one of the server's
-  private fileProblem: { name: string; why: string; overPicture: boolean } | null = null; // the card stays where it was shown first
   private presentation: Presentation | null = null;
   private notice: Notice | null = null; // of the frame that is shown
 
@@ -78,7 +77,7 @@ class Viewer {
     this.ui = new Ui({
       stream: (name) => this.choose(name),
       dismiss: () => {
-        this.fileProblem = null;
+        this.choice.dismiss();
         this.refresh();
       },
       insets: (parts, withPanel) => this.view?.navigator.setInsets(parts, withPanel),
@@ -265,7 +264,7 @@ class Viewer {
   }
 
   private choose(name: string): void {
-    ++this.choices;
+    this.choice.make();
     this.chosenByPerson = true;
     this.shared = null;
     for (const beside of this.companions?.names ?? []) this.companions!.remove(beside);
@@ -361,18 +360,19 @@ class Viewer {
 
   /** Whether it is shown. */
   private async showFile(name: string, open: () => Promise<Opened>, shared: Shared | null = null): Promise<boolean> {
-    const choice = ++this.choices;
+    const choice = this.choice.begin(name);
+    this.refresh();
     let shown = false;
     try {
       const opened = await open();
-      if (choice !== this.choices) return false;
+      if (!this.choice.stillHolds(choice)) return false;
       this.chosenByPerson = true;
       this.stream = null;
       this.file = name;
       this.serverFile = null;
       this.shared = shared;
       if (this.view !== null) this.view.name = name;
-      this.fileProblem = null;
+      this.choice.opened();
       this.view?.restart(null, false);
       this.record.watch(null);
       this.session.watch(opened.kind === 'recording' ? (events) => opened.source(events, shared?.moment) : null);
@@ -380,8 +380,8 @@ class Viewer {
       if (opened.kind === 'surface') this.show(opened.frame);
       shown = true;
     } catch (error) {
-      if (choice !== this.choices) return false;
-      this.fileProblem = { name, why: error instanceof Error ? error.message : String(error), overPicture: this.session.seen };
+      if (!this.choice.stillHolds(choice)) return false;
+      this.choice.failed(name, error, this.session.seen);
     }
     this.refresh();
     return shown;
@@ -454,19 +454,17 @@ class Viewer {
     const { source, info, status, seen, facts } = this.session;
     const offline = source !== null && !source.connected; // it tries again by itself
     if (!offline || facts.refusal !== null) void this.list();
-    this.presentation = present({
+    const told = present({
       ...facts,
       ...(source === null ? { connected: this.server.arrived, retryInS: this.server.retryInS } : {}),
       problem: this.problem,
       stream: this.stream,
+      opening: this.choice.opening,
       hint: this.server.hint,
       file: facts.file ?? (source === null && this.file !== null ? 'surface' : null),
     });
-    if (this.fileProblem !== null) {
-      const { name, why, overPicture } = this.fileProblem;
-      this.presentation = { ...this.presentation, title: text.file.failed(name), text: sentence(why), hint: '', dim: overPicture };
-    }
-    this.ui.showState(this.presentation, seen, this.fileProblem !== null);
+    this.presentation = this.choice.presented(told);
+    this.ui.showState(this.presentation, seen, this.choice.hasFailed);
     this.showNotice();
     const { streams, arrived } = this.server;
     this.streams.panel?.show(streams, this.stream, this.companions?.names ?? [], arrived && (!offline || facts.refusal !== null));

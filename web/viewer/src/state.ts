@@ -26,6 +26,7 @@ export interface Facts {
   retryInS: number | null; // until the next attempt
   refusal: Refusal | null; // of the last one
   stream: string | null; // chosen
+  opening?: string | null; // the recording that is asked of the server, before anything is shown
   announced: boolean; // the server knows the stream
   seen: boolean; // a frame of it was shown
   serverState: 'starting' | 'running' | 'stalled' | 'ended' | null;
@@ -90,6 +91,9 @@ export function present(facts: Facts): Presentation {
     }
     const what = facts.seen ? say.lastPicture : facts.everConnected ? '' : say.filesOpen;
     return make('lost', say.lost[0], { title: say.lost[1], text: what + say.again(facts.retryInS), dim: true });
+  }
+  if (facts.stream === null && (facts.opening ?? null) !== null) {
+    return make('connecting', say.opening[0], { title: say.opening[1](facts.opening!), text: say.opening[2] });
   }
   if (facts.stream === null) {
     return make('empty', say.empty[0], { title: say.empty[1], text: say.empty[2], hint: facts.hint || kStartHint });

@@ -390,6 +390,7 @@ export const text = {
   states: {
     unsupported: ['Not possible', 'Nothing can be shown here'],
     connecting: ['Connecting', 'Connecting', 'Asking the server for its streams.'],
+    opening: ['Opening', (name: string) => `Opening ${name}`, 'Asking the server for it.'],
     lost: ['Offline', 'Connection lost'],
     full: ['Full', 'All places are taken', 'The server lets no more pages watch now. '],
     noName: ['No such name', 'No stream can have this name', 'Names are of 1 to 64 letters, digits, _ . and -, with no dot first. Choose one of the streams above, if there are any.'],

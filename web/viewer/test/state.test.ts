@@ -33,6 +33,7 @@ describe('present', () => {
     ['a server whose places are taken', { connected: false, retryInS: 3, refusal: 'places' }, 'lost'],
     ['a name that no stream can have', { everConnected: false, connected: false, retryInS: 3, refusal: 'name' }, 'refused'],
     ['nothing to watch', { stream: null, announced: false, seen: false }, 'empty'],
+    ['a recording that is on its way', { stream: null, opening: 'walk.mcap', announced: false, seen: false }, 'connecting'],
     ['a stream that is not there yet', { announced: false, seen: false }, 'waiting'],
     ['a stream that left', { announced: false }, 'ended'],
     ['a stream whose source is at its end', { serverState: 'ended' }, 'ended'],
@@ -49,6 +50,7 @@ describe('present', () => {
 
   it('says how to start a stream and when it tries again', () => {
     expect(present({ ...live, stream: null }).hint).toBe(live.hint);
+    expect(present({ ...live, stream: null, seen: false, opening: 'walk.mcap' }).title).toBe('Opening walk.mcap');
     expect(present({ ...live, connected: false, retryInS: 3 }).text).toContain('in 3 s');
     expect(present({ ...live, serverState: 'stalled', serverMessage: 'No signal.' }).text).toContain('No signal.');
   });
