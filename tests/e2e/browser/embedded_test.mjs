@@ -185,6 +185,38 @@ const checks = {
     assert.deepEqual(await styled('window.moved_'), before);
   }),
 
+  'in a window of its own it goes on while the page that it came from is in the background': on('/page.html', {}, async (page) => {
+    await set(page, { src: 'take.mcap', loop: true });
+    await when(page, (p) => p.state === 'file');
+    const [popup] = await Promise.all([
+      page.waitForEvent('popup'),
+      page.evaluate(() => {
+        window.moved_ = document.querySelector('relievo-player');
+        window.popup_ = window.open('about:blank', 'popup', 'width=400,height=300');
+      }),
+    ]);
+    await page.evaluate(() => {
+      // As in the background: nothing is drawn, timers come late, if ever.
+      window.requestAnimationFrame = () => 0;
+      window.setTimeout = () => 0;
+      window.setInterval = () => 0;
+      Object.defineProperty(document, 'hidden', { value: true });
+      document.dispatchEvent(new Event('visibilitychange'));
+      window.popup_.document.body.append(window.moved_);
+      window.frames_ = [];
+      window.moved_.addEventListener('frame', ({ detail }) => window.frames_.push(detail.number));
+      window.moved_.style.width = '300px';
+    });
+    popup.setDefaultTimeout(kPatienceMs);
+    await popup.waitForFunction((frames) => opener.frames_.length > frames, 2 * kFrames); // twice around
+    assert.equal(await page.evaluate(() => window.moved_.state), 'file');
+    const size = () => page.evaluate(() => window.moved_.screenshot().then((blob) => createImageBitmap(blob)).then(({ width }) => width));
+    const before = await size();
+    await page.evaluate(() => (window.moved_.style.width = '200px'));
+    await eventually('its picture keeps its size', async () => (await size()) < before);
+    await popup.close();
+  }),
+
   'without a src, or with one that fails, nothing of before is seen': on('/page.html', {}, async (page) => {
     for (const src of ['', 'there-is-none.mcap']) {
       await set(page, { src: 'take.mcap' });

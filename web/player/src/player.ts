@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // <relievo-player>: a stream or a recording in any page, with the viewer's own parts (relievo-player.d.ts is its API).
 import { kDefaultDisplay, kModes, kThemes, type Mode, type Theme } from '../../viewer/src/display';
-import { make, setText } from '../../viewer/src/dom';
+import { make, setText, windowOf } from '../../viewer/src/dom';
 import { listenToKeys } from '../../viewer/src/keys';
 import { LiveSource } from '../../viewer/src/liveSource';
 import { openRemote, type OpenedRecording } from '../../viewer/src/openFile';
@@ -45,6 +45,7 @@ interface Parts {
   view: View;
   session: Session;
   timeline: Timeline;
+  page: Window; // the one that shows it
   timer: number;
 }
 
@@ -227,7 +228,8 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
       const session = this.makeSession(view);
       this.timelineBox.replaceChildren();
       const timeline = new Timeline(this.timelineBox);
-      this.parts = { view, session, timeline, timer: window.setInterval(() => this.refresh(), kRefreshMs) };
+      const page = windowOf(this);
+      this.parts = { view, session, timeline, page, timer: page.setInterval(() => this.refresh(), kRefreshMs) };
     } catch (error) {
       this.failure = error instanceof NoGraphics ? text.noWebGl : text.player.notStarted(error instanceof Error ? error.message : String(error));
       return this.refresh();
@@ -251,7 +253,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   // Not by <style>, which a page's policy may forbid. Such sheets are of one document alone.
   private dress(root: ShadowRoot): void {
-    const { CSSStyleSheet: Sheet } = (this.ownerDocument.defaultView ?? window) as typeof globalThis;
+    const { CSSStyleSheet: Sheet } = windowOf(this);
     root.adoptedStyleSheets = [ofHost(themeCss), playerCss, timelineCss].map((css) => {
       const sheet = new Sheet();
       sheet.replaceSync(css);
@@ -272,7 +274,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
     this.parts = null;
     ++this.opening;
     if (parts === null) return;
-    window.clearInterval(parts.timer);
+    parts.page.clearInterval(parts.timer);
     this.sight.disconnect();
     this.inSight = true;
     parts.timeline.stop();
@@ -321,7 +323,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
 
   /** Nobody sees it. Its first picture it gets all the same, as a <video> does. */
   private get isUnseen(): boolean {
-    return (!this.inSight || document.hidden) && this.parts?.session.seen === true;
+    return (!this.inSight || this.ownerDocument.hidden) && this.parts?.session.seen === true;
   }
 
   /** What plays goes on without being drawn; what was asked for is drawn. */
@@ -344,13 +346,16 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
   }
 
   private makeSession(view: View): Session {
-    return new Session({
-      changed: () => this.refresh(),
-      described: (info, seen) => view.restart(info.camera, seen),
-      ready: () => this.isIdle || view.invalidate(),
-      hint: () => undefined,
-      unusable: (message) => this.fail(text.noDecoder(message)),
-    });
+    return new Session(
+      {
+        changed: () => this.refresh(),
+        described: (info, seen) => view.restart(info.camera, seen),
+        ready: () => this.isIdle || view.invalidate(),
+        hint: () => undefined,
+        unusable: (message) => this.fail(text.noDecoder(message)),
+      },
+      this.ownerDocument,
+    );
   }
 
   private async open(): Promise<void> {

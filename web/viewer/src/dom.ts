@@ -7,6 +7,9 @@ export const element = <T extends HTMLElement = HTMLElement>(id: string): T => {
   return found as T;
 };
 
+/** The window that shows a node, which may be another than the code's own: its beat, its screen. */
+export const windowOf = (node: Node): Window & typeof globalThis => node.ownerDocument?.defaultView ?? window;
+
 type Child = Node | string;
 
 /** An element with properties (not attributes) and children. */

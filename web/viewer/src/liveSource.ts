@@ -172,6 +172,7 @@ export class LiveSource implements FrameSource, Playback {
         this.events.frame(prefix, message, forLater);
       },
       nonsense: (message: string): void => this.events.nonsense(message),
+      timers: this.events.timers,
       sent: (index: number): void => {
         if (this.returning && index === this.history.end - 1) this.becomeLive();
       },

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Text and marks over the picture, at places of the scene: drawn after it, in the page's own resolution.
+import { windowOf } from './dom';
 import type { Label } from './ground';
 import type { Vec3 } from './pick';
 
@@ -47,7 +48,7 @@ export class Overlay {
   }
 
   draw(project: Project, labels: readonly Label[]): void {
-    const ratio = Math.min(window.devicePixelRatio, 2);
+    const ratio = Math.min(windowOf(this.canvas).devicePixelRatio, 2);
     const { clientWidth, clientHeight } = this.canvas;
     const [width, height] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
     if (this.canvas.width !== width || this.canvas.height !== height) {

@@ -48,20 +48,24 @@ export class Session {
     this.events.changed();
   };
 
-  constructor(private readonly events: SessionEvents) {
+  /** `page`: shows it. */
+  constructor(
+    private readonly events: SessionEvents,
+    private readonly page = document,
+  ) {
     this.decoder = new Decoder({
       decoded: (frame) => this.onDecoded(frame),
       failed: (id, message) => this.onFailed(id, message),
       unusable: (message) => events.unusable(message),
     });
-    document.addEventListener('visibilitychange', this.onHidden);
+    page.addEventListener('visibilitychange', this.onHidden);
   }
 
   /** For good. */
   end(): void {
     this.watch(null);
     this.decoder.stop();
-    document.removeEventListener('visibilitychange', this.onHidden);
+    this.page.removeEventListener('visibilitychange', this.onHidden);
   }
 
   /** Whether a frame that has come is on its way to the screen. */
@@ -119,6 +123,7 @@ export class Session {
       kept: (bytes) => this.meter.came(bytes, performance.now()),
       clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
       nonsense: (message) => this.meter.failed(message),
+      timers: this.page.defaultView ?? window,
     });
     this.source.rest?.(this.rests);
   }
@@ -131,7 +136,7 @@ export class Session {
   }
 
   private get rests(): boolean {
-    return this.unseen || document.hidden;
+    return this.unseen || this.page.hidden;
   }
 
   /** The frame to draw now instead of the one before, whose memory is used again, if there is one. */

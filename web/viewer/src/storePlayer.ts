@@ -24,7 +24,7 @@ export function framesBefore(index: number, key: number, decoded: Decoded, onBef
   return Array.from({ length: index - first }, (_, i) => first + i);
 }
 
-export interface PlayerEvents extends Pick<SourceEvents, 'frame' | 'nonsense'> {
+export interface PlayerEvents extends Pick<SourceEvents, 'frame' | 'nonsense' | 'timers'> {
   /** This frame was handed over. */
   sent?(index: number): void;
   /** It played to the end of what there is. */
@@ -132,7 +132,11 @@ export class StorePlayer implements Playback {
 
   stop(): void {
     this.stopped = true;
-    window.clearTimeout(this.timer);
+    this.timers.clearTimeout(this.timer);
+  }
+
+  private get timers(): Window {
+    return this.handed.timers ?? window;
   }
 
   private due(now: number): number {
@@ -141,7 +145,7 @@ export class StorePlayer implements Playback {
 
   // Sends what is due, or comes back when something is.
   private pump(): void {
-    window.clearTimeout(this.timer);
+    this.timers.clearTimeout(this.timer);
     this.changed();
     if (this.stopped || this.sending || this.credits <= 0) return;
     const now = performance.now();
@@ -154,7 +158,7 @@ export class StorePlayer implements Playback {
     }
     const wait = this.clock.untilNext(now);
     if (wait !== null) {
-      this.timer = window.setTimeout(() => this.pump(), wait);
+      this.timer = this.timers.setTimeout(() => this.pump(), wait);
     } else if (this.running) {
       this.running = false;
       this.ended();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time line of a source that has one: playing, scrubbing, speed, a range to repeat, marks of key frames and gaps.
-import { button, make, setText } from './dom';
+import { button, make, setText, windowOf } from './dom';
 import { clockText, frameAt, kSpeeds } from './playback';
 import type { Preview } from './preview';
 import type { Playback } from './source';
@@ -207,7 +207,7 @@ export class Timeline {
   }
 
   private drawMarks(p: Playback): void {
-    const ratio = Math.min(window.devicePixelRatio, 2);
+    const ratio = Math.min(windowOf(this.track).devicePixelRatio, 2);
     const [width, height] = [this.track.clientWidth * ratio, this.track.clientHeight * ratio];
     this.track.width = width;
     this.track.height = height;

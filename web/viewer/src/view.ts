@@ -2,6 +2,7 @@
 // The picture: what is seen of which surfaces, and what is drawn over it. Draws only when something changed, and again
 // when the drawing before is done; who draws is the painter's matter.
 import { hasPicture, wantsOf, type Display, type Mode, type Wants, type Way } from './display';
+import { windowOf } from './dom';
 import type { Drawing, Painter } from './drawing';
 import { Ground, type Label } from './ground';
 import type { DecodedFrame } from './messages';
@@ -35,9 +36,9 @@ export class View {
   readonly overlay: Overlay;
   /** The processor draws, the rest of the page too. */
   readonly inSoftware: boolean;
-  private readonly sizes = new ResizeObserver(() => this.resize());
+  private readonly sizes: ResizeObserver;
   private ended = false;
-  private ratio = window.devicePixelRatio; // of what was drawn last
+  private ratio: number; // of what was drawn last
   private readonly painter: Painter;
   private headset: Stage | null = null; // draws while a person wears one, instead
   private readonly surfaces = new Surfaces();
@@ -82,6 +83,9 @@ export class View {
     this.overlay = new Overlay(overlay);
     const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
     this.navigator = new Navigator(canvas, navigated, keys);
+    const page = windowOf(canvas);
+    this.ratio = page.devicePixelRatio;
+    this.sizes = new page.ResizeObserver(() => this.resize());
     this.sizes.observe(canvas);
     this.resize();
   }
@@ -293,7 +297,7 @@ export class View {
 
   /** To be called now and then: a window that is moved to another screen keeps its size on the page, and not every browser tells of it. */
   refresh(): void {
-    if (window.devicePixelRatio !== this.ratio) this.invalidate();
+    if (windowOf(this.canvas).devicePixelRatio !== this.ratio) this.invalidate();
   }
 
   invalidate(): void {
@@ -304,7 +308,7 @@ export class View {
       return;
     }
     this.scheduled = true;
-    requestAnimationFrame((now) => {
+    windowOf(this.canvas).requestAnimationFrame((now) => {
       if (!this.ended) this.events.beforeDraw();
       this.scheduled = false; // what changed until here is drawn now, not once more
       if (this.ended || this.headset !== null) return;
@@ -406,7 +410,7 @@ export class View {
     camera.updateMatrixWorld();
     return {
       ...size,
-      ratio: Math.min(window.devicePixelRatio, 2) * scale,
+      ratio: Math.min(windowOf(this.canvas).devicePixelRatio, 2) * scale,
       world: camera.matrixWorld.toArray(),
       projection: camera.projectionMatrix.toArray(),
       mode: this.mode_,
@@ -429,10 +433,10 @@ export class View {
   }
 
   private render(scale: number): void {
-    const drawing = this.drawing(scale, !document.hidden && !this.isFilmed);
+    const drawing = this.drawing(scale, !this.canvas.ownerDocument.hidden && !this.isFilmed);
     this.painting = true;
     this.timing ||= drawing.timed;
-    this.ratio = window.devicePixelRatio;
+    this.ratio = windowOf(this.canvas).devicePixelRatio;
     this.painter.draw(drawing);
     ++this.drawn;
     this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
