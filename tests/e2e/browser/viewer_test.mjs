@@ -287,6 +287,36 @@ const checks = {
     await page.close();
   },
 
+  async 'in a low window drops are seen, and no number of the grid runs under the time line'() {
+    const page = await open('/', { viewport: { width: 844, height: 390 }, hasTouch: true });
+    await shownPast(page, 2);
+    await page.waitForSelector('#timeline', { state: 'visible' });
+    const seen = () => page.evaluate(() => {
+      const box = (e) => e.getBoundingClientRect();
+      const line = box(document.querySelector('#statistics'));
+      const cells = [...document.querySelectorAll('#statistics div')].filter((cell) => box(cell).top >= line.top - 1 && box(cell).bottom <= line.bottom + 1 && box(cell).right <= line.right);
+      const overlay = document.querySelector('#overlay');
+      const scale = overlay.width / overlay.clientWidth;
+      const under = (e) => {
+        const { x, y, width, height } = box(e);
+        const { data } = overlay.getContext('2d').getImageData(x * scale, y * scale, width * scale, height * scale);
+        return data.some((value, i) => i % 4 === 3 && value > 0);
+      };
+      const all = overlay.getContext('2d').getImageData(0, 0, overlay.width, overlay.height).data;
+      return {
+        cells: cells.map((cell) => cell.firstElementChild.textContent),
+        numbers: all.some((value, i) => i % 4 === 3 && value > 0),
+        under: ['#timeline', '#modes', '#statistics', '#rail'].filter((part) => under(document.querySelector(part))),
+      };
+    });
+    let found;
+    await eventually(() => `it is ${JSON.stringify(found)}`, async () => {
+      found = await seen();
+      return found.cells.includes('drops') && found.cells.includes('latency') && found.numbers && found.under.length === 0;
+    });
+    await page.close();
+  },
+
   async 'without WebGL the page says so'() {
     const page = await newPage();
     await withoutWebGl(page);

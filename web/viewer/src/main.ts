@@ -81,6 +81,7 @@ class Viewer {
         this.refresh();
       },
       insets: (parts, withPanel) => this.view?.navigator.setInsets(parts, withPanel),
+      covers: (boxes) => this.view?.cover(boxes),
       retry: () => {
         this.session.source?.retryNow();
         this.server.retryNow();

@@ -166,7 +166,8 @@ export class Meter {
       },
       {
         label: say.drops[0],
-        value: total === 0 ? '0' : `${grouped(total)} (${places.join(', ')})`,
+        value: grouped(total),
+        more: total === 0 ? '' : ` (${places.join(', ')})`,
         title: say.drops[1],
         kind: total === 0 ? 'plain' : 'warn',
       },

@@ -14,7 +14,7 @@ export interface Mark {
 type Project = (point: Vec3) => { x: number; y: number } | null;
 
 /** By its middle. */
-interface Box {
+export interface Box {
   x: number;
   y: number;
   width: number;
@@ -42,6 +42,8 @@ export class Overlay {
   private readonly context: CanvasRenderingContext2D;
   /** Asked for at each drawing: what they are on may have moved. */
   marks: () => readonly Mark[] = () => [];
+  /** What lies over the picture: a number half under it would be read wrong. */
+  covers: readonly Box[] = [];
 
   constructor(private readonly canvas: HTMLCanvasElement) {
     this.context = canvas.getContext('2d')!;
@@ -64,7 +66,7 @@ export class Overlay {
     const style = getComputedStyle(this.canvas);
     const halo = style.getPropertyValue('--halo');
     const accent = style.getPropertyValue('--mark');
-    const taken: Box[] = [];
+    const taken: Box[] = [...this.covers];
     for (const { at, text, colour } of labels) {
       const place = project(at);
       if (place === null) continue;

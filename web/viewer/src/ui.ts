@@ -3,6 +3,7 @@
 import { element, make, setText } from './dom';
 import { kClear, withPanel, type Insets } from './insets';
 import { rigPage, type ListedStream } from './protocol';
+import type { Box } from './overlay';
 import type { Presentation } from './state';
 import { text } from './strings';
 
@@ -12,6 +13,7 @@ const kFactsGap = 7; // pixels, of style.css
 export interface Statistic {
   label: string;
   value: string;
+  more?: string; // behind it, where there is room
   title: string;
   kind?: 'warn' | 'bad' | 'plain';
   minor?: boolean;
@@ -23,6 +25,8 @@ export interface UiEvents {
   dismiss(): void;
   /** Of what is there for good, and with the panel that is open; the same where none is. */
   insets(parts: Insets, withPanel: Insets): void;
+  /** What lies over the picture, each by itself. */
+  covers(boxes: readonly Box[]): void;
 }
 
 export class Ui {
@@ -51,8 +55,9 @@ export class Ui {
       const panel = document.querySelector('#panels aside:not([hidden])')?.getBoundingClientRect();
       const isSeen = panel !== undefined && panel.width > 0;
       events.insets(insets, isSeen ? withPanel(insets, this.canvas.getBoundingClientRect(), panel) : insets);
+      events.covers(this.covers);
     });
-    for (const part of [...this.parts, this.canvas]) this.around.observe(part);
+    for (const part of [...this.parts, ...header.children, ...footer.children, this.canvas]) this.around.observe(part);
   }
 
   /** A panel, which lies over the picture while it is open. */
@@ -75,6 +80,15 @@ export class Ui {
       bottom: footer.height === 0 ? 0 : Math.max(0, picture.bottom - footer.top + kClear - (cursor.hidden ? 0 : cursor.offsetHeight + kFactsGap)),
       left: 0,
     };
+  }
+
+  private get covers(): Box[] {
+    const [header, rail, footer] = this.parts;
+    const { left, top } = this.canvas.getBoundingClientRect();
+    const boxes = [...header.children, rail, ...footer.children].map((part) => part.getBoundingClientRect());
+    return boxes
+      .filter(({ width }) => width > 0)
+      .map(({ x, y, width, height }) => ({ x: x + width / 2 - left, y: y + height / 2 - top, width, height }));
   }
 
   showState(state: Presentation, seen: boolean, dismissible: boolean): void {
@@ -138,7 +152,7 @@ export class Ui {
       cell.box.remove();
       this.cells.delete(label);
     }
-    for (const { label, value, title, kind, minor } of statistics) {
+    for (const { label, value, more = '', title, kind, minor } of statistics) {
       let cell = this.cells.get(label);
       if (cell === undefined) {
         const box = document.createElement('div');
@@ -150,7 +164,7 @@ export class Ui {
         cell = { box, value: text };
         this.cells.set(label, cell);
       }
-      if (cell.value.textContent !== value) cell.value.textContent = value;
+      if (cell.value.textContent !== value + more) cell.value.replaceChildren(value, make('span', { className: 'more' }, more));
       cell.box.title = title;
       cell.box.className = `${kind ?? 'plain'}${minor === true ? ' minor' : ''}`;
     }

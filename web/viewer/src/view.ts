@@ -7,7 +7,7 @@ import type { Drawing, Painter } from './drawing';
 import { Ground, type Label } from './ground';
 import type { DecodedFrame } from './messages';
 import { Navigator } from './navigator';
-import { Overlay } from './overlay';
+import { Overlay, type Box } from './overlay';
 import { loadStage, makePainter } from './painter';
 import { steadyRange, type Range } from './palette';
 import type { Pixels } from './pixels';
@@ -213,6 +213,12 @@ export class View {
   /** Where a stream stands in the first one's frame, by a person's hand or else by both rigs; null: nothing says it. */
   placeOf(name: string): Rigid | null {
     return this.surfaces.placeOf(name);
+  }
+
+  /** Parts of the page lie there over the picture. */
+  cover(boxes: readonly Box[]): void {
+    this.overlay.covers = boxes;
+    this.invalidate();
   }
 
   private arrange(quietly = false): void {

@@ -73,7 +73,11 @@ describe('ServerDrops', () => {
 });
 
 describe('Meter', () => {
-  const said = (meter: Meter, label: string): string | undefined => meter.statistics(0, null).find((s) => s.label === label)?.value;
+  const said = (meter: Meter, label: string): string | undefined =>
+    meter
+      .statistics(0, null)
+      .filter((s) => s.label === label)
+      .map(({ value, more = '' }) => value + more)[0];
   it('begins to count with each source', () => {
     const meter = new Meter();
     const arrived = (sequence: number): void =>
