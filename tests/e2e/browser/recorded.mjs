@@ -4,11 +4,11 @@ import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { rmSync } from 'node:fs';
 
-/** Records `frames` surfaces of sim:object into `file`, about `rate` of them a second; returns `file`. `options`: more of serve. */
-export function recordObject(serverPath, file, { rate, frames, size = 'width=320,height=240,stripes=60', options = [] }) {
+/** Records `frames` surfaces of a simulated scene into `file`, about `rate` of them a second; returns `file`. `options`: more of serve. */
+export function recordObject(serverPath, file, { rate, frames, scene = 'object', size = 'width=320,height=240,stripes=60', options = [] }) {
   const domain = process.env.RELIEVO_TEST_DOMAIN;
   assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
-  const source = `sim:object,${size},rate=${rate}`;
+  const source = `sim:${scene},${size},rate=${rate}`;
   // The first surface takes two frames of the camera.
   const args = ['serve', '--source', source, '--frames', String(frames + 1), '--web', 'none', '--record', file, '--domain', domain, '--interface', 'lo'];
   let said;

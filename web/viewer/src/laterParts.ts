@@ -60,6 +60,8 @@ export interface Measured {
   pointed(at: [number, number] | null): void;
   /** What is known of a stream. */
   described(stream: string): StreamInfo | null;
+  /** What is shown goes on by itself. */
+  playing(): boolean;
   /** The panel was opened, or closed. */
   opened(open: boolean): void;
 }
@@ -85,12 +87,15 @@ export class Measuring {
   /** From now on what is under the cursor is said. */
   async load(): Promise<void> {
     const { MeasurePanel } = await import('./measurePanel');
-    const { view, pointed, described } = this.of;
-    this.panel ??= new MeasurePanel(this.body, view, pointed, described);
+    const { view, pointed, described, playing } = this.of;
+    this.panel ??= new MeasurePanel(this.body, view, pointed, described, playing);
   }
 
   get measurements(): readonly Measurement[] {
     return this.panel?.measurements ?? [];
+  }
+  get flatness(): Record<string, unknown> | null {
+    return this.panel?.flat ?? null;
   }
   /** After each drawing of a new surface. */
   readCursor(): void {

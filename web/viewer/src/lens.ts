@@ -68,6 +68,12 @@ export function undistort(lens: Lens, column: number, row: number): [number, num
   return null;
 }
 
+/** The distorted pixel of x/z and y/z. */
+export function pixelOf({ fx, skew, cx, fy, cy, distortion }: Lens, x: number, y: number): [column: number, row: number] {
+  const d = distort(distortion, x, y);
+  return [fx * d.x + skew * d.y + cx, fy * d.y + cy];
+}
+
 /** x/z at which the light sheet through a distorted, normalised column crosses height y/z = y; NaN where there is none. */
 export function sheetAt(k: Lens['distortion'], column: number, y: number): number {
   let x = column;

@@ -20,7 +20,7 @@ import { rigPlace, type Placement } from './placement';
 import { wantedQuality, writtenOf, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
-import { playbackReport, report } from './reports';
+import { diagnosticsOf, report } from './reports';
 import { address, goTo, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
@@ -179,26 +179,8 @@ class Viewer {
   }
 
   diagnostics(): object {
-    return {
-      state: this.presentation?.state,
-      stream: this.stream,
-      file: this.file,
-      playback: playbackReport(this.session.source?.playback ?? null),
-      mode: this.view?.mode,
-      way: this.view?.navigator.way,
-      cameraPicture: this.view?.navigator.picture, // where it lies on the page
-      drawn: this.view?.drawn,
-      busy: this.view?.isBusy === true || this.session.isBusy || this.companions?.isBusy === true,
-      scale: this.view?.movingScale,
-      depthRange: this.view?.depthRange,
-      gridStep: this.view?.gridStep,
-      besides: this.companions?.report(),
-      measurements: this.measure?.measurements,
-      quality: this.offered,
-      keptBytes: this.session.source?.kept?.bytes,
-      problem: this.problem,
-      ...this.session.meter.report(),
-    };
+    const { view, session, companions, measure, stream, file, problem } = this;
+    return diagnosticsOf({ view, session, companions, measure, state: this.presentation?.state, stream, file, quality: this.offered, problem });
   }
 
   private makeView(): View | null {
@@ -222,6 +204,7 @@ class Viewer {
       view,
       pointed: (at) => this.pictures.point(at),
       described: (name) => (name === view.name ? this.session.info : (this.companions?.info(name) ?? null)),
+      playing: () => this.session.source?.playback.playing === true,
       opened: (open) => {
         view.measuring = open;
         this.wish();

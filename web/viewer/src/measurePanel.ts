@@ -2,6 +2,7 @@
 // Measuring with the mouse or a finger: which tool, what was measured, and the place under the cursor.
 import { button, element, make, setText, toggle } from './dom';
 import { copy, download, fileName } from './download';
+import { FlatnessCard } from './flatnessCard';
 import {
   alongRay,
   kSpots,
@@ -51,8 +52,10 @@ const pointedBy = (event: PointerEvent): Pointed => ({
 const partsText = ({ surface, rig }: Measurement): string =>
   surface === null ? (rig === null ? say.noSigma : say.sigmaOfRig) : rig === null ? say.sigmaOfSurface : say.sigmaOfBoth;
 
+type AnyTool = Tool | 'flatness'; // the latter is of an area of the picture, not of places
+
 export class MeasurePanel {
-  private tool: Tool | null = null;
+  private tool: AnyTool | null = null;
   private spots: Spot[] = [];
   readonly measurements: Measurement[] = [];
   private cursor: Pointed | null = null;
@@ -64,7 +67,9 @@ export class MeasurePanel {
   private aiming = false; // by keys, in the middle
   private snaps = loadSnaps();
   private readonly snapper: Snapper;
-  private readonly tools: Map<Tool, HTMLButtonElement>;
+  private readonly tools: Map<AnyTool, HTMLButtonElement>;
+  private readonly flatness: FlatnessCard;
+  private readonly places: HTMLElement; // what the other tools need
   private readonly hint = make('p', { className: 'quiet' });
   private readonly sigmas = make('p', { className: 'quiet', hidden: true });
   private readonly list = make('ol', { className: 'measurements' });
@@ -72,14 +77,17 @@ export class MeasurePanel {
   private readonly readout = element('cursor');
   private readonly clearing = button(say.clear, say.clear, () => this.clear());
 
-  /** `pointed`: where in the camera's picture the cursor is; `described`: what is known of a stream. */
+  /** `pointed`: where in the camera's picture the cursor is; `described`: what is known of a stream; `playing`: it goes on. */
   constructor(
     body: HTMLElement,
     private readonly view: View,
     private readonly pointed: (at: [number, number] | null) => void,
     private readonly described: (stream: string) => StreamInfo | null,
+    playing: () => boolean,
   ) {
-    this.tools = new Map(kTools.map((tool) => [tool, button(say.tools[tool], say.hints[tool], () => this.choose(tool))]));
+    const names: AnyTool[] = [...kTools, 'flatness'];
+    this.tools = new Map(names.map((tool) => [tool, button(say.tools[tool], say.hints[tool], () => this.choose(tool))]));
+    this.flatness = new FlatnessCard({ view, described, playing, told: (hint) => setText(this.hint, hint) });
     this.snapper = new Snapper(view, described);
     const snapping = toggle(say.snap, (on) => this.setSnaps(on));
     snapping.row.title = say.snapTitle;
@@ -96,7 +104,8 @@ export class MeasurePanel {
     const csv = button(say.csv, say.csvTitle, () => this.save('measurements', measurementsCsv(this.measurements)));
     const section = button(say.sectionCsv, say.sectionCsvTitle, () => this.save('section', sectionCsv(this.lastSection?.profile ?? [])));
     const buttons = make('div', { className: 'buttons' }, copied, csv, section, this.clearing);
-    body.append(group, this.hint, snapping.row, this.list, buttons, this.plot, this.sigmas); // what is read once, last
+    this.places = make('div', {}, snapping.row, this.list, buttons, this.plot, this.sigmas); // what is read once, last
+    body.append(group, this.hint, this.flatness.box, this.places);
     this.listen(view.canvas);
     const others = view.overlay.marks; // loaded before or behind this
     view.overlay.marks = () => [...others(), ...this.marks()];
@@ -112,8 +121,14 @@ export class MeasurePanel {
     return this.tool !== null;
   }
 
+  /** Of the rectangle, as `relievo measure --json` prints it; null: nothing is measured there. */
+  get flat(): Record<string, unknown> | null {
+    return this.flatness.active ? this.flatness.json : null;
+  }
+
   /** After each drawing of a new surface, and when the cursor moves. */
   readCursor(): void {
+    this.flatness.look();
     const hit = this.cursor === null ? null : this.view.pick(this.cursor);
     this.pointed(hit !== null && hit.stream === this.view.name ? coordinatesAt(hit.surface, hit) : null);
     this.lookForEdges();
@@ -128,13 +143,14 @@ export class MeasurePanel {
 
   // Takes some milliseconds: not with each movement, but with the last one.
   private lookForEdges(): void {
-    if (this.tool === null || this.cursor === null || this.cursor.slack === 0 || !this.snaps) return this.hold(null);
+    const isOfPlaces = this.tool !== null && this.tool !== 'flatness';
+    if (!isOfPlaces || this.cursor === null || this.cursor.slack === 0 || !this.snaps) return this.hold(null);
     if (this.catching !== 0) return;
     const wait = Math.max(0, this.caughtAt + Math.max(kHint_ms, kRest * this.caughtIn) - performance.now());
     this.catching = window.setTimeout(() => {
       this.catching = 0;
       const start = performance.now();
-      this.hold(this.cursor === null || this.tool === null ? null : this.catchAt(this.cursor));
+      this.hold(this.cursor === null || this.tool === null || this.tool === 'flatness' ? null : this.catchAt(this.cursor));
       this.caughtAt = performance.now();
       this.caughtIn = this.caughtAt - start;
     }, wait);
@@ -160,10 +176,12 @@ export class MeasurePanel {
     this.readCursor();
   }
 
-  private choose(tool: Tool | null): void {
+  private choose(tool: AnyTool | null): void {
     this.tool = tool;
     this.spots = [];
     this.refresh();
+    this.flatness.active = tool === 'flatness';
+    this.places.hidden = tool === 'flatness';
   }
 
   private clear(): void {
@@ -225,6 +243,7 @@ export class MeasurePanel {
 
   private add(at: Pointed): void {
     if (this.tool === null) return;
+    if (this.tool === 'flatness') return this.flatness.click(at);
     const caught = this.catchAt(at);
     const hit = caught === null ? this.view.pick(at) : null;
     const on = caught ?? hit;
@@ -292,7 +311,7 @@ export class MeasurePanel {
       const { kind, point, line } = caught.snapped;
       hint.push({ points: (line ?? [point]).map((p) => moved(pose, p)), dots: [], ring: moved(pose, point), text: say.kinds[kind] });
     }
-    return [...this.measurements.flatMap((m) => mark(m, valueText(m))), ...mark({ spots: this.spots, profile: [] }, ''), ...hint];
+    return [...this.measurements.flatMap((m) => mark(m, valueText(m))), ...mark({ spots: this.spots, profile: [] }, ''), ...this.flatness.marks(this.cursor), ...hint];
   }
 
   private drawPlot(): void {

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page tells tests and bug reports of itself.
+import type { Companions } from './companions';
 import { crc32 } from './crc32';
+import type { Measuring } from './laterParts';
 import { reportOf, type PixelReport } from './pixels';
+import type { Offered } from './qualityControl';
+import type { Session } from './session';
 import type { Playback } from './source';
+import type { State } from './state';
 import type { View } from './view';
 
 declare global {
@@ -59,8 +64,40 @@ export function report(viewer: Reporting): void {
   };
 }
 
+export interface Diagnosed {
+  readonly view: View | null;
+  readonly session: Session;
+  readonly companions: Companions | null;
+  readonly measure: Measuring | null;
+  readonly state: State | undefined;
+  readonly stream: string | null;
+  readonly file: string | null;
+  readonly quality: Offered | null;
+  readonly problem: string | null;
+}
+
+export function diagnosticsOf({ view, session, companions, measure, ...said }: Diagnosed): object {
+  return {
+    ...said,
+    playback: playbackReport(session.source?.playback ?? null),
+    mode: view?.mode,
+    way: view?.navigator.way,
+    cameraPicture: view?.navigator.picture, // where it lies on the page
+    drawn: view?.drawn,
+    busy: view?.isBusy === true || session.isBusy || companions?.isBusy === true,
+    scale: view?.movingScale,
+    depthRange: view?.depthRange,
+    gridStep: view?.gridStep,
+    besides: companions?.report(),
+    measurements: measure?.measurements,
+    flatness: measure?.flatness,
+    keptBytes: session.source?.kept?.bytes,
+    ...session.meter.report(),
+  };
+}
+
 /** What the time line shows. */
-export function playbackReport(playback: Playback | null): object | null {
+function playbackReport(playback: Playback | null): object | null {
   if (playback === null) return null;
   const keys = Array.from(playback.times, (_, i) => playback.isKey(playback.first + i));
   const gaps = keys.map((_, i) => playback.gapBefore(playback.first + i));
