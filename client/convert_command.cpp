@@ -121,7 +121,8 @@ class Conversion {
     if (auto status = options_.encode() ? encode(sample, *view, *frame) : copy(sample); !status)
       return status;
     if (!foxglove_) return {};
-    return foxglove_->write(*writer_, *frame,
+    const RecordedInfo* info = info_of(sample, infos_);
+    return foxglove_->write(*writer_, *frame, info == nullptr ? nullptr : &info->info.rig.camera,
                             {sample.receive_time_ns, sample.source_time_ns, view->capture_time_ns});
   }
 
@@ -312,7 +313,8 @@ Command convert_command() {
             ->check(CLI::Range(1, 100));
         app.add_flag(
             "--foxglove", options->foxglove,
-            "Besides, the texture as foxglove.CompressedImage and the surface as foxglove.SceneUpdate");
+            "Besides, the texture as foxglove.CompressedImage with its CameraCalibration, and the surface as "
+            "foxglove.SceneUpdate");
         app.add_flag("--json", options->json, "Print the result as JSON");
         app.footer(
             "Examples:\n"

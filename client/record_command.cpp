@@ -185,8 +185,8 @@ Command record_command() {
         options->recording = add_recording_flags(app);
         app.add_flag(
             "--foxglove", options->foxglove,
-            "Besides, the texture as foxglove.CompressedImage and the surface as foxglove.SceneUpdate, which "
-            "generic viewers show, in many times the bytes");
+            "Besides, the texture as foxglove.CompressedImage with its CameraCalibration, and the surface as "
+            "foxglove.SceneUpdate, which generic viewers show, in many times the bytes");
         app.add_flag("--json", options->json, "Print the result as JSON");
         app.final_callback([options] {
           if (!valid_stream_name(options->stream))

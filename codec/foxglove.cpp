@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "codec/foxglove.h"
 
+#include <numbers>
 #include <utility>
 
 #include "codec/export.h"
@@ -15,6 +16,25 @@ constexpr int kJpegQuality = 90;
 constexpr const char* kImageIdl = R"(module foxglove {
   struct Time { uint32 sec; uint32 nsec; };
   struct CompressedImage { Time timestamp; string frame_id; sequence<uint8> data; string format; };
+};
+)";
+
+constexpr const char* kCalibrationIdl = R"(module foxglove {
+  struct Time { uint32 sec; uint32 nsec; };
+  struct CameraCalibration {
+    Time timestamp; string frame_id; uint32 width; uint32 height; string distortion_model; sequence<double> D;
+    double K[9]; double R[9]; double P[12];
+  };
+};
+)";
+
+constexpr const char* kTransformIdl = R"(module foxglove {
+  struct Time { uint32 sec; uint32 nsec; };
+  struct Vector3 { double x; double y; double z; };
+  struct Quaternion { double x; double y; double z; double w; };
+  struct FrameTransform {
+    Time timestamp; string parent_frame_id; string child_frame_id; Vector3 translation; Quaternion rotation;
+  };
 };
 )";
 
@@ -60,14 +80,53 @@ constexpr const char* kSceneIdl = R"(module foxglove {
 };
 )";
 
+std::string camera_frame(const std::string& stream) {
+  return stream + "/camera";
+}
+
 Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std::int64_t time_ns) {
   Bytes jpeg;
   if (auto status = append_jpeg(frame.texture.view(), kJpegQuality, jpeg); !status) return status.error();
   MessageCdr cdr;
   cdr.time(time_ns);
-  cdr.text(stream);
+  cdr.text(camera_frame(stream));
   cdr.octets(jpeg);
   cdr.text("jpeg");
+  return cdr.take();
+}
+
+/// Of the image, which may be smaller than the camera's picture. Both count from the first pixel's centre.
+Bytes calibration_message(const Frame3D& frame, const PinholeModel& camera, const std::string& stream,
+                          std::int64_t time_ns) {
+  const int width = frame.texture.width(), height = frame.texture.height();
+  const double across = static_cast<double>(width) / camera.width;
+  const double down = static_cast<double>(height) / camera.height;
+  const double fx = across * camera.fx(), cx = across * (camera.cx() + .5) - .5;
+  const double fy = down * camera.fy(), cy = down * (camera.cy() + .5) - .5;
+  const double skew = across * camera.matrix[1];
+  MessageCdr cdr;
+  cdr.time(time_ns);
+  cdr.text(camera_frame(stream));
+  cdr.put(static_cast<std::uint32_t>(width));
+  cdr.put(static_cast<std::uint32_t>(height));
+  cdr.text("plumb_bob");  // OpenCV's k1 k2 p1 p2 k3
+  cdr.put(static_cast<std::uint32_t>(camera.distortion.size()));
+  cdr.numbers(camera.distortion);
+  cdr.numbers({fx, skew, cx, 0, fy, cy, 0, 0, 1});           // K
+  cdr.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});                  // R: one camera alone
+  cdr.numbers({fx, skew, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0});  // P: straightened, the camera is the same
+  return cdr.take();
+}
+
+/// From the camera's coordinate frame to the surface's: a quarter of a turn about x.
+Bytes transform_message(const std::string& stream, std::int64_t time_ns) {
+  constexpr double kHalf = std::numbers::sqrt2 / 2;
+  MessageCdr cdr;
+  cdr.time(time_ns);
+  cdr.text(stream);
+  cdr.text(camera_frame(stream));
+  cdr.numbers({0, 0, 0});
+  cdr.numbers({-kHalf, 0, 0, kHalf});
   return cdr.take();
 }
 
@@ -109,20 +168,34 @@ Result<FoxgloveChannels> FoxgloveChannels::add_to(RecordingWriter& writer, const
   };
   if (auto status = add("foxglove::CompressedImage", kImageIdl, "relievo/image", out.image_); !status)
     return status.error();
+  if (auto status =
+          add("foxglove::CameraCalibration", kCalibrationIdl, "relievo/calibration", out.calibration_);
+      !status)
+    return status.error();
+  if (auto status = add("foxglove::FrameTransform", kTransformIdl, "relievo/transform", out.transform_);
+      !status)
+    return status.error();
   if (auto status = add("foxglove::SceneUpdate", kSceneIdl, "relievo/scene", out.scene_); !status)
     return status.error();
   return out;
 }
 
-Status FoxgloveChannels::write(RecordingWriter& writer, const Frame3D& frame, const Times& times) const {
+Status FoxgloveChannels::write(RecordingWriter& writer, const Frame3D& frame, const PinholeModel* camera,
+                               const Times& times) const {
   const auto add = [&](std::uint16_t channel, Result<Bytes> data) -> Status {
     if (!data) return data.error();
     const auto sequence = static_cast<std::uint32_t>(frame.number);
     return writer.write({channel, sequence, times.log_ns, times.publish_ns, *std::move(data)});
   };
-  if (!frame.texture.empty())
-    if (auto status = add(image_, image_message(frame, stream_, times.capture_ns)); !status) return status;
-  return add(scene_, scene_message(frame, stream_, times.capture_ns));
+  const std::int64_t time_ns = times.capture_ns;
+  if (auto status = add(transform_, transform_message(stream_, time_ns)); !status) return status;
+  if (!frame.texture.empty()) {
+    if (camera != nullptr && camera->width > 0 && camera->height > 0)
+      if (auto status = add(calibration_, calibration_message(frame, *camera, stream_, time_ns)); !status)
+        return status;
+    if (auto status = add(image_, image_message(frame, stream_, time_ns)); !status) return status;
+  }
+  return add(scene_, scene_message(frame, stream_, time_ns));
 }
 
 }  // namespace relievo

@@ -282,7 +282,7 @@ Status Recorder::write_for_viewers(const RawSample& frame) {
   if (!view) return {};
   const auto decoded = decoder_.decode(view->data);
   if (!decoded) return {};
-  return foxglove_->write(*writer_, *decoded,
+  return foxglove_->write(*writer_, *decoded, info_ ? &info_->rig.camera : nullptr,
                           {log_time_ns(frame), frame.source_time_ns, view->capture_time_ns});
 }
 

@@ -204,6 +204,15 @@ TEST(RecordingFormats, TexturesStayAsTheyAreUnlessOthersAreAskedFor) {
   }
 }
 
+/// Some frames of an object in this quality.
+void record_object(const std::filesystem::path& file, const std::string& quality) {
+  Process server({program("relievo-server"), "serve", "--source", "sim:object,width=320,height=240",
+                  "--domain", kDomain, "--interface", "lo", "--web", "none", "--stream", "face"});
+  const auto done =
+      run(on_loopback({"record", "face", "--quality", quality, "--frames", "4", "--out", file}));
+  ASSERT_EQ(done.status, 0) << done.err;
+}
+
 /// From the live stream, and from a recording of it.
 TEST(RecordingFormats, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
   const std::filesystem::path js = RELIEVO_MCAP_JS;
@@ -226,11 +235,36 @@ TEST(RecordingFormats, ChannelsForGenericViewersAreWhatTheirSchemasSay) {
     ASSERT_EQ(checked.status, 0) << checked.err;
     const auto counts = nlohmann::json::parse(checked.out);
     EXPECT_EQ(counts["foxglove::CompressedImage"], count);
+    EXPECT_EQ(counts["foxglove::CameraCalibration"], count) << "with each image, so that seeking finds it";
+    EXPECT_EQ(counts["foxglove::FrameTransform"], count);
     EXPECT_EQ(counts["foxglove::SceneUpdate"], count);
     const auto glb = run({"/usr/bin/env", "node", js / "validate_glb.mjs", folder / "last.glb"});
     EXPECT_EQ(glb.status, 0) << glb.err;
     const auto whole = run({"/usr/bin/env", "node", js / "validate.mjs", folder / file});
     EXPECT_EQ(whole.status, 0) << whole.err;
+  }
+}
+
+TEST(RecordingFormats, GenericViewersLayTheImageOverTheSurface) {
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@foxglove/schemas"))
+    GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
+  const TempFolder folder;
+  // Of pictures of the camera's size, and of half of that.
+  for (const std::string quality : {"full", "reduced"}) {
+    SCOPED_TRACE(quality);
+    const std::string recorded = folder / (quality + ".mcap"), shown = folder / (quality + "-shown.mcap");
+    ASSERT_NO_FATAL_FAILURE(record_object(recorded, quality));
+    const auto done =
+        run({program("relievo"), "convert", recorded, "--out", shown, "--frames", "1:2", "--foxglove"});
+    ASSERT_EQ(done.status, 0) << done.err;
+    const auto checked =
+        run({"/usr/bin/env", "node", js / "check_foxglove.mjs", shown, folder.path().string()});
+    ASSERT_EQ(checked.status, 0) << checked.err;
+    const auto found = nlohmann::json::parse(checked.out);
+    EXPECT_EQ(found["foxglove::CameraCalibration"], 2);
+    ASSERT_TRUE(found["off_px"].is_number()) << checked.out;
+    EXPECT_LT(found["off_px"], 0.2);
   }
 }
 
