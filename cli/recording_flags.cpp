@@ -30,7 +30,7 @@ std::shared_ptr<RecordingTexts> add_recording_flags(CLI::App& app) {
       ->type_name("TIME")
       ->check(duration());
   app.add_option("--keep-size", texts->keep_size,
-                 "Remove the oldest of these files while all are larger, e.g. 100GB")
+                 "Remove the oldest of these files while all are larger, or the disk is full, e.g. 100GB")
       ->type_name("SIZE")
       ->check(byte_count());
   app.add_option("--keep-for", texts->keep_for, "Remove those that ended longer ago, e.g. 7d")

@@ -59,6 +59,9 @@ class RecordingWriter {
     std::int64_t sync_ns = 0;  // of the messages' times; 0: each chunk; below 0: only the finished file
     bool keeps_name = false;   // where the file is renamed it fails, as where it is removed
     std::string profile;       // of MCAP, for readers that go by one: "ros2"
+    // Called in any of the calls below where the disk is full: true where something was removed, and it is
+    // tried again. Null: nothing can be.
+    std::function<bool()> make_room = nullptr;
   };
   /// Fails, saying why, where the file exists already or cannot be made; never touches an existing file.
   static Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& file,

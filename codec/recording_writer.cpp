@@ -37,8 +37,7 @@ class Writer final : public RecordingWriter {
   Status start() {
     Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
     mcap::append_header(bytes, options_.profile, "relievo " RELIEVO_VERSION);
-    if (auto status = reserve(bytes.size()); !status) return status;
-    return write_whole({bytes});
+    return write_with_room({bytes});
   }
 
   Result<std::uint16_t> add_channel(const RecordingSchema& schema, const RecordingChannel& channel) override {
@@ -129,8 +128,9 @@ class Writer final : public RecordingWriter {
     if (file_ < 0) return {};
     if (!chunk_.empty())
       if (auto status = flush(); !status) return status;
-    if (auto status = write_index(); !status) return fail(status.error());
-    return close_file();
+    Status status = write_index();
+    while (!status && made_room()) status = write_index();
+    return status ? close_file() : fail(status.error());
   }
 
  private:
@@ -146,8 +146,7 @@ class Writer final : public RecordingWriter {
     while (!bytes.empty()) {
       const ssize_t written = ::write(file_, bytes.data(), bytes.size());
       if (written < 0 && errno == EINTR) continue;
-      if (written <= 0)
-        return Error{"cannot write " + path_.string() + ": " + write_failure(written < 0 ? errno : ENOSPC)};
+      if (written <= 0) return cannot_write(written < 0 ? errno : ENOSPC);
       bytes = bytes.subspan(static_cast<std::size_t>(written));
     }
     return {};
@@ -167,9 +166,15 @@ class Writer final : public RecordingWriter {
       failure = full ? errno : 0;
       can_reserve_ = full;
     }
-    if (failure == 0) return {};
+    return failure == 0 ? Status() : cannot_write(failure);
+  }
+
+  Status cannot_write(int failure) {
+    is_full_ = failure == ENOSPC || failure == EDQUOT;
     return Error{"cannot write " + path_.string() + ": " + write_failure(failure)};
   }
+  /// After a failure: whether it is worth trying again.
+  bool made_room() const { return is_full_ && options_.make_room && options_.make_room(); }
 
   /// The index will be that much longer.
   template <typename Record>
@@ -228,11 +233,17 @@ class Writer final : public RecordingWriter {
   }
   Status write_or_close(Parts parts) {
     if (auto status = check_name(); !status) return fail(status.error());
+    if (auto status = write_with_room(parts); !status) return fail(status.error());
+    return {};
+  }
+  Status write_with_room(Parts parts) {
     std::uint64_t bytes = 0;
     for (const auto part : parts) bytes += part.size();
-    if (auto status = reserve(bytes); !status) return fail(status.error());
-    if (auto status = write_whole(parts); !status) return fail(status.error());
-    return {};
+    for (;;) {
+      Status status = reserve(bytes);
+      if (status) status = write_whole(parts);
+      if (status || !made_room()) return status;
+    }
   }
 
   Status flush() {
@@ -294,6 +305,7 @@ class Writer final : public RecordingWriter {
   std::uint64_t offset_ = 0;
   std::uint32_t crc_ = 0;  // of everything before offset_
   bool can_reserve_ = true;
+  bool is_full_ = false;                          // the disk, when something could not be written last
   std::uint64_t index_bytes_ = kEmptyIndexBytes;  // what write_index() will take, or a little more
   std::int64_t synced_ns_ = 0;                    // the end of the last chunk that is on the disk for sure
 
@@ -322,7 +334,10 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std::file
                                                                  const Options& options) {
   if (options.chunk_bytes == 0 || options.chunk_bytes > mcap::kMaxChunkBytes / 2 || options.chunk_ns < 0)
     return Error{"chunk_bytes must be 1 to 536870912 and chunk_ns not negative"};
-  const int handle = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  const auto open_new = [&] { return ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644); };
+  int handle = open_new();
+  while (handle < 0 && (errno == ENOSPC || errno == EDQUOT) && options.make_room && options.make_room())
+    handle = open_new();
   if (handle < 0) {
     if (errno == EEXIST)
       return Error{"cannot record to " + file.string() +

@@ -186,7 +186,8 @@ Status Recorder::open_file(const RawSample& first) {
   now_writes(file, nullptr);  // before it can be found
   auto writer =
       RecordingWriter::create(file, {.sync_ns = static_cast<std::int64_t>(options_.recording.sync_s * 1e9),
-                                     .keeps_name = options_.keeps_name});
+                                     .keeps_name = options_.keeps_name,
+                                     .make_room = [this] { return make_room(); }});
   if (!writer) return writer.error();
   writer_ = std::move(writer).value();
   now_writes(file, writer_->growing());
@@ -257,9 +258,27 @@ Status Recorder::next_segment(const RawSample& first) {
   }
   add_attachments();
   if (const Status removed = segments_.remove_old(file()); !removed) log_warning(removed.error().message);
+  forget_removed();
+  return {};
+}
+
+/// Who limits the size of all files has said that old ones may go: also where the disk holds less than that.
+bool Recorder::make_room() {
+  if (options_.recording.segments.keep_bytes == 0) return false;
+  const auto removed = segments_.remove_oldest(file());
+  if (!removed) log_warning(removed.error().message);
+  if (!removed || removed->empty()) return false;
+  if (!std::exchange(said_full_, true))
+    log_warning(
+        "the disk is full before this recording is as large as it may be: its oldest files are removed, " +
+        removed->string() + " first");
+  forget_removed();
+  return true;
+}
+
+void Recorder::forget_removed() {
   std::error_code ignored;
   std::erase_if(files_, [&](const std::filesystem::path& f) { return !std::filesystem::exists(f, ignored); });
-  return {};
 }
 
 Status Recorder::write(const RawSample& sample) {

@@ -102,11 +102,12 @@ class Recorder {
   Status next_segment(const RawSample& first);
   Status write(const RawSample& sample);
   Status write_for_viewers(const RawSample& frame);
+  bool make_room();
+  void forget_removed();
   void fail(const Status& status);
 
   const Options options_;
   mutable std::mutex mutex_;
-  std::unique_ptr<RecordingWriter> writer_;  // made with the first sample, so that no empty file is left
   std::uint16_t channels_[3] = {};
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;  // of what goes there
@@ -118,6 +119,7 @@ class Recorder {
   std::optional<std::int64_t> full_ns_;   // since when it waits for a key frame to end before
   std::optional<std::int64_t> asked_ns_;  // when one was last asked for
   bool said_waiting_ = false;
+  bool said_full_ = false;                    // that the disk is
   std::uint64_t frames_before_ = 0;           // in the files before it
   std::vector<std::filesystem::path> files_;  // as files()
   std::optional<StreamInfo> info_;            // as received last,
@@ -132,6 +134,9 @@ class Recorder {
   std::filesystem::path file_;                       // being written
   std::shared_ptr<const GrowingRecording> growing_;  // of it
   bool open_ = false;
+
+  // Made with the first sample, so that no empty file is left. Last: it may make room as it ends.
+  std::unique_ptr<RecordingWriter> writer_;
 };
 
 }  // namespace relievo

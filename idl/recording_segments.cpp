@@ -27,6 +27,10 @@ std::optional<std::uint64_t> number_of(const fs::path& file, const fs::path& who
   return number;
 }
 
+Error not_removed(const fs::path& file, const std::error_code& why) {
+  return {"cannot remove the old recording " + file.string() + ": " + why.message()};
+}
+
 }  // namespace
 
 std::vector<fs::path> RecordingSegments::there() const {
@@ -40,6 +44,12 @@ std::vector<fs::path> RecordingSegments::there() const {
   std::vector<fs::path> out;
   for (auto& [number, path] : found) out.push_back(std::move(path));
   return out;
+}
+
+std::vector<fs::path> RecordingSegments::there_but(const fs::path& open) const {
+  std::vector<fs::path> files = there();
+  std::erase_if(files, [&](const fs::path& f) { return f.filename() == open.filename(); });
+  return files;
 }
 
 fs::path RecordingSegments::next() const {
@@ -62,8 +72,7 @@ bool RecordingSegments::is_all_kept(std::uint64_t bytes, double duration_s) cons
 
 Status RecordingSegments::remove_old(const fs::path& open) const {
   if (!options_.keep()) return {};
-  std::vector<fs::path> files = there();
-  std::erase_if(files, [&](const fs::path& f) { return f.filename() == open.filename(); });
+  const std::vector<fs::path> files = there_but(open);
   std::error_code error, failed;
   std::uint64_t bytes = 0;
   const auto size_of = [&](const fs::path& file) {
@@ -88,8 +97,17 @@ Status RecordingSegments::remove_old(const fs::path& open) const {
       kept = file;
     }
   }
-  return failed ? Status(Error{"cannot remove the old recording " + kept.string() + ": " + failed.message()})
-                : Status();
+  return failed ? Status(not_removed(kept, failed)) : Status();
+}
+
+Result<fs::path> RecordingSegments::remove_oldest(const fs::path& open) const {
+  std::optional<Error> failed;
+  for (const fs::path& file : there_but(open)) {
+    std::error_code error;
+    if (fs::remove(file, error)) return file;
+    if (error && !failed) failed = not_removed(file, error);
+  }
+  return failed ? Result<fs::path>(*failed) : fs::path();
 }
 
 fs::path unused_name(const fs::path& file) {

@@ -28,9 +28,13 @@ class RecordingSegments {
   /// Removes what `keep_bytes` and `keep_s` no longer allow, oldest first, never `open`. Fails, after having
   /// gone on, where a file could not be removed.
   Status remove_old(const std::filesystem::path& open) const;
+  /// Removes the oldest file that can be, never `open`, and returns it; empty where there is none. Fails
+  /// where there are some, and none can be removed.
+  Result<std::filesystem::path> remove_oldest(const std::filesystem::path& open) const;
 
  private:
   std::vector<std::filesystem::path> there() const;  // in order of their numbers
+  std::vector<std::filesystem::path> there_but(const std::filesystem::path& open) const;
 
   const std::filesystem::path file_;
   const SegmentOptions options_;

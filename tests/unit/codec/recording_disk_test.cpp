@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Disks that are full, and files that are taken away while they are recorded to.
 #include <gtest/gtest.h>
-#include <sched.h>
-#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -13,6 +11,7 @@
 #include <fstream>
 
 #include "codec/recording.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/codec/sample_recording.h"
 
@@ -116,12 +115,6 @@ TEST(RecordingFault, AFileThatNothingFitsInIsNotLeftBehind) {
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 0);
   EXPECT_FALSE(std::filesystem::exists(file));
-}
-
-/// A file system of its own, that only this process sees, and nothing left behind.
-bool mount_small_disk(const std::filesystem::path& folder, const char* size) {
-  return ::unshare(CLONE_NEWNS) == 0 && ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
-         ::mount("none", folder.c_str(), "tmpfs", 0, size) == 0;
 }
 
 /// 0: it ended whole, with its index, and says why.

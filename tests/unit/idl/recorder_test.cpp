@@ -5,13 +5,19 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <fstream>
 #include <map>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "idl/cdr.h"
 #include "tests/support/key_frames.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/temp_folder.h"
 
 namespace relievo {
@@ -110,6 +116,75 @@ TEST_F(RecorderInFiles, ASegmentsTimeCountsFromItsFirstFrame) {
   EXPECT_FALSE(wants_key_frame());
   for (int i = 0; i < 3; ++i) frames(5, true);
   EXPECT_THAT(finished(), ElementsAre(10, 5));
+}
+
+/// 0: it went on at the cost of its oldest files, and said so once, until nothing of it was left to remove.
+int record_on_a_small_disk(const std::filesystem::path& folder) {
+  constexpr std::uintmax_t kDisk = 400 << 10;
+  std::uint32_t sequence = 0;
+  testing::internal::CaptureStderr();
+  Recorder recorder({.file = folder / "face.mcap",
+                     .stream = "face",
+                     .recording = {.segments = {.split_bytes = 50'000, .keep_bytes = 100'000'000}}});
+  const auto callbacks = recorder.callbacks();
+  const auto record = [&](int frames) {
+    for (int i = 0; i < frames; ++i) {
+      FrameMessage frame = test::frame_of_group(0, 1);
+      frame.sequence = sequence;
+      callbacks.raw({Topic::kFrame, "face", sequence * kFrame_ns, sequence * kFrame_ns + kFrame_ns,
+                     write_frame_cdr("face", frame)});
+      ++sequence;
+    }
+  };
+  record(3000);  // 3 MB
+  if (!recorder.status()) return 2;
+  const auto files = recorder.files();
+  if (files.size() < 3 || recorder.counts().files < 20 || recorder.counts().missed != 0) return 3;
+  auto others_take_what_is_left = [&, n = 0]() mutable {
+    std::ofstream other(folder / std::to_string(n++), std::ios::binary);
+    while (other << std::string(4096, 'x') << std::flush) continue;
+  };
+  others_take_what_is_left();
+  record(100);
+  if (!recorder.status()) return 4;  // of which old files are left
+  const std::uint32_t last = sequence - 1;
+  std::optional<std::uint32_t> before;
+  std::uintmax_t bytes = 0;
+  for (const auto& file : recorder.files()) {
+    if (file == recorder.file()) continue;
+    const auto reader = RecordingReader::open(file);
+    if (!reader || (*reader)->summary().recovered) return 5;
+    bytes += std::filesystem::file_size(file);
+    for (auto message = (*reader)->next(); message && *message; message = (*reader)->next()) {
+      if (before && (**message).sequence != *before + 1) return 6;
+      before = (**message).sequence;
+    }
+  }
+  if (!before || *before > last || bytes > kDisk) return 7;
+  for (int i = 0; i < 200 && recorder.status(); ++i) {
+    others_take_what_is_left();
+    record(10);
+  }
+  if (recorder.status() || recorder.files().size() != 1) return 8;
+  const auto reader = RecordingReader::open(recorder.file());
+  if (!reader || (*reader)->summary().recovered || (*reader)->summary().messages == 0) return 9;
+  const std::string log = testing::internal::GetCapturedStderr();
+  const std::string said = "the disk is full";
+  return log.find(said) != std::string::npos && log.find(said) == log.rfind(said) ? 0 : 10;
+}
+
+TEST(RecorderFault, OnAFullDiskTheOldestFilesGoWhereTheirSizeIsLimited) {
+  constexpr int kNoSmallDisk = 77;
+  const test::TempFolder folder;
+  const pid_t child = fork();
+  if (child == 0)
+    _exit(test::mount_small_disk(folder.path(), "size=400k") ? record_on_a_small_disk(folder.path())
+                                                             : kNoSmallDisk);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == kNoSmallDisk) GTEST_SKIP() << "may not mount a small file system here";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 /// Of a machine whose clock is set.
