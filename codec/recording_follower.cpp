@@ -41,7 +41,10 @@ Result<RecordingFollower::Found> RecordingFollower::look() {
     const auto length = reader.read<std::uint64_t>();
     const std::uint64_t content = at_ + mcap::kRecordHeaderBytes;
     if (static_cast<int>(op) == 0 || length > mcap::kMaxChunkBytes) return damaged();
-    if (length > size - content) break;  // its rest is yet to come
+    if (length > size - content) {  // its rest is yet to come, or never does
+      if (op != mcap::Op::kMessageIndex) commit();
+      break;
+    }
     if (const Status taken = take(op, content, length, **file); !taken) return damaged();
     at_ = content + length;
   }

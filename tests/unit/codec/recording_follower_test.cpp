@@ -108,6 +108,21 @@ TEST_F(Following, TheLastChunkCountsWhenNothingComesBehindIt) {
   EXPECT_EQ(*follower_.look(), Found::kNothing);
 }
 
+/// As of a writer that was killed, or a copy that was cut.
+TEST_F(Following, AChunkThatIsNotAllThereIsBehindTheOneBeforeIt) {
+  write_to(data_bytes());
+  ASSERT_EQ(*follower_.look(), Found::kMore);
+  const std::uint64_t whole_chunks = follower_.growing()->bytes();
+  for (std::uint64_t bytes = whole_chunks - 1; bytes > 0; --bytes) {
+    if (!follower_.growing()->end_at(bytes)) continue;
+    write_to(bytes + 40);
+    RecordingFollower cut(file_);
+    EXPECT_EQ(*cut.look(), Found::kMore);
+    EXPECT_EQ(cut.growing()->bytes(), bytes);
+    EXPECT_EQ(*cut.look(), Found::kNothing);
+  }
+}
+
 TEST_F(Following, ReadsNothingTwice) {
   write_to(data_bytes());
   ASSERT_TRUE(follower_.look());
