@@ -89,6 +89,7 @@ Status play_once(RecordedStream& recorded, const PlayOptions& options, StopSigna
   std::optional<std::int64_t> last_ns;
   std::int64_t came_ns = steady_now_ns();
   for (;;) {
+    if (options.ended && options.ended()) return {};
     auto sample = recorded.next();
     if (!sample) return sample.error();
     if (!*sample && options.follow) {
@@ -137,7 +138,7 @@ Status play(RecordedStream& recorded, const PlayOptions& options, StopSignal& st
     // A recording of a single moment, or of which nothing is left, must not loop as fast as the machine can.
     const std::int64_t pass_ns = any ? kShortestPass_ns : kNanosecondsPerSecond;
     if (options.loop) stop.wait_for(std::chrono::nanoseconds(start_ns + pass_ns - steady_now_ns()));
-  } while (options.loop && !stop.stopped());
+  } while (options.loop && !stop.stopped() && !(options.ended && options.ended()));
   return {};
 }
 

@@ -24,7 +24,9 @@ struct PlayOptions {
   bool restamp = false;
   double longest_pause_s =
       std::numeric_limits<double>::infinity();  // of the recording's; longer ones become this
-  std::optional<TimeRange> range = {};          // of the samples' times; all of them where there is none
+  // Asked before each sample, and while there is none: true ends it as at the end.
+  std::function<bool()> ended = {};
+  std::optional<TimeRange> range = {};  // of the samples' times; all of them where there is none
 };
 
 /// Calls `publish` with each sample when it is due, by the times they were recorded at, until the end or

@@ -4,11 +4,8 @@
 #include <filesystem>
 #include <optional>
 #include <set>
-#include <thread>
 #include <utility>
 
-#include "base/log.h"
-#include "base/time.h"
 #include "cli/announce.h"
 #include "cli/checks.h"
 #include "cli/listen_address.h"
@@ -16,11 +13,9 @@
 #include "cli/web_flags.h"
 #include "client/commands.h"
 #include "client/input.h"
+#include "client/looped_file.h"
 #include "client/options.h"
-#include "client/player.h"
-#include "client/recorded_stream.h"
 #include "client/rung_relay.h"
-#include "codec/recording_follower.h"
 #include "idl/cdr.h"
 #include "web/gateway/gateway.h"
 #include "web/gateway/key_frame_wishes.h"
@@ -36,8 +31,6 @@ struct Options {
 };
 
 constexpr std::chrono::milliseconds kTick{200};
-constexpr double kLongestPause_s = 5;  // of a recording, whose time line shows the whole of it
-constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a file that long unchanged
 
 Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   Subscriber::Callbacks callbacks;
@@ -56,131 +49,27 @@ Subscriber::Callbacks forward_to(Gateway& gateway, RungRelay& relay) {
   return callbacks;
 }
 
-// A recording played in a loop on a thread of its own, straight into the gateway. One that is being written
-// is gone on with at its end. Pages read the file itself, which grows for them.
-class LoopedFile {
- public:
-  LoopedFile(std::string file, RecordedStream recorded, Gateway& gateway, StopSignal& stop)
-      : file_(std::move(file)), recorded_(std::move(recorded)), gateway_(gateway), name_(recorded_.stream()) {
-    // Before anyone is told the address: who follows it at once finds the stream.
-    if (auto info = recorded_.find_info(); info && *info) (void)publish(**info).ok();
-    if (is_being_written()) follower_.emplace(file_);
-    look();
-    thread_ = std::thread([this, &stop] { run(stop); });
-  }
-  LoopedFile(const LoopedFile&) = delete;
-  LoopedFile& operator=(const LoopedFile&) = delete;
-  /// The stop signal must be given before.
-  ~LoopedFile() { thread_.join(); }
-
-  /// To be called every few tenths of a second, on the thread that made it: offers what there is to read.
-  void look() {
-    std::error_code gone;
-    const auto bytes = std::filesystem::file_size(file_, gone);
-    tell_of(gone ? "is gone: " + gone.message() : bytes == 0 ? "has become empty" : "");
-    if (gone || bytes == 0) return gateway_.offer(name_, {});  // it is played on as far as it is open
-    OfferedRecording offered{.file = file_, .whole = whole_ && bytes >= bytes_};
-    if (follower_) {
-      const auto found = follower_->look();
-      const std::int64_t now_ns = steady_now_ns();
-      if (!found && !std::exchange(damaged_, true))
-        log_warning(found.error().message + ": pages have what is before that");
-      if (found && *found == RecordingFollower::Found::kMore) came_ns_ = now_ns;
-      offered.growing = follower_->growing();
-      offered.has_index = found && *found == RecordingFollower::Found::kFinished;
-      offered.grows = found && !offered.has_index && now_ns - came_ns_ < kLeft_ns;
-    }
-    gateway_.offer(name_, offered);
-  }
-
- private:
-  void run(StopSignal& stop) {
-    const Status status = play(recorded_, {.loop = true, .follow = true, .longest_pause_s = kLongestPause_s},
-                               stop, [this](const RawSample& sample) { return publish(sample); });
-    if (!status) {
-      log_error(file_ + ": " + status.error().message);
-      gateway_.withdraw(recorded_.stream());
-    }
-  }
-
-  /// Each change once; "": all is well.
-  void tell_of(const std::string& missing) {
-    if (missing == missing_) return;
-    if (!missing.empty()) log_warning(file_ + " " + missing + "; pages cannot read it");
-    if (missing.empty()) log_info(file_ + " is there again");
-    missing_ = missing;
-  }
-
-  static std::uint64_t size_of(const std::string& file) {
-    std::error_code ignored;
-    const auto bytes = std::filesystem::file_size(file, ignored);
-    return ignored ? 0 : bytes;
-  }
-
-  bool is_being_written() const {
-    std::error_code ignored;
-    const auto age =
-        std::filesystem::file_time_type::clock::now() - std::filesystem::last_write_time(file_, ignored);
-    return recorded_.summary().recovered && age < std::chrono::nanoseconds(kLeft_ns);
-  }
-
-  // Unreadable samples are skipped: the viewer counts the gap.
-  Status publish(const RawSample& sample) {
-    if (sample.topic == Topic::kInfo) {
-      if (auto info = read_info_cdr(sample.cdr)) gateway_.announce(*info);
-    } else if (sample.topic == Topic::kStatus) {
-      auto status = read_status_cdr(sample.cdr);
-      if (!status) return {};
-      status->rungs.clear();  // its server's then: here there is what was recorded
-      gateway_.publish(*status);
-    } else if (auto frame = read_frame_cdr(sample.cdr)) {
-      FrameMessage message;
-      message.sequence = sequence_++;  // goes on over the loop's seam
-      message.number = frame->number;
-      // As if it were captured now with its latency of then: viewers show the way from here to them.
-      message.publish_time_ns = utc_now_ns();
-      message.capture_time_ns = message.publish_time_ns - (frame->publish_time_ns - frame->capture_time_ns);
-      message.data = std::make_shared<const Bytes>(frame->data.begin(), frame->data.end());
-      gateway_.publish(frame->stream, message);
-    }
-    return {};
-  }
-
-  std::string file_;
-  RecordedStream recorded_;
-  Gateway& gateway_;
-  std::uint64_t sequence_ = 0;
-  const std::string name_;
-  const bool whole_ = !recorded_.summary().recovered;
-  const std::uint64_t bytes_ = size_of(file_);  // when it was opened: with less of them it is not whole
-  std::string missing_;                         // why it cannot be read, as it was told
-  std::optional<RecordingFollower> follower_;   // of what is, or was, being written
-  std::int64_t came_ns_ = steady_now_ns();      // when it was last longer than before
-  bool damaged_ = false;
-  std::thread thread_;
-};
-
 struct Inputs {
-  std::vector<std::pair<std::string, RecordedStream>> files;
+  std::vector<FoundRecording> files;
   std::vector<std::string> live;  // "" for all of the domain
+  std::set<std::string> streams;  // that are named, or in these files
 };
 
 Result<Inputs> sort_inputs(const std::vector<std::string>& names) {
   Inputs inputs;
-  std::set<std::string> streams;
   for (const std::string& name : names) {
     const auto file = is_file(name);
     if (!file) return file.error();
     std::string stream = name;
     if (*file) {
-      auto recorded = RecordedStream::open(name, "");
-      if (!recorded) return recorded.error();
-      stream = recorded->stream();
-      inputs.files.emplace_back(name, std::move(*recorded));
+      auto found = FoundRecording::open(name);
+      if (!found) return found.error();
+      stream = found->recorded.stream();
+      inputs.files.push_back(*std::move(found));
     } else {
       inputs.live.push_back(name);
     }
-    if (!streams.insert(stream).second) {
+    if (!inputs.streams.insert(stream).second) {
       return Error{"stream '" + stream + "' is given twice: serve one of them at another address"};
     }
   }
@@ -222,9 +111,8 @@ Status run(const Options& options, StopSignal& stop) {
       if (inputs->live[i].empty() || inputs->live[i] == stream) subscribers[i]->request_key_frame(stream);
   });
   std::vector<std::unique_ptr<LoopedFile>> files;
-  for (auto& [file, recorded] : inputs->files) {
-    files.push_back(std::make_unique<LoopedFile>(file, std::move(recorded), **gateway, stop));
-  }
+  for (FoundRecording& found : inputs->files)
+    files.push_back(std::make_unique<LoopedFile>(std::move(found), inputs->streams, **gateway, stop));
   announce("viewer " + browser_address({address->host, (*gateway)->port()}, !options.web->tls_cert.empty(),
                                        (*gateway)->made_token()));
   tell_ready();

@@ -141,12 +141,81 @@ TEST(FileThatIsPlayed, IsNotListedWhereItIsGone) {
   std::filesystem::rename(elsewhere, file);
   EXPECT_TRUE(eventually(listed));
   EXPECT_EQ(status(), 200);
-  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) * 3 / 4);  // more than a chunk
   EXPECT_TRUE(eventually([&] {
     return request(port, "GET", "/recordings/face.mcap").headers.at("cache-control") == "no-cache";
   })) << "it is not whole any more";
+}
+
+Json streams_at(std::uint16_t port) {
+  return Json::parse(request(port, "GET", "/api/streams").body)["streams"];
+}
+
+TEST(FileThatIsPlayed, IsNoStreamWhileItIsEmpty) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "face.mcap", kept = folder / "kept.mcap";
+  record_face(file, 2000, 60);
+  std::filesystem::copy_file(file, kept);
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
   std::filesystem::resize_file(file, 0);
-  EXPECT_TRUE(eventually([&] { return !listed(); }));
+  EXPECT_TRUE(eventually([&] { return streams_at(port).empty(); })) << streams_at(port).dump();
+  EXPECT_NE(web.err().find("has become empty"), std::string::npos) << web.err();
+  std::filesystem::copy_file(kept, file, std::filesystem::copy_options::overwrite_existing);
+  EXPECT_TRUE(eventually([&] { return !streams_at(port).empty(); })) << web.err();
+  WsClient client(port, "face");
+  ASSERT_TRUE(client.credit(8));
+  EXPECT_TRUE(client.next_of("frame"));
+}
+
+TEST(FileThatIsPlayed, IsTheOneThatWasMovedInItsPlace) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "face.mcap", other = folder / "other.mcap";
+  record_face(file, 2000, 60);
+  record_face(other, 5000, 40);
+  std::set<std::string> others;  // frames, by their bytes
+  for (const Bytes& cdr : recorded_frames(other)) {
+    const auto frame = read_frame_cdr(cdr);
+    ASSERT_TRUE(frame);
+    others.emplace(frame->data.begin(), frame->data.end());
+  }
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  const auto next_is_of_other = [&](WsClient& client) {
+    constexpr std::size_t kPrefix = 48;
+    EXPECT_TRUE(client.credit(1));
+    const auto frame = client.next_of("frame");
+    EXPECT_TRUE(frame);
+    return frame && others.contains(frame->data.substr(kPrefix));
+  };
+  WsClient before(port, "face");
+  EXPECT_FALSE(next_is_of_other(before));
+  const auto bytes = std::filesystem::file_size(other);
+  std::filesystem::rename(other, file);
+  EXPECT_TRUE(eventually([&] { return web.err().find("is another file now") != std::string::npos; }))
+      << web.err();
+  WsClient client(port, "face");
+  for (int i = 0; i < 5; ++i)
+    EXPECT_TRUE(next_is_of_other(client)) << "what is opened anew is of the new one";
+  EXPECT_TRUE(eventually([&] { return next_is_of_other(before); })) << "who is there goes on with it";
+  EXPECT_EQ(streams_at(port).at(0)["recording"], "recordings/face.mcap");
+  EXPECT_EQ(request(port, "GET", "/recordings/face.mcap").body.size(), bytes);
+}
+
+TEST(FileThatIsPlayed, IsNoStreamWhereWhatWasMovedInItsPlaceIsNoRecording) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "face.mcap", other = folder / "other";
+  record_face(file, 2000, 60);
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  std::ofstream(other) << "a letter";
+  std::filesystem::rename(other, file);
+  EXPECT_TRUE(eventually([&] { return web.err().find("cannot be played") != std::string::npos; }))
+      << web.err();
+  EXPECT_TRUE(streams_at(port).empty()) << streams_at(port).dump();
 }
 
 }  // namespace
