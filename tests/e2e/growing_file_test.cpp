@@ -119,6 +119,27 @@ TEST_F(GrowingFile, OfAKilledRecorderAllThatIsWholeIsThereWithAnIndex) {
   expect_all();
 }
 
+// Where both programs are started again, it is still what the page had of it, and nothing comes any more.
+TEST_F(GrowingFile, WhoBeganToReadItGoesOnAfterItsWriterAndTheGatewayWereKilled) {
+  ASSERT_TRUE(eventually([&] { return stream()["recording"].is_string(); }));
+  ASSERT_TRUE(reads_on());
+  const std::string mine = have_;
+  const std::string part = "Range: bytes=1000-\r\nIf-Range: " + etag_ + "\r\n";
+  recorder_.signal(SIGKILL);
+  ASSERT_TRUE(recorder_.wait());
+  ASSERT_TRUE(eventually([&] { return stream()["growing_bytes"].is_null(); })) << "nothing came for 5 s";
+  web_->signal(SIGKILL);
+  ASSERT_TRUE(web_->wait());
+  web_.emplace(std::vector<std::string>{program("relievo"), "web", file_, "--listen", "127.0.0.1:0"});
+  port_ = viewer_port(*web_);
+  ASSERT_NE(port_, 0) << web_->err();
+  const Response got = get(part);
+  EXPECT_EQ(got.status, 206) << "else the page says that it has changed";
+  EXPECT_TRUE(got.body == mine.substr(1000));
+  reads_on();
+  expect_all();
+}
+
 TEST(FileThatIsPlayed, IsNotListedWhereItIsGone) {
   const TempFolder folder;
   const std::filesystem::path file = folder / "face.mcap", elsewhere = folder / "elsewhere.mcap";

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <string>
+#include <utility>
 
 #include "base/log.h"
 #include "base/time.h"
 #include "codec/cut_recording.h"
+#include "codec/recording_follower.h"
 
 namespace relievo {
 namespace {
@@ -47,6 +49,19 @@ std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::files
   else
     log_warning(file.string() + " was cut short, or is damaged: pages read all of it to open it" + advice);
   return entry->index;
+}
+
+std::shared_ptr<const GrowingRecording> CutRecordings::growth_of(const std::filesystem::path& file,
+                                                                 const struct stat& status) {
+  const auto entry = entry_of(mark_of(status));
+  const std::lock_guard lock(entry->making);
+  if (!std::exchange(entry->walked, true)) {
+    RecordingFollower follower(file);
+    // The second time for the last chunk, with nothing behind it. What is damaged ends what there is.
+    if (follower.look()) static_cast<void>(follower.look().ok());
+    entry->growth = follower.growing();
+  }
+  return entry->growth;
 }
 
 }  // namespace relievo

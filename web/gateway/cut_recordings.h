@@ -23,12 +23,16 @@ class CutRecordings {
   std::shared_ptr<const GrowingRecording> index_of(const std::filesystem::path& file,
                                                    const struct stat& status);
 
+  /// How the file grew, as somebody may have read it then. Never null; may read the heads of all its records.
+  std::shared_ptr<const GrowingRecording> growth_of(const std::filesystem::path& file,
+                                                    const struct stat& status);
+
  private:
   struct Entry {
     FileMark mark;
     std::mutex making;
-    bool made = false;
-    std::shared_ptr<const GrowingRecording> index;
+    bool made = false, walked = false;
+    std::shared_ptr<const GrowingRecording> index, growth;
   };
   std::shared_ptr<Entry> entry_of(const FileMark& mark);
 

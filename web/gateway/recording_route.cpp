@@ -70,17 +70,28 @@ struct Version {
 /// What is to be read of a recording; nothing where it has only just been begun.
 std::optional<Version> version_of(const Asked& asked, const struct stat& file) {
   const OfferedRecording& recording = asked.recording;
-  const auto as_of = [&](std::uint64_t bytes) -> std::optional<Version> {
-    auto end = recording.growing && bytes > 0 ? recording.growing->end_at(bytes) : nullptr;
+  const auto as_of = [&](const std::shared_ptr<const GrowingRecording>& growing,
+                         std::uint64_t bytes) -> std::optional<Version> {
+    auto end = growing && bytes > 0 ? growing->end_at(bytes) : nullptr;
     if (!end) return std::nullopt;
     return Version{{bytes, std::move(end)}, whole_etag(kGrowing, file, bytes)};
   };
-  if (auto version = as_of(growing_bytes(asked.if_range, file))) return version;
-  if (!recording.has_index) return as_of(recording.growing ? recording.growing->bytes() : 0);
+  const std::uint64_t begun_at = growing_bytes(asked.if_range, file);
+  if (auto version = as_of(recording.growing, begun_at)) return version;
+  if (!recording.has_index)
+    return as_of(recording.growing, recording.growing ? recording.growing->bytes() : 0);
+  // Of a program that ended since, this one's before it was started again, say.
+  if (begun_at > 0)
+    if (auto version = as_of(asked.cuts.growth_of(recording.file, file), begun_at)) return version;
   const bool ended = has_end(recording.file);
   if (const auto index = ended ? nullptr : asked.cuts.index_of(recording.file, file)) {
     const std::uint64_t bytes = index->bytes();
     return Version{{bytes, index->end_at(bytes)}, whole_etag(kCut, file, bytes)};
+  }
+  if (!ended && growing_bytes(asked.if_none_match, file) > 0) {
+    // Not left for long enough to be cut: to who followed it, it is what it was.
+    const auto growth = asked.cuts.growth_of(recording.file, file);
+    if (auto version = as_of(growth, growth->bytes())) return version;
   }
   const bool finished = recording.whole && (ended || !asked.of_folder);
   return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), finished};

@@ -297,6 +297,24 @@ std::string new_since(const std::string& recording, const std::string& etag) {
   return "Range: bytes=" + std::to_string(end_of_data(recording)) + "-\r\nIf-None-Match: " + etag + "\r\n";
 }
 
+// Of a server that was killed and is there again: until it is clear that nobody writes the file.
+TEST_F(RecordingApi, WhoFollowedWhatACrashCutShortGoesOnAtOnce) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  ASSERT_TRUE(control.grow());
+  const auto had = request(port, "GET", "/recordings/face-1.mcap");
+  ASSERT_THAT(had.headers.at("etag"), StartsWith("\"growing-"));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(control.grow());
+  ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
+  const std::string content = content_of(folder / "face-1.mcap");
+  std::filesystem::resize_file(folder / "face-1.mcap", end_of_data(content) - 10);
+  const auto got =
+      request(port, "GET", "/recordings/face-1.mcap", new_since(had.body, had.headers.at("etag")));
+  ASSERT_EQ(got.status, 206);
+  EXPECT_THAT(got.headers.at("etag"), StartsWith("\"growing-"));
+  const std::string now = had.body.substr(0, end_of_data(had.body)) + got.body;
+  EXPECT_GT(messages_in(now), messages_in(had.body)) << "it has an index";
+}
+
 ServerStatus make_status() {
   ServerStatus status;
   status.stream = "face";
