@@ -40,6 +40,20 @@ bool imaged(const std::array<double, 5>& k, double x, double y) {
 
 }  // namespace
 
+PinholeModel resized(const PinholeModel& model, int width, int height) {
+  const double across = static_cast<double>(width) / model.width;
+  const double down = static_cast<double>(height) / model.height;
+  PinholeModel out = model;
+  out.width = width;
+  out.height = height;
+  out.matrix[0] *= across;
+  out.matrix[1] *= across;
+  out.matrix[2] = (model.cx() + 0.5) * across - 0.5;
+  out.matrix[4] *= down;
+  out.matrix[5] = (model.cy() + 0.5) * down - 0.5;
+  return out;
+}
+
 bool distorts(const PinholeModel& model) {
   return std::any_of(model.distortion.begin(), model.distortion.end(), [](double k) { return k != 0; });
 }

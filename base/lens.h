@@ -21,6 +21,9 @@ std::array<double, 2> distort(const PinholeModel& model, double x, double y);
 /// y/z = y. NaN where the model folds over on the way there.
 double sheet_at(const std::array<double, 5>& distortion, double column, double y);
 
+/// The same camera with a picture of so many pixels; (0, 0) is the centre of the first one in either.
+PinholeModel resized(const PinholeModel& model, int width, int height);
+
 bool distorts(const PinholeModel& model);
 
 }  // namespace relievo

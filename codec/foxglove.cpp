@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "base/lens.h"
 #include "codec/export.h"
 #include "codec/jpeg_texture.h"
 #include "codec/message_cdr.h"
@@ -95,26 +96,23 @@ Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std
   return cdr.take();
 }
 
-/// Of the image, which may be smaller than the camera's picture. Both count from the first pixel's centre.
+/// Of the image, which may be smaller than the camera's picture.
 Bytes calibration_message(const Frame3D& frame, const PinholeModel& camera, const std::string& stream,
                           std::int64_t time_ns) {
-  const int width = frame.texture.width(), height = frame.texture.height();
-  const double across = static_cast<double>(width) / camera.width;
-  const double down = static_cast<double>(height) / camera.height;
-  const double fx = across * camera.fx(), cx = across * (camera.cx() + .5) - .5;
-  const double fy = down * camera.fy(), cy = down * (camera.cy() + .5) - .5;
-  const double skew = across * camera.matrix[1];
+  const PinholeModel shown = resized(camera, frame.texture.width(), frame.texture.height());
+  const auto& k = shown.matrix;
   MessageCdr cdr;
   cdr.time(time_ns);
   cdr.text(camera_frame(stream));
-  cdr.put(static_cast<std::uint32_t>(width));
-  cdr.put(static_cast<std::uint32_t>(height));
+  cdr.put(static_cast<std::uint32_t>(shown.width));
+  cdr.put(static_cast<std::uint32_t>(shown.height));
   cdr.text("plumb_bob");  // OpenCV's k1 k2 p1 p2 k3
-  cdr.put(static_cast<std::uint32_t>(camera.distortion.size()));
-  cdr.numbers(camera.distortion);
-  cdr.numbers({fx, skew, cx, 0, fy, cy, 0, 0, 1});           // K
-  cdr.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});                  // R: one camera alone
-  cdr.numbers({fx, skew, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0});  // P: straightened, the camera is the same
+  cdr.put(static_cast<std::uint32_t>(shown.distortion.size()));
+  cdr.numbers(shown.distortion);
+  cdr.numbers(k);
+  cdr.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});  // R: one camera alone
+  // P: straightened, the camera is the same
+  cdr.numbers({k[0], k[1], k[2], 0, k[3], k[4], k[5], 0, k[6], k[7], k[8], 0});
   return cdr.take();
 }
 

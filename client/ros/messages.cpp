@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/lens.h"
 #include "codec/jpeg_texture.h"
 #include "codec/message_cdr.h"
 #include "codec/surface_check.h"
@@ -169,28 +170,15 @@ Result<Bytes> image_message(const Frame3D& frame, const std::string& frame_id) {
 }
 
 Bytes camera_info_message(const Frame3D& frame, const std::string& frame_id, const PinholeModel& camera) {
-  const Image8& texture = frame.texture;
-  const int width = texture.empty() ? camera.width : texture.width();
-  const int height = texture.empty() ? camera.height : texture.height();
-  // A texture of a lower quality has fewer pixels; (0, 0) is the centre of the first one of either.
-  const double across = static_cast<double>(width) / camera.width;
-  const double down = static_cast<double>(height) / camera.height;
-  const auto& m = camera.matrix;
-  const std::array<double, 9> k{m[0] * across,
-                                m[1] * across,
-                                (m[2] + 0.5) * across - 0.5,
-                                0,
-                                m[4] * down,
-                                (m[5] + 0.5) * down - 0.5,
-                                0,
-                                0,
-                                1};
+  const Image8& texture = frame.texture;  // of a lower quality it has fewer pixels
+  const PinholeModel shown = texture.empty() ? camera : resized(camera, texture.width(), texture.height());
+  const auto& k = shown.matrix;
   MessageCdr cdr = begin(frame, frame_id);
-  cdr.put(static_cast<std::uint32_t>(height));
-  cdr.put(static_cast<std::uint32_t>(width));
-  cdr.text("plumb_bob");
-  cdr.put(static_cast<std::uint32_t>(camera.distortion.size()));
-  cdr.numbers(camera.distortion);
+  cdr.put(static_cast<std::uint32_t>(shown.height));
+  cdr.put(static_cast<std::uint32_t>(shown.width));
+  cdr.text("plumb_bob");  // OpenCV's k1 k2 p1 p2 k3
+  cdr.put(static_cast<std::uint32_t>(shown.distortion.size()));
+  cdr.numbers(shown.distortion);
   cdr.numbers(k);
   cdr.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});
   cdr.numbers({k[0], k[1], k[2], 0, k[3], k[4], k[5], 0, k[6], k[7], k[8], 0});
