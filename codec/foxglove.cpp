@@ -100,19 +100,12 @@ Result<Bytes> image_message(const Frame3D& frame, const std::string& stream, std
 Bytes calibration_message(const Frame3D& frame, const PinholeModel& camera, const std::string& stream,
                           std::int64_t time_ns) {
   const PinholeModel shown = resized(camera, frame.texture.width(), frame.texture.height());
-  const auto& k = shown.matrix;
   MessageCdr cdr;
   cdr.time(time_ns);
   cdr.text(camera_frame(stream));
   cdr.put(static_cast<std::uint32_t>(shown.width));
   cdr.put(static_cast<std::uint32_t>(shown.height));
-  cdr.text("plumb_bob");  // OpenCV's k1 k2 p1 p2 k3
-  cdr.put(static_cast<std::uint32_t>(shown.distortion.size()));
-  cdr.numbers(shown.distortion);
-  cdr.numbers(k);
-  cdr.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});  // R: one camera alone
-  // P: straightened, the camera is the same
-  cdr.numbers({k[0], k[1], k[2], 0, k[3], k[4], k[5], 0, k[6], k[7], k[8], 0});
+  cdr.calibration(shown);
   return cdr.take();
 }
 

@@ -24,4 +24,15 @@ void MessageCdr::time(std::int64_t ns) {
   put(static_cast<std::uint32_t>(ns % kNanosecondsPerSecond));
 }
 
+void MessageCdr::calibration(const PinholeModel& camera) {
+  const auto& k = camera.matrix;
+  text("plumb_bob");  // OpenCV's k1 k2 p1 p2 k3
+  put(static_cast<std::uint32_t>(camera.distortion.size()));
+  numbers(camera.distortion);
+  numbers(k);
+  numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});  // R: one camera alone
+  // P: straightened, the camera is the same
+  numbers({k[0], k[1], k[2], 0, k[3], k[4], k[5], 0, k[6], k[7], k[8], 0});
+}
+
 }  // namespace relievo

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/rig.h"
 #include "codec/byte_io.h"
 
 namespace relievo {
@@ -33,6 +34,8 @@ class MessageCdr {
     for (const double value : values) put(value);
   }
   void numbers(std::initializer_list<double> values) { numbers(std::span(values.begin(), values.size())); }
+  /// "plumb_bob", D, K, R and P of one camera alone, as ROS and Foxglove both have them in a row.
+  void calibration(const PinholeModel& camera);
   Bytes take() { return std::move(bytes_); }
 
  private:

@@ -172,16 +172,10 @@ Result<Bytes> image_message(const Frame3D& frame, const std::string& frame_id) {
 Bytes camera_info_message(const Frame3D& frame, const std::string& frame_id, const PinholeModel& camera) {
   const Image8& texture = frame.texture;  // of a lower quality it has fewer pixels
   const PinholeModel shown = texture.empty() ? camera : resized(camera, texture.width(), texture.height());
-  const auto& k = shown.matrix;
   MessageCdr cdr = begin(frame, frame_id);
   cdr.put(static_cast<std::uint32_t>(shown.height));
   cdr.put(static_cast<std::uint32_t>(shown.width));
-  cdr.text("plumb_bob");  // OpenCV's k1 k2 p1 p2 k3
-  cdr.put(static_cast<std::uint32_t>(shown.distortion.size()));
-  cdr.numbers(shown.distortion);
-  cdr.numbers(k);
-  cdr.numbers({1, 0, 0, 0, 1, 0, 0, 0, 1});
-  cdr.numbers({k[0], k[1], k[2], 0, k[3], k[4], k[5], 0, k[6], k[7], k[8], 0});
+  cdr.calibration(shown);
   for (int i = 0; i < 6; ++i) cdr.put(std::uint32_t{0});  // no binning, the whole picture
   cdr.put(std::uint8_t{0});
   return cdr.take();

@@ -6,7 +6,6 @@
 
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <cstdio>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -16,9 +15,10 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
-#include <memory>
 #include <string>
 #include <vector>
+
+#include "tests/e2e/fastdds/loopback.h"
 
 namespace {
 
@@ -68,16 +68,6 @@ class FrameType : public TopicDataType {
     return true;
   }
 };
-
-/// On the loopback alone, where tests are. By itself it names its other addresses there.
-DomainParticipantQos on_loopback() {
-  DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
-  const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList.push_back("127.0.0.1");
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  return qos;
-}
 
 int read_frames(DataReader& reader, int frames) {
   for (int n = 0; n < frames;) {

@@ -2,7 +2,6 @@
 // A node of ROS 2 as its Fast DDS middleware is one on the network: fastdds_ros_reader DOMAIN FOLDER TOPIC
 // TYPE ... reads one message of each topic ("/face/points") by ROS's names of topic and type
 // ("sensor_msgs/msg/PointCloud2") and writes its bytes to FOLDER/N.cdr, N from 0.
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -15,9 +14,10 @@
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <vector>
+
+#include "tests/e2e/fastdds/loopback.h"
 
 namespace {
 
@@ -49,16 +49,6 @@ class BytesType : public TopicDataType {
 std::string mangled(const std::string& type) {
   const std::size_t first = type.find('/'), last = type.rfind('/');
   return type.substr(0, first) + "::msg::dds_::" + type.substr(last + 1) + "_";
-}
-
-/// On the loopback alone, where tests are. By itself it names its other addresses there.
-DomainParticipantQos on_loopback() {
-  DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
-  const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList.push_back("127.0.0.1");
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  return qos;
 }
 
 bool read_one(DataReader& reader, const std::string& file) {
