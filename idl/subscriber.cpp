@@ -29,8 +29,18 @@ constexpr std::uint32_t kTakeAtOnce = 16;
 constexpr std::int64_t kDoubt_ns = 20'000'000;                  // between looks at a stream that may be gone
 constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;    // for the first key frame of a lower rung
 constexpr std::int64_t kStatusTime_ns = kNanosecondsPerSecond;  // for the status of a stream that has one
+constexpr std::int64_t kDescriptionTime_ns = kNanosecondsPerSecond;  // for a description that frames overtook
+constexpr std::size_t kMaxEarly = 64;                                // frames of a stream that wait for it
 constexpr int kSilence = 3;               // times kMakeTime_ns, until a way here counts as blocked
 constexpr std::size_t kMaxStreams = 256;  // what a hostile peer can make us remember
+
+// A frame that came before its stream's description. DDS orders the samples of one topic only: who joins gets
+// new ones straight, and what was written before by asking for it.
+struct Early {
+  Bytes cdr;
+  dds_sample_info_t sample;
+  std::int64_t since_ns;
+};
 
 // What is remembered of a stream. It is there while it writes to any topic: DDS marks a topic's instance as
 // not alive when its writer leaves, dies or is silent for its lease, and as alive again only with the topic's
@@ -49,6 +59,8 @@ struct Known {
   std::uint64_t writer_handle = 0;
   dds_guid_t writer{};
   std::uint64_t last_sequence = 0;
+  std::vector<Early> early;
+  bool undescribed = false;  // its frames have waited for a description long enough
 };
 
 class DdsSubscriber final : public Subscriber {
@@ -141,7 +153,7 @@ class DdsSubscriber final : public Subscriber {
     name_this_thread("subscriber");
     for (;;) {
       dds_attach_t triggered[4];
-      const bool in_time = next_ || waits_with_frames() || frames_.asker;
+      const bool in_time = next_ || waits_with_frames() || frames_.asker || any_early();
       const auto count = dds_waitset_wait(waitset_.get(), triggered, 4,
                                           !ended_.empty() ? kDoubt_ns
                                           : in_time       ? kMakeTime_ns
@@ -155,6 +167,7 @@ class DdsSubscriber final : public Subscriber {
       if (next_) break_before_make();
       for (FrameLink* const link : {&frames_, next_ ? &*next_ : nullptr})
         if (link != nullptr && link->asker) link->asker->tick(steady_now_ns());
+      end_waiting();
       // Only now, so that a stream's last frames come before its end.
       std::erase_if(ended_, [&](const std::string& stream) { return !in_doubt(stream); });
     }
@@ -275,6 +288,8 @@ class DdsSubscriber final : public Subscriber {
         known->info = std::move(*info);
         known->told = true;
         if (callbacks_.info) callbacks_.info(*known->info);
+        give_early(*known);
+        known->undescribed = false;
         return {};
       }
       case Topic::kFrame: {
@@ -285,18 +300,11 @@ class DdsSubscriber final : public Subscriber {
         if (known == nullptr) return Error{"more streams than can be followed"};
         last_frame_ns_ = steady_now_ns();
         if (frames_.asker) frames_.asker->got(last_frame_ns_);
-        tell_there(*known);
-        count_lost(*known, *frame, sample.publication_handle);
-        raw(topic, frame->stream, cdr, sample);
-        if (!callbacks_.frame) return {};
-        FrameMessage message;
-        message.sequence = frame->sequence;
-        message.number = frame->number;
-        message.capture_time_ns = frame->capture_time_ns;
-        message.publish_time_ns = frame->publish_time_ns;
-        message.data = std::make_shared<const Bytes>(frame->data.begin(), frame->data.end());
-        message.rung = frames_.rung;
-        callbacks_.frame(frame->stream, message);
+        if (described(*known) || known->undescribed) {
+          give(*known, *frame, cdr, sample);
+        } else {
+          known->early.push_back({Bytes(cdr.begin(), cdr.end()), sample, last_frame_ns_});
+        }
         return {};
       }
       case Topic::kStatus: {
@@ -314,6 +322,48 @@ class DdsSubscriber final : public Subscriber {
       }
     }
     return {};
+  }
+
+  void give(Known& known, const FrameView& frame, std::span<const std::uint8_t> cdr,
+            const dds_sample_info_t& sample) {
+    tell_there(known);
+    count_lost(known, frame, sample.publication_handle);
+    raw(Topic::kFrame, frame.stream, cdr, sample);
+    if (!callbacks_.frame) return;
+    FrameMessage message;
+    message.sequence = frame.sequence;
+    message.number = frame.number;
+    message.capture_time_ns = frame.capture_time_ns;
+    message.publish_time_ns = frame.publish_time_ns;
+    message.data = std::make_shared<const Bytes>(frame.data.begin(), frame.data.end());
+    message.rung = frames_.rung;
+    callbacks_.frame(frame.stream, message);
+  }
+
+  // By who is still there, or was only silent.
+  bool described(const Known& known) const {
+    return known.info &&
+           (known.alive[static_cast<std::size_t>(Topic::kInfo)] || has_writer(known, Topic::kInfo));
+  }
+
+  void give_early(Known& known) {
+    for (const Early& early : std::exchange(known.early, {}))
+      if (const auto frame = read_frame_cdr(early.cdr)) give(known, *frame, early.cdr, early.sample);
+  }
+
+  // A stream may have no description: its frames do not wait for ever.
+  void end_waiting() {
+    for (auto& [stream, known] : known_) {
+      if (known.early.empty()) continue;
+      known.undescribed = known.early.size() >= kMaxEarly ||
+                          steady_now_ns() - known.early.front().since_ns > kDescriptionTime_ns;
+      if (known.undescribed) give_early(known);
+    }
+  }
+
+  bool any_early() const {
+    return std::any_of(known_.begin(), known_.end(),
+                       [](const auto& entry) { return !entry.second.early.empty(); });
   }
 
   bool wants_frames() const { return callbacks_.frame || callbacks_.raw || callbacks_.lost; }
@@ -387,6 +437,7 @@ class DdsSubscriber final : public Subscriber {
     const auto found = known_.find(stream);
     if (found == known_.end() || found->second.live() || !found->second.told) return false;
     if (steady_now_ns() - found->second.heard_ns < kLiveliness_ns && has_writer(found->second)) return true;
+    give_early(found->second);
     found->second.told = false;
     if (callbacks_.gone) callbacks_.gone(stream);
     return false;
@@ -394,13 +445,15 @@ class DdsSubscriber final : public Subscriber {
 
   // Whether one is there, alive or silent.
   bool has_writer(const Known& known) const {
-    return std::any_of(kTopics.begin(), kTopics.end(), [&](Topic topic) {
-      const std::uint64_t writer = known.writers[static_cast<std::size_t>(topic)];
-      if (writer == 0 || reader(topic) == 0) return false;
-      auto* const endpoint = dds_get_matched_publication_data(reader(topic), writer);
-      if (endpoint != nullptr) dds_builtintopic_free_endpoint(endpoint);
-      return endpoint != nullptr;
-    });
+    return std::any_of(kTopics.begin(), kTopics.end(), [&](Topic topic) { return has_writer(known, topic); });
+  }
+
+  bool has_writer(const Known& known, Topic topic) const {
+    const std::uint64_t writer = known.writers[static_cast<std::size_t>(topic)];
+    if (writer == 0 || reader(topic) == 0) return false;
+    auto* const endpoint = dds_get_matched_publication_data(reader(topic), writer);
+    if (endpoint != nullptr) dds_builtintopic_free_endpoint(endpoint);
+    return endpoint != nullptr;
   }
 
   void refuse(Topic topic, const Error& error) {

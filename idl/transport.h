@@ -107,9 +107,10 @@ class RawPublisher {
 };
 
 /// Reads one stream, or every stream where the name is empty. Callbacks run on the subscriber's own thread,
-/// one at a time, and never after the destructor has returned. Frames may come before the stream's
-/// description. Samples that are malformed, or of a stream with an impossible name, are refused and logged
-/// once. Without a frame, raw or lost callback no frame travels.
+/// one at a time, and never after the destructor has returned. Frames that overtook their stream's
+/// description wait for it; some seconds at most, since a stream may have none. Samples that are malformed,
+/// or of a stream with an impossible name, are refused and logged once. Without a frame, raw or lost callback
+/// no frame travels.
 class Subscriber {
  public:
   struct Callbacks {

@@ -343,28 +343,31 @@ TEST(Transport, PausedWriterComesBackForAReaderOfNoFrames) {
   expect_lapse_return_and_end(process, inbox);
 }
 
+// A description, a status and three frames, as a reader gets them.
+std::vector<RawSample> samples_of(const std::string& stream) {
+  auto publisher = expect_made(Publisher::create(kDomain, test::example_info(stream)));
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, stream, inbox.callbacks(true)));
+  if (!publisher || !subscriber) return {};
+  EXPECT_TRUE(wait_for_readers(*publisher, 1));
+  ServerStatus status;
+  status.stream = stream;
+  EXPECT_TRUE(publisher->publish(status).ok());
+  for (std::uint64_t i = 0; i < 3; ++i)
+    EXPECT_TRUE(publisher->publish(test::example_frame(i, 100'001 + i)).ok());
+  EXPECT_TRUE(inbox.wait([&](auto& r) { return r.raw.size() == 5; }));
+  return inbox.now().raw;
+}
+
 TEST(Transport, RawSamplesAreReplayedByteForByte) {
-  std::vector<RawSample> recorded;
-  {
-    auto publisher = expect_made(Publisher::create(kDomain, test::example_info("tape")));
-    Inbox inbox;
-    auto subscriber = expect_made(Subscriber::create(kDomain, "tape", inbox.callbacks(true)));
-    ASSERT_TRUE(publisher && subscriber && wait_for_readers(*publisher, 1));
-    ServerStatus status;
-    status.stream = "tape";
-    ASSERT_TRUE(publisher->publish(status).ok());
-    for (std::uint64_t i = 0; i < 3; ++i) {
-      ASSERT_TRUE(publisher->publish(test::example_frame(i, 100'001 + i)).ok());
-    }
-    ASSERT_TRUE(inbox.wait([&](auto& r) { return r.raw.size() == 5; }));
-    recorded = inbox.now().raw;
-    for (const RawSample& sample : recorded) {
-      if (sample.topic != Topic::kFrame) continue;
-      EXPECT_EQ(write_frame_cdr(*read_frame_cdr(sample.cdr)), sample.cdr) << "as DDS itself writes it";
-    }
-    EXPECT_EQ(recorded[0].stream, "tape");
-    EXPECT_GT(recorded[0].source_time_ns, 0);
+  const std::vector<RawSample> recorded = samples_of("tape");
+  ASSERT_EQ(recorded.size(), 5U);
+  for (const RawSample& sample : recorded) {
+    if (sample.topic != Topic::kFrame) continue;
+    EXPECT_EQ(write_frame_cdr(*read_frame_cdr(sample.cdr)), sample.cdr) << "as DDS itself writes it";
   }
+  EXPECT_EQ(recorded[0].stream, "tape");
+  EXPECT_GT(recorded[0].source_time_ns, 0);
   auto player = expect_made(RawPublisher::create(kDomain, "tape"));
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "tape", inbox.callbacks(true)));
@@ -390,6 +393,60 @@ TEST(Transport, RawSamplesAreReplayedByteForByte) {
   RawSample other = recorded[0];
   other.cdr[12] = 'T';  // the key: "Tape"
   EXPECT_FALSE(player->publish(other).ok());
+}
+
+std::vector<Topic> topics_of(const std::vector<RawSample>& samples) {
+  std::vector<Topic> topics;
+  for (const RawSample& sample : samples) topics.push_back(sample.topic);
+  return topics;
+}
+
+// Its frames come long before its description, as to who joins by a way that loses the latter's first
+// sending.
+void publish_late_described(RawPublisher& player, const std::vector<RawSample>& samples) {
+  std::vector<RawSample> late;
+  for (const RawSample& sample : samples) {
+    if (sample.topic == Topic::kInfo) late.push_back(sample);
+    if (sample.topic == Topic::kFrame) {
+      EXPECT_TRUE(player.publish(sample).ok());
+    }
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  for (const RawSample& sample : late) EXPECT_TRUE(player.publish(sample).ok());
+}
+
+TEST(Transport, FramesThatOvertookTheDescriptionWaitForIt) {
+  const std::vector<RawSample> samples = samples_of("overtaken");
+  const std::vector<Topic> in_order = {Topic::kInfo, Topic::kFrame, Topic::kFrame, Topic::kFrame};
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "overtaken", inbox.callbacks(true)));
+  ASSERT_TRUE(subscriber);
+  for (int server = 1; server <= 2; ++server) {  // the second one has another description
+    auto player = expect_made(RawPublisher::create(kDomain, "overtaken"));
+    ASSERT_TRUE(player && wait_for_readers(*player, 1));
+    publish_late_described(*player, samples);
+    ASSERT_TRUE(inbox.wait([&](auto& r) { return r.frames.size() == 3U * server; }));
+    const std::vector<RawSample> got = inbox.now().raw;
+    EXPECT_EQ(topics_of({got.end() - 4, got.end()}), in_order) << "of server " << server;
+    player.reset();
+    ASSERT_TRUE(inbox.wait([&](auto& r) { return r.gone.size() == std::size_t(server); }));
+  }
+  EXPECT_TRUE(inbox.now().lost.empty());
+}
+
+TEST(Transport, FramesOfAStreamWithoutADescriptionComeYet) {
+  const std::vector<RawSample> samples = samples_of("unknown");
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "unknown", inbox.callbacks()));
+  auto player = expect_made(RawPublisher::create(kDomain, "unknown"));
+  ASSERT_TRUE(subscriber && player && wait_for_readers(*player, 1));
+  for (const RawSample& sample : samples) {
+    if (sample.topic == Topic::kFrame) {
+      EXPECT_TRUE(player->publish(sample).ok());
+    }
+  }
+  EXPECT_TRUE(inbox.wait([](auto& r) { return r.frames.size() == 3; }));
+  EXPECT_TRUE(inbox.now().infos.empty());
 }
 
 }  // namespace
