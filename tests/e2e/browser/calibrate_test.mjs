@@ -223,14 +223,15 @@ const checks = {
       });
       await choose(page, 'colour');
       let late = 0;
-      await page.route('**/api/calibration/camera.jpg', async (route) => {
-        ++late;
-        await reaches(page, 'off'); // the server has none any more
-        await route.continue();
+      await new Promise((asked) => {
+        page.route('**/api/calibration/camera.jpg', async (route) => {
+          ++late;
+          asked();
+          await reaches(page, 'off'); // the server has none any more
+          await route.continue();
+        });
       });
-      const asked = page.waitForRequest('**/api/calibration/camera.jpg');
       const answered = page.waitForResponse('**/api/calibration/camera.jpg');
-      await asked;
       await press(page, 'cancel');
       assert.equal((await answered).status(), 503);
       await page.waitForFunction(() => document.body.dataset.state === 'live' && document.querySelector('#picture').dataset.shows === 'camera');
