@@ -94,14 +94,16 @@ const checks = {
     const asked = new Promise((resolve) => (answer = resolve));
     const made = await pages(async (options) => {
       const page = await newPage(options);
-      await page.route('**/recordings/none.mcap', async (route) => {
-        await asked;
-        await route.continue();
+      const asks = new Promise((resolve) => {
+        page.route('**/recordings/none.mcap', async (route) => {
+          resolve();
+          await asked;
+          await route.continue();
+        });
       });
       const listed = page.waitForResponse('**/api/streams');
       await page.goto(`${origin}/?recording=none.mcap`);
-      await page.waitForRequest('**/recordings/none.mcap');
-      await listed;
+      await Promise.all([asks, listed]);
       return page;
     });
     const says = (words) => Promise.all(made.map(({ page }) => page.waitForFunction((w) => document.querySelector('#card-title').textContent === w, words)));
