@@ -29,8 +29,8 @@ constexpr std::uint32_t kTakeAtOnce = 16;
 constexpr std::int64_t kDoubt_ns = 20'000'000;                  // between looks at a stream that may be gone
 constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;    // for the first key frame of a lower rung
 constexpr std::int64_t kStatusTime_ns = kNanosecondsPerSecond;  // for the status of a stream that has one
-constexpr std::int64_t kDescriptionTime_ns = kNanosecondsPerSecond;  // for a description that frames overtook
-constexpr std::size_t kMaxEarly = 64;                                // frames of a stream that wait for it
+constexpr std::int64_t kDescriptionTime_ns = 3 * kNanosecondsPerSecond;  // for one that frames overtook
+constexpr std::size_t kMaxEarly_bytes = 64 << 20;                        // of frames that wait for theirs
 constexpr int kSilence = 3;               // times kMakeTime_ns, until a way here counts as blocked
 constexpr std::size_t kMaxStreams = 256;  // what a hostile peer can make us remember
 
@@ -153,7 +153,7 @@ class DdsSubscriber final : public Subscriber {
     name_this_thread("subscriber");
     for (;;) {
       dds_attach_t triggered[4];
-      const bool in_time = next_ || waits_with_frames() || frames_.asker || any_early();
+      const bool in_time = next_ || waits_with_frames() || frames_.asker || early_bytes_ > 0;
       const auto count = dds_waitset_wait(waitset_.get(), triggered, 4,
                                           !ended_.empty() ? kDoubt_ns
                                           : in_time       ? kMakeTime_ns
@@ -304,6 +304,7 @@ class DdsSubscriber final : public Subscriber {
           give(*known, *frame, cdr, sample);
         } else {
           known->early.push_back({Bytes(cdr.begin(), cdr.end()), sample, last_frame_ns_});
+          early_bytes_ += cdr.size();
         }
         return {};
       }
@@ -347,23 +348,21 @@ class DdsSubscriber final : public Subscriber {
   }
 
   void give_early(Known& known) {
-    for (const Early& early : std::exchange(known.early, {}))
+    for (const Early& early : std::exchange(known.early, {})) {
+      early_bytes_ -= early.cdr.size();
       if (const auto frame = read_frame_cdr(early.cdr)) give(known, *frame, early.cdr, early.sample);
+    }
   }
 
   // A stream may have no description: its frames do not wait for ever.
   void end_waiting() {
+    if (early_bytes_ == 0) return;
+    const bool too_many = early_bytes_ > kMaxEarly_bytes;
     for (auto& [stream, known] : known_) {
       if (known.early.empty()) continue;
-      known.undescribed = known.early.size() >= kMaxEarly ||
-                          steady_now_ns() - known.early.front().since_ns > kDescriptionTime_ns;
+      known.undescribed = too_many || steady_now_ns() - known.early.front().since_ns > kDescriptionTime_ns;
       if (known.undescribed) give_early(known);
     }
-  }
-
-  bool any_early() const {
-    return std::any_of(known_.begin(), known_.end(),
-                       [](const auto& entry) { return !entry.second.early.empty(); });
   }
 
   bool wants_frames() const { return callbacks_.frame || callbacks_.raw || callbacks_.lost; }
@@ -373,7 +372,8 @@ class DdsSubscriber final : public Subscriber {
   Known* remember(const std::string& stream, Topic topic, const dds_sample_info_t& sample) {
     if (known_.count(stream) == 0) {
       if (known_.size() >= kMaxStreams) {
-        std::erase_if(known_, [](const auto& entry) { return !entry.second.live(); });
+        std::erase_if(known_,
+                      [](const auto& entry) { return !entry.second.live() && entry.second.early.empty(); });
         std::erase_if(stream_of_, [&](const auto& entry) { return known_.count(entry.second) == 0; });
       }
       if (known_.size() >= kMaxStreams) return nullptr;
@@ -490,6 +490,7 @@ class DdsSubscriber final : public Subscriber {
   std::map<std::string, Known> known_;
   std::map<std::pair<Topic, std::uint64_t>, std::string> stream_of_;  // by a topic's instance
   std::set<std::string> ended_;                                       // streams that may be gone
+  std::size_t early_bytes_ = 0;                                       // of all streams
   std::uint64_t refused_ = 0;
 };
 

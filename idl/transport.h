@@ -108,7 +108,7 @@ class RawPublisher {
 
 /// Reads one stream, or every stream where the name is empty. Callbacks run on the subscriber's own thread,
 /// one at a time, and never after the destructor has returned. Frames that overtook their stream's
-/// description wait for it; some seconds at most, since a stream may have none. Samples that are malformed,
+/// description wait for it, three seconds at most: a stream may have none. Samples that are malformed,
 /// or of a stream with an impossible name, are refused and logged once. Without a frame, raw or lost callback
 /// no frame travels.
 class Subscriber {
