@@ -11,6 +11,7 @@
 #include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/detection_lines.h"
 #include "capture/reconstruct/exposure_order.h"
+#include "capture/reconstruct/field_balance.h"
 #include "capture/reconstruct/field_pairs.h"
 #include "capture/reconstruct/half_way.h"
 #include "capture/reconstruct/moving_texture.h"
@@ -100,6 +101,7 @@ struct Reconstructor::State {
         response(r.camera_gamma),
         steps(p, r),
         pairs(p.scheme, r),
+        balance(r.colour_matrix),
         decoder(r, p, o),
         lines(line_count(r, o.line_stride)),
         triangulator(r, p, lines, line_step_px(r.scan, o.line_stride)),
@@ -123,6 +125,7 @@ struct Reconstructor::State {
   StepKeeper steps;
   std::optional<ExposureOrder> exposure_order;  // of a single slide
   FieldPairs pairs;
+  FieldBalance balance;
   SlideDecoder decoder;
   int lines;  // of a frame
   Triangulator triangulator;
@@ -177,6 +180,7 @@ Result<const CapturedFrame*> Reconstructor::State::observe(const CapturedFrame& 
   pair = pairs.read(seen(*frame), pool);
   report.white = pair == nullptr;
   if (pair == nullptr) return frame;
+  if (options.decoder != Decoder::kPaper) pair = &balance.balance(*pair, pool);
   decoder.observe(*pair, pool, report);
   report.detect_ms = clock.lap_ms();
   return frame;

@@ -211,8 +211,8 @@ std::optional<RenderedFrame> Renderer::render(std::uint64_t index, bool with_tru
   for (const int half : {0, 1}) {
     const double time_s = (static_cast<double>(index) + 0.5 * half) / rig_.frame_rate;
     const std::uint64_t number = 2 * index + static_cast<unsigned>(half);
-    Field field{glows(number), time_s, interlaced ? first_row(rig_.field_order, half) : 0, interlaced ? 2 : 1,
-                number};
+    Field field{glows(number),      time_s, interlaced ? first_row(rig_.field_order, half) : 0,
+                interlaced ? 2 : 1, number, ambient_at(time_s)};
     const bool has_truth = interlaced || half == 0;
     const bool truth_beside = interlaced && field.first_row != half;
     render_field(field, has_truth ? &frame.picture : &frame.complement,
@@ -242,6 +242,15 @@ std::array<Renderer::Glow, 2> Renderer::glows(std::uint64_t field) const {
   constexpr double kLeast = 1e-6;
   if (beyond < kLeast) return {glow(slot, 1), glow(slot, 0)};
   return {glow(slot, 1 - beyond), glow(slot + 1, beyond)};
+}
+
+/// Of an exposure that begins then, times its mean: lamps shine twice a period of the mains.
+float Renderer::ambient_at(double time_s) const {
+  constexpr double kTurn_s = 2 * std::numbers::pi * 2 * 50;
+  const double exposure_s = options_.shutter * 0.5 / rig_.frame_rate;
+  const double middle = kTurn_s * (time_s + exposure_s / 2);
+  const double half = kTurn_s * exposure_s / 2;
+  return static_cast<float>(1 + options_.flicker * std::sin(middle) * std::sin(half) / half);
 }
 
 void Renderer::render_field(const Field& field, Image8* out, ImageF* truth,
@@ -342,7 +351,7 @@ Vec3 Renderer::reflected(const std::vector<Placed>& shapes, const Placed& seen, 
   const Vec3 point = direction * hit.depth;
   const Vec3 albedo = material.albedo * static_cast<float>(options_.albedo);
   // Ambient: a little more from above (y points down).
-  Vec3 value = albedo * (ambient_value_ * (0.75f - 0.25f * material.normal.y));
+  Vec3 value = albedo * (ambient_value_ * field.ambient * (0.75f - 0.25f * material.normal.y));
 
   const Vec3 to_light = projector_centre_ - point;
   const float facing = dot(material.normal, to_light);

@@ -64,9 +64,11 @@ class Renderer {
     double time_s;
     int first_row, row_step;
     std::uint64_t noise_key;
+    float ambient;  // times its mean
   };
 
   std::array<Glow, 2> glows(std::uint64_t field) const;
+  float ambient_at(double time_s) const;
   /// Rows of `out` and `truth`, those of which are not null.
   void render_field(const Field& field, Image8* out, ImageF* truth, const std::atomic<bool>& stop) const;
   void trace_row(const std::vector<Placed>& shapes, const Field& field, int y, Row& row) const;

@@ -39,6 +39,7 @@ constexpr Key kKeys[] = {
     {"chroma", &SimOptions::chroma, 0, 20, "sigma of the chroma blur, camera pixels"},
     {"defocus", &SimOptions::defocus, 0, 8, "sigma of the projector's blur, projector pixels"},
     {"ambient", &SimOptions::ambient, 0, 10, "light that is not the projector's, of its white"},
+    {"flicker", &SimOptions::flicker, 0, 1, "of the ambient light, that comes and goes on mains of 50 Hz"},
     {"gloss", &SimOptions::gloss, 0, 100, "times each material's gloss"},
     {"albedo", &SimOptions::albedo, 0, 2, "times each material's albedo"},
     {"crosstalk", &SimOptions::crosstalk, 0, 1, "of the colour channels, 0: none"},

@@ -40,6 +40,7 @@ struct SimOptions {
   double chroma = 1.0;     // sigma of the chroma blur along a line, camera pixels
   double defocus = 0.7;    // sigma of the projector's blur, projector pixels
   double ambient = 0.04;   // light that is not the projector's, of its white
+  double flicker = 0;      // of the ambient light, by how much it comes and goes on mains of 50 Hz
   double gloss = 1.0;      // times each material's own gloss
   double albedo = 1.0;     // times each material's own albedo: dark scenes
   double crosstalk = 1.0;  // 0: the camera sees the projector's primaries as they are

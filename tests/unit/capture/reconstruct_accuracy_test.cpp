@@ -223,6 +223,18 @@ TEST(Accuracy, ACurvedCameraIsAsExactAsAStraightOne) {
   }
 }
 
+// Each frame by another amount: 50 Hz mains pass through 29.97 frames a second.
+TEST(Accuracy, LampsThatFlickerShiftNothing) {
+  for (const std::string scene : {"object,stripes=80,ambient=0.5", "face,scheme=one-slide,ambient=0.3"}) {
+    for (const Decoder decoder : {Decoder::kOrdered, Decoder::kQuick}) {
+      const Score steady = score_of(Filmed(scene), decoder),
+                  flickering = score_of(Filmed(scene + ",flicker=0.5"), decoder);
+      EXPECT_GT(flickering.completeness, steady.completeness - 0.003) << scene;
+      EXPECT_LT(flickering.median_um_per_m, 1.25 * steady.median_um_per_m) << scene;
+    }
+  }
+}
+
 // In a fraction of the time: between the two, and nowhere behind the paper's.
 TEST(Accuracy, TheQuickDecoderIsBetterThanThePapers) {
   for (const char* spec : {"object,stripes=71,chroma=1.6", "face,frames=8", "walk,frames=8"}) {
