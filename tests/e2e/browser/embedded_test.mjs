@@ -46,6 +46,31 @@ const guarded = await Server.start(serverPath, ['--source', kSource, '--key-inte
 const browser = await launchChromium();
 const complaints = [];
 
+/** Moves the page's player into a window of its own, which is returned, and the page into the background. */
+async function moveOut(page) {
+  const [popup] = await Promise.all([
+    page.waitForEvent('popup'),
+    page.evaluate(() => {
+      window.moved_ = document.querySelector('relievo-player');
+      window.popup_ = window.open('about:blank', 'popup', 'width=400,height=300');
+    }),
+  ]);
+  await page.evaluate(() => {
+    // As in the background: nothing is drawn, timers come late, if ever.
+    window.requestAnimationFrame = () => 0;
+    window.setTimeout = () => 0;
+    window.setInterval = () => 0;
+    Object.defineProperty(document, 'hidden', { value: true });
+    document.dispatchEvent(new Event('visibilitychange'));
+    window.popup_.document.body.append(window.moved_);
+    window.frames_ = [];
+    window.moved_.addEventListener('frame', ({ detail }) => window.frames_.push(detail.number));
+    window.moved_.style.width = '300px';
+  });
+  popup.setDefaultTimeout(kPatienceMs);
+  return popup;
+}
+
 async function newPage(path = '/page.html', { at = origin, before } = {}) {
   const page = await browser.newPage({ viewport: { width: 720, height: 560 } });
   page.setDefaultTimeout(kPatienceMs);
@@ -188,32 +213,39 @@ const checks = {
   'in a window of its own it goes on while the page that it came from is in the background': on('/page.html', {}, async (page) => {
     await set(page, { src: 'take.mcap', loop: true });
     await when(page, (p) => p.state === 'file');
-    const [popup] = await Promise.all([
-      page.waitForEvent('popup'),
-      page.evaluate(() => {
-        window.moved_ = document.querySelector('relievo-player');
-        window.popup_ = window.open('about:blank', 'popup', 'width=400,height=300');
-      }),
-    ]);
-    await page.evaluate(() => {
-      // As in the background: nothing is drawn, timers come late, if ever.
-      window.requestAnimationFrame = () => 0;
-      window.setTimeout = () => 0;
-      window.setInterval = () => 0;
-      Object.defineProperty(document, 'hidden', { value: true });
-      document.dispatchEvent(new Event('visibilitychange'));
-      window.popup_.document.body.append(window.moved_);
-      window.frames_ = [];
-      window.moved_.addEventListener('frame', ({ detail }) => window.frames_.push(detail.number));
-      window.moved_.style.width = '300px';
-    });
-    popup.setDefaultTimeout(kPatienceMs);
+    const popup = await moveOut(page);
     await popup.waitForFunction((frames) => opener.frames_.length > frames, 2 * kFrames); // twice around
     assert.equal(await page.evaluate(() => window.moved_.state), 'file');
     const size = () => page.evaluate(() => window.moved_.screenshot().then((blob) => createImageBitmap(blob)).then(({ width }) => width));
     const before = await size();
     await page.evaluate(() => (window.moved_.style.width = '200px'));
     await eventually('its picture keeps its size', async () => (await size()) < before);
+    await popup.close();
+  }),
+
+  'there a live stream comes back after a lost connection, and its time line goes on': on('/page.html', {}, async (page) => {
+    await page.evaluate(() => {
+      window.sockets_ = [];
+      window.WebSocket = class extends WebSocket {
+        constructor(...of) {
+          super(...of);
+          window.sockets_.push(this);
+        }
+      };
+    });
+    await set(page, { src: `${rig.address}/?stream=object`, controls: true });
+    await when(page, (p) => p.state === 'live');
+    const popup = await moveOut(page);
+    await popup.waitForFunction(() => opener.moved_.state === 'live' && opener.frames_.length > 2);
+    const before = await popup.evaluate(() => {
+      opener.sockets_.at(-1).close();
+      return opener.sockets_.length;
+    });
+    await popup.waitForFunction((count) => opener.sockets_.length > count, before);
+    await popup.waitForFunction(() => opener.moved_.state === 'live');
+    const end = () => Number(opener.moved_.shadowRoot.querySelector('#timeline input').max);
+    const reached = await popup.evaluate(end);
+    await popup.waitForFunction((at) => Number(opener.moved_.shadowRoot.querySelector('#timeline input').max) > at, reached);
     await popup.close();
   }),
 

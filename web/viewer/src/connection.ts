@@ -46,7 +46,7 @@ export class Connection {
       void VideoTextures.probed.then(() => {
         if (!VideoTextures.possible) this.sayWhatIsWanted();
       });
-    this.timer = window.setInterval(() => this.tick(), 250);
+    this.timer = this.timers.setInterval(() => this.tick(), 250);
   }
 
   get connected(): boolean {
@@ -82,8 +82,12 @@ export class Connection {
 
   stop(): void {
     this.stopped = true;
-    window.clearInterval(this.timer);
+    this.timers.clearInterval(this.timer);
     this.detach(1000);
+  }
+
+  private get timers(): Window {
+    return this.events.timers ?? window;
   }
 
   private connect(): void {

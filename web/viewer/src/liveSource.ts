@@ -139,7 +139,7 @@ export class LiveSource implements FrameSource, Playback {
     if (!shown) this.underWay.skipped();
     else if (this.live) this.underWay.shown(performance.now(), this.withPage);
     // Asked for before the drawing that has just begun, it would wait for that to end.
-    if (slow) window.setTimeout(() => this.topUp());
+    if (slow) (this.events.timers ?? window).setTimeout(() => this.topUp());
     else this.topUp();
   }
 

@@ -2,7 +2,7 @@
 // A small picture of the frame under the cursor of a time line: its texture, which still pictures bring with
 // every frame and video with key frames. One is read at a time, the last one wished for, and kept; what plays
 // goes before.
-import { make, setText } from './dom';
+import { make, setText, windowOf } from './dom';
 import { kTextureH264, kTextureJpeg, kTexturePng, kTextureWebp, parseFrame, type Frame } from './frame';
 import type { FrameStore } from './frameStore';
 import { frameAt } from './playback';
@@ -33,8 +33,10 @@ export class Preview {
   private wished: number | null = null;
   private reading = false;
   private timer = 0;
+  private readonly page: Window; // that shows it
 
   constructor(track: HTMLElement) {
+    this.page = windowOf(track);
     this.box.setAttribute('aria-hidden', 'true'); // the slider says its time
     track.append(this.box);
   }
@@ -62,7 +64,7 @@ export class Preview {
   hide(): void {
     this.box.hidden = true;
     this.wished = null;
-    window.clearTimeout(this.timer);
+    this.page.clearTimeout(this.timer);
   }
 
   /** Holds none of the frames any more. */
@@ -93,8 +95,8 @@ export class Preview {
     }
     if (this.wished === index) return;
     this.wished = index;
-    window.clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => void this.next(), kRestMs);
+    this.page.clearTimeout(this.timer);
+    this.timer = this.page.setTimeout(() => void this.next(), kRestMs);
   }
 
   private async next(): Promise<void> {
@@ -127,7 +129,7 @@ export class Preview {
     const bitmap = await this.decode(frame);
     if (bitmap === null) return { bitmap, number };
     const small = {
-      resizeWidth: Math.min(bitmap.width, Math.round(kWidth * Math.min(window.devicePixelRatio, 2))),
+      resizeWidth: Math.min(bitmap.width, Math.round(kWidth * Math.min(this.page.devicePixelRatio, 2))),
     };
     const made = await createImageBitmap(bitmap, { ...small, resizeQuality: 'medium' });
     bitmap.close();

@@ -26,8 +26,9 @@ export class Timeline {
   private absolute = false;
   private dirty = false;
   private readonly timer: number;
-  private readonly sizes = new ResizeObserver(() => (this.dirty = true));
+  private readonly sizes: ResizeObserver;
   private marksAt = 0; // when they were drawn
+  private readonly page: Window & typeof globalThis; // that shows it: one in the background has late timers
   private preview: Preview | null = null; // loaded when it is first wanted
   private pointedX: number | null = null; // of the cursor, on the page
 
@@ -36,6 +37,7 @@ export class Timeline {
     /** `chosen` gets the name of one that was offered beside the first; null: the first. */
     chosen: (name: string | null) => void = () => undefined,
   ) {
+    this.page = windowOf(box);
     this.slider.setAttribute('aria-label', say.slider);
     this.speed.setAttribute('aria-label', say.speed);
     for (const speed of kSpeeds) this.speed.append(make('option', { value: String(speed) }, `${speed}×`));
@@ -50,13 +52,14 @@ export class Timeline {
     this.live.id = 'follow';
     this.time.className = 'time';
     this.box.append(this.streams, this.playButton, ...steps, track, this.time, this.live, this.speed, this.range);
+    this.sizes = new this.page.ResizeObserver(() => (this.dirty = true));
     this.sizes.observe(this.track);
-    this.timer = window.setInterval(() => this.refresh(), kRefreshMs);
+    this.timer = this.page.setInterval(() => this.refresh(), kRefreshMs);
   }
 
   /** For good. */
   stop(): void {
-    window.clearInterval(this.timer);
+    this.page.clearInterval(this.timer);
     this.sizes.disconnect();
     this.preview?.end();
   }

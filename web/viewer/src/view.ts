@@ -51,6 +51,7 @@ export class View {
   private mode_: Mode = 'textured';
   private background_: string | null = null;
   private stillTimer = 0;
+  private readonly page: Window & typeof globalThis; // that showed the canvas first: one in the background has late timers
   private range: Range | null = null;
   private grid = false;
   private smooth = false;
@@ -83,9 +84,9 @@ export class View {
     this.overlay = new Overlay(overlay);
     const navigated = { changed: () => this.invalidate(), way: (way: Way) => events.way(way) };
     this.navigator = new Navigator(canvas, navigated, keys);
-    const page = windowOf(canvas);
-    this.ratio = page.devicePixelRatio;
-    this.sizes = new page.ResizeObserver(() => this.resize());
+    this.page = windowOf(canvas);
+    this.ratio = this.page.devicePixelRatio;
+    this.sizes = new this.page.ResizeObserver(() => this.resize());
     this.sizes.observe(canvas);
     this.resize();
   }
@@ -266,7 +267,7 @@ export class View {
   end(): void {
     this.ended = true;
     this.sizes.disconnect();
-    window.clearTimeout(this.stillTimer);
+    this.page.clearTimeout(this.stillTimer);
     this.navigator.end();
     this.painter.end();
     this.headset?.end();
@@ -446,10 +447,10 @@ export class View {
     this.painter.draw(drawing);
     ++this.drawn;
     this.overlay.draw((point) => this.navigator.toPage(point), this.labels);
-    window.clearTimeout(this.stillTimer);
+    this.page.clearTimeout(this.stillTimer);
     this.stillTimer = 0;
     if (scale === 1) return;
-    this.stillTimer = window.setTimeout(() => {
+    this.stillTimer = this.page.setTimeout(() => {
       this.stillTimer = 0;
       if (this.painting) this.again = true;
       else if (this.headset === null) this.render(1);
