@@ -43,6 +43,7 @@ const size = 'width=640,height=480,distortion=1';
 const record = (name, scene) => recordObject(serverPath, join(folder, name), { rate: 6, frames: kFrames, scene, size });
 const wall = record('wall.mcap', 'plane');
 const ball = record('ball.mcap', `mesh:${writeBall(join(folder, 'ball.obj'))}`);
+const large = recordObject(serverPath, join(folder, 'large.mcap'), { rate: 2, frames: 2, scene: 'plane', size: 'width=1920,height=1080' });
 const command = (file, ...options) => JSON.parse(execFileSync(relievoPath, ['measure', file, '--json', '-q', ...options], { encoding: 'utf8' }));
 
 /** Every number alike: the page's arithmetic differs in rounding alone. */
@@ -142,6 +143,26 @@ const onWall = {
     await measured(page, ({ frames, noise_mm }) => frames === 1 && noise_mm === null);
   },
 
+  async 'a step after it has played shows the figures of that frame alone'(page) {
+    await page.focus('#view');
+    for (let i = 0; i < 9; ++i) await page.keyboard.press('<');
+    await eventually('it has always come to its end before it was stopped', async () => {
+      await page.keyboard.press('Home');
+      await page.keyboard.press('Space');
+      await measured(page, ({ frames }) => frames === 2);
+      await page.keyboard.press('Space');
+      await still(page);
+      return (await look(page)).playback.index < kFrames - 1;
+    });
+    assert.ok((await flatness(page)).frames >= 2, 'what has played is gone as it is stopped');
+    const { index } = (await look(page)).playback;
+    await page.keyboard.press('.');
+    const said = command(wall, '--frames', `${index + 1}:${index + 1}`, '--region', await region(page));
+    await measured(page, ({ frames }) => frames === 1);
+    alike(await flatness(page), said);
+    for (let i = 0; i < 3; ++i) await page.keyboard.press('>');
+  },
+
   async 'without a shape it says so'(page) {
     await typeRegion(page, '10,10,5,5');
     await page.waitForFunction(() => /no plane in the region/.test(document.querySelector('#panel-measure').innerText));
@@ -201,6 +222,30 @@ const byKeys = {
   },
 };
 
+const onLarge = {
+  async 'a whole large picture is measured beside the page\'s own thread'(page) {
+    await begin(page);
+    await typeRegion(page, '0,0,1920,1080');
+    await measured(page, (said) => said.region[2] === 1920);
+    alike(await flatness(page), command(large, '--frames', '0:0', '--region', '0,0,1920,1080'));
+    assert.ok(page.workers().some((worker) => /shape/.test(worker.url())), 'the page itself measures');
+    assert.ok((await page.$eval('#panel-measure .flatness canvas', ({ width }) => width)) <= 640);
+  },
+};
+
+const withoutMeasurer = {
+  async 'where what measures does not come it says so, and measures once it does'(page) {
+    let comes = false;
+    await page.route(/assets\/shape\.worker/, (route) => (comes ? route.continue() : route.abort()));
+    await begin(page);
+    await page.waitForFunction(() => /cannot be loaded/.test(document.querySelector('#panel-measure .flatness .warn').textContent));
+    comes = true;
+    await measured(page, ({ shape }) => shape === 'plane');
+    await page.waitForFunction(() => document.querySelector('#panel-measure .flatness .warn').hidden);
+    complaints.splice(0, complaints.length, ...complaints.filter((complaint) => !/ERR_FAILED/.test(complaint)));
+  },
+};
+
 const browser = await launchChromium();
 const complaints = [];
 let failed = 0;
@@ -217,7 +262,8 @@ async function checkOn(file, parts) {
   }
 }
 try {
-  await checkOn(wall, [[onWall, kWide], [byFinger, kPhone], [byKeys, kWide]]);
+  await checkOn(wall, [[onWall, kWide], [withoutMeasurer, { ...kWide, serviceWorkers: 'block' }], [byFinger, kPhone], [byKeys, kWide]]);
+  await checkOn(large, [[onLarge, kWide]]);
   await checkOn(ball, [[onBall, { ...kWide, colorScheme: 'dark' }]]);
   assert.deepEqual(complaints, []);
 } finally {

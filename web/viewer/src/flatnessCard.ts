@@ -9,12 +9,16 @@ import type { Vec3 } from './pick';
 import type { StreamInfo } from './protocol';
 import { middleRegion, parseRegion, regionBetween, regionText, type Region } from './region';
 import { lensOf } from './rigCamera';
-import { kShapes, type ShapeKind } from './shape';
-import { fullOf, reportJson, ShapeMeter, type ShapeReport, type Spread } from './shapeMeter';
+import { kShapes, type Shape, type ShapeKind } from './shape';
+import type { Metered, ShapeReply, ShapeRequest } from './shapeMessages';
+import { reportJson, type ShapeReport, type Spread } from './shapeMeter';
+import { sentence } from './sentence';
 import { text } from './strings';
 import type { View } from './view';
+import { startMeasurer } from './workers';
 
-const kRest = 2; // times as long as a frame took to measure, the page is left in peace
+const kRest = 1; // times as long as a frame took to measure, the machine is left in peace
+const kAgain_ms = 2000; // where what measures did not come
 const kSideSteps = 8; // of an outline: a lens bends it
 const kMostOff = 0.2; // of the points: then it is doubtful that they show that shape
 const say = text.measure.flatness;
@@ -26,10 +30,25 @@ export interface FlatnessOf {
   readonly view: View;
   /** What is known of a stream. */
   described(stream: string): StreamInfo | null;
-  /** What is shown goes on by itself. */
-  playing(): boolean;
+  /** Of the frame that is shown: those of one came one after the other. */
+  run(): string;
   /** Said where hints stand. */
   told(hint: string): void;
+}
+
+/** A frame that is to be measured. */
+interface Asked {
+  readonly frame: object;
+  readonly number: number;
+  readonly run: string;
+  readonly meter: Metered;
+  readonly key: string; // the stream and the meter
+}
+
+interface Measured {
+  readonly meter: Metered;
+  readonly report: ShapeReport | null;
+  readonly shape: Shape | null; // of the last frame
 }
 
 const mm = (metres: number, digits: number): string => `${(metres * 1000).toFixed(digits)} mm`;
@@ -41,10 +60,11 @@ export class FlatnessCard {
   private kind: ShapeKind = 'plane';
   private chosen: Region | null = null; // null: the middle
   private corner: Pixel | null = null; // the first one, where the other is awaited
-  private meter: ShapeMeter | null = null;
-  private madeFor = ''; // lens, region and shape of the meter
-  private measured: { frame: object; number: number; wasPlaying: boolean } | null = null;
-  private report: ShapeReport | null = null;
+  private worker: Worker | null = null;
+  private underWay: Asked | null = null; // with the worker
+  private asked: Asked | null = null; // last
+  private measured: Measured | null = null; // and shown
+  private trouble = ''; // why nothing is measured
   private timer = 0;
   private restUntil = 0;
   private readonly shapes: Map<ShapeKind, HTMLButtonElement>;
@@ -83,7 +103,8 @@ export class FlatnessCard {
     this.box.hidden = !active;
     this.corner = null;
     window.clearTimeout(this.timer);
-    this.timer = 0;
+    this.timer = this.restUntil = 0;
+    if (!active) this.forget();
     this.look();
   }
   get active(): boolean {
@@ -92,7 +113,8 @@ export class FlatnessCard {
 
   /** As `relievo measure --json` prints it; null: nothing is measured. */
   get json(): Record<string, unknown> | null {
-    return this.report === null || this.meter === null ? null : reportJson(this.report, this.meter);
+    const report = this.measured?.report ?? null;
+    return report === null ? null : reportJson(report, this.measured!.meter);
   }
 
   /** Two of these are opposite corners. */
@@ -110,31 +132,30 @@ export class FlatnessCard {
     this.of.view.invalidate();
   }
 
-  /** Measures the frame that is shown, unless it was; later, where the page has done little else of late. */
+  /** Has the frame that is shown measured, unless it was; later, where much was measured of late. */
   look(): void {
-    if (!this.active || this.timer !== 0) return;
+    if (!this.active || this.timer !== 0 || this.underWay !== null) return;
     const wait = this.restUntil - performance.now();
-    if (wait > 0) {
-      this.timer = window.setTimeout(() => {
-        this.timer = 0;
-        this.look();
-      }, wait);
-      return;
+    if (wait > 0) return this.lookIn(wait);
+    const asked = this.wanted();
+    if (asked === 'nothing') return;
+    if (asked === null) {
+      this.forget();
+      this.measured = null;
+      this.show();
+    } else {
+      this.ask(asked);
     }
-    const start = performance.now();
-    if (!this.measure()) return;
-    this.show();
-    this.restUntil = performance.now() + kRest * (performance.now() - start);
   }
 
   /** The region, and what is being chosen; `cursor`: where the other corner would be. */
   marks(cursor: Place | null): Mark[] {
-    const { lens, meter, corner } = this;
+    const { lens, measured, corner } = this;
     if (!this.active || lens === null) return [];
     const marks: Mark[] = [];
-    if (meter !== null && corner === null) {
-      const rms = this.report === null ? '' : say.mark(mm(this.report.rms.median, 4));
-      marks.push({ points: this.outline(meter.region, lens), dots: [], text: rms });
+    if (measured !== null && corner === null) {
+      const rms = measured.report === null ? '' : say.mark(mm(measured.report.rms.median, 4));
+      marks.push({ points: this.outline(measured.meter.region, lens), dots: [], text: rms });
     }
     if (corner === null) return marks;
     const pixel = cursor === null ? corner : this.pixelAt(cursor, lens);
@@ -149,16 +170,15 @@ export class FlatnessCard {
 
   private setKind(kind: ShapeKind): void {
     this.kind = kind;
-    this.restUntil = 0;
-    this.look();
+    this.press();
+    this.lookNow();
   }
 
   private setRegion(region: Region | null): void {
     this.chosen = region;
     this.corner = null;
-    this.restUntil = 0;
     this.of.told(text.measure.hints.flatness);
-    this.look();
+    this.lookNow();
   }
 
   private readRegion(): void {
@@ -187,53 +207,111 @@ export class FlatnessCard {
     return pixelOf(lens, x / z, y / z);
   }
 
-  /** Whether there is something new to be shown. */
-  private measure(): boolean {
-    const { view, playing } = this.of;
-    const { lens } = this;
+  private lookIn(wait_ms: number): void {
+    this.timer = window.setTimeout(() => {
+      this.timer = 0;
+      this.look();
+    }, wait_ms);
+  }
+
+  // A person waits for it.
+  private lookNow(): void {
+    window.clearTimeout(this.timer);
+    this.timer = this.restUntil = 0;
+    this.look();
+  }
+
+  /** Null: nothing can be measured. */
+  private wanted(): Asked | null | 'nothing' {
+    const { view } = this.of;
+    const { lens, kind, asked } = this;
     const frame = view.shown;
-    if (lens === null || frame === null) {
-      this.meter = this.measured = null;
-      this.madeFor = '';
-      return true;
-    }
+    if (lens === null || frame === null) return null;
+    if (frame.quality === null && frame.codedQuality != null) return 'nothing'; // the next one says which points are measured
     const region = this.chosen !== null && parseRegion(regionText(this.chosen), lens) !== null ? this.chosen : middleRegion(lens);
-    const madeFor = JSON.stringify([view.name, lens, region, this.kind]);
-    if (madeFor !== this.madeFor) {
-      this.meter = new ShapeMeter(lens, region, this.kind);
-      this.madeFor = madeFor;
-      this.measured = null;
+    const meter = { lens, region, kind };
+    const key = JSON.stringify([view.name, meter]);
+    return frame === asked?.frame && key === asked.key ? 'nothing' : { frame, number: frame.number, run: this.of.run(), meter, key };
+  }
+
+  private ask(asked: Asked): void {
+    const { positions, triangles, quality } = this.of.view.shown!;
+    const before = this.asked?.key === asked.key ? this.asked : null;
+    const isSame = asked.number === before?.number;
+    // Steps and jumps are no noise, nor is what begins anew.
+    const goesOn = before !== null && asked.run === before.run && asked.number > before.number;
+    // Of its own: the page's memory of a frame is used again.
+    const surface = { positions: positions.slice(), coordinates: null, triangles: triangles.slice(), quality: quality && { sigmas: quality.sigmas.slice(), interpolated: quality.interpolated.slice() } };
+    const request: ShapeRequest = { meter: before === null ? asked.meter : null, joins: isSame ? 'butTheLast' : goesOn ? 'frames' : 'none', surface };
+    this.underWay = this.asked = asked;
+    this.box.classList.toggle('awaited', this.measured !== null && before === null);
+    this.worker ??= this.start();
+    const arrays = [surface.positions, surface.triangles, ...(surface.quality === null ? [] : [surface.quality.sigmas, surface.quality.interpolated])];
+    this.worker.postMessage(request, arrays.map(({ buffer }) => buffer));
+  }
+
+  private start(): Worker {
+    const worker = startMeasurer();
+    worker.onmessage = ({ data }: MessageEvent<ShapeReply>) => this.hear(data);
+    worker.onerror = (event) => {
+      event.preventDefault();
+      this.forget();
+      this.fail(text.panelFailed);
+      this.restUntil = performance.now() + kAgain_ms;
+      this.look();
+    };
+    return worker;
+  }
+
+  private hear(reply: ShapeReply): void {
+    const { meter, key } = this.underWay!;
+    this.underWay = null;
+    const next = this.wanted();
+    const isOfNow = next !== null && (next === 'nothing' || next.key === key);
+    if (reply.type === 'failed') {
+      this.fail(sentence(reply.message));
+    } else if (isOfNow) {
+      this.trouble = '';
+      this.measured = { meter, report: reply.report, shape: reply.shape };
+      this.show();
+      if (reply.picture !== null) this.drawPicture(reply.picture, reply.full_m);
+    } else {
+      reply.picture?.close();
     }
-    const isPlaying = playing();
-    if (frame === this.measured?.frame) {
-      this.measured.wasPlaying = isPlaying;
-      return false;
-    }
-    if (frame.quality === null && frame.codedQuality != null) return false; // the next one says which points are measured
-    const isSame = frame.number === this.measured?.number;
-    // Steps and jumps are no noise. The last frame comes when it plays no more.
-    const goesOn = isPlaying || this.measured?.wasPlaying === true;
-    if (!isSame && (!goesOn || frame.number < (this.measured?.number ?? 0))) this.meter!.clear();
-    this.meter!.add(frame, isSame);
-    this.measured = { frame, number: frame.number, wasPlaying: isPlaying };
-    return true;
+    this.restUntil = isOfNow && reply.type === 'measured' ? performance.now() + kRest * reply.took_ms : 0;
+    this.look();
+  }
+
+  private fail(why: string): void {
+    this.trouble = why;
+    this.measured = null;
+    this.show();
+  }
+
+  // What it has measured is of no use any more.
+  private forget(): void {
+    this.worker?.terminate();
+    this.worker = this.underWay = this.asked = null;
+  }
+
+  private press(): void {
+    for (const [name, b] of this.shapes) b.setAttribute('aria-pressed', String(name === this.kind));
   }
 
   private show(): void {
-    const { meter, kind } = this;
-    this.report = meter?.report() ?? null;
-    const { report } = this;
-    for (const [name, b] of this.shapes) b.setAttribute('aria-pressed', String(name === kind));
+    const { measured, kind } = this;
+    const report = measured?.report ?? null;
+    this.press();
+    this.box.classList.remove('awaited');
     if (document.activeElement !== this.region) {
-      this.region.value = meter === null ? '' : regionText(meter.region);
+      this.region.value = measured === null ? '' : regionText(measured.meter.region);
       this.region.setAttribute('aria-invalid', 'false');
     }
-    const warning = meter === null ? say.noCamera : report === null ? say.none[kind] + say.why : report.off.median > kMostOff ? say.muchOff[kind] : '';
+    const warning = this.trouble !== '' ? this.trouble : measured === null ? say.noCamera : report === null ? say.none[kind] + say.why : report.off.median > kMostOff ? say.muchOff[kind] : '';
     setText(this.warning, warning);
     this.warning.hidden = warning === '';
     this.figures.hidden = this.pictured.hidden = report === null;
     if (report !== null) this.showFigures(report);
-    if (report !== null) this.drawPicture(report);
     this.of.view.invalidate();
   }
 
@@ -261,12 +339,10 @@ export class FlatnessCard {
     }
   }
 
-  private drawPicture(report: ShapeReport): void {
-    const { region } = this.meter!;
-    const full = fullOf(report);
-    [this.picture.width, this.picture.height] = [region.width, region.height];
-    this.picture.getContext('2d')!.putImageData(new ImageData(this.meter!.picture(full), region.width, region.height), 0, 0);
-    setText(this.scale, say.scale(Number((full * 1000).toPrecision(3)).toString()));
+  private drawPicture(picture: ImageBitmap, full_m: number): void {
+    [this.picture.width, this.picture.height] = [picture.width, picture.height];
+    this.picture.getContext('bitmaprenderer')!.transferFromImageBitmap(picture);
+    setText(this.scale, say.scale(Number((full_m * 1000).toPrecision(3)).toString()));
   }
 
   // On the shape, or as far as what is shown.
@@ -290,7 +366,7 @@ export class FlatnessCard {
   }
 
   private awayAlong([x, y]: readonly [number, number]): number {
-    const shape = this.meter?.shape ?? null;
+    const shape = this.measured?.shape ?? null;
     if (shape?.kind === 'plane') return -shape.size / (shape.at[0] * x + shape.at[1] * y + shape.at[2]);
     return shape?.at[2] ?? this.of.view.shown?.extent?.centre[2] ?? 0;
   }

@@ -60,8 +60,8 @@ export interface Measured {
   pointed(at: [number, number] | null): void;
   /** What is known of a stream. */
   described(stream: string): StreamInfo | null;
-  /** What is shown goes on by itself. */
-  playing(): boolean;
+  /** Of the frame that is shown: those of one came one after the other. */
+  run(): string;
   /** The panel was opened, or closed. */
   opened(open: boolean): void;
 }
@@ -87,8 +87,8 @@ export class Measuring {
   /** From now on what is under the cursor is said. */
   async load(): Promise<void> {
     const { MeasurePanel } = await import('./measurePanel');
-    const { view, pointed, described, playing } = this.of;
-    this.panel ??= new MeasurePanel(this.body, view, pointed, described, playing);
+    const { view, pointed, described, run } = this.of;
+    this.panel ??= new MeasurePanel(this.body, view, pointed, described, run);
   }
 
   get measurements(): readonly Measurement[] {

@@ -11,12 +11,15 @@ import type { FrameSource, Kept, Playback, SourceEvents } from './source';
 import type { Refusal } from './state';
 import { StorePlayer } from './storePlayer';
 
+const kBegun = 1; // runs of a player that is where the live stream was stopped
+
 export class LiveSource implements FrameSource, Playback {
   readonly playback: Playback = this;
   private readonly history: History;
   private readonly connection: Connection;
   private player: StorePlayer | null = null; // of what was; null: what comes is shown
   private returning = false; // the player catches up
+  private runs = 0; // before the one that is live, or that the player began with
   private readonly underWay = new Credit();
   private withServer = 0; // frames that the server may send
   private resting = false; // nothing more is asked for
@@ -79,6 +82,9 @@ export class LiveSource implements FrameSource, Playback {
   }
   get index(): number {
     return this.player?.index ?? Math.max(this.first, this.history.end - 1);
+  }
+  get run(): number {
+    return this.runs + (this.player === null ? 0 : Math.max(0, this.player.run - kBegun));
   }
   get position(): number {
     return this.player?.position ?? this.times[this.times.length - 1] ?? 0;
@@ -188,6 +194,7 @@ export class LiveSource implements FrameSource, Playback {
   }
 
   private becomeLive(): void {
+    this.runs = this.run + 1;
     this.player?.stop();
     this.player = null;
     this.returning = false;

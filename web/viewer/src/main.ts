@@ -204,7 +204,7 @@ class Viewer {
       view,
       pointed: (at) => this.pictures.point(at),
       described: (name) => (name === view.name ? this.session.info : (this.companions?.info(name) ?? null)),
-      playing: () => this.session.source?.playback.playing === true,
+      run: () => this.session.run,
       opened: (open) => {
         view.measuring = open;
         this.wish();

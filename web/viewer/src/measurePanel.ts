@@ -77,17 +77,17 @@ export class MeasurePanel {
   private readonly readout = element('cursor');
   private readonly clearing = button(say.clear, say.clear, () => this.clear());
 
-  /** `pointed`: where in the camera's picture the cursor is; `described`: what is known of a stream; `playing`: it goes on. */
+  /** `pointed`: where in the camera's picture the cursor is; `described`: what is known of a stream; `run`: of the frame that is shown (Session). */
   constructor(
     body: HTMLElement,
     private readonly view: View,
     private readonly pointed: (at: [number, number] | null) => void,
     private readonly described: (stream: string) => StreamInfo | null,
-    playing: () => boolean,
+    run: () => string,
   ) {
     const names: AnyTool[] = [...kTools, 'flatness'];
     this.tools = new Map(names.map((tool) => [tool, button(say.tools[tool], say.hints[tool], () => this.choose(tool))]));
-    this.flatness = new FlatnessCard({ view, described, playing, told: (hint) => setText(this.hint, hint) });
+    this.flatness = new FlatnessCard({ view, described, run, told: (hint) => setText(this.hint, hint) });
     this.snapper = new Snapper(view, described);
     const snapping = toggle(say.snap, (on) => this.setSnaps(on));
     snapping.row.title = say.snapTitle;

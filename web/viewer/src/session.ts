@@ -24,6 +24,7 @@ export interface SessionEvents {
 interface Waiting {
   frame: DecodedFrame;
   prefix: FramePrefix;
+  run: string;
 }
 
 export class Session {
@@ -37,9 +38,11 @@ export class Session {
   seen = false; // a frame was shown
   lastFrameAt = 0;
   everConnected = false;
-  private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean }>(); // in the decoder
+  run = ''; // of the frame taken last: those of one were played, or came live, one after the other
+  private readonly underway = new Map<number, { prefix: FramePrefix; forLater: boolean; run: string }>(); // in the decoder
   private waiting: Waiting | null = null; // decoded, not drawn
   private taken: DecodedFrame | null = null; // drawn now
+  private watched = 0; // sources so far
   private live = false; // the frame that came last
   private readonly serverDrops = new ServerDrops();
   private unseen = false; // nobody sees the picture, though the page is seen
@@ -97,6 +100,7 @@ export class Session {
   /** From now on, instead of what was watched before; null: nothing. */
   watch(open: ((events: SourceEvents) => FrameSource) | null): void {
     this.source?.stop();
+    ++this.watched;
     this.forget();
     this.info = this.status = null;
     this.seen = false;
@@ -142,8 +146,9 @@ export class Session {
   /** The frame to draw now instead of the one before, whose memory is used again, if there is one. */
   take(): DecodedFrame | null {
     if (this.waiting === null) return null;
-    const { frame, prefix } = this.waiting;
+    const { frame, prefix, run } = this.waiting;
     this.waiting = null;
+    this.run = run;
     this.meter.shown(frame, prefix, utcNow(), performance.now(), this.source?.live === true);
     this.source?.credit();
     this.seen = true;
@@ -178,7 +183,8 @@ export class Session {
     const isKept = !live && this.source?.kept != null; // it came before
     if (!forLater && !isKept) this.meter.came(bytes.byteLength, this.lastFrameAt);
     if (!forLater) this.meter.arrived(prefix, bytes, this.lastFrameAt, live);
-    this.underway.set(this.decoder.decode(bytes, prefix.bytes), { prefix, forLater });
+    const run = `${this.watched} ${this.source?.playback.run ?? 0}`;
+    this.underway.set(this.decoder.decode(bytes, prefix.bytes), { prefix, forLater, run });
   }
 
   private onDecoded(frame: DecodedFrame): void {
@@ -193,7 +199,7 @@ export class Session {
       this.source?.credit(1, false);
     }
     this.meter.decoded(known.prefix, utcNow());
-    this.waiting = { frame, prefix: known.prefix };
+    this.waiting = { frame, prefix: known.prefix, run: known.run };
     this.events.ready();
   }
 

@@ -143,7 +143,10 @@ export class ShapeMeter {
       if (frames === 0) continue;
       const share = Math.min(1, Math.max(-1, mean / full));
       const pale = Math.round(255 * (1 - Math.abs(share)));
-      out.set([share < 0 ? pale : 255, pale, share > 0 ? pale : 255, 255], 4 * i);
+      out[4 * i] = share < 0 ? pale : 255;
+      out[4 * i + 1] = pale;
+      out[4 * i + 2] = share > 0 ? pale : 255;
+      out[4 * i + 3] = 255;
     }
     return out;
   }

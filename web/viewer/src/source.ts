@@ -65,6 +65,7 @@ export interface Playback {
   readonly startMs: number; // UTC
   readonly first: number; // index of the frame at times[0]
   readonly index: number; // the frame sent last
+  readonly run: number; // it is of: those of one came one after the other, each seek or step begins another
   readonly position: number;
   readonly playing: boolean;
   readonly speed: number;

@@ -36,6 +36,8 @@ export class StorePlayer implements Playback {
   private readonly clock: PlayClock;
   private wanted: number | null; // to be shown whether it plays or not
   private last = -1; // sent
+  private runs = 0; // begun
+  private run_ = 0; // of `last`
   private decoded: Decoded = { key: -1, last: -1 };
   private sending = false;
   private running = false;
@@ -64,6 +66,9 @@ export class StorePlayer implements Playback {
   }
   get index(): number {
     return Math.max(this.first, this.last);
+  }
+  get run(): number {
+    return this.run_;
   }
   get position(): number {
     return this.clock.position(performance.now());
@@ -103,6 +108,7 @@ export class StorePlayer implements Playback {
     this.clock.seek(atMs, now);
     if (!this.clock.playing) this.running = false; // also where it has just come to the end
     this.wanted = this.due(now);
+    ++this.runs;
     this.pump();
   }
 
@@ -152,6 +158,7 @@ export class StorePlayer implements Playback {
     const due = Math.max(this.first, this.wanted ?? this.due(now));
     if (due !== this.last || this.wanted !== null) {
       this.wanted = null;
+      this.run_ = this.runs;
       --this.credits;
       void this.send(due);
       return;

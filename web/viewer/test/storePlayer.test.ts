@@ -36,15 +36,37 @@ describe('StorePlayer', () => {
     vi.unstubAllGlobals();
   });
 
+  const prefix = { bytes: 48, sequence: 0, captureMs: 0, publishMs: 0, sentMs: 0, drops: 0 };
+  const store = {
+    times: Float64Array.of(0, 100, 200),
+    first: 0,
+    keyBefore: async (index: number) => index,
+    buildsOnFrameBefore: async () => false,
+    read: async () => ({ prefix, message: new ArrayBuffer(48) }),
+  } as unknown as FrameStore;
+
+  it('tells frames that it played one after the other from such that somebody went to', async () => {
+    const sent: [number, number][] = []; // index and run
+    const player = new StorePlayer(store, { frame: () => void sent.push([player.index, player.run]), nonsense: () => undefined });
+    const runs = async (act: () => void): Promise<number[]> => {
+      act();
+      await vi.advanceTimersByTimeAsync(50);
+      player.credit();
+      await vi.advanceTimersByTimeAsync(50);
+      return sent.splice(0).map(([, run]) => run);
+    };
+    const [begun] = await runs(() => player.play());
+    expect(await runs(() => undefined)).toEqual([begun]); // frame 1
+    player.pause();
+    player.credit(-1); // its last frame is still under way
+    player.step(1);
+    expect(sent).toEqual([]);
+    const [stepped] = await runs(() => undefined);
+    expect(stepped).not.toBe(begun);
+    expect(await runs(() => player.step(-1))).not.toContain(stepped);
+  });
+
   it('has not played to the end where somebody went back at that moment', async () => {
-    const prefix = { bytes: 48, sequence: 0, captureMs: 0, publishMs: 0, sentMs: 0, drops: 0 };
-    const store = {
-      times: Float64Array.of(0, 100, 200),
-      first: 0,
-      keyBefore: async (index: number) => index,
-      buildsOnFrameBefore: async () => false,
-      read: async () => ({ prefix, message: new ArrayBuffer(48) }),
-    } as unknown as FrameStore;
     const ends: number[] = []; // where it was
     const player = new StorePlayer(store, { frame: () => player.credit(), nonsense: () => undefined, ended: () => ends.push(player.position) });
     player.play();
