@@ -185,20 +185,27 @@ const onBall = {
 };
 
 const byFinger = {
-  async 'on a phone by two taps, and everything is within the screen'(page) {
+  async 'on a phone by two taps, for which the panel folds, and everything is within the screen'(page) {
     await begin(page);
     await measured(page, ({ shape }) => shape === 'plane');
-    const panel = await page.locator('#panel-measure').boundingBox();
+    const top = async () => (await page.locator('#panel-measure').boundingBox()).y;
     const at = await page.evaluate(() => window.relievo.diagnostics().cameraPicture);
-    const below = Math.min(at.y + at.height, panel.y) - 12;
-    await page.touchscreen.tap(at.x + 0.2 * at.width, Math.max(at.y, 60) + 20);
-    await page.waitForFunction(() => /opposite corner/.test(document.querySelector('#panel-measure').textContent));
-    await page.touchscreen.tap(at.x + 0.7 * at.width, below);
-    await measured(page, (said) => said.region[0] > 100 && said.region[0] < 150);
+    const [left, upper, right, lower] = [at.x + 0.2 * at.width, at.y + 0.1 * at.height, at.x + 0.7 * at.width, at.y + 0.95 * at.height];
+    assert.ok((await top()) < lower, 'the panel hides nothing');
+    await page.touchscreen.tap(left, upper);
+    await page.waitForFunction(() => /opposite corner/.test(document.querySelector('#panel-measure').innerText));
+    assert.ok((await top()) > at.y + at.height, 'the panel lies over the other corner');
+    await page.touchscreen.tap(right, lower);
+    await measured(page, (said) => said.region[0] > 100 && said.region[0] < 150 && said.region[3] > 390);
     alike(await flatness(page), command(wall, '--frames', '0:0', '--region', await region(page)));
+    assert.equal(await page.getAttribute('#panel-measure .fold', 'aria-expanded'), 'false');
+    assert.match(await page.innerText('#panel-measure'), /Away \d+\.\d{3} mm · RMS 0\.0\d{3} mm/);
+    if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-phone-folded.png') });
+    await page.tap('#panel-measure .fold');
+    assert.ok((await top()) < lower, 'the panel stays folded');
+    if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-phone.png') });
     const beyond = await page.$$eval('#panel-measure *', (all) => all.filter((e) => e.getClientRects().length > 0 && (e.getBoundingClientRect().right > innerWidth || e.getBoundingClientRect().left < 0)).map((e) => e.className || e.tagName));
     assert.deepEqual(beyond, []);
-    if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-phone.png') });
   },
 };
 

@@ -34,6 +34,8 @@ export interface FlatnessOf {
   run(): string;
   /** Said where hints stand. */
   told(hint: string): void;
+  /** What is said in short is another, or a corner was chosen. */
+  changed(): void;
 }
 
 /** A frame that is to be measured. */
@@ -117,6 +119,20 @@ export class FlatnessCard {
     return report === null ? null : reportJson(report, this.measured!.meter);
   }
 
+  /** In a line; empty: nothing is known. */
+  get summary(): string {
+    const { measured } = this;
+    const report = measured?.report ?? null;
+    if (report === null) return this.warning.textContent;
+    const [label] = measured!.meter.kind === 'plane' ? say.names.depth : say.names.radius;
+    return say.summary(`${label} ${mm(report.size.median, 3)}`, mm(report.rms.median, 4));
+  }
+
+  /** The other corner is awaited. */
+  get awaitsCorner(): boolean {
+    return this.corner !== null;
+  }
+
   /** Two of these are opposite corners. */
   click(at: Place): void {
     const { lens } = this;
@@ -129,6 +145,7 @@ export class FlatnessCard {
     } else {
       this.setRegion(regionBetween(this.corner, pixel, lens));
     }
+    this.of.changed();
     this.of.view.invalidate();
   }
 
@@ -312,6 +329,7 @@ export class FlatnessCard {
     this.warning.hidden = warning === '';
     this.figures.hidden = this.pictured.hidden = report === null;
     if (report !== null) this.showFigures(report);
+    this.of.changed();
     this.of.view.invalidate();
   }
 

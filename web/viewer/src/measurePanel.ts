@@ -3,6 +3,7 @@
 import { button, element, make, setText, toggle } from './dom';
 import { copy, download, fileName } from './download';
 import { FlatnessCard } from './flatnessCard';
+import { Fold } from './fold';
 import {
   alongRay,
   kSpots,
@@ -70,7 +71,10 @@ export class MeasurePanel {
   private readonly tools: Map<AnyTool, HTMLButtonElement>;
   private readonly flatness: FlatnessCard;
   private readonly places: HTMLElement; // what the other tools need
-  private readonly hint = make('p', { className: 'quiet' });
+  private readonly hint = make('p', { className: 'quiet hint' });
+  private readonly fold: Fold;
+  private choosing = false; // places, of which there is one
+  private readonly summary = make('p', { className: 'summary' }); // of what is folded
   private readonly sigmas = make('p', { className: 'quiet', hidden: true });
   private readonly list = make('ol', { className: 'measurements' });
   private readonly plot = make('canvas', { className: 'plot', hidden: true });
@@ -87,7 +91,7 @@ export class MeasurePanel {
   ) {
     const names: AnyTool[] = [...kTools, 'flatness'];
     this.tools = new Map(names.map((tool) => [tool, button(say.tools[tool], say.hints[tool], () => this.choose(tool))]));
-    this.flatness = new FlatnessCard({ view, described, run, told: (hint) => setText(this.hint, hint) });
+    this.flatness = new FlatnessCard({ view, described, run, told: (hint) => setText(this.hint, hint), changed: () => this.sum() });
     this.snapper = new Snapper(view, described);
     const snapping = toggle(say.snap, (on) => this.setSnaps(on));
     snapping.row.title = say.snapTitle;
@@ -105,7 +109,8 @@ export class MeasurePanel {
     const section = button(say.sectionCsv, say.sectionCsvTitle, () => this.save('section', sectionCsv(this.lastSection?.profile ?? [])));
     const buttons = make('div', { className: 'buttons' }, copied, csv, section, this.clearing);
     this.places = make('div', {}, snapping.row, this.list, buttons, this.plot, this.sigmas); // what is read once, last
-    body.append(group, this.hint, this.flatness.box, this.places);
+    this.fold = new Fold(body.parentElement!);
+    body.append(group, this.hint, this.summary, this.flatness.box, this.places);
     this.listen(view.canvas);
     const others = view.overlay.marks; // loaded before or behind this
     view.overlay.marks = () => [...others(), ...this.marks()];
@@ -182,6 +187,7 @@ export class MeasurePanel {
     this.refresh();
     this.flatness.active = tool === 'flatness';
     this.places.hidden = tool === 'flatness';
+    this.sum();
   }
 
   private clear(): void {
@@ -295,7 +301,17 @@ export class MeasurePanel {
     this.sigmas.hidden = measurements.length === 0;
     setText(this.sigmas, [...new Set(measurements.map(partsText))].join(' '));
     this.drawPlot();
+    this.sum();
     this.view.invalidate();
+  }
+
+  private sum(): void {
+    const last = this.measurements.at(-1);
+    const said = last === undefined ? '' : `${say.tools[last.tool]} ${valueText(last)}`;
+    setText(this.summary, this.tool === 'flatness' ? this.flatness.summary : said);
+    const isChoosing = this.tool === 'flatness' ? this.flatness.awaitsCorner : this.spots.length > 0;
+    if (isChoosing && !this.choosing) this.fold.fold();
+    this.choosing = isChoosing;
   }
 
   private marks(): Mark[] {

@@ -43,7 +43,8 @@ export class Panels {
       this.isEntered = true;
       if (!isNext) return;
       event.preventDefault();
-      this.panels.get(this.opened)!.box.querySelector<HTMLElement>('button, input, select, a[href]')?.focus();
+      const inside = this.panels.get(this.opened)!.box.querySelectorAll<HTMLElement>('button, input, select, a[href]');
+      [...inside].find((e) => e.checkVisibility())?.focus();
     });
   }
 
