@@ -206,6 +206,11 @@ const byFinger = {
     if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-phone.png') });
     const beyond = await page.$$eval('#panel-measure *', (all) => all.filter((e) => e.getClientRects().length > 0 && (e.getBoundingClientRect().right > innerWidth || e.getBoundingClientRect().left < 0)).map((e) => e.className || e.tagName));
     assert.deepEqual(beyond, []);
+    await choose(page, 'Distance');
+    await page.touchscreen.tap(left, upper);
+    await page.waitForFunction(() => document.querySelector('#panel-measure .fold').getAttribute('aria-expanded') === 'false');
+    await page.touchscreen.tap(right, lower);
+    await page.waitForFunction(() => /Distance \d+\.\d/.test(document.querySelector('#panel-measure').innerText));
   },
 };
 

@@ -317,6 +317,37 @@ const checks = {
     await page.close();
   },
 
+  async 'no number of the grid runs under an open panel, and what a source is called leaves room for the stream\'s name'() {
+    const page = await open('/', { viewport: { width: 1100, height: 700 } });
+    await shownPast(page, 2);
+    const under = (part) => page.evaluate((selector) => {
+      const { x, y, width, height } = document.querySelector(selector).getBoundingClientRect();
+      const overlay = document.querySelector('#overlay');
+      const scale = overlay.width / overlay.clientWidth;
+      const { data } = overlay.getContext('2d').getImageData(x * scale, y * scale, width * scale, height * scale);
+      return data.some((value, i) => i % 4 === 3 && value > 0);
+    }, part);
+    await page.keyboard.press('b');
+    await page.waitForSelector('#panel-display', { state: 'visible' });
+    for (let moved = 0; moved < 6; ++moved) {
+      for (let i = 0; i < 4; ++i) await page.keyboard.press('Shift+ArrowLeft'); // what is seen goes to the right
+      await eventually(`numbers run under the panel, moved ${moved} times`, async () => !(await under('#panel-display')) && (await under('body')));
+    }
+    await page.setViewportSize({ width: 844, height: 390 });
+    const cut = await page.evaluate(() => {
+      const [source, select] = [document.querySelector('#source'), document.querySelector('#streams')];
+      source.textContent = 'a camera that is called by many words '.repeat(4);
+      const whole = select.cloneNode(true);
+      Object.assign(whole.style, { position: 'absolute', maxWidth: 'none' });
+      select.after(whole);
+      const missing = whole.offsetWidth - select.offsetWidth;
+      whole.remove();
+      return missing;
+    });
+    assert.ok(cut <= 0, `${cut} pixels of the stream's name are cut off`);
+    await page.close();
+  },
+
   async 'without WebGL the page says so'() {
     const page = await newPage();
     await withoutWebGl(page);

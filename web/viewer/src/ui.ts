@@ -29,6 +29,8 @@ export interface UiEvents {
   covers(boxes: readonly Box[]): void;
 }
 
+const openPanel = (): Element | null => document.querySelector('#panels aside:not([hidden])');
+
 export class Ui {
   readonly canvas = element<HTMLCanvasElement>('view');
   private shownStreams = '';
@@ -52,7 +54,7 @@ export class Ui {
     new ResizeObserver(() => say('--rail', rail.offsetWidth)).observe(rail);
     this.around = new ResizeObserver(() => {
       const { insets } = this;
-      const panel = document.querySelector('#panels aside:not([hidden])')?.getBoundingClientRect();
+      const panel = openPanel()?.getBoundingClientRect();
       const isSeen = panel !== undefined && panel.width > 0;
       events.insets(insets, isSeen ? withPanel(insets, this.canvas.getBoundingClientRect(), panel) : insets);
       events.covers(this.covers);
@@ -85,7 +87,8 @@ export class Ui {
   private get covers(): Box[] {
     const [header, rail, footer] = this.parts;
     const { left, top } = this.canvas.getBoundingClientRect();
-    const boxes = [...header.children, rail, ...footer.children].map((part) => part.getBoundingClientRect());
+    const panel = openPanel();
+    const boxes = [...header.children, rail, ...footer.children, ...(panel === null ? [] : [panel])].map((part) => part.getBoundingClientRect());
     return boxes
       .filter(({ width }) => width > 0)
       .map(({ x, y, width, height }) => ({ x: x + width / 2 - left, y: y + height / 2 - top, width, height }));
