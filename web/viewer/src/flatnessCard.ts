@@ -269,9 +269,12 @@ export class FlatnessCard {
 
   private start(): Worker {
     const worker = startMeasurer();
-    worker.onmessage = ({ data }: MessageEvent<ShapeReply>) => this.hear(data);
+    worker.onmessage = ({ data }: MessageEvent<ShapeReply>) => {
+      if (worker === this.worker) this.hear(data); // else it was ended as it answered
+    };
     worker.onerror = (event) => {
       event.preventDefault();
+      if (worker !== this.worker) return;
       this.forget();
       this.fail(text.panelFailed);
       this.restUntil = performance.now() + kAgain_ms;
