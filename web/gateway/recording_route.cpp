@@ -9,9 +9,11 @@
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <optional>
 #include <string>
 
+#include "codec/mcap_records.h"
 #include "web/gateway/byte_range.h"
 #include "web/gateway/cut_recordings.h"
 #include "web/gateway/entity_tag.h"
@@ -35,21 +37,33 @@ std::string etag_of(const struct stat& file) {
 constexpr const char* kGrowing = "growing";
 constexpr const char* kCut = "cut";  // short, and read with an index that is not in it
 
-/// Of what is whole of a file, or was when it was `bytes` long.
-std::string whole_etag(const char* kind, const struct stat& file, std::uint64_t bytes) {
+std::string tag_start(const char* kind, const struct stat& file) {
   char text[48];
-  std::snprintf(text, sizeof text, "\"%s-%llx-%llx\"", kind, static_cast<unsigned long long>(file.st_ino),
-                static_cast<unsigned long long>(bytes));
+  std::snprintf(text, sizeof text, "\"%s-%llx-", kind, static_cast<unsigned long long>(file.st_ino));
   return text;
 }
 
-/// The `bytes` of whole_etag(); 0 where it is another file's, or none.
+/// Of what is whole of a file, or was when it was `bytes` long, with the CRC of its index: where another
+/// recording was written over it, times and places differ, also where as many bytes are whole of that.
+std::string whole_etag(const char* kind, const struct stat& file, const FilePart::Whole& whole) {
+  constexpr std::size_t kBehindCrc = mcap::kMagic.size(), kCrc = 4;
+  char text[48];
+  std::uint32_t crc = 0;
+  if (whole.end->size() >= kCrc + kBehindCrc)
+    std::memcpy(&crc, whole.end->data() + whole.end->size() - kBehindCrc - kCrc, sizeof crc);
+  std::snprintf(text, sizeof text, "%llx-%08x\"", static_cast<unsigned long long>(whole.file_bytes), crc);
+  return tag_start(kind, file) + text;
+}
+
+/// The bytes of whole_etag(); 0 where it is another file's, or none. Whether it was ever so long, and the
+/// same one, is yet to be seen.
 std::uint64_t growing_bytes(std::string_view etag, const struct stat& file) {
-  const std::size_t dash = etag.rfind('-');
-  if (dash == std::string_view::npos) return 0;
+  const std::string start = tag_start(kGrowing, file);
+  if (!etag.starts_with(start)) return 0;
+  etag.remove_prefix(start.size());
   std::uint64_t bytes = 0;
-  std::from_chars(etag.data() + dash + 1, etag.data() + etag.size(), bytes, 16);
-  return whole_etag(kGrowing, file, bytes) == etag ? bytes : 0;
+  std::from_chars(etag.data(), etag.data() + etag.size(), bytes, 16);
+  return bytes;
 }
 
 /// What a request says of a recording, and what holds for it.
@@ -67,34 +81,59 @@ struct Version {
   bool finished = false;  // nobody changes it any more
 };
 
+Version growing_version(const struct stat& file, std::uint64_t bytes, std::shared_ptr<const Bytes> end) {
+  Version out{.whole = {bytes, std::move(end)}, .etag = {}};
+  out.etag = whole_etag(kGrowing, file, out.whole);
+  return out;
+}
+
+/// The file as it was when it had this ETag; nothing where it never had.
+std::optional<Version> version_with(const std::string& etag, const struct stat& file,
+                                    const GrowingRecording* growing) {
+  const std::uint64_t bytes = growing_bytes(etag, file);
+  auto end = growing && bytes > 0 ? growing->end_at(bytes) : nullptr;
+  if (!end) return std::nullopt;
+  auto version = growing_version(file, bytes, std::move(end));
+  return version.etag == etag ? std::optional(std::move(version)) : std::nullopt;
+}
+std::optional<Version> version_now(const struct stat& file, const GrowingRecording* growing) {
+  const std::uint64_t bytes = growing ? growing->bytes() : 0;
+  auto end = bytes > 0 ? growing->end_at(bytes) : nullptr;
+  return end ? std::optional(growing_version(file, bytes, std::move(end))) : std::nullopt;
+}
+
+/// As version_with(), also where a program wrote it that has ended since: this one before it was started
+/// again, say.
+std::optional<Version> version_with(const std::string& etag, const struct stat& file, const Asked& asked) {
+  const OfferedRecording& recording = asked.recording;
+  if (auto version = version_with(etag, file, recording.growing.get())) return version;
+  if (!recording.has_index || growing_bytes(etag, file) == 0) return std::nullopt;
+  return version_with(etag, file, asked.cuts.growth_of(recording.file, file).get());
+}
+
 /// What is to be read of a recording; nothing where it has only just been begun.
 std::optional<Version> version_of(const Asked& asked, const struct stat& file) {
   const OfferedRecording& recording = asked.recording;
-  const auto as_of = [&](const std::shared_ptr<const GrowingRecording>& growing,
-                         std::uint64_t bytes) -> std::optional<Version> {
-    auto end = growing && bytes > 0 ? growing->end_at(bytes) : nullptr;
-    if (!end) return std::nullopt;
-    return Version{{bytes, std::move(end)}, whole_etag(kGrowing, file, bytes)};
-  };
-  const std::uint64_t begun_at = growing_bytes(asked.if_range, file);
-  if (auto version = as_of(recording.growing, begun_at)) return version;
-  if (!recording.has_index)
-    return as_of(recording.growing, recording.growing ? recording.growing->bytes() : 0);
-  // Of a program that ended since, this one's before it was started again, say.
-  if (begun_at > 0)
-    if (auto version = as_of(asked.cuts.growth_of(recording.file, file), begun_at)) return version;
+  if (auto version = version_with(asked.if_range, file, asked)) return version;
+  if (!recording.has_index) return version_now(file, recording.growing.get());
   const bool ended = has_end(recording.file);
   if (const auto index = ended ? nullptr : asked.cuts.index_of(recording.file, file)) {
-    const std::uint64_t bytes = index->bytes();
-    return Version{{bytes, index->end_at(bytes)}, whole_etag(kCut, file, bytes)};
+    Version version{.whole = {index->bytes(), index->end_at(index->bytes())}, .etag = {}};
+    version.etag = whole_etag(kCut, file, version.whole);
+    return version;
   }
-  if (!ended && growing_bytes(asked.if_none_match, file) > 0) {
-    // Not left for long enough to be cut: to who followed it, it is what it was.
-    const auto growth = asked.cuts.growth_of(recording.file, file);
-    if (auto version = as_of(growth, growth->bytes())) return version;
-  }
+  // Not left for long enough to be cut: to who followed it, it is what it was.
+  if (!ended && growing_bytes(asked.if_none_match, file) > 0)
+    if (auto version = version_now(file, asked.cuts.growth_of(recording.file, file).get())) return version;
   const bool finished = recording.whole && (ended || !asked.of_folder);
   return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), finished};
+}
+
+/// Whether who asks for what was added to a file that grew has the begin of another one, to which no part of
+/// this one belongs.
+bool has_another(const Asked& asked, const struct stat& file) {
+  return asked.if_none_match.starts_with('"' + std::string(kGrowing) + '-') &&
+         !version_with(asked.if_none_match, file, asked);
 }
 
 /// A cache may keep it and asks here each time whether it still is the same. One that many share need not,
@@ -153,7 +192,8 @@ HttpReply reply_to(const Asked& asked) {
   reply.content_type = "application/octet-stream";
   ByteRange range{0, size};
   RangeKind kind = RangeKind::kWhole;
-  if (asked.if_range.empty() || asked.if_range == etag) kind = parse_range(asked.range, size, range);
+  const bool of_this = asked.if_range.empty() ? !has_another(asked, status) : asked.if_range == etag;
+  if (of_this) kind = parse_range(asked.range, size, range);
   const std::string of = "/" + std::to_string(size);
   const bool finished = version->finished && kind != RangeKind::kUnsatisfiable;
   reply.headers = {{"Accept-Ranges", "bytes"},

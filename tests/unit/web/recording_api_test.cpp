@@ -69,6 +69,7 @@ class OneStream final : public RecordingControl {
     state_.activity = RecordingActivity::kOff;
     return writer_->finish();
   }
+  void starts_at(std::uint32_t time) { messages_ = time; }
   /// As if nothing of it were on the disk.
   void has_just_begun() {
     const std::lock_guard lock(mutex_);
@@ -313,6 +314,36 @@ TEST_F(RecordingApi, WhoFollowedWhatACrashCutShortGoesOnAtOnce) {
   EXPECT_THAT(got.headers.at("etag"), StartsWith("\"growing-"));
   const std::string now = had.body.substr(0, end_of_data(had.body)) + got.body;
   EXPECT_GT(messages_in(now), messages_in(had.body)) << "it has an index";
+}
+
+// As many bytes, so that its chunks lie where those of the one before it did.
+TEST_F(RecordingApi, WhoFollowedAFileHasNoPartOfAnotherThatWasWrittenOverIt) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  ASSERT_TRUE(control.grow());
+  const auto had = get();
+  const std::string etag = had.headers.at("etag");
+  ASSERT_TRUE(control.grow());
+  ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
+  control.has_just_begun();  // nobody knows any more how it grew
+  EXPECT_EQ(get("Range: bytes=0-9\r\nIf-Range: " + etag + "\r\n").status, 206);
+  EXPECT_EQ(get(new_since(had.body, etag)).status, 206);
+
+  const TempFolder elsewhere;
+  OneStream later(elsewhere.path());
+  later.starts_at(1000);
+  ASSERT_TRUE(later.start("face"));
+  ASSERT_TRUE(later.grow());
+  ASSERT_TRUE(later.grow());
+  ASSERT_TRUE(later.stop("face"));
+  const std::string other = content_of(elsewhere / "face-1.mcap");
+  ASSERT_EQ(other.size(), content_of(folder / "face-1.mcap").size());
+  std::fstream(folder / "face-1.mcap", std::ios::binary | std::ios::in | std::ios::out) << other;
+  for (const std::string& asked :
+       {"Range: bytes=0-9\r\nIf-Range: " + etag + "\r\n", new_since(had.body, etag)}) {
+    const auto got = get(asked);
+    EXPECT_EQ(got.status, 200) << asked;
+    EXPECT_TRUE(got.body == other) << asked;
+  }
 }
 
 ServerStatus make_status() {

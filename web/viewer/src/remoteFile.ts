@@ -7,6 +7,7 @@ export const kBlock = 2 ** 18; // bytes
 const kKept = 64; // blocks
 const kTries = 4;
 const kFirstWaitMs = 300; // before a second try; twice as long before each further one
+const kChanged = 'the recording has changed on the server: open it anew';
 
 export type Fetch = (url: URL, init: RequestInit) => Promise<Response>;
 
@@ -56,6 +57,7 @@ export class RemoteFile implements Bytes {
     const head = await this.fetch(this.url, { headers, cache: 'no-store' });
     if (head.status === 304) return;
     if (head.status !== 206) await head.body?.cancel();
+    if (head.status === 200) throw new Final(kChanged);
     ({ size: this.size_, etag: this.etag } = versionOf(head));
     for (const index of [...this.blocks.keys()]) {
       if ((index + 1) * kBlock > end) this.blocks.delete(index);
@@ -124,7 +126,7 @@ export class RemoteFile implements Bytes {
     const response = await this.fetch(this.url, { headers, cache: 'no-store' });
     if (response.status === 200 || response.status === 416) {
       await response.body?.cancel();
-      throw new Final('the recording has changed on the server: open it anew');
+      throw new Final(kChanged);
     }
     if (response.status !== 206) throw refused(response.status, 'the server does not give the recording');
     const bytes = new Uint8Array(await response.arrayBuffer());

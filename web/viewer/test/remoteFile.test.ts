@@ -111,6 +111,15 @@ describe('RemoteFile', () => {
     }
   });
 
+  it('is another where the server gives no part of it any more', async () => {
+    const server = new Server();
+    const file = await RemoteFile.open(url, async (_, init) => {
+      const isAsked = new Headers(init.headers).has('if-none-match');
+      return isAsked ? new Response('all of another one', { status: 200, headers: { etag: '"growing-1-2-3"' } }) : server.fetch(url, init);
+    });
+    await expect(file.grow(10)).rejects.toThrow('has changed on the server');
+  });
+
   it('is not opened where the server gives no parts', async () => {
     await expect(RemoteFile.open(url, async () => new Response('all of it', { status: 200 }))).rejects.toThrow('HTTP 200');
     await expect(RemoteFile.open(url, async () => new Response('', { status: 404 }))).rejects.toThrow('it is not there (HTTP 404)');
