@@ -92,24 +92,34 @@ void LoopedFile::look() {
     if (gone && playing_) return gateway_.offer(playing_->name, {});  // played on as far as it is open
     return leave();
   }
-  if (!playing_ || is_another(mark)) take_up(mark);
+  const bool was_cut = playing_ && was_cut_in_a_chunk(mark);
+  if (playing_ && (was_cut || is_another(mark))) leave();
+  if (!playing_) take_up(mark, was_cut);
   seen_ = mark;
   if (playing_) offer();
 }
 
-/// Moved in its place, or written over. One that is being written grows.
+/// Moved in its place, or written over. One that is being written grows: the follower says what else it is.
 bool LoopedFile::is_another(const FileMark& mark) const {
-  if (mark.inode != playing_->mark.inode || mark.device != playing_->mark.device) return true;
-  return playing_->follower ? mark.bytes < seen_.bytes : mark.bytes != playing_->mark.bytes;
+  const FileMark& mine = playing_->mark;
+  if (mark.inode != mine.inode || mark.device != mine.device) return true;
+  return playing_->follower ? mark.bytes < seen_.bytes : mark != mine;
 }
 
-void LoopedFile::take_up(const FileMark& mark) {
-  leave();
+/// Of a writer that was killed behind a chunk's messages: who opens the file now has all of them.
+bool LoopedFile::was_cut_in_a_chunk(const FileMark& mark) const {
+  return playing_->follower && playing_->follower->holds_back() && utc_now_ns() - mark.time_ns > kLeft_ns &&
+         steady_now_ns() - playing_->came_ns > kLeft_ns;
+}
+
+void LoopedFile::take_up(const FileMark& mark, bool was_cut) {
+  const bool is_written_over = mark.inode == seen_.inode && mark.bytes == seen_.bytes && mark != seen_;
+  if (is_written_over) return;                 // perhaps not to its end yet
   if (mark == refused_) return tell_of(why_);  // once it stays as it is: it may be on its way there
   auto found = FoundRecording::open(file_);
   const bool taken = found && streams_.contains(found->recorded.stream());
   if (found && !taken) {
-    if (missing_.empty()) log_info(file_ + " is another file now, which is played from here on");
+    if (missing_.empty() && !was_cut) log_info(file_ + " is another file now, which is played from here on");
     return start(*std::move(found));
   }
   refused_ = mark;
@@ -123,13 +133,17 @@ void LoopedFile::offer() {
   OfferedRecording offered{.file = file_, .whole = playing_->whole};
   if (auto& follower = playing_->follower) {
     const auto found = follower->look();
-    const std::int64_t now_ns = steady_now_ns();
+    if (found && *found == RecordingFollower::Found::kAnother) return leave();  // it is taken up next time
     if (!found && !std::exchange(playing_->damaged, true))
       log_warning(found.error().message + ": pages have what is before that");
+    const std::int64_t now_ns = steady_now_ns();
     if (found && *found == RecordingFollower::Found::kMore) playing_->came_ns = now_ns;
     offered.growing = follower->growing();
     offered.has_index = found && *found == RecordingFollower::Found::kFinished;
-    offered.grows = found && !offered.has_index && now_ns - playing_->came_ns < kLeft_ns;
+    // With a chunk that is held back something is yet to come, from whoever wrote it or by
+    // was_cut_in_a_chunk(): pages ask for it once this no longer grows.
+    const bool is_awaited = follower->holds_back() || now_ns - playing_->came_ns < kLeft_ns;
+    offered.grows = found && !offered.has_index && is_awaited;
   }
   gateway_.offer(playing_->name, offered);
 }

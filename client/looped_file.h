@@ -48,9 +48,10 @@ class LoopedFile {
   struct Playing;
   void start(FoundRecording found);
   void leave();
-  void take_up(const FileMark& mark);
+  void take_up(const FileMark& mark, bool was_cut);
   void offer();
   bool is_another(const FileMark& mark) const;
+  bool was_cut_in_a_chunk(const FileMark& mark) const;
   void tell_of(const std::string& missing);
   void run(Playing& playing);
   Status publish(const Playing& playing, const RawSample& sample);

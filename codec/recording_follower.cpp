@@ -13,20 +13,23 @@ namespace {
 constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels, attachments
 constexpr std::uint64_t kMostHeaderBytes = 256;            // of a chunk, before its records
 constexpr std::uint64_t kIndexHeadBytes = 2 + 4;  // of a message index: channel, bytes of its entries
+constexpr std::uint64_t kChunkHeadBytes = mcap::kRecordHeaderBytes + 3 * 8 + 4;  // two times, size, CRC
 
 }  // namespace
 
 Result<RecordingFollower::Found> RecordingFollower::look() {
-  if (finished_) return Found::kFinished;
   const auto file = mcap::File::open(file_);
-  if (!file) return file.error();
+  if (!file) return finished_ ? Result<Found>(Found::kFinished) : file.error();
   const std::uint64_t size = (*file)->size();
+  if (size >= at_ && !(is_there(first_, **file) && is_there(last_, **file))) return Found::kAnother;
+  if (finished_) return Found::kFinished;
   const auto damaged = [&] {
     return Error{file_.string() + ": what is being written is damaged at byte " + std::to_string(at_)};
   };
   if (size < at_) return damaged();
   const std::uint64_t before = index_->bytes();
-  if (std::exchange(size_, size) == size && at_ == size) commit();
+  if (std::exchange(size_, size) == size && at_ == size && chunk_ && chunk_->message_index_length > 0)
+    commit();
   if (at_ == 0 && size >= mcap::kMagic.size()) {
     const auto magic = (*file)->read(0, mcap::kMagic.size());
     if (!magic) return magic.error();
@@ -51,6 +54,11 @@ Result<RecordingFollower::Found> RecordingFollower::look() {
   finished_ = has_footer_ && size - at_ >= mcap::kMagic.size();
   if (finished_) return Found::kFinished;
   return index_->bytes() > before ? Found::kMore : Found::kNothing;
+}
+
+bool RecordingFollower::is_there(const ChunkHead& head, const mcap::File& file) {
+  const auto now = file.read(head.at, head.bytes.size());
+  return now && *now == head.bytes;
 }
 
 Status RecordingFollower::take(mcap::Op op, std::uint64_t content, std::uint64_t length,
@@ -89,6 +97,10 @@ Status RecordingFollower::take(mcap::Op op, std::uint64_t content, std::uint64_t
               .compression = header->first.compression,
               .compressed_size = header->first.records_size,
               .uncompressed_size = header->first.uncompressed_size};
+    auto head = file.read(chunk_->offset, std::min(kChunkHeadBytes, chunk_->length));
+    if (!head) return head.error();
+    last_ = {chunk_->offset, *std::move(head)};
+    if (first_.bytes.empty()) first_ = last_;
   } else if (op == mcap::Op::kMessageIndex && chunk_) {
     const auto start = read(kIndexHeadBytes);
     if (!start || start->size() < kIndexHeadBytes) return Error{"malformed"};

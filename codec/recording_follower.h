@@ -23,6 +23,7 @@ class RecordingFollower {
     kMore,      // than the last time
     kNothing,   // new
     kFinished,  // the file has an index of its own
+    kAnother,   // recording is there in its place: this one is done with
   };
 
   explicit RecordingFollower(std::filesystem::path file) : file_(std::move(file)) {}
@@ -31,10 +32,18 @@ class RecordingFollower {
   /// something is behind it, or nothing came since the call before: its message indexes come after it. Fails
   /// where the file cannot be read, is none, or is damaged: what was whole until then stays.
   Result<Found> look();
+  /// Whether the last chunk does not count, since its message indexes are yet to come; or never do.
+  bool holds_back() const { return chunk_.has_value(); }
   /// Never null.
   std::shared_ptr<const GrowingRecording> growing() const { return index_; }
 
  private:
+  /// A chunk's first bytes, with its times and its CRC: another one's differ.
+  struct ChunkHead {
+    std::uint64_t at = 0;
+    Bytes bytes;
+  };
+  static bool is_there(const ChunkHead& head, const mcap::File& file);
   Status take(mcap::Op op, std::uint64_t content, std::uint64_t length, const mcap::File& file);
   void commit();
 
@@ -43,6 +52,7 @@ class RecordingFollower {
   std::uint64_t size_ = 0;  // when it was last looked at
   bool behind_data_ = false, has_footer_ = false, finished_ = false;
   std::optional<mcap::ChunkIndex> chunk_;  // the last one, while message indexes may follow it
+  ChunkHead first_, last_;                 // of those that were read; empty: there is none yet
   const std::shared_ptr<mcap::WriterIndex> index_ = std::make_shared<mcap::WriterIndex>();
 };
 

@@ -190,17 +190,19 @@ TEST(FileThatIsPlayed, IsNoStreamWhileItIsEmpty) {
   EXPECT_TRUE(client.next_of("frame"));
 }
 
+std::set<std::string> frames_in(const std::filesystem::path& file) {
+  std::set<std::string> out;  // by their bytes
+  for (const Bytes& cdr : recorded_frames(file))
+    if (const auto frame = read_frame_cdr(cdr)) out.emplace(frame->data.begin(), frame->data.end());
+  return out;
+}
+
 TEST(FileThatIsPlayed, IsTheOneThatWasMovedInItsPlace) {
   const TempFolder folder;
   const std::filesystem::path file = folder / "face.mcap", other = folder / "other.mcap";
   record_face(file, 2000, 60);
   record_face(other, 5000, 40);
-  std::set<std::string> others;  // frames, by their bytes
-  for (const Bytes& cdr : recorded_frames(other)) {
-    const auto frame = read_frame_cdr(cdr);
-    ASSERT_TRUE(frame);
-    others.emplace(frame->data.begin(), frame->data.end());
-  }
+  const std::set<std::string> others = frames_in(other);
   Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
   const auto port = viewer_port(web);
   ASSERT_NE(port, 0) << web.err();
@@ -223,6 +225,103 @@ TEST(FileThatIsPlayed, IsTheOneThatWasMovedInItsPlace) {
   EXPECT_TRUE(eventually([&] { return next_is_of_other(before); })) << "who is there goes on with it";
   EXPECT_EQ(streams_at(port).at(0)["recording"], "recordings/face.mcap");
   EXPECT_EQ(request(port, "GET", "/recordings/face.mcap").body.size(), bytes);
+}
+
+/// All of `file` once more, as many bytes of it, as if it were recorded `later_ns` later; frames have other
+/// data.
+void write_like(const std::filesystem::path& file, std::int64_t later_ns, const std::filesystem::path& out) {
+  auto reader = RecordingReader::open(file);
+  ASSERT_TRUE(reader.ok());
+  auto writer = RecordingWriter::create(out, {});
+  ASSERT_TRUE(writer.ok());
+  const RecordingSummary& summary = (*reader)->summary();
+  for (const RecordingChannel& channel : summary.channels) {
+    const auto schema = std::ranges::find(summary.schemas, channel.schema, &RecordingSchema::name);
+    ASSERT_TRUE((*writer)->add_channel(*schema, channel));
+  }
+  for (auto message = (*reader)->next(); message && *message; message = (*reader)->next()) {
+    RecordedMessage& m = **message;
+    m.log_time_ns += later_ns;
+    if (later_ns > 0 && summary.channels[m.channel].topic == "relievo/frame") m.data.back() ^= 0xff;
+    ASSERT_TRUE((*writer)->write(m).ok());
+  }
+  ASSERT_TRUE((*writer)->finish().ok());
+}
+
+void write_over(const std::filesystem::path& file, const std::string& content) {
+  std::fstream(file, std::ios::binary | std::ios::in | std::ios::out) << content;
+}
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// In place, with exactly as many bytes: the index of before is none of it.
+TEST(FileThatIsPlayed, IsTheOneThatWasWrittenOverIt) {
+  const TempFolder folder;
+  const std::filesystem::path recorded = folder / "recorded.mcap", file = folder / "face.mcap",
+                              other = folder / "other.mcap";
+  record_face(recorded, 2000, 60);
+  write_like(recorded, 0, file);
+  write_like(recorded, 3'600'000'000'000, other);
+  const std::set<std::string> others = frames_in(other);
+  const std::string content = content_of(other);
+  ASSERT_EQ(content.size(), std::filesystem::file_size(file));
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  WsClient client(port, "face");
+  ASSERT_TRUE(client.credit(1));
+  ASSERT_TRUE(client.next_of("frame"));
+  write_over(file, content);
+  EXPECT_TRUE(eventually([&] { return web.err().find("is another file now") != std::string::npos; }))
+      << web.err();
+  EXPECT_TRUE(eventually([&] {
+    constexpr std::size_t kPrefix = 48;
+    const auto frame = client.credit(1) ? client.next_of("frame") : std::nullopt;
+    return frame && others.contains(frame->data.substr(kPrefix));
+  })) << "who is there goes on with it";
+  EXPECT_EQ(request(port, "GET", "/recordings/face.mcap").body, content);
+}
+
+// Of one that is being written, by more than there was, so that it looks like its growth.
+TEST(FileThatIsPlayed, IsTheOneThatWasWrittenOverItWhereItGrew) {
+  const TempFolder folder;
+  const std::filesystem::path recorded = folder / "recorded.mcap", file = folder / "face.mcap",
+                              other = folder / "other.mcap";
+  record_face(recorded, 2000, 60);
+  write_like(recorded, 3'600'000'000'000, other);
+  const std::string content = content_of(other);
+  std::ofstream(file, std::ios::binary) << content_of(recorded).substr(0, content.size() * 3 / 4);
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  write_over(file, content);
+  EXPECT_TRUE(eventually([&] { return web.err().find("is another file now") != std::string::npos; }))
+      << web.err();
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/recordings/face.mcap").body == content; }));
+}
+
+// Where its writer is killed within the message indexes behind a chunk, which is whole.
+TEST(FileThatIsPlayed, HasItsLastChunkWhereNothingComesBehindIt) {
+  const TempFolder folder;
+  const std::filesystem::path recorded = folder / "recorded.mcap", file = folder / "face.mcap";
+  record_face(recorded, 2000, 90);
+  const std::string content = content_of(recorded);
+  std::uint64_t summary = 0;
+  std::memcpy(&summary, content.data() + content.size() - 8 - 20, sizeof summary);
+  std::ofstream(file, std::ios::binary) << content.substr(0, summary - 13 - 20);
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  EXPECT_TRUE(eventually([&] {
+    const Response got = request(port, "GET", "/recordings/face.mcap");
+    EXPECT_EQ(got.status, 200) << "it is there all the time";
+    std::ofstream(folder / "have.mcap", std::ios::binary) << got.body;
+    return recorded_frames(folder / "have.mcap").size() == 90;
+  }));
+  EXPECT_EQ(info(folder / "have.mcap")["recovered"], false) << "it has an index";
+  EXPECT_EQ(web.err().find("is another file now"), std::string::npos);
 }
 
 TEST(FileThatIsPlayed, IsNoStreamWhereWhatWasMovedInItsPlaceIsNoRecording) {

@@ -123,14 +123,45 @@ TEST_F(Following, AChunkThatIsNotAllThereIsBehindTheOneBeforeIt) {
   }
 }
 
-TEST_F(Following, ReadsNothingTwice) {
+/// As of a writer that was killed: a file that is opened now has all of that chunk.
+TEST_F(Following, AChunkWhoseMessageIndexesAreNotAllThereIsHeldBack) {
   write_to(data_bytes());
-  ASSERT_TRUE(follower_.look());
-  const std::uint64_t bytes = follower_.growing()->bytes();
+  ASSERT_EQ(*follower_.look(), Found::kMore);
+  const std::uint64_t chunk_end = follower_.growing()->bytes();
+  for (const std::uint64_t less : {std::uint64_t{1}, std::uint64_t{30}}) {
+    write_to(chunk_end - less);
+    RecordingFollower cut(file_);
+    EXPECT_EQ(*cut.look(), Found::kMore);
+    EXPECT_EQ(*cut.look(), Found::kNothing);
+    EXPECT_LT(cut.growing()->bytes(), chunk_end);
+    EXPECT_TRUE(cut.holds_back());
+    write_to(whole().size());
+    EXPECT_EQ(*cut.look(), Found::kFinished) << "it was not killed";
+    EXPECT_FALSE(cut.holds_back());
+  }
+}
+
+TEST_F(Following, AnotherOneThatIsWrittenOverItIsToldFromIt) {
+  write_sample(folder_ / "other.mcap", 23, 41);
+  const Bytes other = read_file(folder_ / "other.mcap");
+  for (const std::size_t size : {data_bytes() / 2, data_bytes(), whole().size()}) {
+    write_to(size);
+    RecordingFollower follower(file_);
+    ASSERT_TRUE(follower.look());
+    const std::uint64_t bytes = follower.growing()->bytes();
+    write_file(file_, std::span(other).first(size));
+    EXPECT_EQ(*follower.look(), Found::kAnother) << size;
+    EXPECT_EQ(follower.growing()->bytes(), bytes) << "nothing of the other is among it";
+  }
+}
+
+TEST_F(Following, ReadsNothingTwiceButTheHeadsOfTwoChunks) {
+  write_to(data_bytes());
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(follower_.look());
   Bytes other(whole().begin(), whole().begin() + static_cast<std::ptrdiff_t>(data_bytes()));
-  std::fill(other.begin(), other.begin() + static_cast<std::ptrdiff_t>(bytes), 0xee);
+  std::fill(other.begin(), other.begin() + 80, 0xee);
   write_file(file_, other);
-  EXPECT_TRUE(follower_.look()) << "what is done with is not looked at again";
+  EXPECT_EQ(*follower_.look(), Found::kNothing) << "what is done with is not looked at again";
 }
 
 TEST_F(Following, DamageEndsItAndWhatWasWholeStays) {
