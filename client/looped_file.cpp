@@ -25,6 +25,10 @@ Result<FoundRecording> FoundRecording::open(const std::string& file) {
   const FileMark mark = mark_of(file);  // before: a file that comes between is found to be another
   auto recorded = RecordedStream::open(file, "");
   if (!recorded) return recorded.error();
+  const bool may_grow = recorded->summary().recovered && utc_now_ns() - mark.time_ns <= kLeft_ns;
+  if (recorded->frames() == 0 && !may_grow)
+    return Error{file + " holds no frame" +
+                 (recorded->summary().recovered ? ": it was cut short before one was recorded" : "")};
   return FoundRecording{file, mark, *std::move(recorded)};
 }
 
@@ -92,7 +96,7 @@ void LoopedFile::look() {
     if (gone && playing_) return gateway_.offer(playing_->name, {});  // played on as far as it is open
     return leave();
   }
-  const bool was_cut = playing_ && was_cut_in_a_chunk(mark);
+  const bool was_cut = playing_ && was_left_unread(mark);
   if (playing_ && (was_cut || is_another(mark))) leave();
   if (!playing_) take_up(mark, was_cut);
   seen_ = mark;
@@ -106,10 +110,12 @@ bool LoopedFile::is_another(const FileMark& mark) const {
   return playing_->follower ? mark.bytes < seen_.bytes : mark != mine;
 }
 
-/// Of a writer that was killed behind a chunk's messages: who opens the file now has all of them.
-bool LoopedFile::was_cut_in_a_chunk(const FileMark& mark) const {
-  return playing_->follower && playing_->follower->holds_back() && utc_now_ns() - mark.time_ns > kLeft_ns &&
-         steady_now_ns() - playing_->came_ns > kLeft_ns;
+/// Of a writer that was killed behind a chunk's messages: who opens the file now has all of them. Or before
+/// the first chunk: it has nothing to open.
+bool LoopedFile::was_left_unread(const FileMark& mark) const {
+  const auto& follower = playing_->follower;
+  return follower && (follower->holds_back() || follower->growing()->bytes() == 0) &&
+         utc_now_ns() - mark.time_ns > kLeft_ns && steady_now_ns() - playing_->came_ns > kLeft_ns;
 }
 
 void LoopedFile::take_up(const FileMark& mark, bool was_cut) {
@@ -141,7 +147,7 @@ void LoopedFile::offer() {
     offered.growing = follower->growing();
     offered.has_index = found && *found == RecordingFollower::Found::kFinished;
     // With a chunk that is held back something is yet to come, from whoever wrote it or by
-    // was_cut_in_a_chunk(): pages ask for it once this no longer grows.
+    // was_left_unread(): pages ask for it once this no longer grows.
     const bool is_awaited = follower->holds_back() || now_ns - playing_->came_ns < kLeft_ns;
     offered.grows = found && !offered.has_index && is_awaited;
   }

@@ -24,7 +24,8 @@ struct FoundRecording {
   FileMark mark;
   RecordedStream recorded;
 
-  /// Fails as RecordedStream::open() does, of the file's only stream.
+  /// Fails as RecordedStream::open() does, of the file's only stream; and where no frame is in it, nor will
+  /// be.
   static Result<FoundRecording> open(const std::string& file);
 };
 
@@ -51,7 +52,7 @@ class LoopedFile {
   void take_up(const FileMark& mark, bool was_cut);
   void offer();
   bool is_another(const FileMark& mark) const;
-  bool was_cut_in_a_chunk(const FileMark& mark) const;
+  bool was_left_unread(const FileMark& mark) const;
   void tell_of(const std::string& missing);
   void run(Playing& playing);
   Status publish(const Playing& playing, const RawSample& sample);

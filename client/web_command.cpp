@@ -77,6 +77,16 @@ Result<Inputs> sort_inputs(const std::vector<std::string>& names) {
   return inputs;
 }
 
+/// What a page says while there is no stream.
+std::string empty_hint(const Inputs& inputs, const DomainOptions& domain) {
+  if (!inputs.live.empty())
+    return "No live stream in DDS domain " + std::to_string(domain.domain) +
+           " yet: start relievo-server serve there.";
+  std::string files;
+  for (const FoundRecording& found : inputs.files) files += (files.empty() ? "" : ", ") + found.file;
+  return "Nothing of " + files + " can be played now: relievo web says why where it was started.";
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto address = parse_listen_address(options.listen);
   if (!address) return address.error();
@@ -88,8 +98,7 @@ Status run(const Options& options, StopSignal& stop) {
       {.host = address->host,
        .port = address->port,
        .web = *options.web,
-       .empty_hint = "No live stream in DDS domain " + std::to_string(options.domain->domain) +
-                     " yet: start relievo-server serve there.",
+       .empty_hint = empty_hint(*inputs, *options.domain),
        .key_frame_wanted = [&](const std::string& stream) { wishes.wish(stream); },
        .refused_peers = refused_peers,
        .samples = SampleFormat{.type_name = topic_type(Topic::kFrame).type_name,

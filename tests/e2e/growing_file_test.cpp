@@ -324,6 +324,30 @@ TEST(FileThatIsPlayed, HasItsLastChunkWhereNothingComesBehindIt) {
   EXPECT_EQ(web.err().find("is another file now"), std::string::npos);
 }
 
+// What was recorded is described at the begin of the file, so that it looks as if there were a stream.
+TEST(FileThatIsPlayed, IsNoStreamWhereItWasCutBeforeTheFirstFrame) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder / "face.mcap", cut = folder / "cut.mcap";
+  record_face(file, 2000, 60);
+  const std::string content = content_of(file);
+  constexpr char kChunk = 6;
+  std::size_t at = 8;
+  for (std::uint64_t bytes = 0; content.at(at) != kChunk; at += 9 + bytes)
+    std::memcpy(&bytes, content.data() + at + 1, sizeof bytes);
+  std::ofstream(cut, std::ios::binary) << content.substr(0, at + 100);
+  Process web({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  const auto port = viewer_port(web);
+  ASSERT_NE(port, 0) << web.err();
+  std::filesystem::rename(cut, file);
+  EXPECT_TRUE(eventually([&] { return web.err().find("holds no frame") != std::string::npos; })) << web.err();
+  EXPECT_TRUE(streams_at(port).empty()) << streams_at(port).dump();
+  const auto anew = run({program("relievo"), "web", file, "--listen", "127.0.0.1:0"});
+  EXPECT_EQ(anew.status, 1);
+  EXPECT_NE(anew.err.find("cut short before"), std::string::npos) << anew.err;
+  const Json list = Json::parse(request(port, "GET", "/api/streams").body);
+  EXPECT_NE(list["hint"].get<std::string>().find("face.mcap"), std::string::npos) << list.dump();
+}
+
 TEST(FileThatIsPlayed, IsNoStreamWhereWhatWasMovedInItsPlaceIsNoRecording) {
   const TempFolder folder;
   const std::filesystem::path file = folder / "face.mcap", other = folder / "other";
