@@ -3,7 +3,6 @@
 
 #include <dds/dds.h>
 
-#include <cstddef>
 #include <utility>
 
 #include "idl/domain.h"
@@ -92,7 +91,7 @@ class DdsRosPublisher final : public RosPublisher {
       return take_entity(dds_create_reader(group, topic->get(), qos.get(), nullptr), "reader");
     };
     // Null strings and sequences of nothing: one of them all.
-    const std::vector<std::max_align_t> nothing(type.m_size / sizeof(std::max_align_t) + 1);
+    const Bytes nothing(type.m_size);
     auto raw = RawType::find(participant, reader_in, writer_in, nothing.data());
     if (!raw) return raw.error();
     auto writer = writer_in(participant);
