@@ -149,6 +149,9 @@ TEST_F(Ros, ABagAppearsWholeOrNotAtAll) {
   EXPECT_THAT(folder.err, HasSubstr("is a folder"));
   std::filesystem::remove(bag_);
   EXPECT_EQ(exported(file, "ros2", bag_, {"--from", "99"}).status, 1);
+  const Finished nowhere = exported(file, "ros2", folder_.path() / "none" / "bag.mcap");
+  EXPECT_EQ(nowhere.status, 1);
+  EXPECT_THAT(nowhere.err, HasSubstr("none/bag.mcap: there is no such folder"));
   const Finished onto = exported(file, "ros2", file);
   EXPECT_EQ(onto.status, 1);
   EXPECT_EQ(names_in(folder_.path()), (std::set<std::string>{"a.mcap", "take"})) << "nothing half-written";
