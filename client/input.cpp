@@ -35,6 +35,13 @@ Result<bool> is_file(const std::string& input) {
   return Error{"there is no file " + input};
 }
 
+void check_stream(const std::string& name) {
+  if (!valid_stream_name(name)) throw CLI::ValidationError("stream", "'" + name + "' cannot name a stream");
+  if (name.ends_with(".mcap") && is_recording(name))
+    throw CLI::ValidationError(
+        "stream", name + " is a recording, and this is of live streams: `relievo play` makes one of it");
+}
+
 void check_given(const CLI::App& app, const std::string& input, const OptionsOfInputs& options) {
   const auto file = is_file(input);
   if (!file) return;  // which is a failure, and not of its usage

@@ -17,6 +17,10 @@ namespace relievo {
 /// recording does is one (`./name` is a file in any case). Fails where it can be neither.
 Result<bool> is_file(const std::string& input);
 
+/// For CLI::App::final_callback, of what can only be a live stream: it is wrong usage where no stream is
+/// called so, or where it is a recording by its name, too.
+void check_stream(const std::string& name);
+
 /// Options that say nothing of the other kind of input.
 struct OptionsOfInputs {
   std::vector<std::string> of_files, of_streams;

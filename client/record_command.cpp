@@ -15,6 +15,7 @@
 #include "cli/progress.h"
 #include "cli/recording_flags.h"
 #include "client/commands.h"
+#include "client/input.h"
 #include "client/options.h"
 #include "idl/recorder.h"
 
@@ -189,8 +190,7 @@ Command record_command() {
             "foxglove.SceneUpdate, which generic viewers show, in many times the bytes");
         app.add_flag("--json", options->json, "Print the result as JSON");
         app.final_callback([options] {
-          if (!valid_stream_name(options->stream))
-            throw CLI::ValidationError("stream", "'" + options->stream + "' cannot name a stream");
+          check_stream(options->stream);
           if (const auto all = recording_options(*options->recording); !all)
             throw CLI::ValidationError("--keep-size, --keep-for", all.error().message);
         });

@@ -13,6 +13,7 @@
 #include "base/log.h"
 #include "cli/checks.h"
 #include "client/commands.h"
+#include "client/input.h"
 #include "client/latest_frame.h"
 #include "client/options.h"
 #include "client/ros/messages.h"
@@ -130,10 +131,7 @@ Command ros2_command() {
             "--in-plain", options->in_plain,
             "Of a stream that is encrypted: ROS has no keys of ours, and all may hear what it hears");
         app.add_flag("--json", options->json, "At the end, what was sent as JSON");
-        app.final_callback([options] {
-          if (!valid_stream_name(options->stream))
-            throw CLI::ValidationError("stream", "'" + options->stream + "' cannot name a stream");
-        });
+        app.final_callback([options] { check_stream(options->stream); });
         app.footer(
             "Examples:\n"
             "  relievo ros2 face\n"

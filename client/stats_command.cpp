@@ -10,6 +10,7 @@
 #include "base/time.h"
 #include "cli/checks.h"
 #include "client/commands.h"
+#include "client/input.h"
 #include "client/live_reader.h"
 #include "client/options.h"
 
@@ -139,10 +140,7 @@ Command stats_command() {
         app.add_option("--seconds", options->seconds, "End after so long (default: at Ctrl-C)")
             ->check(number(0.1, 1e9));
         app.add_flag("--json", options->json, "One JSON object at the end instead of a line a second");
-        app.final_callback([options] {
-          if (!valid_stream_name(options->stream))
-            throw CLI::ValidationError("stream", "'" + options->stream + "' cannot name a stream");
-        });
+        app.final_callback([options] { check_stream(options->stream); });
         app.footer(
             "Latency is from the capture until the frame is decoded here, with the difference of the two\n"
             "machines' clocks taken out (clock: how far the server's is ahead).\n\n"

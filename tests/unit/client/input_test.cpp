@@ -4,6 +4,7 @@
 #include "client/input.h"
 
 #include <gtest/gtest.h>
+#include <CLI/CLI.hpp>
 
 #include <filesystem>
 #include <fstream>
@@ -41,6 +42,28 @@ TEST(Input, RecordingsAreFilesAndNothingElseHidesAStream) {
   EXPECT_STREQ(says("face.mcap"), "file") << "likewise";
   for (const char* none : {"none.mcap", "face/none", "no stream", ""})
     EXPECT_STREQ(says(none), "neither") << none;
+  fs::current_path(before);
+}
+
+// It was waited for as if somebody might still call a stream so.
+TEST(Input, ARecordingIsNoLiveStreamsName) {
+  const test::TempFolder folder;
+  const fs::path before = fs::current_path();
+  fs::current_path(folder.path());
+  std::ofstream("face") << "\x89MCAP0\r\nand more";
+  fs::copy_file("face", "face.mcap");
+  const auto refused = [](const std::string& name) {
+    try {
+      check_stream(name);
+      return std::string();
+    } catch (const CLI::ValidationError& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_EQ(refused("face"), "") << "what was recorded of a stream may be called like it";
+  EXPECT_EQ(refused("other.mcap"), "");
+  EXPECT_NE(refused("face.mcap").find("`relievo play`"), std::string::npos);
+  EXPECT_NE(refused("a/b").find("cannot name a stream"), std::string::npos);
   fs::current_path(before);
 }
 
