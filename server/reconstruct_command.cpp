@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -45,6 +47,7 @@ struct Totals {
   Scheme scheme{};
   std::uint64_t frames = 0, white = 0, textures = 0, unreadable = 0, reconstructed = 0, same_slide = 0,
                 vertices = 0, boundaries = 0, matched = 0;
+  double most_excess = 0;  // of brightness of one exposure
   FilterCounts filters;
   RollingMedian detect_ms, match_ms, triangulate_ms, surface_ms, texture_ms, total_ms;
 };
@@ -53,6 +56,7 @@ void count(const ReconstructReport& report, double total_ms, Totals& totals) {
   totals.boundaries += report.boundaries;
   totals.matched += report.matched;
   totals.filters += report.filters;
+  totals.most_excess = std::max(totals.most_excess, std::fabs(report.slide_excess));
   totals.detect_ms.add(report.detect_ms);
   totals.match_ms.add(report.match_ms);
   totals.triangulate_ms.add(report.triangulate_ms);
@@ -79,6 +83,7 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
                                 {"unreadable", t.unreadable},
                                 {"same_slide", t.same_slide},
                                 {"step", step},
+                                {"most_excess", t.most_excess},
                                 {"vertices_per_frame", per_frame},
                                 {"boundaries", t.boundaries},
                                 {"decoded", t.matched},
@@ -111,6 +116,12 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
   if (steps.status().mixed > 0) {
     std::printf("%llu frames dropped for mixed exposures: %s\n",
                 static_cast<unsigned long long>(steps.status().mixed), steps.advice().c_str());
+  }
+  if (t.most_excess > 0.03) {
+    std::printf(
+        "exposures up to %.1f %% brighter than the frame's other one, which was taken out: lamps that "
+        "flicker?\n",
+        100 * t.most_excess);
   }
   if (t.reconstructed > 0) print_filters(t.filters, t.reconstructed);
 }

@@ -20,6 +20,7 @@ using Json = nlohmann::ordered_json;
 constexpr float kMarginNeeded = 20;    // tc of 5.2.2
 constexpr double kClippedMost = 0.01;  // of the picture
 constexpr int kBrightLeast = 100;      // grey levels that the brightest hundredth should reach
+constexpr double kExcessMost = 0.03;   // of brightness of one exposure: what more costs is not all taken out
 constexpr double kLitLeast = 0.02;     // of the picture: less is stray light
 constexpr double kCoverageLeast = 0.85;
 constexpr double kOrderMost = 0.05;
@@ -132,6 +133,11 @@ std::vector<std::string> rig_advice(const TappedFrame& frame, const RigCheck& ch
                   " of 255 only: expose longer, raise the gain or open the iris");
   }
   if (!frame.step_advice.empty()) out.push_back(frame.step_advice);
+  if (const double excess = std::fabs(frame.report.slide_excess); excess > kExcessMost)
+    out.push_back(
+        "one exposure of a frame is " + percent(excess) +
+        " brighter than the other, which is taken out but for some noise: light with lamps on DC or by day, "
+        "or expose for whole periods of the mains, with the camera's automatic exposure switched off");
   if (frame.decoded && lit_share(check) < kLitLeast) {
     out.emplace_back(
         "no stripes arrive: is the projector on, does it show the pattern, and does the camera see where?");
@@ -160,7 +166,8 @@ std::string rig_report(const std::string& stream, const TappedFrame& frame, cons
         {"clipped_level", kClippedLevel},
         {"dark", check.exposure.dark},
         {"dark_level", kDarkLevel},
-        {"bright", bright_level(check.exposure)}}},
+        {"bright", bright_level(check.exposure)},
+        {"slide_excess", frame.report.slide_excess}}},
       {"margins", margins_json(check)},
       {"margin_needed", kMarginNeeded},
       {"noise", tenths(check.noise)},

@@ -25,8 +25,9 @@ class FieldBalance {
   const CapturedFrame& balance(const CapturedFrame& frame, WorkerPool& pool);
 
   /// By how much the slide's exposure of the frame read last was brighter, of the mean of both: per captured
-  /// channel. 0 where too few edges tell it.
-  const std::array<double, 3>& excess() const { return excess_; }
+  /// channel, and of all. 0 where too few edges tell it.
+  const std::array<double, 3>& excess_of_channels() const { return excess_; }
+  double excess() const { return (excess_[0] + excess_[1] + excess_[2]) / 3; }
 
  private:
   /// Two channels that cross zero at one boundary: by how much the second lies behind the first, and by how

@@ -180,7 +180,10 @@ Result<const CapturedFrame*> Reconstructor::State::observe(const CapturedFrame& 
   pair = pairs.read(seen(*frame), pool);
   report.white = pair == nullptr;
   if (pair == nullptr) return frame;
-  if (options.decoder != Decoder::kPaper) pair = &balance.balance(*pair, pool);
+  if (options.decoder != Decoder::kPaper) {
+    pair = &balance.balance(*pair, pool);
+    report.slide_excess = balance.excess();
+  }
   decoder.observe(*pair, pool, report);
   report.detect_ms = clock.lap_ms();
   return frame;

@@ -44,14 +44,16 @@ TEST(FieldBalance, TellsByHowMuchEachChannelIsBrighter) {
     CapturedFrame frame = filmed.frame(3);
     const CapturedFrame& level = balance.balance(frame, pool);
     EXPECT_EQ(&level, &frame) << scan << ": both exposures of one brightness";
-    for (const double excess : balance.excess()) EXPECT_NEAR(excess, 0, 4e-3) << scan;
+    for (const double excess : balance.excess_of_channels()) EXPECT_NEAR(excess, 0, 4e-3) << scan;
 
     scale_complement(frame, by);
     const CapturedFrame balanced = balance.balance(frame, pool).clone();
     for (std::size_t c = 0; c < 3; ++c)
-      EXPECT_NEAR(balance.excess()[c], 2 * (1 - by[c]) / (1 + by[c]), 8e-3) << scan << " channel " << c;
+      EXPECT_NEAR(balance.excess_of_channels()[c], 2 * (1 - by[c]) / (1 + by[c]), 8e-3)
+          << scan << " channel " << c;
     balance.balance(balanced, pool);
-    for (const double excess : balance.excess()) EXPECT_NEAR(excess, 0, 6e-3) << scan << ", what is left";
+    for (const double excess : balance.excess_of_channels())
+      EXPECT_NEAR(excess, 0, 6e-3) << scan << ", what is left";
   }
 }
 

@@ -48,6 +48,16 @@ TEST(RigAdvice, IsInSentences) {
   }
 }
 
+TEST(RigAdvice, LampsThatFlickerAreSaid) {
+  Looked looked(100);
+  looked.check.margins.clear();
+  looked.frame.report.slide_excess = -0.02;
+  EXPECT_THAT(rig_advice(looked.frame, looked.check), testing::IsEmpty());
+  looked.frame.report.slide_excess = -0.08;
+  EXPECT_THAT(rig_advice(looked.frame, looked.check),
+              ElementsAre(HasSubstr("is 8.0 % brighter than the other")));
+}
+
 TEST(RigAdvice, ARigThatIsNotCalibratedIsToBeCalibratedNotFocused) {
   Looked looked(13);
   looked.frame.calibrated = false;
