@@ -74,6 +74,7 @@ TEST_P(Scores, BunnyAsWellAsThePapersDecoder) {
   EXPECT_EQ(summary.value("frames", 0), 12);
   EXPECT_EQ(summary.value("reconstructed", 0), 11);
   EXPECT_EQ(summary.value("same_slide", 0), 1);
+  EXPECT_EQ(summary.value("most_excess", 1.0), 0) << "its exposures are of one brightness";
   EXPECT_EQ(files(), 11U);
 
   const json score = run_json({kPython, (shared() / "tools" / "score.py").string(), take.string(),
