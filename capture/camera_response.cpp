@@ -29,11 +29,7 @@ void CameraResponse::light_of(const std::uint8_t* values, int samples, float* li
 }
 
 void CameraResponse::straighten(const CapturedFrame& captured, WorkerPool& pool, CapturedFrame& out) const {
-  out.number = captured.number;
-  out.time_ns = captured.time_ns;
-  out.scan = captured.scan;
-  out.field_order = captured.field_order;
-  out.lost_before = captured.lost_before;
+  out.take_heading(captured);
   const auto whole = [&](const Image8& from, Image8& to) {
     fit_image(from.width(), from.height(), from.channels(), to);
     const int samples = from.width() * from.channels();

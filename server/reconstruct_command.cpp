@@ -117,7 +117,7 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
     std::printf("%llu frames dropped for mixed exposures: %s\n",
                 static_cast<unsigned long long>(steps.status().mixed), steps.advice().c_str());
   }
-  if (t.most_excess > 0.03) {
+  if (t.most_excess > ReconstructReport::kNotableExcess) {
     std::printf(
         "exposures up to %.1f %% brighter than the frame's other one, which was taken out: lamps that "
         "flicker?\n",

@@ -20,7 +20,6 @@ using Json = nlohmann::ordered_json;
 constexpr float kMarginNeeded = 20;    // tc of 5.2.2
 constexpr double kClippedMost = 0.01;  // of the picture
 constexpr int kBrightLeast = 100;      // grey levels that the brightest hundredth should reach
-constexpr double kExcessMost = 0.03;   // of brightness of one exposure: what more costs is not all taken out
 constexpr double kLitLeast = 0.02;     // of the picture: less is stray light
 constexpr double kCoverageLeast = 0.85;
 constexpr double kOrderMost = 0.05;
@@ -133,7 +132,7 @@ std::vector<std::string> rig_advice(const TappedFrame& frame, const RigCheck& ch
                   " of 255 only: expose longer, raise the gain or open the iris");
   }
   if (!frame.step_advice.empty()) out.push_back(frame.step_advice);
-  if (const double excess = std::fabs(frame.report.slide_excess); excess > kExcessMost)
+  if (const double excess = std::fabs(frame.report.slide_excess); excess > ReconstructReport::kNotableExcess)
     out.push_back(
         "one exposure of a frame is " + percent(excess) +
         " brighter than the other, which is taken out but for some noise: light with lamps on DC or by day, "

@@ -27,12 +27,13 @@ constexpr double kLeastExcess = 5e-3;  // less shifts no edge by what matters
 
 using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Matrix5 = Eigen::Matrix<float, 5, 5>;
-using Vector5 =
-    Eigen::Matrix<float, 5, 1>;  // offsets of red, green, blue; columns that green, blue lie behind red
+// Offsets of red, green and blue, and by how many columns green and blue lie behind red.
+using Vector5 = Eigen::Matrix<float, 5, 1>;
+
+using ChannelTables = std::array<std::array<std::uint8_t, 256>, 3>;
 
 /// out = row, each channel by its own table.
-void look_up(const std::uint8_t* row, int width, const std::array<std::array<std::uint8_t, 256>, 3>& tables,
-             std::uint8_t* out) {
+void look_up(const std::uint8_t* row, int width, const ChannelTables& tables, std::uint8_t* out) {
   for (int x = 0; x < width; ++x)
     for (std::size_t c = 0; c < 3; ++c)
       out[3 * x + static_cast<int>(c)] = tables[c][row[3 * x + static_cast<int>(c)]];
@@ -41,11 +42,10 @@ void look_up(const std::uint8_t* row, int width, const std::array<std::array<std
 }  // namespace
 
 FieldBalance::FieldBalance(const std::array<double, 9>& colour_matrix) {
-  constexpr float kScale =
-      1.F / 32;  // FieldRows are twice, and after the low-pass 32 times, what the fields hold
   const Matrix3 mixing = Matrix3(Eigen::Map<const Matrix3>(colour_matrix.data())).inverse();
   Eigen::Map<Matrix3>(mixing_.data()) = mixing;
-  for (std::size_t i = 0; i < 9; ++i) weights_.colour[i] = static_cast<float>(colour_matrix[i]) * kScale;
+  for (std::size_t i = 0; i < 9; ++i)
+    weights_.colour[i] = static_cast<float>(colour_matrix[i]) / RowKernels::kLowPassed;
   weights_.luma = {};
 }
 
@@ -144,8 +144,7 @@ std::array<double, 3> FieldBalance::offsets() {
   return {found[0], found[1], found[2]};
 }
 
-const CapturedFrame& FieldBalance::balance(const CapturedFrame& frame, WorkerPool& pool) {
-  const DetectionLines lines(frame);
+void FieldBalance::measure(const DetectionLines& lines) {
   const int width = lines.own.width;
   const auto row = static_cast<std::size_t>(3 * width);
   rows_.resize(5 * row);
@@ -156,7 +155,7 @@ const CapturedFrame& FieldBalance::balance(const CapturedFrame& frame, WorkerPoo
   residuals_.reserve(pairs_.capacity());
   pairs_.clear();
   excess_ = {};
-  if (lines.other.empty()) return frame;
+  if (lines.other.empty()) return;
   for (int i = 0; i < kLines && (i < kLeastLines || pairs_.size() < kEnoughPairs); ++i) {
     const int place = kStride * i % kLines;
     read_line(lines, (2 * place + 1) * lines.own.height / (2 * kLines));
@@ -167,12 +166,11 @@ const CapturedFrame& FieldBalance::balance(const CapturedFrame& frame, WorkerPoo
   const Eigen::Vector3d of_captured = mixing * Eigen::Map<const Eigen::Vector3d>(offset.data());
   const Eigen::Vector3d white = mixing.rowwise().sum();
   for (int c = 0; c < 3; ++c) excess_[static_cast<std::size_t>(c)] = 2 * of_captured[c] / white[c];
-  if (std::all_of(excess_.begin(), excess_.end(), [](double e) { return std::fabs(e) < kLeastExcess; }))
-    return frame;
+}
 
-  // The brighter one is made darker, so that nothing saturates.
-  std::array<std::array<std::array<std::uint8_t, 256>, 3>, 2>
-      tables;  // of the slide's and of the other exposure
+/// The brighter one is made darker, so that nothing saturates.
+void FieldBalance::darken(const CapturedFrame& frame, WorkerPool& pool) {
+  std::array<ChannelTables, 2> tables;  // of the slide's and of the other exposure
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t exposure = 0; exposure < 2; ++exposure) {
       const double more = std::clamp(exposure == 0 ? excess_[c] : -excess_[c], 0.0, 1.0);
@@ -182,22 +180,25 @@ const CapturedFrame& FieldBalance::balance(const CapturedFrame& frame, WorkerPoo
             static_cast<std::uint8_t>(std::lround(share * static_cast<double>(value)));
     }
   }
-  balanced_.number = frame.number;
-  balanced_.time_ns = frame.time_ns;
-  balanced_.scan = frame.scan;
-  balanced_.field_order = frame.field_order;
-  balanced_.lost_before = frame.lost_before;
+  balanced_.take_heading(frame);
   const bool interlaced = frame.scan == Scan::kInterlaced;
   const auto each_row = [&](const Image8& from, Image8& to, const auto& exposure_of) {
     fit_image(from.width(), from.height(), from.channels(), to);
     pool.for_ranges(from.height(), [&](int begin, int end, int) {
-      for (int y = begin; y < end; ++y) look_up(from.row(y), width, tables[exposure_of(y)], to.row(y));
+      for (int y = begin; y < end; ++y) look_up(from.row(y), from.width(), tables[exposure_of(y)], to.row(y));
     });
   };
-  const std::size_t even = interlaced && !lines.shows_slide ? 1 : 0;
+  const std::size_t even = interlaced && frame.field_order == FieldOrder::kBottom ? 1 : 0;
   each_row(frame.picture, balanced_.picture,
            [&](int y) { return interlaced && y % 2 == 1 ? 1 - even : even; });
   if (!interlaced) each_row(frame.complement, balanced_.complement, [](int) { return std::size_t{1}; });
+}
+
+const CapturedFrame& FieldBalance::balance(const CapturedFrame& frame, WorkerPool& pool) {
+  measure(DetectionLines(frame));
+  if (std::all_of(excess_.begin(), excess_.end(), [](double e) { return std::fabs(e) < kLeastExcess; }))
+    return frame;
+  darken(frame, pool);
   return balanced_;
 }
 

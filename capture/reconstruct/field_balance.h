@@ -41,6 +41,8 @@ class FieldBalance {
     float column_px, rise_px;  // in which it rises by the exposures' sum
   };
 
+  void measure(const DetectionLines& lines);
+  void darken(const CapturedFrame& frame, WorkerPool& pool);
   void read_line(const DetectionLines& lines, int line);
   void pair_line(int width);
   std::array<double, 3> offsets();

@@ -65,8 +65,7 @@ void shift_row(const std::uint8_t* row, const float* motion_px, float share, int
 }  // namespace
 
 Differencer::Differencer(const std::array<double, 9>& colour_matrix) {
-  // FieldRows are twice, and after the low-pass 32 times, what the fields hold.
-  constexpr float kScale = 1.F / 32;
+  constexpr float kScale = 1 / RowKernels::kLowPassed;
   for (std::size_t i = 0; i < 9; ++i) {
     matrix_[i] = static_cast<float>(colour_matrix[i]);
     weights_.colour[i] = matrix_[i] * kScale;

@@ -39,6 +39,8 @@ struct ReconstructOptions {
 
 /// Milliseconds of each stage of the last frame, and what each decided.
 struct ReconstructReport {
+  static constexpr double kNotableExcess = 0.03;  // what more costs is not all taken out
+
   double detect_ms = 0, match_ms = 0, triangulate_ms = 0, surface_ms = 0, texture_ms = 0;
   std::size_t boundaries = 0;  // detected in this frame
   std::size_t matched = 0;     // of which decoded with the frame before

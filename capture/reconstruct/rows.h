@@ -59,6 +59,8 @@ struct PairProducts {
 /// Every pointer is to a row of its own; none overlap but where said. `samples` is 3 * width.
 struct RowKernels {
   static constexpr float kClearShare = 0.4F;
+  static constexpr float kLowPassed =
+      32;  // times what the fields hold: FieldRows, twice that, after low_pass()
   static constexpr int kPairBlock_px = 8;
   static constexpr float kAlike = 24;  // sum of three samples' differences: rows below it belong together
 

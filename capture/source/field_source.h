@@ -33,14 +33,20 @@ struct CapturedFrame {
   /// The exposure after it: the other rows of an interlaced picture, or the whole second picture.
   View8 complement_field() const { return scan == Scan::kInterlaced ? field(1) : complement.view(); }
 
+  /// All but the pictures, which stay.
+  void take_heading(const CapturedFrame& other) {
+    number = other.number;
+    time_ns = other.time_ns;
+    scan = other.scan;
+    field_order = other.field_order;
+    lost_before = other.lost_before;
+  }
   CapturedFrame clone() const {
-    return {.number = number,
-            .time_ns = time_ns,
-            .scan = scan,
-            .field_order = field_order,
-            .picture = picture.clone(),
-            .complement = complement.clone(),
-            .lost_before = lost_before};
+    CapturedFrame out;
+    out.take_heading(*this);
+    out.picture = picture.clone();
+    out.complement = complement.clone();
+    return out;
   }
 
  private:

@@ -421,7 +421,7 @@ TEST(Transport, FramesThatOvertookTheDescriptionWaitForIt) {
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "overtaken", inbox.callbacks(true)));
   ASSERT_TRUE(subscriber);
-  for (int server = 1; server <= 2; ++server) {  // the second one has another description
+  for (int server = 1; server <= 2; ++server) {  // the second one is not described by the first
     auto player = expect_made(RawPublisher::create(kDomain, "overtaken"));
     ASSERT_TRUE(player && wait_for_readers(*player, 1));
     publish_late_described(*player, samples);
