@@ -16,7 +16,8 @@ namespace {
 
 // How far into a file a description is looked for: it is received with the first frames.
 constexpr int kInfoWithinSamples = 1000;
-constexpr std::size_t kMostSaid = 20;  // damaged parts: a long file can have tens of thousands
+constexpr std::size_t kMostTopics = 5;  // that are named of another program's file
+constexpr std::size_t kMostSaid = 20;   // damaged parts: a long file can have tens of thousands
 
 std::optional<Topic> topic_of(const RecordingChannel& channel) {
   if (channel.message_encoding != "cdr") return std::nullopt;
@@ -37,6 +38,23 @@ std::string joined(const std::set<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
+}
+
+/// Of a file without a stream: what it is instead.
+std::string what_else(const RecordingSummary& summary) {
+  if (summary.channels.empty())
+    return summary.recovered ? ": it was cut short before anything was recorded" : ": it is empty";
+  const bool of_ros = std::ranges::any_of(
+      summary.schemas, [](const auto& schema) { return schema.encoding.starts_with("ros2"); });
+  std::set<std::string> topics;
+  for (const RecordingChannel& channel : summary.channels) topics.insert(channel.topic);
+  const std::size_t more = topics.size() > kMostTopics ? topics.size() - kMostTopics : 0;
+  while (topics.size() > kMostTopics) topics.erase(std::prev(topics.end()));
+  return ", but " + joined(topics) + (more > 0 ? " and " + std::to_string(more) + " more topics" : "") +
+         (of_ros
+              ? ": it is a bag of ROS 2, for `ros2 bag play -s mcap`; a stream is in the recording that it "
+                "was made of"
+              : ", of another program");
 }
 
 }  // namespace
@@ -88,10 +106,7 @@ Result<RecordedStream> RecordedStream::open(const std::filesystem::path& file, c
   for (const RecordingChannel& channel : summary.channels) {
     if (topic_of(channel) && !stream_of(channel).empty()) streams.insert(stream_of(channel));
   }
-  if (streams.empty()) {
-    return Error{file.string() + " holds no 3D video stream" +
-                 (summary.recovered ? ": it was cut short before anything was recorded" : "")};
-  }
+  if (streams.empty()) return Error{file.string() + " holds no 3D video stream" + what_else(summary)};
   if (stream.empty() && streams.size() > 1) {
     return Error{file.string() + " holds several streams: choose one with --stream (" + joined(streams) +
                  ")"};

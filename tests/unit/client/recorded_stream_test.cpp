@@ -13,6 +13,7 @@
 
 #include "base/time.h"
 #include "client/player.h"
+#include "client/ros/bag.h"
 #include "client/time_range.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
@@ -62,6 +63,30 @@ class RecordedStreamTest : public testing::Test {
   const std::filesystem::path file_ = folder_ / "a.mcap";
   std::optional<RecordedStream> stream_;
 };
+
+TEST_F(RecordedStreamTest, WhatIsNoneOfOursIsToldByWhatItHolds) {
+  auto bag = RosBag::create(folder_ / "bag.mcap", "my-face", std::nullopt);
+  ASSERT_TRUE(bag.ok()) << bag.error().message;
+  Frame3D frame;
+  frame.surface.positions.resize(3);
+  ASSERT_TRUE(bag->add(frame));
+  ASSERT_TRUE(bag->finish());
+  auto opened = RecordedStream::open(folder_ / "bag.mcap", "");
+  ASSERT_FALSE(opened.ok());
+  EXPECT_THAT(opened.error().message, HasSubstr("holds no 3D video stream, but "));
+  EXPECT_THAT(opened.error().message, HasSubstr("/my_face/points"));
+  EXPECT_THAT(opened.error().message, HasSubstr("a bag of ROS 2"));
+
+  auto writer = RecordingWriter::create(folder_ / "other.mcap", {});
+  ASSERT_TRUE(writer.ok());
+  for (int i = 0; i < 7; ++i)
+    ASSERT_TRUE(
+        (*writer)->add_channel({"T", "jsonschema", "{}"}, {"t" + std::to_string(i), "json", "T", {}}));
+  ASSERT_TRUE((*writer)->finish());
+  opened = RecordedStream::open(folder_ / "other.mcap", "");
+  ASSERT_FALSE(opened.ok());
+  EXPECT_THAT(opened.error().message, HasSubstr("t0, t1, t2, t3, t4 and 2 more topics, of another program"));
+}
 
 TEST_F(RecordedStreamTest, SeeksToTheKeyFrameThatATimeNeeds) {
   const std::pair<std::int64_t, std::uint64_t> cases[] = {
