@@ -108,4 +108,25 @@ Result<std::shared_ptr<const GrowingRecording>> index_cut_recording(const std::f
   return std::shared_ptr<const GrowingRecording>(std::make_shared<CutRecording>(bytes, std::move(indexes)));
 }
 
+bool may_hold_chunk(const std::filesystem::path& path) {
+  const auto file = mcap::File::open(path);
+  if (!file) return true;
+  const std::uint64_t size = (*file)->size();
+  const auto magic = (*file)->read(0, std::min<std::uint64_t>(size, mcap::kMagic.size()));
+  if (!magic || !std::equal(magic->begin(), magic->end(), mcap::kMagic.begin())) return true;
+  for (std::uint64_t at = mcap::kMagic.size(); at <= size && size - at >= mcap::kRecordHeaderBytes;) {
+    const auto head = (*file)->read(at, mcap::kRecordHeaderBytes);
+    if (!head) return true;
+    ByteReader reader(*head);
+    const auto op = static_cast<mcap::Op>(reader.read<std::uint8_t>());
+    const auto length = reader.read<std::uint64_t>();
+    if (static_cast<int>(op) == 0 || length > mcap::kMaxChunkBytes) return true;
+    at += mcap::kRecordHeaderBytes;
+    if (length > size - at) return false;
+    if (op == mcap::Op::kChunk) return true;
+    at += length;
+  }
+  return false;
+}
+
 }  // namespace relievo

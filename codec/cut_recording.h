@@ -16,4 +16,8 @@ namespace relievo {
 /// middle. Fails where it is no recording, or cannot be read.
 Result<std::shared_ptr<const GrowingRecording>> index_cut_recording(const std::filesystem::path& file);
 
+/// Whether there is anything to read in a file without an end, by the heads of its records up to the first
+/// chunk. True where it is no recording or damaged before that: what there is then takes more to find out.
+bool may_hold_chunk(const std::filesystem::path& file);
+
 }  // namespace relievo

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/json_text.h"
+#include "codec/cut_recording.h"
 #include "codec/mcap_records.h"
 
 namespace relievo {
@@ -102,12 +103,16 @@ HttpReply list(const RecordingControl& control) {
   });
   if (found.size() > kMostListed) found.resize(kMostListed);
   Json list = Json::array();
-  for (const Found& f : found)
+  for (const Found& f : found) {
+    const fs::path file = control.folder() / f.name;
+    const bool cut = !f.recording && !has_end(file);
+    if (cut && !may_hold_chunk(file)) continue;  // nothing to see
     list.push_back({{"file", f.name},
                     {"bytes", f.bytes},
                     {"modified_ns", f.modified_ns},
                     {"recording", f.recording},
-                    {"cut", !f.recording && !has_end(control.folder() / f.name)}});
+                    {"cut", cut}});
+  }
   return json({{"recordings", std::move(list)}});
 }
 

@@ -227,17 +227,22 @@ TEST_F(RecordingApi, WhatACrashCutShortIsListedSoAndNoCacheKeepsIt) {
     return request(port, "GET", "/recordings/" + file).headers.at("cache-control");
   };
   ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(control.grow());
   EXPECT_EQ(cut("face-1.mcap"), false) << "it is being written";
   ASSERT_EQ(post_json(port, kFace, kStop).status, 200);
   const std::string content = content_of(folder / "face-1.mcap");
   EXPECT_EQ(cut("face-1.mcap"), false);
   EXPECT_EQ(kept("face-1.mcap"), "max-age=0, s-maxage=300");
-  for (const std::size_t bytes : {std::size_t{0}, std::size_t{8}, content.size() / 2, content.size() - 1}) {
+  const std::size_t nothing_whole = content.find(std::string(100, 7)) + 100;
+  for (const std::size_t bytes :
+       {std::size_t{0}, std::size_t{8}, nothing_whole, content.size() / 2, content.size() - 1}) {
     std::ofstream(folder / "cut.mcap", std::ios::binary) << content.substr(0, bytes);
-    EXPECT_EQ(cut("cut.mcap"), true) << bytes;
+    EXPECT_EQ(cut("cut.mcap"), bytes > nothing_whole ? Json(true) : Json()) << bytes;
     EXPECT_EQ(kept("cut.mcap"), "no-cache") << bytes;
     EXPECT_EQ(request(port, "GET", "/recordings/cut.mcap").body, content.substr(0, bytes));
   }
+  std::ofstream(folder / "cut.mcap", std::ios::binary) << "no recording at all";
+  EXPECT_EQ(cut("cut.mcap"), true) << "damaged, perhaps";
   std::ofstream(folder / "cut.mcap", std::ios::binary) << content;
   EXPECT_EQ(cut("cut.mcap"), false) << "mended";
   EXPECT_EQ(kept("cut.mcap"), "max-age=0, s-maxage=300");
