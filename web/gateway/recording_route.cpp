@@ -102,12 +102,12 @@ std::optional<Version> version_now(const struct stat& file, const GrowingRecordi
   return end ? std::optional(growing_version(file, bytes, std::move(end))) : std::nullopt;
 }
 
-/// As version_with(), also where a program wrote it that has ended since: this one before it was started
-/// again, say.
+/// As version_with(), also of a file that is written no more. How that grew is read from itself: it may be
+/// another by now than its writer, which is done with it, remembers.
 std::optional<Version> version_with(const std::string& etag, const struct stat& file, const Asked& asked) {
   const OfferedRecording& recording = asked.recording;
-  if (auto version = version_with(etag, file, recording.growing.get())) return version;
-  if (!recording.has_index || growing_bytes(etag, file) == 0) return std::nullopt;
+  if (!recording.has_index) return version_with(etag, file, recording.growing.get());
+  if (growing_bytes(etag, file) == 0) return std::nullopt;
   return version_with(etag, file, asked.cuts.growth_of(recording.file, file).get());
 }
 
