@@ -22,7 +22,7 @@ constexpr std::int64_t kLeft_ns = 5 * kNanosecondsPerSecond;  // nobody writes a
 }  // namespace
 
 Result<FoundRecording> FoundRecording::open(const std::string& file) {
-  const FileMark mark = mark_of(file);  // before: a file that comes between is found to be another
+  const FileMark mark = settled_mark_of(file);  // before: a file that comes between is found to be another
   auto recorded = RecordedStream::open(file, "");
   if (!recorded) return recorded.error();
   const bool may_grow = recorded->summary().recovered && utc_now_ns() - mark.time_ns <= kLeft_ns;

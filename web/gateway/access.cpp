@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <boost/asio/ssl/context.hpp>
+#include <chrono>
 #include <ctime>
 #include <limits>
 #include <sstream>
+#include <thread>
 
 #include "base/log.h"
 #include "base/secret_file.h"
@@ -81,6 +83,15 @@ FileMark mark_of(const struct stat& file) {
           .bytes = static_cast<std::uint64_t>(file.st_size),
           .inode = file.st_ino,
           .device = file.st_dev};
+}
+
+FileMark settled_mark_of(const std::filesystem::path& file) {
+  constexpr std::int64_t kTick_ns = 20'000'000;  // longer than any clock takes by which files' times go
+  const FileMark mark = mark_of(file);
+  const std::int64_t age_ns = utc_now_ns() - mark.time_ns;
+  if (age_ns < 0 || age_ns > kTick_ns) return mark;
+  std::this_thread::sleep_for(std::chrono::nanoseconds(kTick_ns - age_ns));
+  return mark_of(file);
 }
 
 Result<Tokens> Tokens::load(const std::filesystem::path& file) {

@@ -29,6 +29,10 @@ struct FileMark {
 };
 FileMark mark_of(const std::filesystem::path& file);
 FileMark mark_of(const struct stat& file);
+/// One that differs once the file is written to again: what is written within the tick of the change before
+/// leaves the same time, so this waits it out, 20 ms at most. Of a file that is being written there may be
+/// none.
+FileMark settled_mark_of(const std::filesystem::path& file);
 
 /// Tokens that open a gateway, from a file that may change.
 class Tokens {

@@ -3,6 +3,8 @@
 // has one gets in by a header, a cookie or once by the address.
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <filesystem>
 #include <fstream>
 
 #include "tests/support/temp_folder.h"
@@ -16,6 +18,23 @@ const std::string kToken = "correct-horse-battery";
 
 std::string bearer(const std::string& token) {
   return "Authorization: Bearer " + token + "\r\n";
+}
+
+TEST(FileMarks, AreOthersWhereAFileIsWrittenToWithinATickOfItsTime) {
+  const TempFolder folder;
+  const auto file = folder / "file";
+  std::ofstream(file) << "one";
+  // As file systems set times that go by a clock of 100 Hz.
+  const auto touch = [&] {
+    using Ticks = std::chrono::duration<std::int64_t, std::centi>;
+    const auto now = std::filesystem::file_time_type::clock::now();
+    std::filesystem::last_write_time(file, std::chrono::floor<Ticks>(now));
+  };
+  touch();
+  const FileMark mark = settled_mark_of(file);
+  touch();
+  EXPECT_NE(mark_of(file).time_ns, mark.time_ns);
+  EXPECT_EQ(settled_mark_of(folder / "none"), FileMark{});
 }
 
 class GatewayTokens : public GatewayTest {
