@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "idl/recording_segments.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <optional>
 #include <system_error>
+
+#include "base/whole_file.h"
 
 namespace relievo {
 namespace {
@@ -118,6 +124,12 @@ fs::path unused_name(const fs::path& file) {
   return out;
 }
 
+Status check_record_folder(const fs::path& folder) {
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) == 0) return {};
+  return Error{"cannot record in the folder " + folder.string() + ": " + write_failure(errno) +
+               (errno == EACCES ? "; let this user write there, or name another one" : "")};
+}
+
 Status check_recording_target(const fs::path& file, bool split) {
   std::error_code error;
   if (!split && fs::exists(file, error))
@@ -125,7 +137,7 @@ Status check_recording_target(const fs::path& file, bool split) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   if (!fs::is_directory(folder, error))
     return Error{"cannot record to " + file.string() + ": there is no folder " + folder.string()};
-  return {};
+  return check_record_folder(folder);
 }
 
 }  // namespace relievo

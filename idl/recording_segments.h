@@ -43,8 +43,11 @@ class RecordingSegments {
 /// `file`, or where there is one already, its name with -2, -3 ...
 std::filesystem::path unused_name(const std::filesystem::path& file);
 
+/// Fails where this user can make no file in a folder that is there.
+Status check_record_folder(const std::filesystem::path& folder);
+
 /// Fails where `file` cannot be recorded to, found out before anything is received: it exists already (unless
-/// it is to be split, which names other files), or its folder does not.
+/// it is to be split, which names other files), its folder does not, or is closed.
 Status check_recording_target(const std::filesystem::path& file, bool split);
 
 }  // namespace relievo

@@ -215,6 +215,12 @@ class Reader {
     const toml::node* node = table_.get(key);
     return node != nullptr && node->is_array_of_tables();
   }
+  /// Where KEY is a table, but is to be one of several.
+  void no_single_table(std::string_view key) {
+    const toml::node* node = table_.get(key);
+    if (node != nullptr && node->is_table())
+      refuse(*node, key, "is a table with one bracket: write [[" + std::string(key) + "]]");
+  }
   /// What `read` makes of each of them.
   template <typename Read>
   void tables(std::string_view key, const Read& read) {
@@ -404,6 +410,7 @@ Status read_config(const std::filesystem::path& file, ServeConfig& config, Setti
   reader.table("projector", [&](Reader& projector) { read_projector(projector, config.projector); });
   reader.table("gateway", [&](Reader& gateway) { read_gateway(gateway, config.gateway); });
   // Last, since what is said outside of them holds for all.
+  reader.no_single_table("stream");
   if (!reader.has_tables("stream"))
     reader.checked("stream", stream_name(), config.stream);
   else

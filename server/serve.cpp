@@ -15,6 +15,7 @@
 #include "cli/service_manager.h"
 #include "codec/video_encoder_kind.h"
 #include "idl/cdr.h"
+#include "idl/recording_segments.h"
 #include "server/calibration_desk.h"
 #include "server/recording_desk.h"
 #include "server/rig_desk.h"
@@ -94,6 +95,9 @@ Status make_record_folder(const ServeConfig& config) {
   std::error_code code;
   std::filesystem::create_directory(config.record_folder, code);
   if (code) return Error{"cannot make the folder " + config.record_folder + ": " + code.message()};
+  // The stream is worth having without: perhaps its disk is mended meanwhile.
+  if (const Status open = check_record_folder(config.record_folder); !open)
+    log_warning("no recording can be started: " + open.error().message);
   return {};
 }
 

@@ -286,6 +286,10 @@ Command serve_command() {
           set_stream(*f, given);
           if (const Status lines = check_lines(given); !lines)
             throw CLI::ValidationError("--half-lines", lines.error().message);
+          // What there is to be split may be in the file.
+          const auto kept = recording_options(*f->recording);
+          if (!f->config && !kept)
+            throw CLI::ValidationError("--keep-size, --keep-for", kept.error().message);
         });
         app.footer(
             "Examples:\n"

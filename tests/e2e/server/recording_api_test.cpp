@@ -310,6 +310,25 @@ TEST_F(RecordingOnRequest, ARecordingKeepsItsCamerasGamma) {
   }
 }
 
+TEST_F(RecordingOnRequest, AFolderThatIsClosedIsToldAtTheStart) {
+  // Modes hold for root, too, then.
+  const auto closed = [&](std::vector<std::string> command) {
+    if (::geteuid() == 0)
+      command.insert(command.begin(), {"/usr/bin/setpriv", "--bounding-set=-all", "--inh-caps=-all"});
+    return run(command);
+  };
+  if (closed({program("relievo-server"), "--version"}).status != 0)
+    GTEST_SKIP() << "root may not give up its rights here";
+  fs::permissions(out_, fs::perms::owner_read | fs::perms::owner_exec);
+  const std::string what = "cannot record in the folder " + out_.string() + ": Permission denied";
+  expect_one_error(closed(serve(source_, {"--web", "none", "--record", out_ / "a.mcap"})), what);
+  const Finished served =
+      closed(serve(source_, {"--web", "127.0.0.1:0", "--fast", "--frames", "4", "--record-dir", out_}));
+  EXPECT_EQ(served.status, 0) << "it can be watched";
+  EXPECT_THAT(served.err, HasSubstr("no recording can be started: " + what));
+  fs::permissions(out_, fs::perms::owner_all);
+}
+
 TEST_F(RecordingOnRequest, WhatCannotWorkIsSaidAtTheStart) {
   expect_one_error(run(serve(source_, {"--web", "127.0.0.1:0", "--record-dir", out_ / "none/takes"})),
                    "there is no folder " + (out_ / "none").string());
@@ -319,6 +338,9 @@ TEST_F(RecordingOnRequest, WhatCannotWorkIsSaidAtTheStart) {
   const Finished wrong = run(serve(source_, {"--record-dir", out_, "--pre-roll", "long"}));
   EXPECT_EQ(wrong.status, 2);
   EXPECT_THAT(wrong.err, HasSubstr("10s"));
+  const Finished alone = run(serve(source_, {"--record", out_ / "a.mcap", "--keep-size", "1GB"}));
+  EXPECT_EQ(alone.status, 2);
+  EXPECT_THAT(alone.err, HasSubstr("--split-size"));
 }
 
 }  // namespace

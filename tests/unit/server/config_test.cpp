@@ -20,6 +20,14 @@ namespace {
 using test::Read;
 using test::read;
 
+TEST(Config, ATableOfAStreamWithOneBracketIsToldSo) {
+  const Read one = read("source = \"sim:face\"\n[stream]\nname = \"left\"\n");
+  ASSERT_FALSE(one.status);
+  EXPECT_NE(one.status.error().message.find(":2: stream is a table with one bracket: write [[stream]]"),
+            std::string::npos)
+      << one.status.error().message;
+}
+
 // The file that is installed is the manual: each setting is in it, and each line of it is one.
 TEST(Config, TheInstalledFileNamesEverySettingAndAllOfItIsTaken) {
   const std::regex setting(R"(#?((\w+) = .*|\[\w+\]))");
