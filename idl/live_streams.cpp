@@ -4,13 +4,19 @@
 #include <dds/dds.h>
 
 #include <algorithm>
+#include <mutex>
+#include <set>
+#include <utility>
 
+#include "base/log.h"
 #include "base/time.h"
 #include "idl/topics.h"
 #include "relievo.h"
 
 namespace relievo {
 namespace {
+
+constexpr std::size_t kMostTold = 20;  // others of one name: none fills the log
 
 Result<bool> take_live_info(std::int32_t reader, const std::string& stream) {
   void* sample = nullptr;  // lent by Cyclone
@@ -26,6 +32,55 @@ Result<bool> take_live_info(std::int32_t reader, const std::string& stream) {
     if (live) return true;
   }
 }
+
+class DescriptionWatch final : public NameWatch {
+ public:
+  static Result<std::unique_ptr<NameWatch>> open(const Domain& domain, const std::string& stream,
+                                                 std::int32_t own) {
+    auto watch = std::make_unique<DescriptionWatch>();
+    watch->stream_ = stream;
+    if (const auto code = dds_get_instance_handle(own, &watch->own_); code < 0)
+      return dds_error(code, "cannot watch over the stream's name");
+    auto group = create_group(domain.participant(), Role::kWatcher, false, stream);
+    if (!group) return group.error();
+    watch->group_ = *std::move(group);
+    auto reader = create_reader(domain.participant(), watch->group_.get(), Topic::kInfo);
+    if (!reader) return reader.error();
+    watch->reader_ = *std::move(reader);
+    const Listener listener(dds_create_listener(watch.get()));
+    dds_lset_data_available(
+        listener.get(), [](const dds_entity_t, void* self) { static_cast<DescriptionWatch*>(self)->look(); });
+    dds_set_listener(watch->reader_.get(), listener.get());
+    watch->look();  // what came before there was a listener
+    return std::unique_ptr<NameWatch>(std::move(watch));
+  }
+  // Waits for a call in progress.
+  ~DescriptionWatch() override { dds_set_listener(reader_.get(), nullptr); }
+
+ private:
+  /// Any thread.
+  void look() {
+    const std::lock_guard lock(mutex_);
+    void* sample = nullptr;  // lent by Cyclone
+    dds_sample_info_t info;
+    while (dds_take(reader_.get(), &sample, &info, 1, 1) > 0) {
+      const auto* description = static_cast<const relievo_StreamInfo*>(sample);
+      const bool other = info.valid_data && info.instance_state == DDS_IST_ALIVE &&
+                         info.publication_handle != own_ && description->stream == stream_;
+      dds_return_loan(reader_.get(), &sample, 1);
+      if (other && told_.size() < kMostTold && told_.insert(info.publication_handle).second)
+        log_warning("another server in this domain has a stream named '" + stream_ +
+                    "', too: who watches or records it gets both mixed. Give one of them another name");
+    }
+  }
+
+  std::string stream_;
+  dds_instance_handle_t own_ = 0;
+  std::mutex mutex_;
+  std::set<dds_instance_handle_t> told_;
+  Entity group_;
+  Entity reader_;
+};
 
 }  // namespace
 
@@ -54,6 +109,11 @@ Status check_name_is_free(const Domain& domain, const std::string& stream, std::
     }
   }
   return {};
+}
+
+Result<std::unique_ptr<NameWatch>> NameWatch::create(const Domain& domain, const std::string& stream,
+                                                     std::int32_t own) {
+  return DescriptionWatch::open(domain, stream, own);
 }
 
 }  // namespace relievo

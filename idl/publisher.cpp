@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <memory>
 #include <utility>
 
 #include "idl/clock.h"
@@ -123,6 +124,9 @@ class DdsPublisher final : public Publisher {
       publisher->cdr1_writers_[static_cast<std::size_t>(topic)] = std::move(cdr1).value();
     }
     if (auto status = publisher->publish(info); !status) return status.error();
+    auto watch = NameWatch::create(*publisher->domain_, info.stream, publisher->writer(Topic::kInfo));
+    if (!watch) return watch.error();
+    publisher->watch_ = *std::move(watch);
     auto notice = SecuredNotice::create(*publisher->domain_, info.stream);
     if (!notice) return notice.error();
     publisher->notice_ = std::move(notice).value();
@@ -282,6 +286,7 @@ class DdsPublisher final : public Publisher {
   std::shared_ptr<Domain> domain_;
   Entity group_;
   std::array<Entity, kTopics.size()> writers_, cdr1_writers_;
+  std::unique_ptr<NameWatch> watch_;
   SecuredNotice notice_;
   std::unique_ptr<ClockService> clock_;
   Entity request_group_;

@@ -80,6 +80,10 @@ class DdsRawPublisher final : public RawPublisher {
       if (!writer) return writer.error();
       publisher->writers_[index] = std::move(writer).value();
     }
+    auto watch = NameWatch::create(*publisher->domain_, stream,
+                                   publisher->writers_[static_cast<std::size_t>(Topic::kInfo)].get());
+    if (!watch) return watch.error();
+    publisher->watch_ = *std::move(watch);
     return std::unique_ptr<RawPublisher>(std::move(publisher));
   }
 
@@ -129,6 +133,7 @@ class DdsRawPublisher final : public RawPublisher {
   Entity group_;
   std::array<Entity, kTopics.size()> writers_;
   std::array<RawType, kTopics.size()> types_;
+  std::unique_ptr<NameWatch> watch_;
 };
 
 }  // namespace

@@ -310,6 +310,23 @@ TEST(Transport, KilledWriterIsGone) {
   EXPECT_TRUE(inbox.now().plausible());
 }
 
+// As where their networks were apart: neither could hear of the other before it was live.
+TEST(Transport, TwoOfOneNameAreToldOfEachOther) {
+  Inbox inbox;
+  auto subscriber = expect_made(Subscriber::create(kDomain, "both", inbox.callbacks()));
+  auto first = start_publisher("both", {"1000", "100", "0"});
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.there(); })) << first.err();
+  first.signal(SIGSTOP);
+  ASSERT_TRUE(inbox.wait([&](auto& r) { return r.was_there_and_is_gone(); }));
+  auto second = start_publisher("both", {"1000", "100", "0"});
+  ASSERT_TRUE(second.wait_for_text("live")) << second.err();
+  EXPECT_THAT(second.err(), testing::Not(HasSubstr("another server")));
+  first.signal(SIGCONT);
+  for (test::Process* one : {&first, &second})
+    EXPECT_TRUE(one->wait_for_text("another server in this domain has a stream named 'both', too"))
+        << one->err();
+}
+
 // A writer that stood still for longer than its lease, and then died for good.
 void expect_lapse_return_and_end(test::Process& process, Inbox& inbox) {
   ASSERT_TRUE(inbox.wait([&](auto& r) { return r.there(); })) << process.err();
