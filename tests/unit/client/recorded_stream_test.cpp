@@ -81,11 +81,12 @@ TEST_F(RecordedStreamTest, WhatIsNoneOfOursIsToldByWhatItHolds) {
   ASSERT_TRUE(writer.ok());
   for (int i = 0; i < 7; ++i)
     ASSERT_TRUE(
-        (*writer)->add_channel({"T", "jsonschema", "{}"}, {"t" + std::to_string(i), "json", "T", {}}));
+        (*writer)->add_channel({"T", "jsonschema", "{}"}, {"t\x1b" + std::to_string(i), "json", "T", {}}));
   ASSERT_TRUE((*writer)->finish());
   opened = RecordedStream::open(folder_ / "other.mcap", "");
   ASSERT_FALSE(opened.ok());
-  EXPECT_THAT(opened.error().message, HasSubstr("t0, t1, t2, t3, t4 and 2 more topics, of another program"));
+  EXPECT_THAT(opened.error().message,
+              HasSubstr("t?0, t?1, t?2, t?3, t?4 and 2 more topics, of another program"));
 }
 
 TEST_F(RecordedStreamTest, SeeksToTheKeyFrameThatATimeNeeds) {
