@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
+#include "base/log.h"
 #include "capture/source/sim/scene.h"
 #include "capture/source/sim/sim_options.h"
 #include "capture/source/sim/sim_source.h"
@@ -50,7 +51,10 @@ Status run(const Options& options, StopSignal& stop) {
   const Status done = write_take(options.out, **source, take);
   stop.clear_on_stop();
   progress.finish();
-  if (stopped) return {};  // asked for; nothing is left behind
+  if (stopped && !done) {  // asked for
+    log_info(done.error().message);
+    return {};
+  }
   if (!done) return done;
   if (options.json) {
     std::puts(json_text(nlohmann::json({{"take", options.out}, {"frames", written}})).c_str());

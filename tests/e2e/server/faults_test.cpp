@@ -289,6 +289,8 @@ TEST_P(ServerSignal, EndsSimulateWithNothingHalfWritten) {
   process.signal(GetParam());
   EXPECT_EQ(process.wait(), 0) << process.err();
   EXPECT_TRUE(errors(process.err()).empty()) << process.err();
+  EXPECT_NE(process.err().find("stopped: nothing was written to " + out_.string()), std::string::npos)
+      << process.err();
   EXPECT_EQ(names_in(folder_.path()), std::set<std::string>{"take"});
 }
 
