@@ -113,6 +113,20 @@ const countFrames = (page) =>
       }
     };
   });
+/** While the page's `hang_` is set no decoder hears what it is asked for; the next worker that is started ends that. */
+const hangingDecoders = (page) =>
+  page.addInitScript(() => {
+    const { Worker } = window;
+    window.Worker = class extends Worker {
+      constructor(...of) {
+        super(...of);
+        window.hang_ = false;
+      }
+      postMessage(message, ...rest) {
+        if (!(window.hang_ && message.type === 'decode')) super.postMessage(message, ...rest);
+      }
+    };
+  });
 /** Until the page has drawn itself twice, and knows what of it is in sight. */
 const turned = (page) => page.evaluate(() => new Promise((resolve) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve))))));
 const publishedOf = async ({ address }) => (await (await fetch(`${address}/api/streams`)).json()).streams[0]?.status?.frames_published ?? 0;
@@ -246,6 +260,18 @@ const checks = {
     const end = () => Number(opener.moved_.shadowRoot.querySelector('#timeline input').max);
     const reached = await popup.evaluate(end);
     await popup.waitForFunction((at) => Number(opener.moved_.shadowRoot.querySelector('#timeline input').max) > at, reached);
+    await popup.close();
+  }),
+
+  'there a decoder that hangs is replaced': on('/page.html', { before: hangingDecoders }, async (page) => {
+    await set(page, { src: `${rig.address}/?stream=object` });
+    await when(page, (p) => p.state === 'live');
+    const popup = await moveOut(page);
+    await popup.waitForFunction(() => opener.frames_.length > 2);
+    await popup.evaluate(() => (opener.hang_ = true));
+    await popup.waitForFunction(() => !opener.hang_); // another one was started
+    const before = await popup.evaluate(() => opener.frames_.length);
+    await popup.waitForFunction((count) => opener.frames_.length > count, before);
     await popup.close();
   }),
 

@@ -24,9 +24,13 @@ export class Decoder {
   private ready = false;
   private readonly timer: number;
 
-  constructor(private readonly events: DecoderEvents) {
+  /** `timers`: of the window that is seen, as those of one in the background come late. */
+  constructor(
+    private readonly events: DecoderEvents,
+    private readonly timers: Window = window,
+  ) {
     this.worker = this.start();
-    this.timer = window.setInterval(() => this.watch(), 1000);
+    this.timer = timers.setInterval(() => this.watch(), 1000);
   }
 
   /** Takes the message's bytes; the answer carries the id returned. */
@@ -47,7 +51,7 @@ export class Decoder {
 
   /** For good. */
   stop(): void {
-    window.clearInterval(this.timer);
+    this.timers.clearInterval(this.timer);
     this.worker.terminate();
     this.pending.clear();
   }

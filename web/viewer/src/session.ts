@@ -56,11 +56,12 @@ export class Session {
     private readonly events: SessionEvents,
     private readonly page = document,
   ) {
-    this.decoder = new Decoder({
-      decoded: (frame) => this.onDecoded(frame),
-      failed: (id, message) => this.onFailed(id, message),
-      unusable: (message) => events.unusable(message),
-    });
+    const decoderEvents = {
+      decoded: (frame: DecodedFrame) => this.onDecoded(frame),
+      failed: (id: number, message: string) => this.onFailed(id, message),
+      unusable: (message: string) => events.unusable(message),
+    };
+    this.decoder = new Decoder(decoderEvents, page.defaultView ?? window);
     page.addEventListener('visibilitychange', this.onHidden);
   }
 
