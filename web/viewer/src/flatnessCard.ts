@@ -11,7 +11,7 @@ import { middleRegion, parseRegion, regionBetween, regionText, type Region } fro
 import { lensOf } from './rigCamera';
 import { kShapes, type Shape, type ShapeKind } from './shape';
 import type { Metered, ShapeReply, ShapeRequest } from './shapeMessages';
-import { reportJson, type ShapeReport, type Spread } from './shapeMeter';
+import { isDoubtful, reportJson, type ShapeReport, type Spread } from './shapeMeter';
 import { sentence } from './sentence';
 import { text } from './strings';
 import type { View } from './view';
@@ -20,7 +20,6 @@ import { startMeasurer } from './workers';
 const kRest = 1; // times as long as a frame took to measure, the machine is left in peace
 const kAgain_ms = 2000; // where what measures did not come
 const kSideSteps = 8; // of an outline: a lens bends it
-const kMostOff = 0.2; // of the points: then it is doubtful that they show that shape
 const say = text.measure.flatness;
 type Name = keyof typeof say.names;
 type Place = Readonly<{ x: number; y: number }>;
@@ -66,6 +65,7 @@ export class FlatnessCard {
   private underWay: Asked | null = null; // with the worker
   private asked: Asked | null = null; // last
   private measured: Measured | null = null; // and shown
+  private doubtful = false; // that it shows that shape
   private trouble = ''; // why nothing is measured
   private timer = 0;
   private restUntil = 0;
@@ -321,13 +321,14 @@ export class FlatnessCard {
   private show(): void {
     const { measured, kind } = this;
     const report = measured?.report ?? null;
+    this.doubtful = report !== null && isDoubtful(report, this.doubtful);
     this.press();
     this.box.classList.remove('awaited');
     if (document.activeElement !== this.region) {
       this.region.value = measured === null ? '' : regionText(measured.meter.region);
       this.region.setAttribute('aria-invalid', 'false');
     }
-    const warning = this.trouble !== '' ? this.trouble : measured === null ? say.noCamera : report === null ? say.none[kind] + say.why : report.off.median > kMostOff ? say.muchOff[kind] : '';
+    const warning = this.trouble !== '' ? this.trouble : measured === null ? say.noCamera : report === null ? say.none[kind] + say.why : this.doubtful ? say.muchOff[kind] : '';
     setText(this.warning, warning);
     this.warning.hidden = warning === '';
     this.figures.hidden = this.pictured.hidden = report === null;

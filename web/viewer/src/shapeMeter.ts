@@ -12,6 +12,8 @@ const kSpanShare = 0.997;
 const kLeastFull = 1e-6;
 const kMostFrames = 30;
 const kMostPixels = 4e6; // of all frames that are kept
+const kMostOff = 0.2; // of the points: then it is doubtful that they show that shape
+const kClearlyOn = 0.15; // and then no more, as frames follow each other
 
 /** Over frames. */
 export interface Spread {
@@ -219,6 +221,11 @@ export class ShapeMeter {
     }
     return { form: Math.sqrt(squares / on), noise: moving === 0 ? null : medianOf(deviations, moving) };
   }
+}
+
+/** Whether it is doubtful that the points show that shape; `before`: whether it was of the frames before. */
+export function isDoubtful({ off, frames }: Pick<ShapeReport, 'off' | 'frames'>, before: boolean): boolean {
+  return off.median > (before && frames > 1 ? kClearlyOn : kMostOff);
 }
 
 /** At which a picture of such a form is of full colour. */

@@ -4,7 +4,7 @@ import { describe, expect, it } from 'vitest';
 import type { Lens } from '../src/lens';
 import type { Surface } from '../src/pick';
 import { middleRegion, parseRegion, regionBetween, regionText } from '../src/region';
-import { fullOf, reportJson, ShapeMeter } from '../src/shapeMeter';
+import { fullOf, isDoubtful, reportJson, ShapeMeter } from '../src/shapeMeter';
 
 const lens: Lens = { width: 100, height: 80, fx: 100, skew: 0, cx: 49.5, fy: 100, cy: 39.5, distortion: [0.01, 0, 0, 0, 0] };
 
@@ -51,6 +51,14 @@ describe('ShapeMeter', () => {
     expect(report.noise!).toBeCloseTo(2e-4 * Math.sqrt(30 / 29), 6);
     expect(report.form).toBeGreaterThan(0.7e-4);
     expect(report.form).toBeLessThan(1e-4);
+  });
+
+  it('does not change its mind from frame to frame about what is doubtful', () => {
+    const off = (median: number, frames: number): Parameters<typeof isDoubtful>[0] => ({ off: { median, deviation: 0 }, frames });
+    let doubtful = false;
+    const told = [0.19, 0.21, 0.19, 0.2, 0.16, 0.14, 0.19].map((share) => (doubtful = isDoubtful(off(share, 30), doubtful)));
+    expect(told).toEqual([false, true, true, true, true, false, false]);
+    expect(isDoubtful(off(0.19, 1), true)).toBe(false); // of one frame alone nothing was before
   });
 
   it('draws red what is before the shape, blue what is behind', () => {
