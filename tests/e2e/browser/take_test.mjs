@@ -76,6 +76,28 @@ const checks = {
     assert.ok(await page.isVisible('#panel-statistics .plot'));
   },
 
+  async 'a frame that comes very late is cut off at the top of the plot, with its number there'(page) {
+    const shown = () => page.evaluate(() => window.relievo.diagnostics().shown);
+    await shownPast(page, (await shown()) + 40); // of which one does not set the scale
+    await page.evaluate(() => {
+      const { fillText } = CanvasRenderingContext2D.prototype;
+      CanvasRenderingContext2D.prototype.fillText = function (said, ...at) {
+        if (/^↑ /.test(said)) window.beyond_ = said;
+        return fillText.call(this, said, ...at);
+      };
+    });
+    await eventually('no number tells of what is cut off', async () => {
+      await page.evaluate(() => { for (const end = performance.now() + 2500; performance.now() < end; ); });
+      await shownPast(page, (await shown()) + 10);
+      return page.evaluate(() => Number(/^↑ (\d+)/.exec(window.beyond_ ?? '')?.[1]) > 1000);
+    });
+    const above = await page.$eval('#panel-statistics .plot', (plot) => {
+      const { data } = plot.getContext('2d').getImageData(0, 0, plot.width, Math.floor((7 * plot.width) / plot.clientWidth));
+      return data.some((value, i) => i % 4 === 3 && value > 0);
+    });
+    assert.ok(!above, 'lines run beyond the top of the plot');
+  },
+
   async 'a picture has a transparent ground and the surface on it'(page) {
     await feeder.standStill(page, kFrame);
     await page.keyboard.press('Escape');

@@ -15,6 +15,7 @@ export interface Axes {
   unit: string; // of both, at the corner
 }
 
+/** What lies above `y` is cut off there. */
 export function plot(canvas: HTMLCanvasElement, { x, y, unit }: Axes, lines: readonly Line[]): void {
   const ratio = Math.min(window.devicePixelRatio, 2);
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
@@ -44,6 +45,10 @@ export function plot(canvas: HTMLCanvasElement, { x, y, unit }: Axes, lines: rea
   }
   c.textAlign = 'left';
   c.fillText(unit, 2, height - kMargin.bottom + 10);
+  c.save();
+  c.beginPath();
+  c.rect(kMargin.left, kMargin.top, inner.width, inner.height);
+  c.clip();
   c.lineWidth = 1.5;
   c.lineJoin = 'round';
   for (const line of lines) {
@@ -60,6 +65,16 @@ export function plot(canvas: HTMLCanvasElement, { x, y, unit }: Axes, lines: rea
     }
     c.stroke();
   }
+  c.restore();
+  // What is cut off at the top is told by its number.
+  let beyond: readonly [number, number] | null = null;
+  for (const { points } of lines) for (const point of points) if (point[1] > (beyond?.[1] ?? y.to)) beyond = point;
+  if (beyond === null) return;
+  const said = `↑ ${metres(beyond[1], stepY)}`;
+  const half = c.measureText(said).width / 2;
+  c.fillStyle = style.getPropertyValue('--text');
+  c.textAlign = 'center';
+  c.fillText(said, Math.min(Math.max(atX(beyond[0]), kMargin.left + half), width - kMargin.right - half), kMargin.top + 5);
 }
 
 function rule(c: CanvasRenderingContext2D, from: [number, number], to: [number, number]): void {
