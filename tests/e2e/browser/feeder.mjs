@@ -161,9 +161,8 @@ export const kJitter_px = 13;
 export const freeMiddle = (page) =>
   page.evaluate(() => {
     const box = (of) => document.querySelector(of).getBoundingClientRect();
-    const cursor = box('#cursor').height; // comes and goes with the mouse
     const panel = document.querySelector('#panels aside:not([hidden])');
-    return { x: (panel ?? document.querySelector('#rail')).getBoundingClientRect().left / 2, y: (box('header').bottom + box('footer').top + (cursor > 0 ? cursor + 7 : 0)) / 2 };
+    return { x: (panel ?? document.querySelector('#rail')).getBoundingClientRect().left / 2, y: (box('header').bottom + box('footer').top) / 2 };
   });
 
 /** Runs named checks one after the other; the number of those that failed. */

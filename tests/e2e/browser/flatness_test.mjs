@@ -129,6 +129,23 @@ const onWall = {
     await measured(page, (said) => said.region[2] === 256);
   },
 
+  async 'the panel stays where it is as the mouse comes to it from the picture'(page) {
+    const middle = page.locator('#panel-measure .flatness button:text-is("Middle")');
+    await middle.scrollIntoViewIfNeeded();
+    const places = async () => {
+      // Observers of sizes have been told by then.
+      await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+      return [await middle.boundingBox(), await page.locator('#timeline').boundingBox()];
+    };
+    const at = await page.evaluate(() => window.relievo.diagnostics().cameraPicture);
+    await page.mouse.move(at.x + at.width / 2, at.y + at.height / 2);
+    await page.waitForSelector('#cursor', { state: 'visible' });
+    const before = await places();
+    await page.mouse.move(2, 2);
+    await page.waitForSelector('#cursor', { state: 'hidden' });
+    assert.deepEqual(await places(), before);
+  },
+
   async 'while it plays there is noise, of the frames that came'(page) {
     await page.focus('#view');
     await eventually('no two frames are measured one after the other', async () => {

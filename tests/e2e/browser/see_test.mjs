@@ -29,8 +29,7 @@ const pictureAndFree = (page) =>
   page.evaluate(() => {
     const of = (selector) => document.querySelector(selector).getBoundingClientRect();
     const panel = [...document.querySelectorAll('#panels aside:not([hidden])')].map((e) => e.getBoundingClientRect()).find(({ width }) => width > 0);
-    const readout = of('#cursor'); // comes and goes with the mouse
-    const free = { top: of('header').bottom, bottom: of('footer').top + (readout.height > 0 ? readout.height + 7 : 0), right: Math.min(of('#rail').left, panel?.left ?? Infinity) };
+    const free = { top: of('header').bottom, bottom: of('footer').top, right: Math.min(of('#rail').left, panel?.left ?? Infinity) };
     return [window.relievo.diagnostics().cameraPicture, free];
   });
 /** It is whole where nothing lies over the page. */

@@ -7,8 +7,6 @@ import type { Box } from './overlay';
 import type { Presentation } from './state';
 import { text } from './strings';
 
-const kFactsGap = 7; // pixels, of style.css
-
 /** A cell of the statistics line. `minor` ones give way on a narrow screen. */
 export interface Statistic {
   label: string;
@@ -74,12 +72,11 @@ export class Ui {
   /** What lies over the picture's sides for good. */
   private get insets(): Insets {
     const picture = this.canvas.getBoundingClientRect();
-    const cursor = element('cursor'); // comes and goes with the mouse
     const [header, rail, footer] = this.parts.map((part) => part.getBoundingClientRect()) as [DOMRect, DOMRect, DOMRect];
     return {
       top: header.height === 0 ? 0 : Math.max(0, header.bottom + kClear - picture.top), // 0 where it is hidden
       right: rail.width === 0 ? 0 : Math.max(0, picture.right - rail.left + kClear),
-      bottom: footer.height === 0 ? 0 : Math.max(0, picture.bottom - footer.top + kClear - (cursor.hidden ? 0 : cursor.offsetHeight + kFactsGap)),
+      bottom: footer.height === 0 ? 0 : Math.max(0, picture.bottom - footer.top + kClear),
       left: 0,
     };
   }
