@@ -201,6 +201,23 @@ const onBall = {
   },
 };
 
+/** From the first frame to the second, by the time line, which nothing lies over, and that one is measured. */
+async function steps(page) {
+  const boxes = () => page.evaluate(() => ['#timeline', '#panel-measure', '#rail'].map((of) => document.querySelector(of).getBoundingClientRect().toJSON()));
+  let found;
+  await eventually(() => `the time line is covered: ${JSON.stringify(found)}`, async () => {
+    found = await boxes();
+    const [line, ...others] = found;
+    const apart = (other) => other.left >= line.right || other.right <= line.left || other.top >= line.bottom || other.bottom <= line.top;
+    return line.width > 200 && line.left >= 0 && line.bottom <= page.viewportSize().height && others.every(apart);
+  });
+  const said = command(wall, '--frames', '1:1', '--region', await region(page));
+  await page.getByRole('button', { name: 'A frame ahead' }).tap();
+  await measured(page, ({ frames, depth_mm }) => frames === 1 && Math.abs(depth_mm.median - said.depth_mm.median) < 1e-5);
+  const beyond = await page.$$eval('#timeline > *', (all) => all.filter((e) => e.getClientRects().length > 0 && e.getBoundingClientRect().right > document.querySelector('#timeline').getBoundingClientRect().right).map((e) => e.className || e.textContent));
+  assert.deepEqual(beyond, []);
+}
+
 const byFinger = {
   async 'on a phone by two taps, for which the panel folds, and everything is within the screen'(page) {
     await begin(page);
@@ -218,6 +235,9 @@ const byFinger = {
     assert.equal(await page.getAttribute('#panel-measure .fold', 'aria-expanded'), 'false');
     assert.match(await page.innerText('#panel-measure'), /Away \d+\.\d{3} mm · RMS 0\.0\d{3} mm/);
     if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-phone-folded.png') });
+    await steps(page);
+    await page.keyboard.press('Home');
+    await still(page);
     await page.tap('#panel-measure .fold');
     assert.ok((await top()) < lower, 'the panel stays folded');
     if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-phone.png') });
@@ -228,6 +248,14 @@ const byFinger = {
     await page.waitForFunction(() => document.querySelector('#panel-measure .fold').getAttribute('aria-expanded') === 'false');
     await page.touchscreen.tap(right, lower);
     await page.waitForFunction(() => /Distance \d+\.\d/.test(document.querySelector('#panel-measure').innerText));
+  },
+};
+
+const onItsSide = {
+  async 'on a phone on its side the time line stays beside the panel'(page) {
+    await begin(page);
+    await measured(page, ({ shape }) => shape === 'plane');
+    await steps(page);
   },
 };
 
@@ -291,7 +319,7 @@ async function checkOn(file, parts) {
   }
 }
 try {
-  await checkOn(wall, [[onWall, kWide], [withoutMeasurer, { ...kWide, serviceWorkers: 'block' }], [byFinger, kPhone], [byKeys, kWide]]);
+  await checkOn(wall, [[onWall, kWide], [withoutMeasurer, { ...kWide, serviceWorkers: 'block' }], [byFinger, kPhone], [onItsSide, { ...kPhone, viewport: { width: 844, height: 390 } }], [byKeys, kWide]]);
   await checkOn(large, [[onLarge, kWide]]);
   await checkOn(ball, [[onBall, { ...kWide, colorScheme: 'dark' }]]);
   assert.deepEqual(complaints, []);

@@ -51,8 +51,9 @@ export class Ui {
     new ResizeObserver(() => say('--footer', footer.offsetHeight)).observe(footer);
     new ResizeObserver(() => say('--rail', rail.offsetWidth)).observe(rail);
     this.around = new ResizeObserver(() => {
-      const { insets } = this;
       const panel = openPanel()?.getBoundingClientRect();
+      if (panel !== undefined) say('--panel-height', panel.height);
+      const { insets } = this;
       const isSeen = panel !== undefined && panel.width > 0;
       events.insets(insets, isSeen ? withPanel(insets, this.canvas.getBoundingClientRect(), panel) : insets);
       events.covers(this.covers);
