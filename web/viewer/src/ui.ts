@@ -58,7 +58,7 @@ export class Ui {
       events.insets(insets, isSeen ? withPanel(insets, this.canvas.getBoundingClientRect(), panel) : insets);
       events.covers(this.covers);
     });
-    for (const part of [...this.parts, ...header.children, ...footer.children, this.canvas]) this.around.observe(part);
+    for (const part of [...this.parts, ...this.coverable, this.canvas]) this.around.observe(part);
   }
 
   /** A panel, which lies over the picture while it is open. */
@@ -68,6 +68,11 @@ export class Ui {
 
   private get parts(): [header: HTMLElement, rail: HTMLElement, footer: HTMLElement] {
     return [document.querySelector('header')!, element('rail'), document.querySelector('footer')!];
+  }
+
+  private get coverable(): Element[] {
+    const [header, rail, footer] = this.parts;
+    return [...header.children, rail, ...footer.children, element('legend'), element('notice')];
   }
 
   /** What lies over the picture's sides for good. */
@@ -83,11 +88,11 @@ export class Ui {
   }
 
   private get covers(): Box[] {
-    const [header, rail, footer] = this.parts;
     const { left, top } = this.canvas.getBoundingClientRect();
     const panel = openPanel();
-    const boxes = [...header.children, rail, ...footer.children, ...(panel === null ? [] : [panel])].map((part) => part.getBoundingClientRect());
-    return boxes
+    const parts = [...this.coverable, ...(panel === null ? [] : [panel])].filter((part) => part.checkVisibility({ visibilityProperty: true }));
+    return parts
+      .map((part) => part.getBoundingClientRect())
       .filter(({ width }) => width > 0)
       .map(({ x, y, width, height }) => ({ x: x + width / 2 - left, y: y + height / 2 - top, width, height }));
   }
