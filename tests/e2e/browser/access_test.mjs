@@ -179,6 +179,51 @@ const checks = {
     await page.close();
   },
 
+  async 'on plain http a link is copied without taking the keyboard from its button'() {
+    feeder.say('start ball');
+    const page = await open();
+    await shownPast(page, 2);
+    await page.evaluate(() => Object.defineProperty(navigator, 'clipboard', { value: undefined }));
+    await page.keyboard.press('t');
+    const link = page.locator('#panel-take button', { hasText: 'Copy link' });
+    await link.focus();
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => document.querySelector('#panel-take [role=status]').textContent !== '');
+    assert.ok(await link.evaluate((e) => e === document.activeElement), 'the keyboard is elsewhere');
+    await page.close();
+  },
+
+  async 'for who asks for more contrast words and edges are clearer'() {
+    feeder.say('start ball');
+    for (const colorScheme of ['dark', 'light']) {
+      const page = await open('/', { viewport: { width: 1280, height: 760 }, colorScheme, contrast: 'more' });
+      await shownPast(page, 2);
+      await page.waitForSelector('#statistics dt');
+      const { words, text, edges } = await page.evaluate(() => {
+        const of = (selector) => getComputedStyle(document.querySelector(selector));
+        // Of 0 to 255, as it is seen on the part's ground.
+        const drawn = (...colours) => {
+          const context = new OffscreenCanvas(1, 1).getContext('2d');
+          for (const colour of colours) {
+            context.fillStyle = colour;
+            context.fillRect(0, 0, 1, 1);
+          }
+          return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
+        };
+        const luminance = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+        const contrast = (a, b) => (Math.max(luminance(a), luminance(b)) + 0.05) / (Math.min(luminance(a), luminance(b)) + 0.05);
+        const edges = ['#timeline', '#rail', '#modes'].map((part) => {
+          const { backgroundColor, borderTopColor } = of(part);
+          return contrast(drawn(backgroundColor, borderTopColor), drawn(backgroundColor));
+        });
+        return { words: of('#statistics dt').color, text: of('body').color, edges };
+      });
+      assert.equal(words, text);
+      assert.ok(edges.every((ratio) => ratio >= 3), `${colorScheme}: ${edges}`);
+      await page.close();
+    }
+  },
+
   async 'in small windows no part lies over another or is cut off'() {
     feeder.say('also a-stream-whose-name-is-as-long-as-a-name-of-a-stream-can-be-here');
     const streams = ['ball', 'a-stream-whose-name-is-as-long-as-a-name-of-a-stream-can-be-here'];

@@ -14,11 +14,13 @@ export async function copy(text: string): Promise<boolean> {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
+    const focused = document.activeElement;
     const area = make('textarea', { value: text });
     document.body.append(area);
     area.select();
     const done = document.execCommand('copy');
     area.remove();
+    if (focused instanceof HTMLElement) focused.focus(); // keys go on from where they were
     return done;
   }
 }
