@@ -29,6 +29,8 @@ const browser = await launchChromium();
 const complaints = [];
 const { open } = pagesOf(browser, server.address, complaints);
 const { open: openRecording } = pagesOf(browser, recordingServer.address, complaints);
+const goneServer = await Server.start(serverPath, [...serve, '--stream', 'gone']);
+const { newPage: newGone } = pagesOf(browser, goneServer.address, complaints);
 const { open: openBrief } = pagesOf(browser, briefServer.address, complaints);
 const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
 const kKept = 12;
@@ -325,6 +327,33 @@ const checks = {
     assert.ok(complaints.length <= 3); // once a page, and the picture that could not be had
   },
 
+  async 'on plain http from elsewhere what was received is saved also once the server has gone'() {
+    const page = await newGone({ viewport: { width: 800, height: 500 } });
+    await page.addInitScript(() => delete Navigator.prototype.serviceWorker); // as where nothing keeps the page
+    await page.goto(goneServer.address);
+    await page.waitForFunction(() => window.relievo?.diagnostics().playback?.times.length > 4);
+    await page.click('#tool-record');
+    await pressedIs(page, 'true');
+    const parts = ['takePanel', 'rangeExport', 'recordingFile', 'sample', 'cdrWriter'];
+    await page.waitForFunction((all) => {
+      const loaded = performance.getEntriesByType('resource').map(({ name }) => name);
+      return all.every((part) => loaded.some((name) => name.includes(`/${part}-`)));
+    }, parts);
+    await goneServer.kill();
+    await inState(page, 'lost');
+    const save = async (act) => {
+      const [file] = await Promise.all([page.waitForEvent('download'), act()]);
+      await file.saveAs(saved);
+      const told = JSON.parse(execFileSync(relievoPath, ['info', '--json', saved], { encoding: 'utf8' }));
+      assert.equal(told.stream, 'gone');
+      assert.ok(told.frames > 4 && told.unreadable === 0, `${told.frames} frames`);
+    };
+    await save(() => page.click('#tool-record'));
+    await page.keyboard.press('t');
+    await save(() => page.click('#panel-take button:text-is("MCAP")'));
+    await page.close();
+  },
+
   async 'of a server that has gone it is not known whether it records, and it cannot be stopped'() {
     const page = await openBrief();
     await shownPast(page, 2);
@@ -351,6 +380,7 @@ try {
   await server.kill();
   await recordingServer.kill();
   await briefServer.kill();
+  await goneServer.kill();
   rmSync(scratch, { recursive: true, force: true });
 }
 process.exit(failed === 0 ? 0 : 1);

@@ -114,6 +114,8 @@ export async function addImmersive(view: View, failed: (why: string) => void): P
 const kAskMs = 5000; // whether a picture is on its way
 const kIdleWithinMs = 2000;
 
+const loadSaving = () => Promise.all([import('./takePanel'), import('./rangeExport'), import('./cdrWriter'), import('./surfaceFiles')]);
+
 /** Loads what nobody has asked for yet, and keeps the page for when its server is not there; behind the first picture, or where none comes. */
 export class Rest {
   private begun = false;
@@ -140,7 +142,8 @@ export class Rest {
 
   private load(): void {
     void this.measuring?.load().catch(() => undefined); // its panel says so and tries again
-    // Only in secure contexts; without it the page needs its server.
-    if (import.meta.env.PROD && 'serviceWorker' in navigator) void navigator.serviceWorker.register('sw.js').catch(() => undefined);
+    // Only in secure contexts keeps the browser the page. Elsewhere it has to have by now what saves what it has received.
+    if (!('serviceWorker' in navigator)) loadSaving().catch(() => undefined);
+    else if (import.meta.env.PROD) void navigator.serviceWorker.register('sw.js').catch(() => undefined);
   }
 }

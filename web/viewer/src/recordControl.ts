@@ -16,6 +16,8 @@ const kSaidMs = 10_000; // how long it is said where a recording went
 const kMostBytes = 1e9; // kept here, in memory
 const kPatienceMs = 5000; // with a server that was asked
 
+const loadWriters = () => Promise.all([import('./recordingFile'), import('./sample'), import('./cdrWriter')]);
+
 /** What runs in this page. */
 export interface Running {
   bytes: number;
@@ -160,6 +162,7 @@ export class RecordControl {
     };
     source.keptMessages().forEach(take);
     this.taken = taken;
+    loadWriters().catch(() => undefined); // now that the server is there: that it has gone may be why it is saved
     this.saidUntil = 0;
     askBeforeLeaving(taken);
     source.tap = (message) => {
@@ -176,11 +179,7 @@ export class RecordControl {
     try {
       const { frames } = taken!;
       if (frames.length === 0) return this.say(say.nothing, true);
-      const [{ writeRecording }, { sampleOf }, { writeStreamInfo }] = await Promise.all([
-        import('./recordingFile'),
-        import('./sample'),
-        import('./cdrWriter'),
-      ]);
+      const [{ writeRecording }, { sampleOf }, { writeStreamInfo }] = await loadWriters();
       const described = new Map<StreamInfo | null, Uint8Array | null>([[null, null]]);
       function* samples(): Generator<DescribedSample> {
         for (const { message, info } of frames) {
