@@ -231,6 +231,7 @@ void HttpSession::reply(HttpReply content, bool head, unsigned version, bool kee
   if (content_.refusal) host_.counts().refuse(*content_.refusal);
   http::response<http::empty_body> response(static_cast<http::status>(content_.status), version);
   response.set(http::field::server, "relievo/" RELIEVO_VERSION);
+  response.set(http::field::date, utc_text(utc_now_ns(), "%a, %d %b %Y %H:%M:%S GMT"));
   response.set(http::field::content_type, content_.content_type);
   for (const auto& [name, text] : security_headers()) response.set(name, text);
   for (const auto& [name, text] : content_.headers) response.set(name, text);

@@ -28,7 +28,7 @@ const briefServer = await Server.start(serverPath, [...serve, '--stream', 'brief
 const browser = await launchChromium();
 const complaints = [];
 const { open } = pagesOf(browser, server.address, complaints);
-const { open: openRecording } = pagesOf(browser, recordingServer.address, complaints);
+const { open: openRecording, newPage: newRecording } = pagesOf(browser, recordingServer.address, complaints);
 const goneServer = await Server.start(serverPath, [...serve, '--stream', 'gone']);
 const { newPage: newGone } = pagesOf(browser, goneServer.address, complaints);
 const { open: openBrief } = pagesOf(browser, briefServer.address, complaints);
@@ -325,6 +325,23 @@ const checks = {
     // Chromium tells of what the server refuses: that it has no folder, where the list did not say so before.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);
     assert.ok(complaints.length <= 3); // once a page, and the picture that could not be had
+  },
+
+  async 'how long it records is said by the server\'s clock'() {
+    for (const ahead of [3600e3, -3600e3]) {
+      const page = await newRecording({ viewport: { width: 800, height: 500 } });
+      await page.addInitScript((by) => {
+        const { now } = Date;
+        Date.now = () => now() + by;
+      }, ahead);
+      await page.goto(recordingServer.address);
+      await shownPast(page, 2);
+      await page.click('#tool-record');
+      await pillSays(page, '^0:(0[2-9]|[1-5]\\d), ');
+      await page.click('#tool-record');
+      await pressedIs(page, 'false');
+      await page.close();
+    }
   },
 
   async 'on plain http from elsewhere what was received is saved also once the server has gone'() {

@@ -2,6 +2,7 @@
 // Proves: the gateway's HTTP side answers what it should, refuses what it should, and outlives hostile input.
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "base/time.h"
@@ -18,6 +19,19 @@ TEST_F(GatewayHttp, HealthzIsOk) {
   const auto response = request(port, "GET", "/healthz");
   EXPECT_EQ(response.status, 200);
   EXPECT_EQ(response.body, "ok\n");
+}
+
+TEST_F(GatewayHttp, AnswersSayTheServersTime) {
+  const std::int64_t before_s = utc_now_ns() / kNanosecondsPerSecond;
+  for (const char* path : {"/healthz", "/", "/api/streams", "/nothing"}) {
+    const auto response = request(port, "GET", path);
+    ASSERT_TRUE(response.headers.contains("date")) << path;
+    std::tm utc{};
+    const char* end = strptime(response.headers.at("date").c_str(), "%a, %d %b %Y %H:%M:%S GMT", &utc);
+    ASSERT_TRUE(end != nullptr && *end == '\0') << response.headers.at("date");
+    EXPECT_GE(timegm(&utc), before_s);
+    EXPECT_LE(timegm(&utc), utc_now_ns() / kNanosecondsPerSecond);
+  }
 }
 
 TEST_F(GatewayHttp, PageAndItsFilesAreServedWithPolicy) {

@@ -15,6 +15,7 @@ const kEveryMs = 1000; // between questions to a server that records
 const kSaidMs = 10_000; // how long it is said where a recording went
 const kMostBytes = 1e9; // kept here, in memory
 const kPatienceMs = 5000; // with a server that was asked
+const kCoarse_ms = 1500; // a server says its time in whole seconds
 
 const loadWriters = () => Promise.all([import('./recordingFile'), import('./sample'), import('./cdrWriter')]);
 
@@ -39,7 +40,8 @@ export class RecordControl {
   private readonly pill = element('recording');
   private of: Recorded | null = null;
   private server: ServerRecording | null = null; // null: it has no folder, or was not asked yet
-  private heardAt = 0; // when the server said so, Date.now()
+  private heardAt = 0; // when the server said so, performance.now()
+  private startedAt = 0; // when it began to, by the same clock
   private isUnheard = false; // it did not answer since
   private taken: Taken | null = null; // by this page
   private video: Running | null = null;
@@ -110,7 +112,7 @@ export class RecordControl {
     } else if (why !== null) {
       this.say(isStart ? say.failed(why) : say.notStopped(why), true);
     } else {
-      this.take((await response!.json()) as ServerRecording);
+      this.take((await response!.json()) as ServerRecording, dateOf(response!));
     }
   }
 
@@ -119,7 +121,7 @@ export class RecordControl {
     const { of } = this;
     const response = await this.ask({});
     if (this.of !== of) return;
-    if (response?.ok === true) this.take((await response.json()) as ServerRecording);
+    if (response?.ok === true) this.take((await response.json()) as ServerRecording, dateOf(response));
     else this.miss();
   }
 
@@ -128,10 +130,13 @@ export class RecordControl {
     return fetch(url, { cache: 'no-store', signal: AbortSignal.timeout(kPatienceMs), ...init }).catch(() => null);
   }
 
-  private take(told: ServerRecording): void {
+  /** `now`: by the server's clock, UTC in ms; this page's may be another. */
+  private take(told: ServerRecording, now = Date.now()): void {
     const before = this.server;
     this.server = told;
-    this.heardAt = Date.now();
+    this.heardAt = performance.now();
+    const startedAt = this.heardAt - Math.max(0, now - told.started_ns / 1e6);
+    if (told.file !== before?.file || Math.abs(startedAt - this.startedAt) > kCoarse_ms) this.startedAt = startedAt;
     this.isUnheard = false;
     if (told.state === 'failed') this.say(say.failed(told.message), true);
     if (told.state === 'off' && before?.state === 'recording') this.say(say.savedThere(told.file || before.file, told.frames || before.frames));
@@ -225,10 +230,14 @@ export class RecordControl {
 
   private recordingWords(): string {
     if (this.taken !== null) return runningWords(this.taken);
-    const { started_ns, bytes } = this.server!;
-    const words = say.running(timeText((this.isUnheard ? this.heardAt : Date.now()) - started_ns / 1e6), bytes);
+    const words = say.running(timeText((this.isUnheard ? this.heardAt : performance.now()) - this.startedAt), this.server!.bytes);
     return this.isUnheard ? say.unknown(words) : words;
   }
+}
+
+function dateOf({ headers }: Response): number | undefined {
+  const utc = Date.parse(headers.get('date') ?? '');
+  return Number.isNaN(utc) ? undefined : utc;
 }
 
 const timeText = (ms: number): string => clockText(ms).replace(/\.\d+$/, '');
