@@ -146,6 +146,23 @@ const onWall = {
     assert.deepEqual(await places(), before);
   },
 
+  async 'what is read of a place does not hide it'(page) {
+    const line = page.locator('#cursor');
+    const at = await page.evaluate(() => window.relievo.diagnostics().cameraPicture);
+    await page.mouse.move(at.x + at.width / 2, at.y + at.height / 2);
+    await line.waitFor({ state: 'visible' });
+    const { x, y, width, height } = await line.boundingBox();
+    const place = { x: Math.max(x + width / 2, at.x + 20), y: y + height / 2 };
+    await page.mouse.move(place.x, place.y);
+    await eventually('it stays over the place that is pointed at', async () => {
+      const now = await line.boundingBox();
+      return now !== null && now.y + now.height < place.y - 10;
+    });
+    await page.mouse.move(at.x + at.width / 2, at.y + at.height / 2);
+    await eventually('it does not come back', async () => (await line.boundingBox())?.y === y);
+    await page.mouse.move(2, 2);
+  },
+
   async 'while it plays there is noise, of the frames that came'(page) {
     await page.focus('#view');
     await eventually('no two frames are measured one after the other', async () => {

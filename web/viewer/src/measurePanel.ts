@@ -31,6 +31,7 @@ import type { View } from './view';
 const kStill_px = 5; // a click moves no further
 const kSlack_px = 10; // from an edge or corner that is meant
 const kFinger_px = 20;
+const kBeside_px = 24; // of the place that is read: what is read of it keeps as far away (style.css)
 const kHint_ms = 120; // between two looks for what a click would be on, at least
 const kRest = 4; // times that long it is left in peace after one
 const kStored = 'relievo.snap';
@@ -144,6 +145,16 @@ export class MeasurePanel {
     const mm = (v: number): string => (v * 1000).toFixed(1);
     const read = say.cursor(say.kinds[spot.kind], valueText(measure('point', [spot], null, [0, 0, 0])), mm(x), mm(-y));
     setText(this.readout, this.view.isAlone ? read : say.cursorOf(spot.stream, read));
+    this.readout.classList.toggle('raised', this.cursor !== null && this.liesUnderReadout(this.cursor));
+  }
+
+  // Where it stands unless it was raised.
+  private liesUnderReadout({ x, y }: Pointed): boolean {
+    const { offsetLeft, offsetTop, offsetWidth, offsetHeight, offsetParent } = this.readout;
+    if (offsetParent === null) return false; // nothing but the picture is shown
+    const [picture, footer] = [this.view.canvas.getBoundingClientRect(), offsetParent.getBoundingClientRect()];
+    const [right, down] = [picture.left + x - footer.left - offsetLeft, picture.top + y - footer.top - offsetTop];
+    return right > -kBeside_px && right < offsetWidth + kBeside_px && down > -kBeside_px && down < offsetHeight + kBeside_px;
   }
 
   // Takes some milliseconds: not with each movement, but with the last one.
