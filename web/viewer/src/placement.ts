@@ -52,8 +52,11 @@ export function between(first: Rigid | null | undefined, other: Rigid | null | u
 export function around(extents: readonly (Extent | null)[], poses: readonly Rigid[]): Extent | null {
   const boxes = extents.flatMap((extent, i) => (extent === null ? [] : [boxAround(extent, poses[i]!)]));
   if (boxes.length === 0) return null;
-  const [min, max] = [least(boxes.map((box) => box.min)), most(boxes.map((box) => box.max))];
-  return { min, max, centre: min.map((low, axis) => (low + max[axis]!) / 2) as Vec3 };
+  const { min, max } = joined(boxes);
+  const deep = joined(
+    extents.flatMap((extent, i) => (extent === null ? [] : [boxAround(deepened(extent), poses[i]!)])),
+  );
+  return { min, max, centre: min.map((low, axis) => (low + max[axis]!) / 2) as Vec3, depths: [deep.min[2], deep.max[2]] };
 }
 
 function boxAround({ min, max }: Box, pose: Rigid): Box {
@@ -63,5 +66,7 @@ function boxAround({ min, max }: Box, pose: Rigid): Box {
   return { min: least(corners), max: most(corners) };
 }
 
+const deepened = ({ min, max, depths }: Extent): Box => ({ min: [min[0], min[1], depths[0]], max: [max[0], max[1], depths[1]] });
+const joined = (boxes: Box[]): Box => ({ min: least(boxes.map((box) => box.min)), max: most(boxes.map((box) => box.max)) });
 const least = (points: Vec3[]): Vec3 => [0, 1, 2].map((axis) => Math.min(...points.map((p) => p[axis]!))) as Vec3;
 const most = (points: Vec3[]): Vec3 => [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis]!))) as Vec3;

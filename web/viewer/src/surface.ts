@@ -92,16 +92,20 @@ export interface Box {
 
 export interface Extent extends Box {
   centre: [number, number, number]; // medians
+  /** Near and far, of nearly all: who stands at the picture's side is in it. */
+  depths: readonly [number, number];
   /** Of what stands apart before the rest, as a person before a wall; without it: nothing does. */
   subject?: Box;
 }
 
+const kOutside = 0.02; // of all, on either side of the box
+const kStray = 0.003; // of all, before or behind the depths
 const kBins = 32; // of depth
 const kEmpty = 0.003; // of all, in a bin at most: what flies between two surfaces does not join them
 const kApart = 5; // empty bins
 const kSubject = 0.08; // of all, at least
 
-/** Robust box: what lies outside 2 % on either side does not move the first view. Nothing below 50 vertices. */
+/** Robust box: what lies outside of it, 2 % on either side, does not move the first view. Nothing below 50 vertices. */
 export function robustExtent(positions: Float32Array): Extent | null {
   const vertices = positions.length / 3;
   if (vertices < 50) return null;
@@ -110,19 +114,19 @@ export function robustExtent(positions: Float32Array): Extent | null {
   for (let i = 0; i < some[0]!.length; ++i) {
     for (let axis = 0; axis < 3; ++axis) some[axis]![i] = positions[i * step * 3 + axis]!;
   }
-  const { box, medians } = boxOf(some);
+  const { box, medians, depths } = boxOf(some);
   const before = gapOf(some[2]!, box.min[2], box.max[2]);
-  if (before === null) return { ...box, centre: medians };
+  if (before === null) return { ...box, centre: medians, depths };
   const isNear = some[2]!.map((z) => (z < before ? 1 : 0));
   const subject = boxOf(some.map((values) => values.filter((_, i) => isNear[i] === 1))).box;
-  return { ...box, centre: medians, subject };
+  return { ...box, centre: medians, depths, subject };
 }
 
-function boxOf(axes: Float32Array[]): { box: Box; medians: [number, number, number] } {
+function boxOf(axes: Float32Array[]): { box: Box; medians: [number, number, number]; depths: [number, number] } {
   const at = (fraction: number): [number, number, number] =>
     axes.map((values) => values[Math.floor(fraction * (values.length - 1))]!) as [number, number, number];
   axes = axes.map((values) => values.slice().sort()); // by number, without a call for each pair
-  return { box: { min: at(0.02), max: at(0.98) }, medians: at(0.5) };
+  return { box: { min: at(kOutside), max: at(1 - kOutside) }, medians: at(0.5), depths: [at(kStray)[2], at(1 - kStray)[2]] };
 }
 
 /** A depth between what stands apart and the rest; null: there is no such. */

@@ -137,5 +137,5 @@ function box(positions: Float32Array): Extent {
   const of = (pick: (...v: number[]) => number): [number, number, number] =>
     [0, 1, 2].map((axis) => pick(...positions.filter((_, i) => i % 3 === axis))) as [number, number, number];
   const [min, max] = [of(Math.min), of(Math.max)];
-  return { min, max, centre: min.map((low, i) => (low + max[i]!) / 2) as [number, number, number] };
+  return { min, max, centre: min.map((low, i) => (low + max[i]!) / 2) as [number, number, number], depths: [min[2], max[2]] };
 }

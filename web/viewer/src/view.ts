@@ -232,7 +232,7 @@ export class View {
     const all = this.surfaces.around;
     if (all === null) return;
     this.ground.setExtent(all);
-    this.range = steadyRange(all.min[2], all.max[2], this.range);
+    this.range = steadyRange(...all.depths, this.range);
     this.navigator.setExtent(all);
   }
 

@@ -42,7 +42,7 @@ it.each([
 });
 
 it('is of the subject, or of all, from when it was chosen on, whatever comes and goes', () => {
-  const wall = { min: [-2, -1, 3] as [number, number, number], max: [2, 1, 3.2] as [number, number, number], centre: [0, 0, 3.1] as [number, number, number] };
+  const wall = { min: [-2, -1, 3] as [number, number, number], max: [2, 1, 3.2] as [number, number, number], centre: [0, 0, 3.1] as [number, number, number], depths: [3, 3.2] as [number, number] };
   const person = { min: [-0.4, -0.9, 1] as [number, number, number], max: [0.4, 0.9, 1.4] as [number, number, number] };
   const both = { ...wall, subject: person };
   const framing = new Framing();

@@ -4,7 +4,7 @@ import { expect, it } from 'vitest';
 import { groundLabels, groundLines, groundRanges } from '../src/ground';
 import type { Extent } from '../src/surface';
 
-const extent: Extent = { min: [-0.48, -0.36, 1.02], max: [0.48, 0.36, 1.215], centre: [0, 0, 1.12] };
+const extent: Extent = { min: [-0.48, -0.36, 1.02], max: [0.48, 0.36, 1.215], centre: [0, 0, 1.12], depths: [1, 1.25] };
 
 it('surrounds the surface by whole steps', () => {
   const { x, y, z, step } = groundRanges(extent, null);

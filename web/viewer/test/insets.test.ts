@@ -65,7 +65,7 @@ describe('a panel', () => {
     made.restart(rig, false);
     made.resize(size);
     made.setInsets(parts, parts);
-    made.setExtent({ min: [-0.2, -0.3, 0.9], max: [0.3, 0.3, 1.2], centre: [0.05, 0, 1] });
+    made.setExtent({ min: [-0.2, -0.3, 0.9], max: [0.3, 0.3, 1.2], centre: [0.05, 0, 1], depths: [0.9, 1.2] });
     return made;
   }
   const targetOf = ({ pose: { target: [x, y, z] } }: Navigator): [number, number, number] => [x, -y, -z];

@@ -11,6 +11,7 @@ const extent = (from: number, to: number, near = 1): Extent => ({
   min: [from, -0.2, near],
   max: [to, 0.2, near + 0.5],
   centre: [(from + to) / 2, 0, near + 0.25],
+  depths: [near - 0.1, near + 0.6],
 });
 const kThree = [extent(-0.5, 0.5), extent(-0.1, 0.1, 2), extent(-1, 0)];
 const right = (poses: ReturnType<typeof placed>): number[] => poses.map(({ translation }) => translation[0]);
@@ -68,6 +69,7 @@ describe('around', () => {
     expect(box.min).toEqual([-0.5, -0.2, 1]);
     expect(box.max[0]).toBeCloseTo(kThree[2]!.max[0] + right(poses)[2]!, 9);
     expect(box.max[2]).toBe(2.5);
+    expect(box.depths).toEqual([0.9, 2.6]);
     expect(around([null], [kNowhere])).toBeNull();
   });
   it('also what is turned', () => {

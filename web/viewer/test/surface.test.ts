@@ -50,6 +50,15 @@ it('what stands apart before the rest is the subject', () => {
   expect(robustExtent(positions)!.subject).toBeUndefined();
 });
 
+it('depths are of who stands at the side, too, and not of what flies', () => {
+  const positions = new Float32Array(3 * 4000);
+  for (let v = 0; v < 4000; ++v) positions.set([v / 4000, 0, v % 400 === 2 ? 2.2 : v % 1000 === 6 ? 0.4 : 3.7], v * 3);
+  const { min, depths } = robustExtent(positions)!;
+  expect(min[2]).toBeCloseTo(3.7, 6); // the first view stays that of the wall
+  expect(depths[0]).toBeCloseTo(2.2, 6);
+  expect(depths[1]).toBeCloseTo(3.7, 6);
+});
+
 it('normals average the noise of single lines away', () => {
   // A plane of 40 lines, every second one 1 mm nearer: lines 2 mm apart, columns 10 mm.
   const [rows, columns] = [40, 10];
