@@ -17,6 +17,7 @@
 #include "idl/cdr.h"
 #include "idl/domain.h"
 #include "idl/frame_link.h"
+#include "idl/frame_order.h"
 #include "idl/security.h"
 #include "idl/topics.h"
 #include "idl/transport.h"
@@ -54,11 +55,7 @@ struct Known {
   bool told = false;  // the info callback was called, and the gone callback not since
 
   bool live() const { return std::find(alive.begin(), alive.end(), true) != alive.end(); }
-  // The writer of the last frame; none before the first. Its handle is another one after a break of the
-  // network that was long enough for DDS to forget it; its guid is the same.
-  std::uint64_t writer_handle = 0;
-  dds_guid_t writer{};
-  std::uint64_t last_sequence = 0;
+  FrameOrder order;
   std::vector<Early> early;
   bool undescribed = false;  // its frames have waited for a description long enough
 };
@@ -328,7 +325,7 @@ class DdsSubscriber final : public Subscriber {
   void give(Known& known, const FrameView& frame, std::span<const std::uint8_t> cdr,
             const dds_sample_info_t& sample) {
     tell_there(known);
-    count_lost(known, frame, sample.publication_handle);
+    look_at_order(known, frame, sample.publication_handle);
     raw(Topic::kFrame, frame.stream, cdr, sample);
     if (!callbacks_.frame) return;
     FrameMessage message;
@@ -392,27 +389,13 @@ class DdsSubscriber final : public Subscriber {
     if (callbacks_.info) callbacks_.info(*known.info);
   }
 
-  void count_lost(Known& known, const FrameView& frame, std::uint64_t writer) {
-    const bool follows = same_writer(known, writer) && frame.sequence > known.last_sequence;
-    const std::uint64_t lost = follows ? frame.sequence - known.last_sequence - 1 : 0;
-    known.last_sequence = frame.sequence;
+  void look_at_order(Known& known, const FrameView& frame, std::uint64_t writer) {
+    const bool was_mixed = known.order.is_mixed();
+    const std::uint64_t lost = known.order.add(reader(Topic::kFrame), writer, frame.sequence);
     if (lost > 0 && callbacks_.lost) callbacks_.lost(frame.stream, lost);
-  }
-
-  // Whether a frame's writer is that of the frame before, and remembers it.
-  bool same_writer(Known& known, std::uint64_t handle) const {
-    if (known.writer_handle == handle) return true;
-    const bool first = known.writer_handle == 0;
-    known.writer_handle = handle;
-    const dds_guid_t before = known.writer;
-    auto* const endpoint = dds_get_matched_publication_data(reader(Topic::kFrame), handle);
-    if (endpoint == nullptr) {  // it has left already
-      known.writer = {};
-      return false;
-    }
-    known.writer = endpoint->key;
-    dds_builtintopic_free_endpoint(endpoint);
-    return !first && std::equal(std::begin(before.v), std::end(before.v), std::begin(known.writer.v));
+    if (known.order.is_mixed() && !was_mixed)
+      log_warning("two servers in this domain have a stream named '" + std::string(frame.stream) +
+                  "': what is received is of both by turns. Give one of them another name");
   }
 
   void raw(Topic topic, const std::string& stream, std::span<const std::uint8_t> cdr,

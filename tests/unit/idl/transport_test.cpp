@@ -310,21 +310,33 @@ TEST(Transport, KilledWriterIsGone) {
   EXPECT_TRUE(inbox.now().plausible());
 }
 
+// How often a frame has another size than the one before: from one server to the other.
+std::ptrdiff_t changes(const std::vector<std::pair<std::string, FrameMessage>>& frames) {
+  std::ptrdiff_t times = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    times += frames[i].second.data->size() != frames[i - 1].second.data->size();
+  return times;
+}
+
 // As where their networks were apart: neither could hear of the other before it was live.
 TEST(Transport, TwoOfOneNameAreToldOfEachOther) {
   Inbox inbox;
   auto subscriber = expect_made(Subscriber::create(kDomain, "both", inbox.callbacks()));
-  auto first = start_publisher("both", {"1000", "100", "0"});
+  auto first = start_publisher("both", {"1000", "100", "100000"});
   ASSERT_TRUE(inbox.wait([&](auto& r) { return r.there(); })) << first.err();
   first.signal(SIGSTOP);
   ASSERT_TRUE(inbox.wait([&](auto& r) { return r.was_there_and_is_gone(); }));
-  auto second = start_publisher("both", {"1000", "100", "0"});
+  auto second = start_publisher("both", {"2000", "100", "100000"});
   ASSERT_TRUE(second.wait_for_text("live")) << second.err();
   EXPECT_THAT(second.err(), testing::Not(HasSubstr("another server")));
+  testing::internal::CaptureStderr();
   first.signal(SIGCONT);
   for (test::Process* one : {&first, &second})
     EXPECT_TRUE(one->wait_for_text("another server in this domain has a stream named 'both', too"))
         << one->err();
+  EXPECT_TRUE(inbox.wait([](auto& r) { return changes(r.frames) >= 3; }));
+  const std::string told = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(told, HasSubstr("two servers in this domain have a stream named 'both'"));
 }
 
 // A writer that stood still for longer than its lease, and then died for good.
