@@ -288,8 +288,7 @@ Command serve_command() {
             throw CLI::ValidationError("--half-lines", lines.error().message);
           // What there is to be split may be in the file.
           const auto kept = recording_options(*f->recording);
-          if (!f->config && !kept)
-            throw CLI::ValidationError("--keep-size, --keep-for", kept.error().message);
+          if (!f->config && !kept) throw CLI::ValidationError(kept.error().message);
         });
         app.footer(
             "Examples:\n"

@@ -69,10 +69,6 @@ TEST_F(ServerRecording, InFilesThatAreReadAlone) {
   }
 }
 
-TEST_F(ServerRecording, KeepingWithoutSplittingIsRefused) {
-  expect_one_error(run(serve(source_, {"--record", file_.string(), "--keep-for", "1h"})), "--split-every");
-}
-
 TEST_F(ServerRecording, EndsWholeOnASignal) {
   Process process(serve(source_, {"--loop", "--record", file_.string()}));
   ASSERT_TRUE(process.wait_for_text("stream take")) << process.err();

@@ -41,6 +41,7 @@ TEST(ServerUsage, WrongUsageIsTwoAndOneLine) {
       {"evaluate", "take", "--pictures", ""},
       {"evaluate", ""},
       {"serve", "--source", "sim:plane", "--record", ""},
+      {"serve", "--source", "sim:plane", "--record", "a.mcap", "--keep-for", "1h"},
       {"simulate", "--scene", "plane", "--scheme", "", "--out", "folder"},
       {"plan", "--slides", "3"},
       {"pattern", "--slides", "0", "--out", "folder"},
