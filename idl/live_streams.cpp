@@ -18,18 +18,19 @@ namespace {
 
 constexpr std::size_t kMostTold = 20;  // others of one name: none fills the log
 
-Result<bool> take_live_info(std::int32_t reader, const std::string& stream) {
+/// The writer of the next description of that name that is live; 0: no other has come.
+Result<dds_instance_handle_t> take_live_writer(std::int32_t reader, const std::string& stream) {
   void* sample = nullptr;  // lent by Cyclone
   dds_sample_info_t info;
   for (;;) {
     const auto count = dds_take(reader, &sample, &info, 1, 1);
     if (count < 0) return dds_error(count, "cannot look for the stream's name");
-    if (count == 0) return false;
+    if (count == 0) return dds_instance_handle_t{0};
     const auto* description = static_cast<const relievo_StreamInfo*>(sample);
     const bool live =
         info.valid_data && info.instance_state == DDS_IST_ALIVE && description->stream == stream;
     dds_return_loan(reader, &sample, 1);
-    if (live) return true;
+    if (live) return info.publication_handle;
   }
 }
 
@@ -61,14 +62,10 @@ class DescriptionWatch final : public NameWatch {
   /// Any thread.
   void look() {
     const std::lock_guard lock(mutex_);
-    void* sample = nullptr;  // lent by Cyclone
-    dds_sample_info_t info;
-    while (dds_take(reader_.get(), &sample, &info, 1, 1) > 0) {
-      const auto* description = static_cast<const relievo_StreamInfo*>(sample);
-      const bool other = info.valid_data && info.instance_state == DDS_IST_ALIVE &&
-                         info.publication_handle != own_ && description->stream == stream_;
-      dds_return_loan(reader_.get(), &sample, 1);
-      if (other && told_.size() < kMostTold && told_.insert(info.publication_handle).second)
+    for (;;) {
+      const auto writer = take_live_writer(reader_.get(), stream_);
+      if (!writer || *writer == 0) return;
+      if (*writer != own_ && told_.size() < kMostTold && told_.insert(*writer).second)
         log_warning("another server in this domain has a stream named '" + stream_ +
                     "', too: who watches or records it gets both mixed. Give one of them another name");
     }
@@ -102,9 +99,9 @@ Status check_name_is_free(const Domain& domain, const std::string& stream, std::
     last = left_ns <= 0;
     dds_attach_t triggered = 0;
     dds_waitset_wait(waitset->get(), &triggered, 1, std::max<std::int64_t>(0, left_ns));
-    auto live = take_live_info(reader->get(), stream);
+    const auto live = take_live_writer(reader->get(), stream);
     if (!live) return live.error();
-    if (*live) {
+    if (*live != 0) {
       return Error{"a stream named '" + stream + "' is already live in this domain: choose another name"};
     }
   }

@@ -340,7 +340,7 @@ TEST_F(RecordingOnRequest, WhatCannotWorkIsSaidAtTheStart) {
   EXPECT_THAT(wrong.err, HasSubstr("10s"));
   const Finished alone = run(serve(source_, {"--record", out_ / "a.mcap", "--keep-size", "1GB"}));
   EXPECT_EQ(alone.status, 2);
-  EXPECT_THAT(alone.err, HasSubstr("--split-size"));
+  EXPECT_THAT(alone.err, HasSubstr("--split-size or --split-every"));
 }
 
 }  // namespace
