@@ -115,16 +115,11 @@ bool may_hold_chunk(const std::filesystem::path& path) {
   const auto magic = (*file)->read(0, std::min<std::uint64_t>(size, mcap::kMagic.size()));
   if (!magic || !std::equal(magic->begin(), magic->end(), mcap::kMagic.begin())) return true;
   for (std::uint64_t at = mcap::kMagic.size(); at <= size && size - at >= mcap::kRecordHeaderBytes;) {
-    const auto head = (*file)->read(at, mcap::kRecordHeaderBytes);
-    if (!head) return true;
-    ByteReader reader(*head);
-    const auto op = static_cast<mcap::Op>(reader.read<std::uint8_t>());
-    const auto length = reader.read<std::uint64_t>();
-    if (static_cast<int>(op) == 0 || length > mcap::kMaxChunkBytes) return true;
-    at += mcap::kRecordHeaderBytes;
-    if (length > size - at) return false;
-    if (op == mcap::Op::kChunk) return true;
-    at += length;
+    const auto record = mcap::read_record_place(**file, at);
+    if (!record || record->length > mcap::kMaxChunkBytes) return true;
+    if (record->end() > size) return false;
+    if (record->op == mcap::Op::kChunk) return true;
+    at = record->end();
   }
   return false;
 }

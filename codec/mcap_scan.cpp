@@ -19,6 +19,7 @@ namespace relievo::mcap {
 namespace {
 
 constexpr std::uint64_t kMaxSummaryBytes = 256u << 20;
+constexpr std::uint64_t kMostHeaderBytes = 256;  // of a chunk, before its records
 
 /// From the summary at the file's end; nothing where there is none or any byte of it is wrong.
 std::optional<Contents> read_index(const File& file) {
@@ -81,6 +82,35 @@ Result<std::vector<Contents>> walk_damaged_start(const File& file) {
 }
 
 }  // namespace
+
+std::optional<RecordPlace> read_record_place(const File& file, std::uint64_t offset) {
+  const auto head = file.read(offset, kRecordHeaderBytes);
+  if (!head) return std::nullopt;
+  ByteReader reader(*head);
+  RecordPlace place{.op = static_cast<Op>(reader.read<std::uint8_t>()), .offset = offset};
+  place.length = reader.read<std::uint64_t>();
+  if (static_cast<int>(place.op) == 0) return std::nullopt;  // zeros that a power loss left
+  if (place.end() < place.content()) return std::nullopt;
+  return place;
+}
+
+std::optional<ChunkIndex> read_chunk_place(const File& file, const RecordPlace& chunk) {
+  const auto start = file.read(chunk.content(), std::min(chunk.length, kMostHeaderBytes));
+  if (!start) return std::nullopt;
+  const auto header = read_chunk_header(*start);
+  if (!header || header->first.records_size > chunk.length ||
+      header->second > chunk.length - header->first.records_size)
+    return std::nullopt;
+  return ChunkIndex{.start_time = header->first.start_time,
+                    .end_time = header->first.end_time,
+                    .offset = chunk.offset,
+                    .length = kRecordHeaderBytes + chunk.length,
+                    .message_index_offsets = {},
+                    .message_index_length = 0,
+                    .compression = header->first.compression,
+                    .compressed_size = header->first.records_size,
+                    .uncompressed_size = header->first.uncompressed_size};
+}
 
 /// The first one of an id counts; the specification has all of an id equal.
 bool Contents::add(const std::optional<Schema>& schema) {

@@ -40,6 +40,23 @@ class File {
   mutable std::uint64_t bytes_read_ = 0;
 };
 
+/// Where a record lies.
+struct RecordPlace {
+  Op op{};
+  std::uint64_t offset = 0;
+  std::uint64_t length = 0;  // of its content
+
+  std::uint64_t content() const { return offset + kRecordHeaderBytes; }
+  std::uint64_t end() const { return content() + length; }
+};
+
+/// Of the record at `offset`, which the file's end may cut off. Nothing where the file has no head of one
+/// there.
+std::optional<RecordPlace> read_record_place(const File& file, std::uint64_t offset);
+
+/// Of a chunk, without message indexes; nothing where its head is wrong.
+std::optional<ChunkIndex> read_chunk_place(const File& file, const RecordPlace& chunk);
+
 /// Bytes that are no records.
 struct Gap {
   std::uint64_t offset = 0;

@@ -13,19 +13,8 @@ namespace relievo::mcap {
 namespace {
 
 constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels
-constexpr std::uint64_t kMostHeaderBytes = 256;            // of a chunk, before its records
 constexpr std::uint64_t kWindowBytes = 1u << 20;           // read at once while looking for a record
 constexpr std::size_t kMostRecordings = 4096;              // that a file may be joined of
-
-/// Where a record that begins at `at` lies; nothing where the file is too short for it.
-struct Extent {
-  Op op{};
-  std::uint64_t at = 0;
-  std::uint64_t length = 0;  // of its content
-
-  std::uint64_t content() const { return at + kRecordHeaderBytes; }
-  std::uint64_t end() const { return content() + length; }
-};
 
 class Walk {
  public:
@@ -34,7 +23,7 @@ class Walk {
   Result<std::vector<Contents>> run() {
     std::uint64_t at = skip_magic();
     while (at < file_.size()) {
-      const auto record = ended_ ? std::nullopt : extent(at);
+      const auto record = ended_ ? std::nullopt : record_at(at);
       loose_messages_ = loose_messages_ || (record && record->op == Op::kMessage);
       if (record && add(*record)) {
         at = record->end();
@@ -60,22 +49,17 @@ class Walk {
   }
 
  private:
-  std::optional<Extent> extent(std::uint64_t at) const {
-    const auto head = file_.read(at, kRecordHeaderBytes);
-    if (!head) return std::nullopt;
-    ByteReader reader(*head);
-    Extent out{.op = static_cast<Op>(reader.read<std::uint8_t>()), .at = at};
-    out.length = reader.read<std::uint64_t>();
-    if (static_cast<int>(out.op) == 0) return std::nullopt;  // zeros that a power loss left
-    if (out.length > file_.size() - out.content()) return std::nullopt;
-    return out;
+  /// Nothing where the file does not hold all of it.
+  std::optional<RecordPlace> record_at(std::uint64_t at) const {
+    const auto record = read_record_place(file_, at);
+    return record && record->end() <= file_.size() ? record : std::nullopt;
   }
 
   /// The file's first bytes, where they or what follows them is as it should be. Returns where that is.
   std::uint64_t skip_magic() {
     const auto magic = file_.read(0, kMagic.size());
     if (magic && std::ranges::equal(*magic, kMagic)) return kMagic.size();
-    const auto header = magic ? extent(kMagic.size()) : std::nullopt;
+    const auto header = magic ? record_at(kMagic.size()) : std::nullopt;
     if (!header || header->op != Op::kHeader || !goes_on_at(header->end())) return 0;
     contents_.gaps.push_back({0, kMagic.size()});
     return kMagic.size();
@@ -92,7 +76,7 @@ class Walk {
   bool begins_at(std::uint64_t at) const {
     const auto magic = file_.read(at, kMagic.size());
     if (!magic || !std::equal(kMagic.begin(), kMagic.end(), magic->begin())) return false;
-    const auto header = extent(at + kMagic.size());
+    const auto header = record_at(at + kMagic.size());
     return header && header->op == Op::kHeader;
   }
 
@@ -108,12 +92,12 @@ class Walk {
 
   /// True where a record or a recording could begin at `at`, or the file ends there.
   bool goes_on_at(std::uint64_t at) const {
-    const auto next = extent(at);
+    const auto next = record_at(at);
     return at == file_.size() || (next && next->op <= Op::kDataEnd) || begins_at(at);
   }
 
   /// False where the record, or its length, cannot be.
-  bool add(const Extent& record) {
+  bool add(const RecordPlace& record) {
     switch (record.op) {
       case Op::kChunk:
         return add_chunk(record);
@@ -151,31 +135,13 @@ class Walk {
     }
   }
 
-  Result<Bytes> small_content(const Extent& record) const {
+  Result<Bytes> small_content(const RecordPlace& record) const {
     if (record.length > kMaxSmallRecordBytes) return Error{"too large"};
     return file_.read(record.content(), record.length);
   }
 
-  std::optional<ChunkIndex> chunk_at(const Extent& record) const {
-    const auto start = file_.read(record.content(), std::min(record.length, kMostHeaderBytes));
-    if (!start) return std::nullopt;
-    const auto header = read_chunk_header(*start);
-    if (!header || header->first.records_size > record.length ||
-        header->second > record.length - header->first.records_size)
-      return std::nullopt;
-    return ChunkIndex{.start_time = header->first.start_time,
-                      .end_time = header->first.end_time,
-                      .offset = record.at,
-                      .length = kRecordHeaderBytes + record.length,
-                      .message_index_offsets = {},
-                      .message_index_length = 0,
-                      .compression = header->first.compression,
-                      .compressed_size = header->first.records_size,
-                      .uncompressed_size = header->first.uncompressed_size};
-  }
-
-  bool add_chunk(const Extent& record) {
-    auto chunk = chunk_at(record);
+  bool add_chunk(const RecordPlace& record) {
+    auto chunk = read_chunk_place(file_, record);
     if (!chunk) return false;
     if (which_ == ReadChunks::kWhereNeeded && count_by_index(*chunk)) {
       contents_.chunks.push_back(std::move(*chunk));
@@ -196,8 +162,8 @@ class Walk {
     ChunkIndex with_index = chunk;
     const std::uint64_t begin = chunk.offset + chunk.length;
     std::uint64_t at = begin;
-    auto next = extent(at);
-    for (; next && next->op == Op::kMessageIndex; next = extent(at)) {
+    auto next = record_at(at);
+    for (; next && next->op == Op::kMessageIndex; next = record_at(at)) {
       const auto channel = file_.read(next->content(), std::min<std::uint64_t>(next->length, 2));
       if (!channel || channel->size() < 2) return false;
       with_index.message_index_offsets.emplace_back(ByteReader(*channel).read<std::uint16_t>(), at);
@@ -225,14 +191,14 @@ class Walk {
     ++counts_[channel];
   }
 
-  bool add_attachment(const Extent& record) {
+  bool add_attachment(const RecordPlace& record) {
     // Its data may be large; the name is all that is wanted here.
     const auto start = file_.read(record.content(), std::min<std::uint64_t>(record.length, 4096));
     if (!start) return false;
     ByteReader reader(*start);
     reader.take(16);
     AttachmentIndex index;
-    index.offset = record.at;
+    index.offset = record.offset;
     index.length = kRecordHeaderBytes + record.length;
     index.name = reader.read_string();
     if (!reader.ok()) return false;
@@ -278,10 +244,10 @@ class Walk {
   /// By its CRC. Bytes made to look like many large records cannot keep us for longer than a few times what
   /// reading the file takes.
   bool is_whole(std::uint64_t at) {
-    const auto record = extent(at);
+    const auto record = record_at(at);
     if (!record || record->length > std::min(kMaxChunkBytes, effort_left_)) return false;
     if (record->op == Op::kChunk) {
-      const auto chunk = chunk_at(*record);
+      const auto chunk = read_chunk_place(file_, *record);
       if (!chunk || chunk->compressed_size != chunk->uncompressed_size || !chunk->compression.empty())
         return false;
       effort_left_ -= record->length;

@@ -44,7 +44,7 @@ class RecordingFollower {
     Bytes bytes;
   };
   static bool is_there(const ChunkHead& head, const mcap::File& file);
-  Status take(mcap::Op op, std::uint64_t content, std::uint64_t length, const mcap::File& file);
+  Status take(const mcap::RecordPlace& record, const mcap::File& file);
   void commit();
 
   const std::filesystem::path file_;
