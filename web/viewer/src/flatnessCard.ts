@@ -303,6 +303,7 @@ export class FlatnessCard {
   }
 
   private fail(why: string): void {
+    if (why === this.trouble && this.measured === null) return; // the picture need not be drawn again for it
     this.trouble = why;
     this.measured = null;
     this.show();
