@@ -22,7 +22,7 @@ const kFlags = [
 ];
 
 /** For anything that happens by itself, however slow or loaded the machine. */
-export const kPatienceMs = 60_000;
+export const kPatienceMs = 180_000;
 /** For a program that computes all the while: a calibration's views, and what is calculated of them. */
 export const kLongPatienceMs = 300_000;
 
