@@ -80,8 +80,16 @@ Status fill(FieldSource& source, const Options& options, Captured& captured) {
   return {};
 }
 
+/// To the end, whatever was asked for meanwhile: there is no second take of it.
+Status write(const Options& options, Captured& captured) {
+  Progress progress("write", "frames", captured.size());
+  return write_take(options.out, captured, {.progress = [&](std::uint64_t done) { progress.update(done); }});
+}
+
 Status run(const Options& options, StopSignal& stop) {
   if (const Status known = check_rig(options.source, options.camera); !known) return known;
+  // What was filmed may not come again: that it cannot be kept is said before.
+  if (const Status target = check_take_target(options.out); !target) return target;
   auto source = open_source(options.source, {.camera = options.camera});
   if (!source) return source.error();
   Captured captured((*source)->info());
@@ -92,8 +100,11 @@ Status run(const Options& options, StopSignal& stop) {
   const SourceCounts counts = (*source)->counts();
   source->reset();  // the camera is free while the take is written
   const std::size_t frames = captured.size();
-  if (frames == 0 && stop.stopped()) return {};
-  if (const Status written = write_take(options.out, captured, {}); !written) return written;
+  if (frames == 0 && stop.stopped()) {
+    log_info("stopped before the first frame: nothing was written to " + options.out);
+    return {};
+  }
+  if (const Status written = write(options, captured); !written) return written;
   if (options.json) {
     const nlohmann::json json = {{"take", options.out},
                                  {"frames", frames},

@@ -61,17 +61,31 @@ Status write_frame(const fs::path& take, std::uint64_t number, const CapturedFra
   return truth.empty() ? Status{} : write_npy(take_truth(take, number), truth);
 }
 
+/// Where links lead, and without the slash of "take/".
+fs::path target_of(const fs::path& take) {
+  std::error_code code;
+  const fs::path target = fs::weakly_canonical(fs::absolute(take, code), code);
+  return target.has_filename() ? target : target.parent_path();
+}
+
+/// In `folder`, of what becomes `target`.
+fs::path partial_name(const fs::path& folder, const fs::path& target) {
+  return folder / ("." + target.filename().string() + ".partial-" + std::to_string(getpid()));
+}
+
+Status check_free(const fs::path& take, const fs::path& target) {
+  std::error_code code;
+  if (!fs::exists(target, code) || (fs::is_directory(target, code) && fs::is_empty(target, code))) return {};
+  return Error{take.string() + " exists already: give a new folder or remove it"};
+}
+
 /// `truth()`: of the frame that the source gave last.
 Status write(const fs::path& take, FieldSource& source, const std::function<const ImageF&()>& truth,
              const TakeOptions& options) {
   std::error_code code;
-  const fs::path target = fs::weakly_canonical(fs::absolute(take, code), code);  // where links lead
-  const fs::path whole = target.has_filename() ? target : target.parent_path();  // "take/"
-  if (fs::exists(whole, code) && !(fs::is_directory(whole, code) && fs::is_empty(whole, code))) {
-    return Error{take.string() + " exists already: give a new folder or remove it"};
-  }
-  PartialFolder partial(whole.parent_path() /
-                        ("." + whole.filename().string() + ".partial-" + std::to_string(getpid())));
+  const fs::path whole = target_of(take);
+  if (const Status free = check_free(take, whole); !free) return free;
+  PartialFolder partial(partial_name(whole.parent_path(), whole));
   for (const char* folder : {"frames", "truth"}) {
     if (!fs::create_directories(partial.path() / folder, code) && code) {
       return Error{partial.path().string() + " cannot be created: " + code.message()};
@@ -111,6 +125,22 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
 }
 
 }  // namespace
+
+Status check_take_target(const fs::path& take) {
+  const fs::path target = target_of(take);
+  if (const Status free = check_free(take, target); !free) return free;
+  std::error_code code;
+  fs::path above = target.parent_path();
+  while (above != above.parent_path() && !fs::exists(above, code)) above = above.parent_path();
+  // Tried, not asked for: what rights say does not hold for root, nor on every disk.
+  const fs::path trial = partial_name(above, target);
+  if (fs::create_directory(trial, code)) {
+    fs::remove(trial, code);
+    return {};
+  }
+  if (!code) return {};  // one of that name is there, of a process that is gone
+  return Error{take.string() + " cannot be created in " + above.string() + ": " + code.message()};
+}
 
 Status write_take(const fs::path& take, FieldSource& source, const TakeOptions& options) {
   const ImageF none;

@@ -20,6 +20,10 @@ struct TakeOptions {
   const std::atomic<bool>* stop = nullptr;  // once true, nothing is left behind and an error returned
 };
 
+/// Fails where write_take() would at once: something is there, or no folder can be made there. Leaves
+/// nothing.
+Status check_take_target(const std::filesystem::path& take);
+
 /// Writes the frames of `source` into the new folder `take`, times from its first frame on. The folder
 /// appears when it is complete: until then a sibling ".NAME.partial-PID" holds it, which is removed on every
 /// failure. A folder that is there already and is not empty is refused.

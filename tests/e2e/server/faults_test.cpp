@@ -178,6 +178,16 @@ TEST_F(ServerFault, ATakeOfWhichNothingDecodes) {
   }
 }
 
+// What a camera saw does not come again: it was filmed to the end, and lost then.
+TEST_F(ServerFault, CaptureSaysBeforehandThatItsTakeCannotBeWritten) {
+  const fs::path none = folder_ / "none";
+  for (const auto& [out, words] : {std::pair<fs::path, std::string>{take_, "exists already"},
+                                   {"/proc/take", "cannot be created in /proc"}})
+    expect_one_error(
+        run(server({"capture", "--source", "take:" + none.string(), "--frames", "2", "--out", out.string()})),
+        words);  // it has not even looked at the source
+}
+
 TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   std::ofstream(out_) << "mine\n";
   expect_one_error(run(server({"reconstruct", take_.string(), "--out", out_.string()})), out_.string());

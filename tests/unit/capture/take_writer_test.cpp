@@ -80,6 +80,24 @@ TEST(TakeWriter, RefusesAFolderWithSomethingInIt) {
   EXPECT_TRUE(write_take(folder.path() / "empty/", *source, {}));
 }
 
+TEST(TakeWriter, WhetherATakeCanBeThereIsToldBeforehand) {
+  test::TempFolder folder;
+  EXPECT_TRUE(check_take_target(folder.path() / "take"));
+  EXPECT_TRUE(check_take_target(folder.path() / "not/yet/take/"));
+  EXPECT_EQ(entries(folder.path()), 0u);
+  std::filesystem::create_directory(folder.path() / "empty");
+  EXPECT_TRUE(check_take_target(folder.path() / "empty"));
+  test::write_text(folder.path() / "file", "x");
+  const auto refusal = [](const std::filesystem::path& take) {
+    const Status possible = check_take_target(take);
+    return possible ? "" : possible.error().message;
+  };
+  EXPECT_THAT(refusal(folder.path()), HasSubstr("exists already"));
+  EXPECT_THAT(refusal(folder.path() / "file"), HasSubstr("exists already"));
+  EXPECT_THAT(refusal(folder.path() / "file/take"), HasSubstr("cannot be created"));
+  EXPECT_THAT(refusal("/proc/take"), HasSubstr("cannot be created in /proc: "));
+}
+
 TEST(TakeWriter, GoesWhereALinkLeads) {
   test::TempFolder folder;
   std::filesystem::create_directory(folder.path() / "large_disk");
