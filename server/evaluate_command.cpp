@@ -23,6 +23,7 @@
 #include "server/commands.h"
 #include "server/evaluate_pictures.h"
 #include "server/options.h"
+#include "server/step_watch.h"
 
 namespace relievo {
 namespace {
@@ -193,11 +194,16 @@ Result<std::uint64_t> find_lead(const Options& options, const SourceInfo& info) 
 class Evaluation {
  public:
   Evaluation(const Options& options, const SourceInfo& info, Reconstructor& reconstructor, Judges& judges)
-      : options_(options), info_(info), reconstructor_(reconstructor), judges_(judges) {}
+      : options_(options),
+        info_(info),
+        reconstructor_(reconstructor),
+        judges_(judges),
+        steps_(info.pattern, info.rig) {}
 
   /// Of the frames scored.
   const FilterCounts& filters() const { return filters_; }
   std::uint64_t done() const { return done_; }
+  const StepWatch& steps() const { return steps_; }
 
   Status add(CapturedFrame&& frame, const Exposure& exposure) {
     bool decodable = exposure.light == Light::kSlide &&
@@ -206,6 +212,7 @@ class Evaluation {
     auto result = reconstructor_.add(frame);
     if (!result) return result.error();
     ++done_;
+    steps_.add(frame.time_ns, reconstructor_.report());
     const bool regrouped = reconstructor_.report().step.regrouped;
     // The first two frames are one pair then.
     decodable = decodable && !(regrouped && done_ == 2 && info_.pattern.slides > 1);
@@ -255,6 +262,7 @@ class Evaluation {
   std::optional<int> previous_slide_;
   ImageF previous_truth_;
   AsDecoded as_decoded_;
+  StepWatch steps_;
   std::uint64_t done_ = 0;
 };
 
@@ -316,6 +324,8 @@ Status run(const Options& options, StopSignal& stop) {
     if (!written) return written.error();
   }
   print(score, evaluation.filters(), options.json);
+  if (const StepWatch& steps = evaluation.steps(); steps.exchanged() > 0)
+    log_warning(steps.exchange_advice());
   return {};
 }
 

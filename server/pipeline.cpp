@@ -231,7 +231,7 @@ class ThreadedPipeline final : public Pipeline {
     std::optional<std::uint64_t> previous;
     std::uint64_t without_surface = 0;  // frames, before the first surface
     bool any_surface = false;
-    StepWatch steps(source_.info().pattern, source_.info().rig.frame_rate);
+    StepWatch steps(source_.info().pattern, source_.info().rig);
     SlidesSeen slides;
     const bool dropping = !options_.lossless && source_.info().pattern.scheme == Scheme::kComplementary;
     const auto not_alone = [&](const Captured& item) {

@@ -46,7 +46,7 @@ struct Options {
 struct Totals {
   Scheme scheme{};
   std::uint64_t frames = 0, white = 0, textures = 0, unreadable = 0, reconstructed = 0, same_slide = 0,
-                vertices = 0, boundaries = 0, matched = 0;
+                exchanged = 0, vertices = 0, boundaries = 0, matched = 0;
   double most_excess = 0;  // of brightness of one exposure
   FilterCounts filters;
   RollingMedian detect_ms, match_ms, triangulate_ms, surface_ms, texture_ms, total_ms;
@@ -55,6 +55,7 @@ struct Totals {
 void count(const ReconstructReport& report, double total_ms, Totals& totals) {
   totals.boundaries += report.boundaries;
   totals.matched += report.matched;
+  totals.exchanged += report.exchanged ? 1 : 0;
   totals.filters += report.filters;
   totals.most_excess = std::max(totals.most_excess, std::fabs(report.slide_excess));
   totals.detect_ms.add(report.detect_ms);
@@ -82,6 +83,7 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
                                 {"white", t.white},
                                 {"unreadable", t.unreadable},
                                 {"same_slide", t.same_slide},
+                                {"exchanged", t.exchanged},
                                 {"step", step},
                                 {"most_excess", t.most_excess},
                                 {"vertices_per_frame", per_frame},
@@ -193,7 +195,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (!numbers) return numbers.error();
   remove_earlier(options.out, *numbers);
 
-  StepWatch steps((*source)->info().pattern, (*source)->info().rig.frame_rate);
+  StepWatch steps((*source)->info().pattern, (*source)->info().rig);
   Totals totals;
   totals.scheme = (*source)->info().pattern.scheme;
   Error last_error;
@@ -235,6 +237,7 @@ Status run(const Options& options, StopSignal& stop) {
   print(totals, steps, options);
   if (totals.scheme == Scheme::kWhiteFrame && totals.white == 0 && !steps.message().empty())
     log_warning(steps.message());
+  if (totals.exchanged > 0) log_warning(std::to_string(totals.exchanged) + " " + steps.exchange_advice());
   if (totals.unreadable > 0) {
     return Error{std::to_string(totals.unreadable) + " of " + std::to_string(totals.frames) +
                  " frames could not be read (the last: " + last_error.message +

@@ -15,15 +15,31 @@ constexpr std::uint64_t kLeast = 15;    // frames before anything is said
 constexpr std::uint64_t kRenewed = 30;  // frames, after which what is said is brought up to date
 constexpr std::uint64_t kCyclesWithoutWhite = 4;
 
+std::string advice_of_exchange(const Rig& rig) {
+  const std::string found = "frames decode far better with the exposures of each the other way round: ";
+  if (rig.scan == Scan::kProgressive)
+    return found +
+           "the first picture of a frame is to be the one under the slide, the second the one under its "
+           "complement";
+  const std::string is(to_string(other(rig.field_order)));
+  return found + "is the " + is + " field exposed first? Then rig.yaml must have field_order: " + is +
+         "; of a camera also --field-order " + is;
+}
+
 }  // namespace
 
-StepWatch::StepWatch(const Pattern& pattern, double frame_rate)
-    : frame_rate_(frame_rate),
+StepWatch::StepWatch(const Pattern& pattern, const Rig& rig)
+    : frame_rate_(rig.frame_rate),
+      exchange_advice_(advice_of_exchange(rig)),
       white_every_(pattern.scheme == Scheme::kWhiteFrame ? static_cast<std::uint64_t>(cycle_frames(pattern))
                                                          : 0),
       lately_(kLately) {}
 
 void StepWatch::add(std::int64_t time_ns, const ReconstructReport& report) {
+  if (report.exchanged)
+    ++exchanged_;
+  else if (report.matched > 0)
+    exchanged_ = 0;
   if (white_every_ > 0) return look_for_white(report.white);
   add(time_ns, report.step);
 }

@@ -2,10 +2,9 @@
 #include "capture/reconstruct/exposure_order.h"
 
 #include <algorithm>
-#include <utility>
 
-#include "capture/pattern/schedule.h"
 #include "capture/reconstruct/detection_lines.h"
+#include "capture/reconstruct/exchanged_pair.h"
 #include "capture/reconstruct/slide_decoder.h"
 
 namespace relievo {
@@ -21,16 +20,6 @@ constexpr int kSeldom = 240;             // frames
 
 std::size_t given_up(const ReconstructReport& report) {
   return report.filters.unsupported + report.filters.rejected;
-}
-
-CapturedFrame turned(const CapturedFrame& pair) {
-  CapturedFrame out = pair.clone();
-  if (pair.scan == Scan::kInterlaced) {
-    out.field_order = other(pair.field_order);
-  } else {
-    std::swap(out.picture, out.complement);
-  }
-  return out;
 }
 
 }  // namespace
@@ -57,7 +46,7 @@ bool ExposureOrder::exchanged(const CapturedFrame& pair, const ReconstructReport
   }
   if (report.matched < kLeast || wait_ > 0) return false;
   const std::size_t as_it_is = given_up_of(pair, pool);
-  const std::size_t other = given_up_of(turned(pair), pool);
+  const std::size_t other = given_up_of(exchanged_pair(pair), pool);
   const auto clear = [](std::size_t less, std::size_t more) { return kClear * less + kLeastApart < more; };
   const bool exchanged = clear(other, as_it_is);
   const bool kept = clear(as_it_is, other);

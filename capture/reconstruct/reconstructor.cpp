@@ -10,6 +10,7 @@
 #include "base/time.h"
 #include "capture/reconstruct/depth_range.h"
 #include "capture/reconstruct/detection_lines.h"
+#include "capture/reconstruct/exposure_doubt.h"
 #include "capture/reconstruct/exposure_order.h"
 #include "capture/reconstruct/field_balance.h"
 #include "capture/reconstruct/field_pairs.h"
@@ -114,6 +115,8 @@ struct Reconstructor::State {
     decoded.reset(p.boundaries(), lines);
     if (p.scheme == Scheme::kWhiteField) decoded_between.reset(p.boundaries(), lines);
     if (p.slides == 1) exposure_order.emplace(r, p, o.line_stride);
+    // Under white-field the white one of two exposures tells.
+    if (p.slides == 2 && p.scheme != Scheme::kWhiteField) exposure_doubt.emplace(r, p, o.line_stride);
     spare.reserve(kSpareFrames);
   }
 
@@ -124,6 +127,7 @@ struct Reconstructor::State {
   CameraResponse response;
   StepKeeper steps;
   std::optional<ExposureOrder> exposure_order;  // of a single slide
+  std::optional<ExposureDoubt> exposure_doubt;  // of two
   FieldPairs pairs;
   FieldBalance balance;
   SlideDecoder decoder;
@@ -330,6 +334,7 @@ Result<std::optional<Frame3D>> Reconstructor::add(const CapturedFrame& captured)
     s.report.step.restarted = true;
     return std::optional<Frame3D>();
   }
+  if (s.exposure_doubt) s.report.exchanged = s.exposure_doubt->exchanged(*s.pair, s.report, s.pool);
 
   const bool white_field = s.pattern.scheme == Scheme::kWhiteField;
   std::optional<Frame3D> between;

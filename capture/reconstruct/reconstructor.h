@@ -49,6 +49,7 @@ struct ReconstructReport {
   StepReport step;             // of projector and camera; a frame of mixed exposures is dropped
   double slide_excess = 0;     // of brightness, over the complement's exposure: taken out (field_balance.h)
   bool white = false;          // this frame was white and gave texture alone (scheme white-frame)
+  bool exchanged = false;      // frames decode far better with their exposures exchanged (exposure_doubt.h)
   bool same_slide = false;     // this frame shows the slide of the one before: a frame was dropped (5.2.3)
 };
 

@@ -3,8 +3,10 @@
 // else, frames a field off are regrouped, and what is reconstructed lies where the scene is.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "capture/reconstruct/reconstructor.h"
@@ -242,6 +244,57 @@ TEST(ExposureOrder, ADriftAcrossASlideChangeIsFoundWithinAFewFrames) {
   EXPECT_LT(s.regrouped, 40U);
   EXPECT_GT(s.count, 50U);
   EXPECT_LT(s.wrong_share(), 0.15);
+}
+
+/// How many of a scene's frames are said to have their exposures the other way round, where they are
+/// `exchanged` from a frame on.
+std::vector<bool> told(const std::string& spec, Decoder decoder, std::uint64_t exchanged_from) {
+  auto source = make_sim(spec, {.threads = 1});
+  EXPECT_TRUE(source) << source.error().message;
+  auto reconstructor =
+      Reconstructor::create((*source)->info().rig, (*source)->info().pattern, {.decoder = decoder});
+  EXPECT_TRUE(reconstructor);
+  std::vector<bool> out;
+  while (true) {
+    auto frame = (*source)->next();
+    if (!frame || !*frame) break;
+    CapturedFrame& f = **frame;
+    if (f.number >= exchanged_from && f.scan == Scan::kProgressive) std::swap(f.picture, f.complement);
+    if (f.number >= exchanged_from && f.scan == Scan::kInterlaced) {
+      for (int y = 0; y + 1 < f.picture.height(); y += 2)  // a picture of the camera's other field order
+        std::swap_ranges(f.picture.row(y), f.picture.row(y) + 3 * f.picture.width(), f.picture.row(y + 1));
+    }
+    EXPECT_TRUE(reconstructor->add(f));
+    out.push_back(reconstructor->report().exchanged);
+  }
+  return out;
+}
+
+constexpr std::uint64_t kNever = 1000;
+
+TEST(ExposureDoubt, FramesTheOtherWayRoundAreFound) {
+  for (const Decoder decoder : {Decoder::kOrdered, Decoder::kQuick, Decoder::kPaper}) {
+    for (const std::string more : {"", ",scan=progressive", ",field_order=bottom", ",scheme=white-frame"}) {
+      const std::string spec = "object,frames=9" + more + kSmall;
+      EXPECT_TRUE(told(spec, decoder, 0)[7]) << more;
+      const std::vector<bool> as_is = told(spec, decoder, kNever);
+      EXPECT_EQ(std::count(as_is.begin(), as_is.end(), true), 0) << more;
+    }
+  }
+}
+
+TEST(ExposureDoubt, AChangeInTheMiddleIsFound) {
+  const std::vector<bool> seen = told("object,frames=16" + kSmall, Decoder::kOrdered, 6);
+  EXPECT_EQ(std::count(seen.begin(), seen.begin() + 8, true), 0);
+  EXPECT_EQ(std::count(seen.begin() + 10, seen.end(), true), 6);
+}
+
+TEST(ExposureDoubt, APictureThatHardlyDecodesEitherWayIsNone) {
+  for (const std::string more : {",defocus=5,stripes=60", ",exposure=0.05,noise=8", ",gloss=20,ambient=3"}) {
+    const std::vector<bool> seen =
+        told("face,frames=12,width=320,height=240" + more, Decoder::kOrdered, kNever);
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), true), 0) << more;
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "capture/pattern/schedule.h"
 #include "capture/source/field_source.h"
 #include "server/pipeline.h"
 #include "server/step_watch.h"
@@ -14,7 +15,11 @@ namespace {
 
 using namespace test;
 
-constexpr double kRate = 29.97;
+Rig rig_at_rate() {
+  Rig rig;
+  rig.frame_rate = 29.97;
+  return rig;
+}
 
 ReconstructReport at(float phase, bool mixed) {
   ReconstructReport report;
@@ -23,7 +28,7 @@ ReconstructReport at(float phase, bool mixed) {
 }
 
 TEST(StepWatch, SpeaksOnceManyAreDroppedAndNoMoreWhenFewAre) {
-  StepWatch watch(Pattern{}, kRate);
+  StepWatch watch(Pattern{}, rig_at_rate());
   std::int64_t frame = 0;
   const auto add = [&](int count, float phase, bool mixed) {
     for (int i = 0; i < count; ++i) watch.add(frame++ * 33'366'700, at(phase, mixed));
@@ -46,7 +51,7 @@ TEST(StepWatch, SpeaksWhereNoFrameIsWhiteThatShouldBe) {
   Pattern pattern;
   pattern.slides = 2;
   pattern.scheme = Scheme::kWhiteFrame;
-  StepWatch watch(pattern, kRate);
+  StepWatch watch(pattern, rig_at_rate());
   const auto add = [&](bool white) {
     ReconstructReport report;
     report.white = white;
@@ -61,24 +66,46 @@ TEST(StepWatch, SpeaksWhereNoFrameIsWhiteThatShouldBe) {
   EXPECT_EQ(watch.message(), "");
 }
 
+TEST(StepWatch, SpeaksWhileExposuresAreTheOtherWayRound) {
+  Rig rig = rig_at_rate();
+  rig.field_order = FieldOrder::kBottom;
+  StepWatch watch(Pattern{}, rig);
+  ReconstructReport report;
+  report.matched = 100;
+  watch.add(0, report);
+  EXPECT_EQ(watch.message(), "");
+  report.exchanged = true;
+  watch.add(1, report);
+  EXPECT_NE(watch.message().find("field_order: top"), std::string::npos) << watch.message();
+  watch.add(2, ReconstructReport{});  // of which nothing was decoded
+  EXPECT_EQ(watch.exchanged(), 1U);
+  report.exchanged = false;
+  watch.add(3, report);
+  EXPECT_EQ(watch.message(), "");
+}
+
 struct Served {
   Status done;
   ServerStatus status;
 };
 
-Served serve(const std::string& more, bool loop = false) {
-  auto source = open_source("sim:plane,width=192,height=144,stripes=30" + more, {.loop = loop});
-  EXPECT_TRUE(source) << source.error().message;
+Served serve(FieldSource& source) {
   CollectingSink sink;
   PipelineOptions options;
   options.stream = "test";
   options.paced = false;
   options.lossless = true;
-  auto pipeline = Pipeline::create(**source, {&sink}, options);
+  auto pipeline = Pipeline::create(source, {&sink}, options);
   EXPECT_TRUE(pipeline) << pipeline.error().message;
   Served out{(*pipeline)->run(), {}};
   out.status = sink.statuses().back();
   return out;
+}
+
+Served serve(const std::string& more, bool loop = false) {
+  auto source = open_source("sim:plane,width=192,height=144,stripes=30" + more, {.loop = loop});
+  EXPECT_TRUE(source) << source.error().message;
+  return serve(**source);
 }
 
 TEST(ServedOutOfStep, DriftIsCountedAndSaid) {
@@ -111,6 +138,36 @@ TEST(ServedOutOfStep, WhiteFrameThatShowsNoWhiteIsSaid) {
   const Served out_of_step = serve(",frames=18,scheme=white-frame,phase=0.5");
   EXPECT_NE(out_of_step.status.message.find("no frame is white"), std::string::npos)
       << out_of_step.status.message;
+}
+
+/// A source whose rig says that the other field is exposed first.
+class OtherFieldFirst final : public FieldSource {
+ public:
+  explicit OtherFieldFirst(std::unique_ptr<FieldSource> source)
+      : source_(std::move(source)), info_(source_->info()) {
+    info_.rig.field_order = other(info_.rig.field_order);
+  }
+  const SourceInfo& info() const override { return info_; }
+  Result<std::optional<CapturedFrame>> next() override {
+    auto frame = source_->next();
+    if (frame && *frame) (*frame)->field_order = info_.rig.field_order;
+    return frame;
+  }
+  void request_stop() override { source_->request_stop(); }
+
+ private:
+  const std::unique_ptr<FieldSource> source_;
+  SourceInfo info_;
+};
+
+TEST(ServedOutOfStep, AnotherFieldOrderThanTheRigsIsSaid) {
+  auto source = open_source("sim:object,width=320,height=240,stripes=60,frames=12", {});
+  ASSERT_TRUE(source) << source.error().message;
+  OtherFieldFirst other(*std::move(source));
+  const Served served = serve(other);
+  ASSERT_TRUE(served.done) << served.done.error().message;
+  EXPECT_NE(served.status.message.find("is the top field exposed first?"), std::string::npos)
+      << served.status.message;
 }
 
 TEST(ServedOutOfStep, ALoopOfMixedExposuresAloneEndsWithAdvice) {
