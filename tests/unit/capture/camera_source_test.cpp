@@ -419,6 +419,25 @@ TEST(DriverClock, AnyClockBecomesUtc) {
   EXPECT_EQ(clock.to_utc(INT64_MIN + 9, true, 7 * kSecond + 500), 7 * kSecond + 20 + kUtc);  // it wrapped
   EXPECT_EQ(clock.to_utc(123, false, 8 * kSecond), 8 * kSecond + kUtc);                      // it jumped
   EXPECT_EQ(clock.to_utc(123 + kSecond, false, 9 * kSecond + 7), 9 * kSecond + kUtc);
+  // Neither is later than now.
+  EXPECT_EQ(clock.to_utc(123 + 2 * kSecond, false, 9 * kSecond + 500), 9 * kSecond + 500 + kUtc);
+  EXPECT_EQ(clock.to_utc(14 * kSecond, true, 10 * kSecond), 10 * kSecond + kUtc);
+}
+
+TEST(CameraSource, AStampFromTheFutureIsOfOneFrameAlone) {
+  FakeCamera camera;
+  camera.field = V4L2_FIELD_INTERLACED;
+  const auto source = open(camera);
+  camera.film(0, 8);
+  camera.shots[2].late_ns = -4'000'000'000;  // as USB cameras' own clocks have it now and then
+  camera.shots[5].late_ns = 4'000'000'000;
+  std::vector<std::int64_t> since;
+  for (int i = 0; i < 8; ++i) since.push_back(next(*source).time_ns - FakeCamera::kUtc_ns - 1'000'000'000);
+  for (std::size_t i = 0; i < since.size(); ++i) {
+    if (i == 5) continue;
+    EXPECT_EQ(since[i], static_cast<std::int64_t>(i + 1) * 10'000'000) << i;
+  }
+  EXPECT_EQ(since[5], since[4] + 1);  // none goes back
 }
 
 }  // namespace
