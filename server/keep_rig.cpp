@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/keep_rig.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -37,7 +38,7 @@ Status can_keep_rig(const fs::path& file) {
   const fs::path folder =
       fs::weakly_canonical(fs::absolute(file), ignored).parent_path();  // where a link leads
   if (!fs::is_directory(folder, ignored)) return cannot("make the folder " + folder.string());
-  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0)
     return cannot("let the server write in the folder " + folder.string() + " (" + write_failure(errno) +
                   ")");
   return {};
