@@ -192,9 +192,11 @@ class ThreadedPipeline final : public Pipeline {
     while (!options_.frames || delivered < *options_.frames) {
       auto next = next_frame();
       if (!next) {
-        // An error is logged once the source goes on behind it, or returned where it does not.
-        if (errors_in_a_row > 0 && last_error.message != next.error().message)
-          log_warning(label_ + last_error.message);
+        // Logged at once of a camera, which somebody may have to see to. Else once the source goes on behind
+        // it, or returned where it does not.
+        const bool another = errors_in_a_row == 0 || last_error.message != next.error().message;
+        if (info.live && another) log_warning(label_ + next.error().message);
+        if (!info.live && another && errors_in_a_row > 0) log_warning(label_ + last_error.message);
         last_error = next.error();
         if (!info.live) stats_.lost_in_capture(1);  // a camera counts its own
         set_state(StreamState::kStalled, last_error.message);
@@ -202,7 +204,8 @@ class ThreadedPipeline final : public Pipeline {
         continue;
       }
       if (!*next) return errors_in_a_row > 0 && !stopping() ? Status(last_error) : Status();
-      if (errors_in_a_row > 0) log_warning(label_ + last_error.message);
+      if (errors_in_a_row > 0 && info.live) log_info(label_ + info.name + " gives frames again");
+      if (errors_in_a_row > 0 && !info.live) log_warning(label_ + last_error.message);
       errors_in_a_row = 0;
       set_state(StreamState::kRunning, "");
       CapturedFrame frame = *std::move(*next);

@@ -23,6 +23,8 @@ constexpr int kWait_ms = 50;  // at most until a stop is noticed
 constexpr int kRetry_ms = 200;
 constexpr std::int64_t kLookAtSignal_ns = 500'000'000;
 constexpr int kMostRestarts = 3;  // without a picture between them
+constexpr std::int64_t kSilent_ns = 5'000'000'000;
+constexpr std::int64_t kSilentPictures = 10;  // at least, of slow cameras
 
 /// A device that streams.
 struct Session {
@@ -69,11 +71,15 @@ class CameraSource final : public FieldSource {
       if (const Status signal = look_at_signal(); !signal) return signal.error();
       const auto filled = session_->stream->take(kWait_ms);
       if (!filled) {
-        if (!session_->stream->ended()) continue;
+        if (!session_->stream->ended()) {
+          if (const Status heard = look_at_silence(); !heard) return heard.error();
+          continue;
+        }
         if (const Status goes_on = after_the_end(); !goes_on) return goes_on.error();
         continue;
       }
       restarts_in_a_row_ = 0;
+      silent_since_ns_.reset();
       if (auto frame = consume(*filled)) return frame;
     }
     return std::optional<CapturedFrame>{};
@@ -130,6 +136,20 @@ class CameraSource final : public FieldSource {
     return {};
   }
 
+  /// Fails once when the camera has given nothing for long, though nothing says that it does not work.
+  Status look_at_silence() {
+    const std::int64_t now = io_.monotonic_ns();
+    if (!silent_since_ns_) {
+      silent_since_ns_ = now;
+      silence_told_ = false;
+    }
+    const std::int64_t most = std::max(kSilent_ns, kSilentPictures * format_.picture_ns);
+    if (no_signal_ || silence_told_ || now - *silent_since_ns_ < most) return {};
+    silence_told_ = true;
+    return Error{path_ + ": no picture for " + std::to_string(most / 1'000'000'000) +
+                 " s; capture goes on when one comes: does it wait for a trigger, or hang?"};
+  }
+
   /// Streaming ended by itself: starts it again where that can be, and fails where the camera is gone.
   Status after_the_end() {
     if (*session_->stream->ended() == StreamEnd::kUnplugged) {
@@ -164,6 +184,7 @@ class CameraSource final : public FieldSource {
     assembler_.restart();
     look_again_ns_ = 0;
     no_signal_ = false;
+    silent_since_ns_.reset();
     ++counts_.reconnects;
     return {};
   }
@@ -188,6 +209,8 @@ class CameraSource final : public FieldSource {
   std::int64_t last_time_ns_ = 0;
   std::int64_t look_again_ns_ = 0;  // at the signal
   bool no_signal_ = false;
+  std::optional<std::int64_t> silent_since_ns_;
+  bool silence_told_ = false;
   int restarts_in_a_row_ = 0;
 };
 

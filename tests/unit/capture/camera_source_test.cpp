@@ -389,6 +389,21 @@ TEST(CameraSource, ALostSignalIsSaidOnceAndItsPicturesAreLost) {
   EXPECT_EQ(next(*source).picture.row(0)[0], 10);
 }
 
+TEST(CameraSource, ACameraThatGivesNothingIsSaidOnce) {
+  FakeCamera camera;
+  const auto source = open(camera);
+  camera.film(0, 2);
+  EXPECT_EQ(next(*source).number, 0u);
+  EXPECT_SAYS(failure(*source), "/dev/video0: no picture for 5 s");
+  EXPECT_LT(camera.now_ns, 8'000'000'000);
+  camera.on_idle = [&] {
+    if (camera.now_ns > 60'000'000'000 && camera.shots.empty()) camera.film(2, 2);
+  };
+  EXPECT_EQ(next(*source).number, 1u);
+  camera.on_idle = [] {};
+  EXPECT_SAYS(failure(*source), "no picture for 5 s");  // another time
+}
+
 TEST(CameraSource, StopEndsAWaitAndStaysTheEnd) {
   FakeCamera camera;
   const auto source = open(camera);

@@ -105,6 +105,30 @@ TEST_F(PipelineTest, StalledIsSaidWhileErrorsLast) {
   EXPECT_EQ(sink_.statuses().back().message, "");
 }
 
+TEST_F(PipelineTest, ACamerasTroubleIsLoggedWhileItLasts) {
+  testing::internal::CaptureStderr();
+  std::string while_it_lasts;
+  ScriptedSource source(
+      scene_,
+      [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+        if (n == 2 || n == 3) return Error{"it was unplugged"};
+        if (n == 4) {
+          while_it_lasts = testing::internal::GetCapturedStderr();
+          testing::internal::CaptureStderr();
+        }
+        if (n > 5) return ScriptedSource::end();
+        return std::optional(frames_(n));
+      },
+      true);
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  EXPECT_TRUE(pipeline->run());
+  const std::string afterwards = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(while_it_lasts.find("it was unplugged"), while_it_lasts.rfind("it was unplugged"));
+  EXPECT_NE(while_it_lasts.find("it was unplugged"), std::string::npos) << while_it_lasts;
+  EXPECT_NE(afterwards.find("scripted gives frames again"), std::string::npos) << afterwards;
+  EXPECT_EQ(afterwards.find("it was unplugged"), std::string::npos) << afterwards;
+}
+
 TEST_F(PipelineTest, StalledIsSaidWhileTheSourceIsSilent) {
   Gate stalled;
   sink_.on_status = [&](const ServerStatus& s) -> Status {
