@@ -83,7 +83,8 @@ Status fill(FieldSource& source, const Options& options, Captured& captured) {
 /// To the end, whatever was asked for meanwhile: there is no second take of it.
 Status write(const Options& options, Captured& captured) {
   Progress progress("write", "frames", captured.size());
-  return write_take(options.out, captured, {.progress = [&](std::uint64_t done) { progress.update(done); }});
+  return write_take(options.out, captured,
+                    {.progress = [&](std::uint64_t done) { progress.update(done); }, .keep_written = true});
 }
 
 Status run(const Options& options, StopSignal& stop) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "capture/source/npy.h"
 #include "capture/source/take_files.h"
@@ -79,6 +80,35 @@ Status check_free(const fs::path& take, const fs::path& target) {
   return Error{take.string() + " exists already: give a new folder or remove it"};
 }
 
+/// A line of timestamps.csv.
+std::string stamp_of(std::uint64_t number, std::int64_t time_ns) {
+  char line[64];
+  std::snprintf(line, sizeof line, "%llu,%.9f\n", static_cast<unsigned long long>(number),
+                static_cast<double>(time_ns) * 1e-9);
+  return line;
+}
+
+/// The pictures of the last frame, or what there is of them.
+void remove_last(const fs::path& take, Scan scan, std::vector<std::string>& stamps) {
+  stamps.pop_back();
+  std::error_code ignored;
+  const std::uint64_t pictures = scan == Scan::kProgressive ? 2 : 1;
+  for (std::uint64_t i = 0; i < pictures; ++i)
+    fs::remove(take_picture(take, pictures * stamps.size() + i), ignored);
+  fs::remove(take_truth(take, stamps.size()), ignored);
+}
+
+Status write_texts(const fs::path& take, const SourceInfo& info, const std::vector<std::string>& stamps) {
+  std::string times = "frame,time_s\n";
+  for (const std::string& line : stamps) times += line;
+  const std::pair<const char*, std::string> texts[] = {
+      {"rig.yaml", to_yaml(info.rig)}, {"pattern.yaml", to_yaml(info.pattern)}, {"timestamps.csv", times}};
+  for (const auto& [name, text] : texts) {
+    if (Status s = write_text(take / name, text); !s) return s;
+  }
+  return {};
+}
+
 /// `truth()`: of the frame that the source gave last.
 Status write(const fs::path& take, FieldSource& source, const std::function<const ImageF&()>& truth,
              const TakeOptions& options) {
@@ -92,36 +122,40 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
     }
   }
 
-  std::string stamps = "frame,time_s\n";
-  std::uint64_t written = 0;
+  std::vector<std::string> stamps;
   bool with_truth = false;
   std::int64_t first_ns = 0;
-  while (options.frames == 0 || written < options.frames) {
+  Status failed;  // of a frame, whose frames before are to be kept
+  while (options.frames == 0 || stamps.size() < options.frames) {
     if (options.stop && *options.stop) return Error{"stopped: nothing was written to " + take.string()};
     Result<std::optional<CapturedFrame>> frame = source.next();
     if (!frame) return frame.error();
     if (!*frame) break;
-    if (written == 0 && source.info().live) first_ns = (*frame)->time_ns;
-    if (Status s = write_frame(partial.path(), written, **frame, truth()); !s) return s;
+    if (stamps.empty() && source.info().live) first_ns = (*frame)->time_ns;
+    failed = write_frame(partial.path(), stamps.size(), **frame, truth());
+    if (!failed && !options.keep_written) return failed;
+    stamps.push_back(stamp_of(stamps.size(), (*frame)->time_ns - first_ns));
+    if (!failed) break;
     with_truth = with_truth || !truth().empty();
-    char line[64];
-    std::snprintf(line, sizeof line, "%llu,%.9f\n", static_cast<unsigned long long>(written),
-                  static_cast<double>((*frame)->time_ns - first_ns) * 1e-9);
-    stamps += line;
-    ++written;
-    if (options.progress) options.progress(written);
+    if (options.progress) options.progress(stamps.size());
   }
   if (options.stop && *options.stop) return Error{"stopped: nothing was written to " + take.string()};
-  if (written == 0)
+  if (stamps.empty())
     return Error{source.info().name + " gave no frame: nothing was written to " + take.string()};
   if (!with_truth) fs::remove(partial.path() / "truth", code);
-  const std::pair<const char*, std::string> texts[] = {{"rig.yaml", to_yaml(source.info().rig)},
-                                                       {"pattern.yaml", to_yaml(source.info().pattern)},
-                                                       {"timestamps.csv", stamps}};
-  for (const auto& [name, text] : texts) {
-    if (Status s = write_text(partial.path() / name, text); !s) return s;
+  if (!failed) remove_last(partial.path(), source.info().rig.scan, stamps);
+  if (stamps.empty()) return failed;
+  Status finished = write_texts(partial.path(), source.info(), stamps);
+  while (!finished && options.keep_written && stamps.size() > 1) {
+    if (failed) failed = finished;
+    remove_last(partial.path(), source.info().rig.scan, stamps);  // makes room
+    finished = write_texts(partial.path(), source.info(), stamps);
   }
-  return partial.rename_to(whole);
+  if (!finished) return finished;
+  finished = partial.rename_to(whole);
+  if (failed || !finished) return finished;
+  return Error{failed.error().message + " " + take.string() + " has the first " +
+               std::to_string(stamps.size()) + " frames"};
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ namespace relievo {
 struct TakeOptions {
   std::uint64_t frames = 0;                                  // at most; 0: until the source ends
   std::function<void(std::uint64_t written)> progress = {};  // after each frame
+  bool keep_written = false;  // a frame that cannot be written ends the take, which has those before it
   const std::atomic<bool>* stop = nullptr;  // once true, nothing is left behind and an error returned
 };
 
@@ -26,7 +27,7 @@ Status check_take_target(const std::filesystem::path& take);
 
 /// Writes the frames of `source` into the new folder `take`, times from its first frame on. The folder
 /// appears when it is complete: until then a sibling ".NAME.partial-PID" holds it, which is removed on every
-/// failure. A folder that is there already and is not empty is refused.
+/// failure but that of keep_written. A folder that is there already and is not empty is refused.
 Status write_take(const std::filesystem::path& take, FieldSource& source, const TakeOptions& options);
 
 /// The same, with the truth where the source has any.

@@ -4,6 +4,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
+#include <random>
 
 #include "capture/source/npy.h"
 #include "small_take.h"
@@ -126,6 +131,85 @@ TEST(TakeWriter, AFailureLeavesNothingBehind) {
   ASSERT_FALSE(failed);
   EXPECT_THAT(failed.error().message, HasSubstr("cannot be created"));
   EXPECT_EQ(entries(folder.path()), 1u);
+}
+
+/// Files of this process larger than `bytes` are refused, as by a full disk.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit now{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &now);
+    signal_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, signal_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*signal_)(int);
+};
+
+/// Black but for the last picture of the third frame, whose noise no PNG makes small.
+class GrowingPictures final : public FieldSource {
+ public:
+  explicit GrowingPictures(Scan scan)
+      : source_(small_sim(scan == Scan::kProgressive ? ",scan=progressive" : "")) {}
+  const SourceInfo& info() const override { return source_->info(); }
+  Result<std::optional<CapturedFrame>> next() override {
+    auto frame = source_->next();
+    if (!frame || !*frame) return frame;
+    CapturedFrame& f = **frame;
+    Image8& last = f.scan == Scan::kProgressive ? f.complement : f.picture;
+    std::minstd_rand random(1);
+    for (Image8* picture : {&f.picture, &last}) {
+      std::fill(picture->data(), picture->data() + picture->size(), std::uint8_t{0});
+    }
+    if (f.number == 2)
+      std::generate(last.data(), last.data() + last.size(),
+                    [&] { return static_cast<std::uint8_t>(random()); });
+    return frame;
+  }
+  void request_stop() override { source_->request_stop(); }
+
+ private:
+  const std::unique_ptr<FieldSource> source_;
+};
+
+TEST(TakeWriter, WhatWasWrittenIsKeptWhereThatIsWanted) {
+  for (const Scan scan : {Scan::kInterlaced, Scan::kProgressive}) {
+    test::TempFolder folder;
+    GrowingPictures source(scan);
+    const std::filesystem::path take = folder.path() / "take";
+    Status done;
+    {
+      const FullDisk full(8000);
+      done = write_take(take, source, {.keep_written = true});
+    }
+    ASSERT_FALSE(done);
+    EXPECT_THAT(done.error().message, HasSubstr("is the disk full?"));
+    EXPECT_THAT(done.error().message, HasSubstr("has the first 2 frames"));
+    EXPECT_EQ(entries(folder.path()), 1u);
+    EXPECT_EQ(entries(take / "frames"), scan == Scan::kProgressive ? 4u : 2u);
+    const auto read = open_source("take:" + take.string(), {});
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ((*read)->info().frames, 2u);
+    for (int i = 0; i < 2; ++i) EXPECT_TRUE((*read)->next());
+  }
+}
+
+TEST(TakeWriter, OfNoFrameNothingIsKept) {
+  test::TempFolder folder;
+  const auto source = small_sim("");
+  const FullDisk full(100);
+  const Status failed = write_take(folder.path() / "take", *source, {.keep_written = true});
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().message, HasSubstr("is the disk full?"));
+  EXPECT_EQ(entries(folder.path()), 0u);
 }
 
 }  // namespace
