@@ -58,7 +58,8 @@ class Captured final : public FieldSource {
   std::size_t bytes_ = 0;
 };
 
-/// Until there are as many as wanted, the source ends or it is stopped.
+/// Until there are as many as wanted, the source ends or it is stopped. Fails where the source gives only
+/// errors.
 Status fill(FieldSource& source, const Options& options, Captured& captured) {
   Progress progress("capture", "frames", options.frames);
   for (int errors = 0; captured.size() < options.frames;) {
@@ -97,7 +98,7 @@ Status run(const Options& options, StopSignal& stop) {
   stop.on_stop([&] { (*source)->request_stop(); });
   const Status filled = fill(**source, options, captured);
   stop.clear_on_stop();
-  if (!filled) return filled;
+  if (!filled && captured.size() == 0) return filled;
   const SourceCounts counts = (*source)->counts();
   source->reset();  // the camera is free while the take is written
   const std::size_t frames = captured.size();
@@ -119,7 +120,9 @@ Status run(const Options& options, StopSignal& stop) {
                 static_cast<unsigned long long>(counts.lost_frames),
                 static_cast<unsigned long long>(counts.damaged_pictures));
   }
-  return {};
+  if (filled) return {};
+  return Error{filled.error().message + "; " + options.out + " has the " + std::to_string(frames) +
+               " frames before"};
 }
 
 }  // namespace

@@ -188,6 +188,21 @@ TEST_F(ServerFault, CaptureSaysBeforehandThatItsTakeCannotBeWritten) {
         words);  // it has not even looked at the source
 }
 
+// As a camera that is unplugged, and stays away.
+TEST_F(ServerFault, CaptureKeepsWhatItHasSeenOfASourceThatGivesNoMore) {
+  const fs::path film = folder_ / "film";
+  ASSERT_TRUE(write_striped_take(striped_scene(), film, 36));
+  for (const std::string& name : names_in(film / "frames")) {
+    if (name > "000005.png") fs::resize_file(film / "frames" / name, 200);
+  }
+  const Finished done = run(server(
+      {"capture", "--source", "take:" + film.string(), "--frames", "36", "--out", out_.string(), "--json"}));
+  EXPECT_EQ(done.status, 1);
+  EXPECT_NE(done.err.find("has the 6 frames before"), std::string::npos) << done.err;
+  EXPECT_NE(done.out.find("\"frames\": 6"), std::string::npos) << done.out;
+  EXPECT_EQ(names_in(out_ / "frames").size(), 6U);
+}
+
 TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   std::ofstream(out_) << "mine\n";
   expect_one_error(run(server({"reconstruct", take_.string(), "--out", out_.string()})), out_.string());
