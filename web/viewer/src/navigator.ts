@@ -20,7 +20,9 @@ export interface Pose {
   target: Vec3;
 }
 
-const kRest = 1e-4; // of the distance, or radians a drawing: less is not seen
+const kRestPerMs = 6e-6; // of the distance, or radians: less is not seen
+const kDampingMs = 180; // in which all but a third of a motion that is left is done
+const kUsualMs = 1000 / 60; // between drawings
 const kJitter = 24; // pixels of the page: so much they may change before the view follows
 
 export interface NavigatorEvents {
@@ -53,6 +55,8 @@ export class Navigator {
   private placed = false; // the first view is set
   private moved = false; // by a person, since
   private placing = false; // the view is being set, by no hand
+  private moving = false; // at the last update
+  private updated = 0; // when that was
 
   constructor(
     canvas: HTMLCanvasElement,
@@ -61,7 +65,6 @@ export class Navigator {
   ) {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.09;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener('change', () => {
       if (this.isRigView && !this.placing && this.hasLeftRig) this.byHand();
@@ -268,10 +271,15 @@ export class Navigator {
     if (step !== null) this.pan(...step);
     const { position, quaternion } = this.camera;
     const [place, gaze] = [position.clone(), quaternion.clone()];
+    // The controls' damping is of each drawing, and drawings may be a second apart.
+    const since = this.moving ? now - this.updated : kUsualMs;
+    this.controls.dampingFactor = 1 - Math.exp(-since / kDampingMs);
     this.controls.update();
     // The controls tell of no step below a milliradian or a millimetre, and many such are left of a drag.
     const moved = position.distanceTo(place) / position.distanceTo(this.controls.target) + quaternion.angleTo(gaze);
-    if (moved > kRest) this.events.changed();
+    this.moving = moved > kRestPerMs * since;
+    this.updated = now;
+    if (this.moving) this.events.changed();
     if (this.isRigView) this.projectRig();
   }
 
