@@ -48,6 +48,15 @@ double length_m(const std::string& number, const std::string& unit) {
   return std::atof(number.c_str()) * (unit == "mm" ? 0.001 : unit == "cm" ? 0.01 : 1);
 }
 
+// Of a square that somebody prints. Others are a wrong unit: all that is calibrated by it looks good, in
+// kilometres.
+constexpr double kLeastSquare_m = 0.001, kMostSquare_m = 1;
+
+Status check_square(const std::string& text, double square_m) {
+  if (square_m >= kLeastSquare_m && square_m <= kMostSquare_m) return {};
+  return Error{text + ": a square's side must be 1 mm to 1 m: is its unit right?"};
+}
+
 Result<Board> parse_charuco(const std::string& text) {
   static const std::regex pattern(std::string(R"(charuco:(\d{1,3})[xX](\d{1,3}):)") + kLength + ":" +
                                   kLength + "(:[A-Za-z0-9_]{1,32})?");
@@ -58,6 +67,7 @@ Result<Board> parse_charuco(const std::string& text) {
   if (match[7].matched) board.dictionary = match[7].str().substr(1);
   if (board.dictionary.rfind("DICT_", 0) != 0) board.dictionary = "DICT_" + board.dictionary;
   if (board.columns < 2 || board.rows < 2) return Error{text + ": at least 3 x 3 squares are needed"};
+  if (const Status square = check_square(text, board.square_m); !square) return square.error();
   if (!(board.marker_m > 0 && board.marker_m < board.square_m)) {
     return Error{text + ": a marker's side must be above 0 and below the square's"};
   }
@@ -150,7 +160,7 @@ Result<Board> parse_board(const std::string& text) {
   if (!std::regex_match(text, match, pattern)) return Error{"'" + text + "'" + kUsage};
   Board board{std::stoi(match[1]), std::stoi(match[2]), length_m(match[3], match[4])};
   if (board.columns < 3 || board.rows < 3) return Error{text + ": at least 3 x 3 inner corners are needed"};
-  if (!(board.square_m > 0)) return Error{text + ": a square's side must be above 0"};
+  if (const Status square = check_square(text, board.square_m); !square) return square.error();
   return board;
 }
 

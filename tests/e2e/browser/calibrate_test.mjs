@@ -303,7 +303,7 @@ const checks = {
       for (const [board, says] of [
         ['a plank', /^'a plank' is no board such as chessboard/],
         ['', /^'' is no board such as chessboard/],
-        ['chessboard:9x7:9000mm', /^Chessboard:9x7:9000mm does not fit before the rig: give a smaller board\.$/],
+        ['chessboard:9x7:900mm', /^Chessboard:9x7:900mm does not fit before the rig: give a smaller board\.$/],
       ]) {
         await page.fill('#calibration-board', board);
         await page.click('#calibration button:has-text("Start")');

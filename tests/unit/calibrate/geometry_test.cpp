@@ -297,6 +297,9 @@ TEST(Board, ParsesAndRefuses) {
         "charuco:20x20:30mm:20mm"}) {
     EXPECT_FALSE(parse_board(wrong).ok()) << wrong;
   }
+  // A unit that was mistyped.
+  for (const char* wrong : {"chessboard:9x7:25m", "chessboard:9x7:0.025mm", "charuco:10x8:30m:22mm"})
+    EXPECT_THAT(parse_board(wrong).error().message, HasSubstr("is its unit right?")) << wrong;
   const auto charuco = parse_board("charuco:10x8:30mm:2.2cm:DICT_5X5_100");
   ASSERT_TRUE(charuco.ok());
   EXPECT_TRUE(charuco->charuco());
