@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <deque>
 #include <memory>
@@ -35,12 +36,7 @@ class Captured final : public FieldSource {
  public:
   explicit Captured(SourceInfo info) : info_(std::move(info)) {}
 
-  /// False where memory for it is short.
-  bool keep(CapturedFrame&& frame) {
-    bytes_ += frame.picture.size() + frame.complement.size();
-    frames_.push_back(std::move(frame));
-    return bytes_ <= kMostBytes;
-  }
+  void keep(CapturedFrame&& frame) { frames_.push_back(std::move(frame)); }
   std::size_t size() const { return frames_.size(); }
 
   const SourceInfo& info() const override { return info_; }
@@ -55,14 +51,22 @@ class Captured final : public FieldSource {
  private:
   const SourceInfo info_;
   std::deque<CapturedFrame> frames_;
-  std::size_t bytes_ = 0;
 };
 
 /// Until there are as many as wanted, the source ends or it is stopped. Fails where the source gives only
 /// errors.
 Status fill(FieldSource& source, const Options& options, Captured& captured) {
-  Progress progress("capture", "frames", options.frames);
-  for (int errors = 0; captured.size() < options.frames;) {
+  const Rig& rig = source.info().rig;
+  const std::size_t pictures = rig.scan == Scan::kProgressive ? 2 : 1;
+  const std::size_t frame_bytes =
+      3 * pictures * static_cast<std::size_t>(rig.camera.width) * static_cast<std::size_t>(rig.camera.height);
+  const std::size_t most = kMostBytes / std::max<std::size_t>(frame_bytes, 1);
+  if (options.frames > most)
+    log_warning("4 GiB of memory hold " + std::to_string(most) + " of the " + std::to_string(options.frames) +
+                " frames: it will end after them");
+  const std::uint64_t wanted = std::min<std::uint64_t>(options.frames, most);
+  Progress progress("capture", "frames", wanted);
+  for (int errors = 0; captured.size() < wanted;) {
     auto frame = source.next();
     if (!frame) {
       if (++errors == kMostErrors) return frame.error();
@@ -71,10 +75,7 @@ Status fill(FieldSource& source, const Options& options, Captured& captured) {
     }
     if (!*frame) break;
     errors = 0;
-    if (!captured.keep(*std::move(*frame))) {
-      log_warning("stopped after " + std::to_string(captured.size()) + " frames, which fill 4 GiB of memory");
-      break;
-    }
+    captured.keep(*std::move(*frame));
     progress.update(captured.size());
   }
   progress.finish();
@@ -133,7 +134,8 @@ Command capture_command() {
             app.add_option("--source", options->source, "v4l2:DEVICE, or any other source")
                 ->type_name("SOURCE")
                 ->required();
-            app.add_option("--frames", options->frames, "Frames to keep, in memory until all are there")
+            app.add_option("--frames", options->frames,
+                           "Frames to keep, in memory until all are there, 4 GiB at most")
                 ->check(whole_number(1, 1'000'000))
                 ->required();
             app.add_option("--out", options->out, "Take folder to make")->type_name("TAKE")->required();

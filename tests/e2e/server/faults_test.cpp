@@ -203,6 +203,15 @@ TEST_F(ServerFault, CaptureKeepsWhatItHasSeenOfASourceThatGivesNoMore) {
   EXPECT_EQ(names_in(out_ / "frames").size(), 6U);
 }
 
+TEST_F(ServerFault, CaptureSaysBeforehandHowManyFramesMemoryHolds) {
+  Process process(server({"capture", "--source", "sim:plane,width=4096,height=4096,scan=progressive",
+                          "--frames", "50", "--out", out_.string()}));
+  ASSERT_TRUE(process.wait_for_text("4 GiB of memory hold 42 of the 50 frames")) << process.err();
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait(), 0) << process.err();
+  EXPECT_EQ(names_in(folder_.path()), (std::set<std::string>{"take"})) << process.err();
+}
+
 TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   std::ofstream(out_) << "mine\n";
   expect_one_error(run(server({"reconstruct", take_.string(), "--out", out_.string()})), out_.string());
