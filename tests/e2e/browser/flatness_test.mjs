@@ -214,6 +214,15 @@ const onBall = {
     alike(await flatness(page), said);
     assert.ok(Math.abs((await flatness(page)).radius_mm.median - 150 / Math.sqrt(3)) < 0.2);
     assert.match(await page.innerText('#panel-measure .flatness'), /Radius\s+86\.\d{3} mm/);
+    await page.keyboard.press('t'); // which closes the panel of measuring
+    const link = new URL(await page.evaluate(() => window.relievo.link()));
+    const other = await pagesOf(browser, link.origin, complaints).open(link.pathname + link.search + link.hash, kWide);
+    await measured(other, ({ shape, frames }) => shape === 'sphere' && frames === 1);
+    alike(await flatness(other), said);
+    assert.equal(await region(other), kBall.join());
+    await other.close();
+    await page.keyboard.press('m');
+    await measured(page, ({ shape }) => shape === 'sphere');
     if (screenshots) await page.screenshot({ path: join(screenshots, 'flatness-ball.png') });
   },
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: what is measured with the mouse is true. First on the feeder's known surface, then
 // through the whole chain on the simulator's cube of 100 mm, with the standard deviations that the server sends: on its face,
-// and from corner to corner, where clicks snap, live and in a recording.
+// and from corner to corner, where clicks snap, live and in a recording, and by a link on another page.
 // Run as: in_own_domain node measure_test.mjs GATEWAY_FEEDER RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -286,6 +286,43 @@ const inRecording = {
     await choose(page, 'Distance');
     await still(page);
     await cornerToCorner(page, kFront);
+  },
+
+  async 'a link shows somebody else what was measured, and how exactly'(page) {
+    await click(page, onCube(-0.02, 0.01)); // of a distance that is not measured to its end
+    await measure(page, 'Angle', [onCube(-0.03, 0.03), onCube(-0.03, -0.03), onCube(0.03, -0.03)]);
+    await page.keyboard.down('Alt');
+    const section = await measure(page, 'Section', [onCube(-0.03, 0), onCube(0.03, 0)]);
+    await page.keyboard.up('Alt');
+    await page.keyboard.press('t'); // which closes the panel of measuring
+    await page.waitForSelector('#panel-take');
+    const words = (of) => of.$$eval('#panel-measure .measurements li', (all) => all.map((item) => item.textContent));
+    const link = new URL(await page.evaluate(() => window.relievo.link()));
+    const said = await words(page);
+    assert.equal(said.length, kFront.length + 2);
+
+    const other = await pagesOf(browser, link.origin, complaints).open(link.pathname + link.search + link.hash, kPage);
+    await other.waitForSelector('#panel-measure .measurements li');
+    assert.deepEqual(await words(other), said);
+    await shownPast(other, 1);
+    await other.waitForFunction(() => window.relievo.diagnostics().measurements.at(-1).profile.length > 0);
+    const { profile } = (await look(other)).measurements.at(-1);
+    assert.equal(profile.length, section.profile.length);
+    for (const [i, [{ along, height }]] of profile.entries()) {
+      near(along, section.profile[i][0].along, 1e-7, `place ${i} of the section`);
+      near(height, section.profile[i][0].height, 1e-7, `height ${i} of the section`);
+    }
+    assert.ok(await other.isVisible('#panel-measure .plot'));
+    // Passed on once more it is the same, and pasted into a page that is open it takes the place of what is there.
+    await other.keyboard.press('Escape');
+    assert.equal(await other.evaluate(() => window.relievo.link()), link.href);
+    await other.evaluate(() => (location.hash = '#measure=point_x_x__0_surface_0_0_1_x&measure=point_x_x__7_surface_0_0_1_x'));
+    await other.waitForFunction(() => /^Point1000\.00 mm/.test(document.querySelector('#panel-measure .measurements').textContent));
+    assert.equal((await words(other)).length, 1);
+    await other.evaluate(() => (location.hash = '#mode=shaded'));
+    await other.waitForFunction(() => window.relievo.diagnostics().mode === 'shaded');
+    assert.equal((await words(other)).length, 1, 'a link without measurements takes away those that are there');
+    await other.close();
   },
 };
 

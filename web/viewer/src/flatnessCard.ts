@@ -11,6 +11,7 @@ import { middleRegion, parseRegion, regionBetween, regionText, type Region } fro
 import { lensOf } from './rigCamera';
 import { kShapes, type Shape, type ShapeKind } from './shape';
 import type { Metered, ShapeReply, ShapeRequest } from './shapeMessages';
+import type { FlatRegion } from './shareMeasure';
 import { isDoubtful, reportJson, type ShapeReport, type Spread } from './shapeMeter';
 import { sentence } from './sentence';
 import { text } from './strings';
@@ -111,6 +112,16 @@ export class FlatnessCard {
   }
   get active(): boolean {
     return !this.box.hidden;
+  }
+
+  /** What is to be measured. */
+  get setting(): FlatRegion {
+    return { kind: this.kind, region: this.chosen };
+  }
+  set setting({ kind, region }: FlatRegion) {
+    this.kind = kind;
+    this.setRegion(region);
+    this.press();
   }
 
   /** As `relievo measure --json` prints it; null: nothing is measured. */

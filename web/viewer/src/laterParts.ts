@@ -8,6 +8,7 @@ import type { Panels } from './panels';
 import type { StreamInfo, StreamStatus } from './protocol';
 import type { Kept } from './source';
 import type { StatisticsPanel } from './statisticsPanel';
+import type { Measured as Shared } from './share';
 import type { StreamsPanel, StreamsPanelEvents } from './streamsPanel';
 import { text } from './strings';
 import type { Takeable, TakePanel } from './takePanel';
@@ -70,10 +71,11 @@ export interface Measured {
 export class Measuring {
   private panel: MeasurePanel | null = null;
   private readonly body: HTMLElement;
+  private given: readonly [Shared, readonly string[]] | null = null; // by a link, until the panel is there
   isOpen = false;
 
   constructor(
-    panels: Panels,
+    private readonly panels: Panels,
     private readonly of: Measured,
   ) {
     this.body = panels.panel('measure', text.measure.title, async (open) => {
@@ -89,6 +91,22 @@ export class Measuring {
     const { MeasurePanel } = await import('./measurePanel');
     const { view, pointed, described, run } = this.of;
     this.panel ??= new MeasurePanel(this.body, view, pointed, described, run);
+    const { given } = this;
+    this.given = null;
+    if (given !== null) this.panel.restore(...given);
+  }
+
+  /** Shows what a link says, of these streams, in place of what was measured before; where it says nothing, that stays. */
+  restore(shared: Shared, streams: readonly string[]): void {
+    if (shared.measurements.length === 0 && shared.flatness === null) return;
+    this.given = [shared, streams];
+    if (this.isOpen) void this.load().catch(() => undefined); // its panel says so and tries again
+    else this.panels.show('measure');
+  }
+
+  /** For a link to these streams. */
+  shared(streams: readonly string[]): Shared {
+    return this.panel?.shared(streams) ?? { measurements: [], flatness: null };
   }
 
   get measurements(): readonly Measurement[] {
@@ -97,8 +115,9 @@ export class Measuring {
   get flatness(): Record<string, unknown> | null {
     return this.panel?.flat ?? null;
   }
-  /** After each drawing of a new surface. */
-  readCursor(): void {
+  /** After each drawing of a new surface; `first`: of what a link was made of. */
+  readCursor(first: boolean): void {
+    if (first) this.panel?.cutAnew();
     this.panel?.readCursor();
   }
 }

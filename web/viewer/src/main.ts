@@ -21,7 +21,7 @@ import { wantedQuality, writtenOf, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { diagnosticsOf, report } from './reports';
-import { address, goTo, momentOf, readShared, shareLink, type Shared, type Shown } from './share';
+import { address, goTo, momentOf, namesOf, readShared, shareLink, type Shared, type Shown } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
@@ -139,6 +139,7 @@ class Viewer {
     listenToCommands(this, this.ui.canvas);
     this.change({});
     this.openAddressed(new URLSearchParams(location.search));
+    this.measure?.restore(this.shared.measured, namesOf(location.search));
     window.addEventListener('hashchange', () => this.followLink()); // not of what the page writes itself
     window.setInterval(() => this.refresh(), kRefreshMs);
     this.refresh();
@@ -159,13 +160,14 @@ class Viewer {
 
   /** A link to what is shown already, by a person's hand. */
   private followLink(): void {
-    const { display, pose, moment, places } = (this.shared = readShared(location.hash, this.display));
+    const { display, pose, moment, places, measured } = (this.shared = readShared(location.hash, this.display));
     for (const [name, rigid] of places) this.view?.place(name, rigid);
     this.change(display);
     const navigator = this.view?.navigator;
     if (pose !== null && navigator?.isRigView === false) navigator.pose = pose;
     const playback = this.session.source?.playback;
     if (moment !== null && playback !== undefined) goTo(playback, moment);
+    this.measure?.restore(measured, namesOf(location.search));
   }
 
   /** From now on; kept for the next visit. */
@@ -235,7 +237,9 @@ class Viewer {
     const moment = momentOf(this.session.source?.playback ?? null);
     const names = this.companions?.names ?? [];
     const places = [...(this.view?.placedByHand ?? [])].filter(([name]) => names.includes(name));
-    return shareLink(location.href, this.addressed, this.display, pose, moment, new Map(places));
+    const { addressed } = this;
+    const measured = this.measure?.shared(addressed === null ? [] : namesOf(address(location.href, addressed).search));
+    return shareLink(location.href, addressed, this.display, pose, moment, new Map(places), measured);
   }
 
   // What the decoder should bring along.
@@ -397,7 +401,8 @@ class Viewer {
     this.view.show(frame);
     this.notice = frame.notice;
     this.showNotice();
-    const pose = this.posed ? null : (this.shared?.pose ?? null);
+    const first = !this.posed;
+    const pose = first ? (this.shared?.pose ?? null) : null;
     this.posed = true;
     if (pose !== null && !this.view.navigator.isRigView) this.view.navigator.pose = pose;
     this.view.invalidate();
@@ -405,7 +410,7 @@ class Viewer {
     this.pictures.show(frame); // the one before is closed
     this.pictures.set(this.display.split, this.pictureAlone);
     this.wish();
-    this.measure?.readCursor();
+    this.measure?.readCursor(first);
     this.rest.begin();
     this.showDisplay();
   }

@@ -14,7 +14,8 @@ export type Tool = (typeof kTools)[number];
 export const kSpots: Record<Tool, number> = { point: 1, distance: 2, angle: 3, section: 2 };
 
 /** What of a surface a place is on; edges and corners are fitted to what is around (snap.ts). */
-export type Kind = 'surface' | 'edge' | 'corner';
+export const kKinds = ['surface', 'edge', 'corner'] as const;
+export type Kind = (typeof kKinds)[number];
 
 export interface Spot {
   point: Vec3;
@@ -33,6 +34,7 @@ export interface Measurement {
   surface: number | null; // its part from the spots' own sigmas
   rig: number | null; // its part from the rigs
   profile: Segment[]; // of a section
+  eye: Vec3 | null; // from where that was cut, in its camera's frame
 }
 
 const minus = (a: Vec3, b: Vec3): Vec3 => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -91,6 +93,7 @@ export function measure(tool: Tool, spots: Spot[], surface: Surface | null, eye:
     surface: own,
     rig,
     profile: tool === 'section' && surface !== null ? section(surface, points[0]!, points[1]!, eye, spots[0]!.rig) : [],
+    eye: tool === 'section' ? eye : null,
   };
 }
 
@@ -104,7 +107,8 @@ export function markOf({ spots, profile }: Pick<Measurement, 'spots' | 'profile'
   return { points: path.length > 0 ? path : dots, dots, text };
 }
 
-const together = (surface: number | null, rig: number | null): number | null =>
+/** Both parts, independent of each other; null: neither is known. */
+export const together = (surface: number | null, rig: number | null): number | null =>
   surface === null && rig === null ? null : Math.hypot(surface ?? 0, rig ?? 0);
 
 // An error of one standard deviation: by what it moves each of the places; null: not at all.

@@ -11,6 +11,7 @@ import {
   markOf,
   measure,
   measurementsCsv,
+  section,
   sectionCsv,
   valueText,
   type Measurement,
@@ -23,6 +24,8 @@ import { plot } from './plot';
 import type { StreamInfo } from './protocol';
 import { inverse, moved } from './rigid';
 import { rigErrorOf } from './rigError';
+import type { Measured } from './share';
+import { readFlatRegion, readMeasurement, writeFlatRegion, writeMeasurement } from './shareMeasure';
 import { Snapper, type Caught } from './snapper';
 import { text } from './strings';
 import type { Hit } from './surfaces';
@@ -58,8 +61,11 @@ type AnyTool = Tool | 'flatness'; // the latter is of an area of the picture, no
 
 export class MeasurePanel {
   private tool: AnyTool | null = null;
+  private lastTool: AnyTool = 'distance'; // while the panel was open
   private spots: Spot[] = [];
   readonly measurements: Measurement[] = [];
+  private given: readonly Measurement[] = []; // sections of a link
+  private uncut: readonly Measurement[] = []; // those whose surface has not come yet
   private cursor: Pointed | null = null;
   private pressed: { x: number; y: number } | null = null;
   private caught: Caught | null = null; // what a click would be on
@@ -120,7 +126,7 @@ export class MeasurePanel {
 
   /** The panel is open or closed: measurements stay, clicks only count while it is open. */
   set open(open: boolean) {
-    this.choose(open ? (this.tool ?? 'distance') : null);
+    this.choose(open ? this.lastTool : null);
     this.drawPlot();
   }
   get isOpen(): boolean {
@@ -132,8 +138,47 @@ export class MeasurePanel {
     return this.flatness.active ? this.flatness.json : null;
   }
 
+  /** What a link carries to these streams: what was measured on them, and Flatness' region where that was used last. */
+  shared(streams: readonly string[]): Measured {
+    const measurements = this.measurements.map((m) => writeMeasurement(m, streams)).filter((written) => written !== null);
+    return { measurements, flatness: this.lastTool === 'flatness' ? writeFlatRegion(this.flatness.setting) : null };
+  }
+
+  /** Shows that in place of what was measured before; what of it makes no sense is left out. */
+  restore({ measurements, flatness }: Measured, streams: readonly string[]): void {
+    this.clear();
+    this.measurements.push(...measurements.map((written) => readMeasurement(written, streams)).filter((m) => m !== null));
+    this.given = this.uncut = this.measurements.filter(({ tool }) => tool === 'section');
+    const flat = flatness === null ? null : readFlatRegion(flatness);
+    if (flat !== null) this.flatness.setting = flat;
+    this.lastTool = flat !== null ? 'flatness' : this.lastTool === 'flatness' ? 'distance' : this.lastTool;
+    if (this.tool !== null) this.choose(this.lastTool);
+    this.refresh();
+    this.cut();
+    this.fold.fold(); // the picture first, which a panel lies over on a phone
+  }
+
+  /** Another surface than so far is that which a link was made of. */
+  cutAnew(): void {
+    this.uncut = this.given;
+  }
+
+  private cut(): void {
+    const before = this.uncut.length;
+    this.uncut = this.uncut.filter((m) => {
+      const [from, to] = m.spots.map(({ point }) => point) as [Vec3, Vec3];
+      const { stream } = m.spots[0]!;
+      const seen = this.view.seen.find((s) => s.stream === stream);
+      if (seen === undefined) return true;
+      m.profile = section(seen.surface, from, to, m.eye!, rigErrorOf(this.described(stream)));
+      return false;
+    });
+    if (this.uncut.length < before) this.refresh();
+  }
+
   /** After each drawing of a new surface, and when the cursor moves. */
   readCursor(): void {
+    if (this.uncut.length > 0) this.cut();
     this.flatness.look();
     const hit = this.cursor === null ? null : this.view.pick(this.cursor);
     this.pointed(hit !== null && hit.stream === this.view.name ? coordinatesAt(hit.surface, hit) : null);
@@ -194,6 +239,7 @@ export class MeasurePanel {
 
   private choose(tool: AnyTool | null): void {
     this.tool = tool;
+    this.lastTool = tool ?? this.lastTool;
     this.spots = [];
     this.refresh();
     this.flatness.active = tool === 'flatness';
@@ -203,6 +249,7 @@ export class MeasurePanel {
 
   private clear(): void {
     this.measurements.length = 0;
+    this.given = this.uncut = [];
     this.spots = [];
     this.refresh();
   }

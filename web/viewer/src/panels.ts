@@ -82,6 +82,10 @@ export class Panels {
     if (open) this.set(name, true);
   }
 
+  show(name: RailName): void {
+    if (this.opened !== name) this.toggle(name);
+  }
+
   close(): boolean {
     const was = this.opened;
     if (was !== null) this.set(was, false);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A link that shows somebody else the same: stream or recording, time, view and display. The part behind # is not sent to any server. Pure.
+// A link that shows somebody else the same: stream or recording, time, view, display and what was measured. The part behind # is not sent to any server. Pure.
 import { parseDisplay, writeDisplay, type Display } from './display';
 import type { Pose } from './navigator';
 import type { Vec3 } from './pick';
@@ -28,6 +28,22 @@ export interface Shared {
   readonly moment: Moment | null;
   /** Where streams stand in the first one's frame, by name. */
   readonly places: ReadonlyMap<string, Rigid>;
+  readonly measured: Measured;
+}
+
+/** What was measured, as shareMeasure.ts writes and reads it. */
+export interface Measured {
+  readonly measurements: readonly string[];
+  readonly flatness: string | null;
+}
+
+const kMostMeasurements = 64; // of a link; the last ones
+
+/** What an address is of, the first stream first. */
+export function namesOf(search: string): string[] {
+  const given = new URLSearchParams(search);
+  const recording = given.get('recording');
+  return given.has('stream') || recording === null ? (given.get('stream') ?? '').split(',').filter((name) => name !== '') : [recording];
 }
 
 /** The time that is shown. Of a live stream: none, or that of day where a person went back in it. Null: there is none yet. */
@@ -54,6 +70,7 @@ export function shareLink(
   pose: Pose | null,
   moment: Moment | 'live' | null,
   places: ReadonlyMap<string, Rigid> = new Map(),
+  measured: Measured = { measurements: [], flatness: null },
 ): string {
   const url = shown === null ? new URL(page) : address(page, shown);
   if (shown === null) url.search = '';
@@ -72,6 +89,8 @@ export function shareLink(
     const numbers = [...axisOf(rigid), ...rigid.translation].map((c) => Number(c.toFixed(5)));
     state.append('place', [name, ...numbers].join('_'));
   }
+  for (const measurement of measured.measurements.slice(-kMostMeasurements)) state.append('measure', measurement);
+  if (measured.flatness !== null) state.set('flat', measured.flatness);
   url.hash = state.toString();
   return url.href;
 }
@@ -87,7 +106,8 @@ export function readShared(hash: string, fallback: Display): Shared {
   const [position, target] = [read('eye'), read('at')];
   const apart = position !== null && target !== null && position.some((c, i) => Math.abs(c - target[i]!) > 1e-6);
   const pose = apart ? { position: position!, target: target! } : null;
-  return { display: parseDisplay(text, fallback), pose, moment: readMoment(given), places: readPlaces(given) };
+  const measured = { measurements: given.getAll('measure').slice(-kMostMeasurements), flatness: given.get('flat') };
+  return { display: parseDisplay(text, fallback), pose, moment: readMoment(given), places: readPlaces(given), measured };
 }
 
 // A name, which may hold underscores, and six numbers: of rigidOf().

@@ -8,7 +8,7 @@ import { writeGlb } from '../src/exportGlb';
 import { writePly } from '../src/exportPly';
 import type { Surface } from '../src/pick';
 import { rigidOf } from '../src/rigid';
-import { momentOf, readShared, shareLink } from '../src/share';
+import { momentOf, namesOf, readShared, shareLink, type Measured } from '../src/share';
 import type { Moment, Playback } from '../src/source';
 
 const surface: Surface = {
@@ -37,6 +37,7 @@ describe('the name of what is saved', () => {
 });
 
 describe('a link', () => {
+  const nothing: Measured = { measurements: [], flatness: null };
   const display = { ...kDefaultDisplay, mode: 'depth' as const, grid: false, fov: 30, theme: 'light' as const };
   const pose = { position: [0.1, -0.25, 1.5], target: [0, 0, -1] } as { position: [number, number, number]; target: [number, number, number] };
 
@@ -88,8 +89,25 @@ describe('a link', () => {
 
   it.each(['', '#', '#eye=1_2&at=0_0_0', '#eye=1_2_x&at=0_0_0', '#eye=1__2&at=0_0_0', '#eye=1_1_1&at=1_1_1', '#eye=1e99_0_0&at=0_0_0', '#eye=0_0_1'])(
     'without a whole view shows the first one: %s',
-    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null, moment: null, places: new Map() }),
+    (hash) => expect(readShared(hash, kDefaultDisplay)).toEqual({ display: kDefaultDisplay, pose: null, moment: null, places: new Map(), measured: nothing }),
   );
+
+  it('brings back what was measured as it was written, the last of very many', () => {
+    const measured = { measurements: ['point_x_x__0_surface_0_0_1_x', 'distance_x_x'], flatness: 'plane_1_2_3_4' };
+    const back = (of: Measured): Measured =>
+      readShared(new URL(shareLink('http://host/', recording, display, null, null, undefined, of)).hash, kDefaultDisplay).measured;
+    expect(back(measured)).toEqual(measured);
+    expect(back(nothing)).toEqual(nothing);
+    const many = Array.from({ length: 100 }, (_, i) => `point_${i}`);
+    expect(back({ measurements: many, flatness: null }).measurements).toEqual(many.slice(-64));
+    expect(readShared(`#${many.map((m) => `measure=${m}`).join('&')}`, kDefaultDisplay).measured.measurements).toHaveLength(64);
+  });
+
+  it('is of streams, or of a recording', () => {
+    expect(namesOf('?stream=face,left_one&quality=full')).toEqual(['face', 'left_one']);
+    expect(namesOf('?recording=a%2Cb.mcap')).toEqual(['a,b.mcap']);
+    for (const search of ['', '?stream=', '?x=1']) expect(namesOf(search)).toEqual([]);
+  });
 });
 
 describe('PLY', () => {
