@@ -6,7 +6,7 @@
 // Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -217,6 +217,33 @@ const checks = {
     await page.waitForSelector(`#panel-streams li:has-text("${whole}") canvas[data-drawn]`);
     assert.deepEqual(sockets.filter((url) => url.includes('.mcap')), []);
     await page.close();
+  },
+
+  async 'of a long list the pictures in sight are read, and stay as it grows'() {
+    const [whole] = readdirSync(folder);
+    const copies = Array.from({ length: 60 }, (_, i) => join(folder, `copy-${String(i).padStart(2, '0')}.mcap`));
+    for (const copy of copies) copyFileSync(join(folder, whole), copy);
+    const page = await openRecording();
+    const read = new Set();
+    page.on('request', (request) => /\/recordings\//.test(request.url()) && read.add(request.url()));
+    await page.keyboard.press('n');
+    const listed = page.locator('#panel-streams li:has-text(".mcap")');
+    await eventually('not all are listed', async () => (await listed.count()) > copies.length);
+    await page.waitForSelector('#panel-streams li:has-text("copy-59") canvas[data-drawn]');
+    const first = page.locator('#panel-streams li:has-text("copy-59") button:has-text("Show")');
+    await first.focus();
+    await page.evaluate(() => [...document.querySelectorAll('#panel-streams canvas[data-drawn]')].forEach((canvas) => (canvas.was = true)));
+    await order('start');
+    await order('stop');
+    await eventually('the new one is not listed', async () => (await listed.count()) > copies.length + 1);
+    assert.ok(await page.$eval('#panel-streams li:has-text("copy-59") canvas', (canvas) => canvas.was), 'its picture is made anew');
+    assert.ok(await first.evaluate((button) => button === document.activeElement), 'the focus is lost');
+    // The last one's comes at once, not behind all of the others'.
+    await listed.last().scrollIntoViewIfNeeded();
+    await listed.last().locator('canvas[data-drawn]').waitFor();
+    assert.ok(read.size < copies.length / 2, `${read.size} recordings were read`);
+    await page.close();
+    for (const copy of copies) rmSync(copy);
   },
 
   async 'the button follows what somebody else records'() {

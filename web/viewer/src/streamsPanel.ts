@@ -11,6 +11,7 @@ import type { View } from './view';
 
 const say = text.streams;
 const kFreshMs = 15_000; // between pictures of a stream that is not shown
+const kAhead = '50%'; // of the panel's height: pictures of recordings so far out of sight are read, too
 
 export interface StreamsPanelEvents {
   choose(name: string): void;
@@ -44,6 +45,7 @@ export class StreamsPanel {
   private listings = 0; // of the folder, asked for
   private shownFile: string | null = null;
   private readonly thumbnails = new Thumbnails();
+  private readonly inSight: IntersectionObserver; // which of the folder's pictures
   private isOpen = false;
   private readonly aligner: Aligner | null;
   private readonly aligning = make('p', { hidden: true, className: 'aligning' });
@@ -55,6 +57,7 @@ export class StreamsPanel {
     private readonly events: StreamsPanelEvents,
     private readonly view: View | null,
   ) {
+    this.inSight = new IntersectionObserver((entries) => this.ask(entries), { root: body.parentElement, rootMargin: `${kAhead} 0px` });
     this.aligner = view === null ? null : new Aligner(view, (now) => this.showAligning(now));
     this.buttons = make('div', { className: 'buttons', hidden: true }, this.apply, button(say.cancel, say.cancel, () => this.aligner?.begin(null)));
     this.aligning.setAttribute('role', 'status');
@@ -156,18 +159,45 @@ export class StreamsPanel {
     const { recordings } = (await response.json()) as { recordings: ListedRecording[] };
     if (listing !== this.listings) return; // asked for again since: what comes then is newer
     this.folderTitle.hidden = recordings.length === 0;
-    this.folder.replaceChildren();
-    this.recordings.clear();
-    for (const { file, bytes, recording, cut } of recordings) {
-      const row = makeRow(file, () => this.events.recording(file));
+    this.drop(recordings.map(({ file }) => file));
+    for (const [i, { file, bytes, recording, cut }] of recordings.entries()) {
+      const row = this.recordings.get(file) ?? this.addRecording(file);
       const state = recording ? say.beingRecorded : cut ? say.cut : '';
       setText(row.about, say.withWord(`${(bytes / 1e6).toFixed(1)} MB`, state));
-      if (state === say.cut) row.about.title = say.cutTitle;
-      this.folder.append(row.item);
-      this.recordings.set(file, row);
-      this.thumbnails.ask({ stream: null, recording: `recordings/${encodeURIComponent(file)}`, onto: row.picture });
+      row.about.title = state === say.cut ? say.cutTitle : '';
+      const before = this.folder.children[i];
+      if (before !== row.item) this.folder.insertBefore(row.item, before ?? null);
     }
     this.markRecording();
+  }
+
+  private addRecording(file: string): Row {
+    const row = makeRow(file, () => this.events.recording(file));
+    this.recordings.set(file, row);
+    this.inSight.observe(row.picture);
+    return row;
+  }
+
+  /** Recordings that are none of these are gone. */
+  private drop(files: readonly string[]): void {
+    const there = new Set(files);
+    for (const [file, { item, picture }] of this.recordings) {
+      if (there.has(file)) continue;
+      this.inSight.unobserve(picture);
+      this.thumbnails.forget(picture);
+      item.remove();
+      this.recordings.delete(file);
+    }
+  }
+
+  // Of hundreds of recordings those that nobody looks at are not read.
+  private ask(entries: readonly IntersectionObserverEntry[]): void {
+    for (const { target, isIntersecting } of entries) {
+      const onto = target as HTMLCanvasElement;
+      const file = [...this.recordings].find(([, { picture }]) => picture === onto)?.[0];
+      if (!isIntersecting || file === undefined) this.thumbnails.forget(onto);
+      else if (onto.dataset['drawn'] === undefined) this.thumbnails.ask({ stream: null, recording: `recordings/${encodeURIComponent(file)}`, onto });
+    }
   }
 }
 

@@ -29,6 +29,11 @@ export class Thumbnails {
     if (this.jobs.length === 1) void this.begin();
   }
 
+  /** It is not to be drawn any more, unless it is under way. */
+  forget(onto: HTMLCanvasElement): void {
+    this.jobs = this.jobs.filter((job, i) => i === 0 || job.onto !== onto);
+  }
+
   /** Forgets what is not drawn yet. */
   stop(): void {
     this.jobs = [];
