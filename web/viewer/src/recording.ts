@@ -12,6 +12,7 @@ import { videoTextureIsKey } from './videoTexture';
 const kFrameTopic = 'relievo/frame';
 const kInfoTopic = 'relievo/info';
 const kTogether = 64; // heads read at a time
+const kApartMs = 1; // between two frames, at least: links are of whole milliseconds
 const kFarHeadMs = 8; // between those of a remote file
 const kFarSayMs = 500; // between marks drawn meanwhile
 const kMostFarHeads = 20_000; // that are asked for one by one; of longer ones those have marks that were shown
@@ -91,9 +92,9 @@ export class Recording implements FrameStore {
     return true;
   }
 
-  // A server's clock that was put back since makes no frame come before one that is there.
-  private timesOf(frames: McapMessage[], last = 0): Float64Array {
-    return Float64Array.from(frames, (m) => (last = Math.max(last, m.timeMs - this.startMs)));
+  // Each has a time of its own, by which it can be gone to, also where the clock stood still or was put back.
+  private timesOf(frames: McapMessage[], last = -Infinity): Float64Array {
+    return Float64Array.from(frames, (m) => (last = Math.max(last + kApartMs, m.timeMs - this.startMs)));
   }
 
   get count(): number {

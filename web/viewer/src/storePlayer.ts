@@ -6,6 +6,8 @@ import { PlayClock, type Loop } from './playback';
 import type { FramePrefix } from './protocol';
 import type { Playback, SourceEvents } from './source';
 
+const kLongestWaitMs = 2 ** 30; // browsers take what is twice as long for none
+
 /** What the decoder holds: the key frame, and the last frame that was decoded after it. */
 export interface Decoded {
   key: number;
@@ -165,7 +167,7 @@ export class StorePlayer implements Playback {
     }
     const wait = this.clock.untilNext(now);
     if (wait !== null) {
-      this.timer = this.timers.setTimeout(() => this.pump(), wait);
+      this.timer = this.timers.setTimeout(() => this.pump(), Math.min(wait, kLongestWaitMs));
     } else if (this.running) {
       this.running = false;
       this.ended();

@@ -3,6 +3,7 @@
 import { expect, it } from 'vitest';
 import { writeFrame, writeStreamInfo } from '../src/cdrWriter';
 import { bytesOf } from '../src/mcap';
+import { frameAt } from '../src/playback';
 import { Recording } from '../src/recording';
 import { writeRecording } from '../src/recordingFile';
 import { kInfo } from './streamInfo';
@@ -13,12 +14,12 @@ const kSources = ['one', 'one', 'other', 'other', 'one', 'one'];
 
 const publishMs = (index: number): number => kStartMs + index * kPeriodMs;
 
-function recorded(sources: string[]): Promise<Blob> {
+function recorded(sources: string[], publishMs = (index: number): number => kStartMs + index * kPeriodMs): Promise<Blob> {
   const descriptions = new Map(sources.map((source) => [source, writeStreamInfo({ ...kInfo, source })]));
   const { stream } = kInfo;
   const data = Uint8Array.from([0x52, 0x4c, 0x56, 0x46, 1, 1, 9, 9]);
   const frames = sources.map((source, i) => {
-    const publishNs = BigInt(publishMs(i)) * 1_000_000n;
+    const publishNs = BigInt(Math.round(publishMs(i) * 1000)) * 1000n;
     const message = writeFrame({ stream, sequence: BigInt(i), number: BigInt(i), captureNs: publishNs, publishNs, data });
     const sample = { data: message, sequence: i, logNs: publishNs + 5_000_000n, publishNs };
     return { sample, description: descriptions.get(source)! };
@@ -38,4 +39,13 @@ it('takes no description of another stream for its own', async () => {
   const description = writeStreamInfo({ ...kInfo, stream: 'stranger' });
   const recording = await Recording.open(bytesOf(await writeRecording(kInfo.stream, [{ sample, description }])));
   expect(recording.infoAt(publishMs(0))).toBeNull();
+});
+
+it('has a time of its own for each frame, whatever the clock did, of which a link can tell', async () => {
+  const clock = [0, 0, 0, 33, 33.5, 34, 500];
+  const { times } = await Recording.open(bytesOf(await recorded(clock.map(() => 'one'), (i) => kStartMs + clock[i]!)));
+  const linked = [...times].map(Math.ceil);
+  expect([...times].map((_, i) => frameAt(times, linked[i]!))).toEqual(clock.map((_, i) => i));
+  expect(times[0]).toBe(0);
+  expect(times[6]).toBe(500);
 });

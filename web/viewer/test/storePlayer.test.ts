@@ -83,4 +83,19 @@ describe('StorePlayer', () => {
     await vi.advanceTimersByTimeAsync(1000);
     expect(ends).toEqual([200]);
   });
+
+  it('waits for a frame of months later without looking for it all the time', async () => {
+    const far = { ...store, times: Float64Array.of(0, 100 * 24 * 3_600_000) } as FrameStore;
+    const player = new StorePlayer(far, { frame: () => player.credit(), nonsense: () => undefined });
+    player.play();
+    await vi.advanceTimersByTimeAsync(1);
+    let looks = 0;
+    player.changed = () => ++looks;
+    const timers = vi.spyOn(window, 'setTimeout');
+    player.setSpeed(0.1);
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(looks).toBeLessThan(5);
+    for (const [, wait] of timers.mock.calls) expect(wait).toBeLessThan(2 ** 31); // which browsers take for none
+    player.stop();
+  });
 });
