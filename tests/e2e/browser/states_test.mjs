@@ -45,7 +45,7 @@ async function inspect(name, made, said) {
       const overlap = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
       const element = document.querySelector('#card');
       const at = box(element);
-      const controls = [...document.querySelectorAll('header > *, footer > *, #rail')].filter((e) => e.getClientRects().length > 0);
+      const controls = [...document.querySelectorAll('header > *, footer > *, #rail, #panels aside')].filter((e) => e.getClientRects().length > 0);
       return {
         card: !element.hidden,
         inside: at.left >= 0 && at.top >= 0 && at.right <= innerWidth && at.bottom <= innerHeight && element.scrollWidth <= element.clientWidth,
@@ -59,7 +59,7 @@ async function inspect(name, made, said) {
       found = await seen();
       return found.card && found.inside && found.covered.length === 0 && said.test(found.words);
     });
-    if (screenshots) {
+    if (screenshots && taken.has(look)) {
       await page.waitForTimeout(600); // what is dimmed fades
       taken.get(look).push({ name, png: (await page.screenshot()).toString('base64') });
     }
@@ -158,6 +158,21 @@ const checks = {
     feeder.say('stop\nstatus stalled No signal from the camera.');
     for (const { page } of made) await inState(page, 'stalled');
     await inspect('Stalled', made, /stalled.*No signal from the camera/s);
+  },
+
+  async 'stalled, while a panel is open: beside it'() {
+    feeder.say('start ball\nstatus running');
+    const made = [];
+    for (const [width, height] of [[844, 390], [1000, 560], [660, 700]]) {
+      const page = await open('/', { viewport: { width, height } });
+      await shownPast(page, 1);
+      await page.keyboard.press('i');
+      await page.waitForSelector('#panel-statistics .plot');
+      made.push({ look: `${width}x${height}`, page });
+    }
+    feeder.say('stop\nstatus stalled No signal from the camera.');
+    for (const { page } of made) await inState(page, 'stalled');
+    await inspect('Stalled beside a panel', made, /stalled.*No signal from the camera/s);
   },
 
   async 'ended'() {
