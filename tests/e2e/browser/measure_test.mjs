@@ -288,6 +288,23 @@ const inRecording = {
     await cornerToCorner(page, kFront);
   },
 
+  async 'what is read of a place is of the one where the cursor rests, though no frame follows'(page) {
+    for (const name of ['frontLeftTop', 'frontRightBottom', 'frontLeftBottom']) {
+      const at = await restingPlace(page, kCorners[name]);
+      await page.mouse.move(at.x + 3, at.y - 3);
+      const [x, y, z] = kCorners[name].map((c) => c * 1000);
+      let said;
+      await eventually(() => `at ${name}, ${[x, -y, z]}, it reads ${said}`, async () => {
+        said = await page.textContent('#cursor');
+        const read = /^corner · depth ([\d.]+) ± [\d.]+ mm · right (-?[\d.]+) · up (-?[\d.]+)$/.exec(said)?.slice(1).map(Number);
+        return read !== undefined && [z, x, -y].every((c, i) => Math.abs(read[i] - c) < 1.5);
+      });
+    }
+    const middle = await restingPlace(page, onCube(0, 0));
+    await page.mouse.move(middle.x, middle.y);
+    await page.waitForFunction(() => /^depth/.test(document.querySelector('#cursor').textContent));
+  },
+
   async 'a link shows somebody else what was measured, and how exactly'(page) {
     await click(page, onCube(-0.02, 0.01)); // of a distance that is not measured to its end
     await measure(page, 'Angle', [onCube(-0.03, 0.03), onCube(-0.03, -0.03), onCube(0.03, -0.03)]);

@@ -183,6 +183,11 @@ export class MeasurePanel {
     const hit = this.cursor === null ? null : this.view.pick(this.cursor);
     this.pointed(hit !== null && hit.stream === this.view.name ? coordinatesAt(hit.surface, hit) : null);
     this.lookForEdges();
+    this.read(hit);
+  }
+
+  // `hit`: at the cursor, where that is not on an edge or corner.
+  private read(hit: Hit | null): void {
     const spot = this.caught !== null ? this.caughtSpot(this.caught) : hit !== null ? this.spot(hit) : null;
     this.readout.hidden = spot === null;
     if (spot === null) return;
@@ -214,6 +219,7 @@ export class MeasurePanel {
       this.hold(this.cursor === null || this.tool === null || this.tool === 'flatness' ? null : this.catchAt(this.cursor));
       this.caughtAt = performance.now();
       this.caughtIn = this.caughtAt - start;
+      this.read(this.cursor === null ? null : this.view.pick(this.cursor)); // no frame may come behind it
     }, wait);
   }
 
