@@ -50,11 +50,11 @@ double length_m(const std::string& number, const std::string& unit) {
 
 // Of a square that somebody prints. Others are a wrong unit: all that is calibrated by it looks good, in
 // kilometres.
-constexpr double kLeastSquare_m = 0.001, kMostSquare_m = 1;
+constexpr double kLeastSquare_m = 0.0001, kMostSquare_m = 1;
 
 Status check_square(const std::string& text, double square_m) {
   if (square_m >= kLeastSquare_m && square_m <= kMostSquare_m) return {};
-  return Error{text + ": a square's side must be 1 mm to 1 m: is its unit right?"};
+  return Error{text + ": a square's side must be 0.1 mm to 1 m: is its unit right?"};
 }
 
 Result<Board> parse_charuco(const std::string& text) {
