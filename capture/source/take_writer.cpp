@@ -80,6 +80,14 @@ Status check_free(const fs::path& take, const fs::path& target) {
   return Error{take.string() + " exists already: give a new folder or remove it"};
 }
 
+/// `target`, or NAME-2 and so on beside it where something is there by now.
+fs::path free_like(const fs::path& target) {
+  fs::path out = target;
+  for (int i = 2; !check_free(out, out); ++i)
+    out = target.parent_path() / (target.filename().string() + "-" + std::to_string(i));
+  return out;
+}
+
 /// A line of timestamps.csv.
 std::string stamp_of(std::uint64_t number, std::int64_t time_ns) {
   char line[64];
@@ -114,7 +122,7 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
              const TakeOptions& options) {
   std::error_code code;
   const fs::path whole = target_of(take);
-  if (const Status free = check_free(take, whole); !free) return free;
+  if (const Status free = check_free(take, whole); !free && !options.keep_written) return free;
   PartialFolder partial(partial_name(whole.parent_path(), whole));
   for (const char* folder : {"frames", "truth"}) {
     if (!fs::create_directories(partial.path() / folder, code) && code) {
@@ -152,10 +160,13 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
     finished = write_texts(partial.path(), source.info(), stamps);
   }
   if (!finished) return finished;
-  finished = partial.rename_to(whole);
-  if (failed || !finished) return finished;
-  return Error{failed.error().message + " " + take.string() + " has the first " +
-               std::to_string(stamps.size()) + " frames"};
+  const fs::path there = options.keep_written ? free_like(whole) : whole;
+  if (finished = partial.rename_to(there); !finished) return finished;
+  if (!failed)
+    return Error{failed.error().message + " " + there.string() + " has the first " +
+                 std::to_string(stamps.size()) + " frames"};
+  if (there != whole) return Error{take.string() + " exists by now: the frames are in " + there.string()};
+  return {};
 }
 
 }  // namespace

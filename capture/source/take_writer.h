@@ -17,7 +17,9 @@ namespace relievo {
 struct TakeOptions {
   std::uint64_t frames = 0;                                  // at most; 0: until the source ends
   std::function<void(std::uint64_t written)> progress = {};  // after each frame
-  bool keep_written = false;  // a frame that cannot be written ends the take, which has those before it
+  // A frame that cannot be written ends the take, which has those before it; where something is in its place
+  // it is NAME-2 and so on. Both are errors that say so.
+  bool keep_written = false;
   const std::atomic<bool>* stop = nullptr;  // once true, nothing is left behind and an error returned
 };
 

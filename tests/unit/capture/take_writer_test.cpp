@@ -202,6 +202,20 @@ TEST(TakeWriter, WhatWasWrittenIsKeptWhereThatIsWanted) {
   }
 }
 
+TEST(TakeWriter, WhatIsKeptHasAnotherNameWhereSomethingIsThereByNow) {
+  test::TempFolder folder;
+  const std::filesystem::path take = folder.path() / "take";
+  ASSERT_TRUE(write_take(take, *small_sim(""), {}));
+  ASSERT_FALSE(write_take(take, *small_sim(""), {}));
+  for (const char* name : {"take-2", "take-3"}) {
+    const Status done = write_take(take, *small_sim(""), {.keep_written = true});
+    ASSERT_FALSE(done);
+    const std::filesystem::path there = folder.path() / name;
+    EXPECT_EQ(done.error().message, take.string() + " exists by now: the frames are in " + there.string());
+    EXPECT_EQ(entries(there / "frames"), 5u);
+  }
+}
+
 TEST(TakeWriter, OfNoFrameNothingIsKept) {
   test::TempFolder folder;
   const auto source = small_sim("");
