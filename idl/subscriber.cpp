@@ -26,7 +26,7 @@
 namespace relievo {
 namespace {
 
-constexpr std::uint32_t kTakeAtOnce = 16;
+constexpr int kMostAtOnce = 64;
 constexpr std::int64_t kDoubt_ns = 20'000'000;                  // between looks at a stream that may be gone
 constexpr std::int64_t kMakeTime_ns = kNanosecondsPerSecond;    // for the first key frame of a lower rung
 constexpr std::int64_t kStatusTime_ns = kNanosecondsPerSecond;  // for the status of a stream that has one
@@ -249,27 +249,26 @@ class DdsSubscriber final : public Subscriber {
     return topic == Topic::kFrame ? frames_.reader.get() : readers_[static_cast<std::size_t>(topic)].get();
   }
 
-  // Everything there is, but bounded, so that no topic starves the others.
+  // Everything there is, but bounded, so that no topic starves the others; nor do a slow client's frames a
+  // change of rung, which is to make them fewer.
   void take(Topic topic) {
     if (reader(topic) == 0) return;
-    for (int round = 0; round < 4; ++round) {
-      if (take_some(topic) < static_cast<std::int32_t>(kTakeAtOnce)) return;
+    for (int i = 0; i < kMostAtOnce && take_one(topic); ++i) {
+      if (topic == Topic::kFrame && (next_ || wanted_rung_ != frames_.rung)) return;
     }
   }
 
-  std::int32_t take_some(Topic topic) {
-    ddsi_serdata* samples[kTakeAtOnce] = {};
-    dds_sample_info_t infos[kTakeAtOnce];
-    const auto count = dds_takecdr(reader(topic), samples, kTakeAtOnce, infos, DDS_ANY_STATE);
-    for (std::int32_t i = 0; i < count; ++i) {
-      if (infos[i].valid_data) {
-        const LentBytes bytes(samples[i]);
-        if (auto status = deliver(topic, bytes.span(), infos[i]); !status) refuse(topic, status.error());
-      }
-      if (infos[i].instance_state != DDS_IST_ALIVE) end(topic, infos[i].instance_handle);
-      ddsi_serdata_unref(samples[i]);
+  bool take_one(Topic topic) {
+    ddsi_serdata* sample = nullptr;
+    dds_sample_info_t info;
+    if (dds_takecdr(reader(topic), &sample, 1, &info, DDS_ANY_STATE) != 1) return false;
+    if (info.valid_data) {
+      const LentBytes bytes(sample);
+      if (auto status = deliver(topic, bytes.span(), info); !status) refuse(topic, status.error());
     }
-    return count;
+    if (info.instance_state != DDS_IST_ALIVE) end(topic, info.instance_handle);
+    ddsi_serdata_unref(sample);
+    return true;
   }
 
   Status deliver(Topic topic, std::span<const std::uint8_t> cdr, const dds_sample_info_t& sample) {
