@@ -2,7 +2,10 @@
 // In the guest: every format and field layout that the test camera has, against what its pattern must give.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <ostream>
+#include <utility>
+#include <vector>
 
 #include "base/time.h"
 #include "vivid.h"
@@ -194,7 +197,6 @@ TEST_P(Fields, RowsLieWhereTheyBelong) {
   const std::string field = c.field;
   const bool bottom_first = field == "seq-bt" || (field != "seq-tb" && ntsc);
   EXPECT_EQ(rig.field_order, bottom_first ? FieldOrder::kBottom : FieldOrder::kTop);
-  std::int64_t before_ns = 0;
   for (std::uint64_t i = 0; i < 3; ++i) {
     const CapturedFrame frame = next(*source);
     EXPECT_EQ(frame.number, i);
@@ -206,13 +208,19 @@ TEST_P(Fields, RowsLieWhereTheyBelong) {
       const double level = y % 2 == 0 ? 0 : 255;
       return Rgb{level, level, level};
     });
-    if (i > 0) {
-      // The driver's stamps are those of its 4 ms clock.
-      EXPECT_NEAR(static_cast<double>(frame.time_ns - before_ns) * 1e-6, 1000 / rig.frame_rate, 9);
-    }
-    before_ns = frame.time_ns;
     EXPECT_NEAR(seconds(frame.time_ns), seconds(utc_now_ns()), 2);
   }
+  std::vector<double> periods_ms;
+  CapturedFrame before = next(*source);
+  while (periods_ms.size() < 5) {
+    CapturedFrame frame = next(*source);
+    periods_ms.push_back(static_cast<double>(frame.time_ns - before.time_ns) * 1e-6 /
+                         static_cast<double>(frame.number - before.number));
+    before = std::move(frame);
+  }
+  // The driver's stamps are those of its 4 ms clock, or later where the guest had no processor.
+  std::nth_element(periods_ms.begin(), periods_ms.begin() + 2, periods_ms.end());
+  EXPECT_NEAR(periods_ms[2], 1000 / rig.frame_rate, 9);
 }
 
 INSTANTIATE_TEST_SUITE_P(Vivid, Fields,

@@ -325,9 +325,10 @@ const inRecording = {
     await other.waitForFunction(() => window.relievo.diagnostics().measurements.at(-1).profile.length > 0);
     const { profile } = (await look(other)).measurements.at(-1);
     assert.equal(profile.length, section.profile.length);
+    const kShown = 5e-6; // half a digit; where the cut runs along an edge of the mesh a link's nanometre is most of a micrometre
     for (const [i, [{ along, height }]] of profile.entries()) {
-      near(along, section.profile[i][0].along, 1e-7, `place ${i} of the section`);
-      near(height, section.profile[i][0].height, 1e-7, `height ${i} of the section`);
+      near(along, section.profile[i][0].along, kShown, `place ${i} of the section`);
+      near(height, section.profile[i][0].height, kShown, `height ${i} of the section`);
     }
     assert.ok(await other.isVisible('#panel-measure .plot'));
     // Passed on once more it is the same, and pasted into a page that is open it takes the place of what is there.
