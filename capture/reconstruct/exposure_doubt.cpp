@@ -3,10 +3,6 @@
 
 #include <algorithm>
 
-#include "capture/reconstruct/detection_lines.h"
-#include "capture/reconstruct/exchanged_pair.h"
-#include "capture/reconstruct/slide_decoder.h"
-
 namespace relievo {
 namespace {
 
@@ -25,26 +21,12 @@ std::size_t kept(const ReconstructReport& report) {
 }  // namespace
 
 ExposureDoubt::ExposureDoubt(const Rig& rig, const Pattern& pattern, int line_stride)
-    : rig_(rig), pattern_(pattern), options_{.decoder = Decoder::kQuick, .line_stride = line_stride} {}
-
-std::size_t ExposureDoubt::kept_of(const CapturedFrame& first, const CapturedFrame& second,
-                                   WorkerPool& pool) const {
-  SlideDecoder decoder(rig_, pattern_, options_);
-  DecodedGrid grid;
-  grid.reset(pattern_.boundaries(), line_count(rig_, options_.line_stride));
-  ReconstructReport report;
-  bool complete = false;
-  for (const CapturedFrame* pair : {&first, &second}) {
-    report = {};
-    decoder.observe(*pair, pool, report);
-    complete = decoder.decode({*pair, nullptr}, pool, report, grid);
-  }
-  return complete ? kept(report) : 0;
-}
+    : trial_(rig, pattern, line_stride) {}
 
 bool ExposureDoubt::better_exchanged(const CapturedFrame& pair, WorkerPool& pool) const {
-  const std::size_t as_it_is = kept_of(before_, pair, pool);
-  const std::size_t other = kept_of(exchanged_pair(before_), exchanged_pair(pair), pool);
+  const CapturedFrame turned_before = exchanged_pair(before_), turned = exchanged_pair(pair);
+  const std::size_t as_it_is = kept(trial_.decode({&before_, &pair}, pool));
+  const std::size_t other = kept(trial_.decode({&turned_before, &turned}, pool));
   return static_cast<double>(other) > kFarBetter * static_cast<double>(as_it_is + kLeast);
 }
 

@@ -10,6 +10,7 @@
 #include "base/pattern.h"
 #include "base/rig.h"
 #include "capture/reconstruct/reconstructor.h"
+#include "capture/reconstruct/trial_decoder.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -27,13 +28,10 @@ class ExposureDoubt {
  private:
   static constexpr int kSoon = 3;  // frames
 
-  std::size_t kept_of(const CapturedFrame& first, const CapturedFrame& second, WorkerPool& pool) const;
   bool better_exchanged(const CapturedFrame& pair, WorkerPool& pool) const;
 
-  Rig rig_;
-  Pattern pattern_;
-  ReconstructOptions options_;  // of the quick decoder, which tells as clearly as the others
-  CapturedFrame before_;        // the pair before; of no picture where none is wanted
+  TrialDecoder trial_;
+  CapturedFrame before_;  // the pair before; of no picture where none is wanted
   bool exchanged_ = false;
   int pause_ = kSoon;
   int wait_ = kSoon;  // doubtful frames until it is asked again

@@ -3,10 +3,6 @@
 
 #include <algorithm>
 
-#include "capture/reconstruct/detection_lines.h"
-#include "capture/reconstruct/exchanged_pair.h"
-#include "capture/reconstruct/slide_decoder.h"
-
 namespace relievo {
 namespace {
 
@@ -25,17 +21,7 @@ std::size_t given_up(const ReconstructReport& report) {
 }  // namespace
 
 ExposureOrder::ExposureOrder(const Rig& rig, const Pattern& pattern, int line_stride)
-    : rig_(rig), pattern_(pattern), options_{.decoder = Decoder::kQuick, .line_stride = line_stride} {}
-
-std::size_t ExposureOrder::given_up_of(const CapturedFrame& pair, WorkerPool& pool) const {
-  SlideDecoder decoder(rig_, pattern_, options_);
-  DecodedGrid grid;
-  grid.reset(pattern_.boundaries(), line_count(rig_, options_.line_stride));
-  ReconstructReport report;
-  decoder.observe(pair, pool, report);
-  decoder.decode({pair, nullptr}, pool, report, grid);
-  return given_up(report);
-}
+    : trial_(rig, pattern, line_stride) {}
 
 bool ExposureOrder::exchanged(const CapturedFrame& pair, const ReconstructReport& report, WorkerPool& pool) {
   wait_ = std::max(wait_ - 1, 0);
@@ -45,8 +31,9 @@ bool ExposureOrder::exchanged(const CapturedFrame& pair, const ReconstructReport
     return false;
   }
   if (report.matched < kLeast || wait_ > 0) return false;
-  const std::size_t as_it_is = given_up_of(pair, pool);
-  const std::size_t other = given_up_of(exchanged_pair(pair), pool);
+  const CapturedFrame turned = exchanged_pair(pair);
+  const std::size_t as_it_is = given_up(trial_.decode({&pair}, pool));
+  const std::size_t other = given_up(trial_.decode({&turned}, pool));
   const auto clear = [](std::size_t less, std::size_t more) { return kClear * less + kLeastApart < more; };
   const bool exchanged = clear(other, as_it_is);
   const bool kept = clear(as_it_is, other);

@@ -10,6 +10,7 @@
 #include "base/pattern.h"
 #include "base/rig.h"
 #include "capture/reconstruct/reconstructor.h"
+#include "capture/reconstruct/trial_decoder.h"
 #include "capture/source/field_source.h"
 
 namespace relievo {
@@ -27,11 +28,7 @@ class ExposureOrder {
  private:
   static constexpr int kSoon = 3;  // frames
 
-  std::size_t given_up_of(const CapturedFrame& pair, WorkerPool& pool) const;
-
-  Rig rig_;
-  Pattern pattern_;
-  ReconstructOptions options_;  // of the quick decoder, which tells as clearly as the other
+  TrialDecoder trial_;
   bool known_ = false;
   int pause_ = kSoon;
   int wait_ = 0;  // doubtful frames until it is asked again
