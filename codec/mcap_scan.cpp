@@ -19,6 +19,7 @@ namespace relievo::mcap {
 namespace {
 
 constexpr std::uint64_t kMaxSummaryBytes = 256u << 20;
+constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;
 constexpr std::uint64_t kMostHeaderBytes = 256;  // of a chunk, before its records
 
 /// From the summary at the file's end; nothing where there is none or any byte of it is wrong.
@@ -92,6 +93,11 @@ std::optional<RecordPlace> read_record_place(const File& file, std::uint64_t off
   if (static_cast<int>(place.op) == 0) return std::nullopt;  // zeros that a power loss left
   if (place.end() < place.content()) return std::nullopt;
   return place;
+}
+
+Result<Bytes> read_small_content(const File& file, const RecordPlace& record) {
+  if (record.length > kMaxSmallRecordBytes) return Error{"too large"};
+  return file.read(record.content(), record.length);
 }
 
 std::optional<ChunkIndex> read_chunk_place(const File& file, const RecordPlace& chunk) {

@@ -54,6 +54,10 @@ struct RecordPlace {
 /// there.
 std::optional<RecordPlace> read_record_place(const File& file, std::uint64_t offset);
 
+/// The content of a schema, channel, attachment or footer; fails, before it reads, where it is too large for
+/// one.
+Result<Bytes> read_small_content(const File& file, const RecordPlace& record);
+
 /// Of a chunk, without message indexes; nothing where its head is wrong.
 std::optional<ChunkIndex> read_chunk_place(const File& file, const RecordPlace& chunk);
 

@@ -12,9 +12,8 @@
 namespace relievo::mcap {
 namespace {
 
-constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels
-constexpr std::uint64_t kWindowBytes = 1u << 20;           // read at once while looking for a record
-constexpr std::size_t kMostRecordings = 4096;              // that a file may be joined of
+constexpr std::uint64_t kWindowBytes = 1u << 20;  // read at once while looking for a record
+constexpr std::size_t kMostRecordings = 4096;     // that a file may be joined of
 
 class Walk {
  public:
@@ -105,14 +104,14 @@ class Walk {
         return goes_on_at(record.end()) && (behind_data_ || add_attachment(record));
       case Op::kSchema:
       case Op::kChannel: {
-        const auto content = small_content(record);
+        const auto content = read_small_content(file_, record);
         if (!content) return false;
         const bool read = record.op == Op::kSchema ? contents_.add(read_schema(*content))
                                                    : contents_.add(read_channel(*content));
         return read && goes_on_at(record.end());
       }
       case Op::kFooter: {
-        const auto content = small_content(record);
+        const auto content = read_small_content(file_, record);
         const auto footer = content ? read_footer(*content) : std::nullopt;
         // A footer that points to a summary means that the summary was there, but not as it should be.
         plain_end_ = footer && footer->summary_start == 0;
@@ -133,11 +132,6 @@ class Walk {
       default:
         return goes_on_at(record.end());
     }
-  }
-
-  Result<Bytes> small_content(const RecordPlace& record) const {
-    if (record.length > kMaxSmallRecordBytes) return Error{"too large"};
-    return file_.read(record.content(), record.length);
   }
 
   bool add_chunk(const RecordPlace& record) {

@@ -10,7 +10,6 @@
 namespace relievo {
 namespace {
 
-constexpr std::uint64_t kMaxSmallRecordBytes = 64u << 20;  // schemas, channels, attachments
 constexpr std::uint64_t kLeastIndexBytes = 2 + 4;  // of a message index: channel, bytes of its entries
 constexpr std::uint64_t kChunkHeadBytes = mcap::kRecordHeaderBytes + 3 * 8 + 4;  // two times, size, CRC
 
@@ -67,8 +66,7 @@ Status RecordingFollower::take(const mcap::RecordPlace& record, const mcap::File
   has_footer_ = op == mcap::Op::kFooter;
   if (behind_data_) return {};  // what it says of the data again
   if (op == mcap::Op::kSchema || op == mcap::Op::kChannel || op == mcap::Op::kAttachment) {
-    const auto bytes = record.length > kMaxSmallRecordBytes ? Result<Bytes>(Error{"too large"})
-                                                            : file.read(record.content(), record.length);
+    const auto bytes = mcap::read_small_content(file, record);
     if (!bytes) return bytes.error();
     if (op == mcap::Op::kSchema) return added(mcap::read_schema(*bytes));
     if (op == mcap::Op::kChannel) return added(mcap::read_channel(*bytes));
