@@ -11,13 +11,14 @@
 
 #include "base/json_text.h"
 #include "base/log.h"
-#include "base/time.h"
+#include "capture/evaluate/frame_places.h"
 #include "capture/evaluate/score.h"
 #include "capture/pattern/schedule.h"
 #include "capture/reconstruct/join_exposures.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
 #include "capture/source/npy.h"
+#include "capture/source/take_files.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "server/commands.h"
@@ -39,12 +40,6 @@ struct Options {
   std::string pictures;
   bool json = false;
 };
-
-fs::path truth_of(const fs::path& take, std::uint64_t number) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%06llu.npy", static_cast<unsigned long long>(number));
-  return take / "truth" / name;
-}
 
 Result<ImageF> read_truth(const fs::path& file, const PinholeModel& camera) {
   auto truth = read_npy(file);
@@ -161,33 +156,55 @@ class AsDecoded {
   CapturedFrame joined_;
 };
 
-/// What was projected follows from the time stamp, independently of the decoder, so that what that takes for
-/// something else counts as missing. `lead`: frames by which the projector was ahead of the take's first one.
-Exposure shown_in(const CapturedFrame& frame, const SourceInfo& info, std::uint64_t lead) {
-  const long place = std::max(0L, std::lround(seconds(frame.time_ns) * info.rig.frame_rate));
-  return shown(info.pattern, static_cast<std::uint64_t>(place) + lead, 0);
+/// How the time stamps of a take tell what was projected, independently of the decoder, so that what that
+/// takes for something else counts as missing.
+struct Timing {
+  double period_ns;
+  std::uint64_t lead = 0;  // frames by which the projector was ahead of the take's first one
+};
+
+/// Whether two frames that follow each other fit what the decoder takes the later one for.
+bool fits(const Pattern& pattern, const ReconstructReport& report, std::uint64_t before, std::uint64_t now) {
+  const Exposure exposure = shown(pattern, now, 0);
+  if (pattern.scheme == Scheme::kWhiteFrame) return (exposure.light == Light::kWhite) == report.white;
+  return (exposure.slide == shown(pattern, before, 0).slide) == report.same_slide;
 }
 
-/// The lead under which the most of the first frames are white that look white. 0 under other schemes: which
-/// of two slides came first changes no score.
-Result<std::uint64_t> find_lead(const Options& options, const SourceInfo& info) {
+/// Where stamps and scheme leave a choice, that which the most of the first frames fit. The lead is 0 but
+/// under white-frame: which of two slides came first changes no score.
+Result<Timing> find_timing(const Options& options, const SourceInfo& info) {
   constexpr int kFrames = 30;  // ten times the three of white-frame
-  if (info.pattern.scheme != Scheme::kWhiteFrame) return std::uint64_t{0};
+  const auto stamps = read_timestamps(fs::path(options.take) / "timestamps.csv");
+  if (!stamps) return stamps.error();
+  const Pattern& pattern = info.pattern;
+  const int leads = pattern.scheme == Scheme::kWhiteFrame ? cycle_frames(pattern) : 1;
+  std::vector<Timing> choices;
+  std::vector<FramePlaces> places;
+  for (const double period_ns : likely_periods_ns(*stamps, info.rig.frame_rate)) {
+    for (int lead = 0; lead < leads; ++lead) {
+      choices.push_back({period_ns, static_cast<std::uint64_t>(lead)});
+      places.emplace_back(period_ns);
+    }
+  }
+  if (choices.size() == 1 || cycle_frames(pattern) == 1) return choices.front();
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
-  auto reconstructor = Reconstructor::create(info.rig, info.pattern, {.decoder = Decoder::kQuick});
+  auto reconstructor = Reconstructor::create(info.rig, pattern, {.decoder = Decoder::kQuick});
   if (!reconstructor) return reconstructor.error();
-  std::vector<int> fitting(static_cast<std::size_t>(cycle_frames(info.pattern)));
+  std::vector<std::uint64_t> before(choices.size());
+  std::vector<int> fitting(choices.size());
   for (int i = 0; i < kFrames; ++i) {
     auto next = (*source)->next();
     if (!next) return next.error();
     if (!*next) break;
     if (const Status seen = reconstructor->observe(**next); !seen) return seen.error();
-    for (std::size_t lead = 0; lead < fitting.size(); ++lead)
-      fitting[lead] +=
-          (shown_in(**next, info, lead).light == Light::kWhite) == reconstructor->report().white ? 1 : 0;
+    for (std::size_t c = 0; c < choices.size(); ++c) {
+      const std::uint64_t now = places[c].next((*next)->time_ns) + choices[c].lead;
+      fitting[c] += fits(pattern, reconstructor->report(), before[c], now) ? 1 : 0;
+      before[c] = now;
+    }
   }
-  return static_cast<std::uint64_t>(std::ranges::max_element(fitting) - fitting.begin());
+  return choices[static_cast<std::size_t>(std::ranges::max_element(fitting) - fitting.begin())];
 }
 
 /// Scores the frames of a take, one after the other.
@@ -225,7 +242,7 @@ class Evaluation {
  private:
   Status score(const CapturedFrame& frame, const CapturedFrame& shown, bool decodable,
                std::optional<Frame3D> completed) {
-    const fs::path file = truth_of(options_.take, frame.number);
+    const fs::path file = take_truth(options_.take, frame.number);
     if (frame.number < options_.skip || !fs::exists(file)) {
       previous_truth_ = ImageF();
       return {};
@@ -233,8 +250,8 @@ class Evaluation {
     auto truth = read_truth(file, info_.rig.camera);
     if (!truth) return truth.error();
     const bool regrouped = reconstructor_.report().step.regrouped;
-    if (regrouped && previous_truth_.empty() && fs::exists(truth_of(options_.take, frame.number - 1))) {
-      auto before = read_truth(truth_of(options_.take, frame.number - 1), info_.rig.camera);
+    if (regrouped && previous_truth_.empty() && fs::exists(take_truth(options_.take, frame.number - 1))) {
+      auto before = read_truth(take_truth(options_.take, frame.number - 1), info_.rig.camera);
       if (!before) return before.error();
       previous_truth_ = *std::move(before);
     }
@@ -267,13 +284,15 @@ class Evaluation {
 };
 
 /// Until the take ends, something fails or the command is stopped.
-Status score_frames(FieldSource& source, std::uint64_t lead, Evaluation& evaluation, StopSignal& stop) {
+Status score_frames(FieldSource& source, const Timing& timing, Evaluation& evaluation, StopSignal& stop) {
+  FramePlaces places(timing.period_ns);
   Progress progress("evaluate", "frames", source.info().frames.value_or(0));
   while (!stop.stopped()) {
     auto next = source.next();
     if (!next) return next.error();
     if (!*next) break;
-    const Exposure exposure = shown_in(**next, source.info(), lead);
+    const std::uint64_t place = places.next((*next)->time_ns) + timing.lead;
+    const Exposure exposure = shown(source.info().pattern, place, 0);
     if (auto s = evaluation.add(*std::move(*next), exposure); !s) return s;
     progress.update(evaluation.done());
   }
@@ -296,8 +315,8 @@ Status run(const Options& options, StopSignal& stop) {
                                               .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
 
-  const auto lead = find_lead(options, info);
-  if (!lead) return lead.error();
+  const auto timing = find_timing(options, info);
+  if (!timing) return timing.error();
 
   Judges judges{Scorer(reconstructor->rig(), reconstructor->pattern())};
   if (!options.pictures.empty()) {
@@ -307,7 +326,7 @@ Status run(const Options& options, StopSignal& stop) {
   }
 
   Evaluation evaluation(options, info, *reconstructor, judges);
-  const Status scored = score_frames(**source, *lead, evaluation, stop);
+  const Status scored = score_frames(**source, *timing, evaluation, stop);
   const Score score = judges.scorer.score();
   if (!scored || stop.stopped()) {
     // A score of a part would not be comparable, but the pictures that there are want their page.

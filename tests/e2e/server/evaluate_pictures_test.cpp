@@ -8,8 +8,10 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "capture/picture_file.h"
 
@@ -86,6 +88,28 @@ TEST_F(SmallTake, EvaluationShowsEveryStageOnOnePage) {
   EXPECT_NE(page.find("completeness"), std::string::npos);
   // The pictures change nothing of the figures.
   EXPECT_EQ(server_json({"evaluate", take_.string()}), score);
+}
+
+// Stamps of a clock that began before, or half way between two frames, and of other frame rates than the
+// rig's.
+TEST_F(SmallTake, IsScoredWhateverItsStampsAre) {
+  const json score = server_json({"evaluate", take_.string()});
+  EXPECT_EQ(score.value("of", 0), 3);
+  constexpr double kPeriod_s = 1 / 29.97;
+  for (const auto& [name, stamps_s] : std::map<std::string, std::vector<double>>{
+           {"before", {-100, -100 + kPeriod_s, -100 + 2 * kPeriod_s, -100 + 3 * kPeriod_s}},
+           {"half way", {kPeriod_s / 2, 1.6 * kPeriod_s, 2.4 * kPeriod_s, 3.6 * kPeriod_s}},
+           {"half as fast", {0, 2 * kPeriod_s, 4 * kPeriod_s, 6 * kPeriod_s}},
+           {"far too fast", {0, 0.0001, 0.0002, 0.0003}}}) {
+    std::ofstream csv(take_ / "timestamps.csv");
+    csv << "frame,time_s\n";
+    for (std::size_t i = 0; i < stamps_s.size(); ++i) csv << i << ',' << stamps_s[i] << '\n';
+    csv.close();
+    const json again = server_json({"evaluate", take_.string()});
+    EXPECT_EQ(again.value("frames", 0), 3) << name;
+    EXPECT_EQ(again.value("of", 0), 3) << name;
+    EXPECT_NEAR(again.value("completeness", 0.0), score.value("completeness", 1.0), 0.002) << name;
+  }
 }
 
 TEST_F(SmallTake, AnEvaluationThatIsBrokenOffLeavesThePageOfItsPictures) {
