@@ -264,12 +264,16 @@ class Calibration {
     std::vector<double> rms;
     for (const Working& w : working_) rms.push_back(view_rms(fit, w).stereo_rms);
     const auto worst = std::max_element(rms.begin(), rms.end());
-    const double limit = std::max(options_.bad_view_px, options_.bad_view * median(rms));
+    const double usual = median(rms);
+    const double limit = std::min(std::max(options_.bad_view_px, options_.bad_view * usual),
+                                  std::max(options_.stray_view_px, options_.stray_view * usual));
     if (*worst <= limit) return false;
     const auto at = working_.begin() + (worst - rms.begin());
-    char why[96];
-    std::snprintf(why, sizeof why, "its stereo RMS of %.2f px is over %.2f px, %.3g times the views' median",
-                  *worst, limit, options_.bad_view);
+    char why[128];
+    std::snprintf(
+        why, sizeof why,
+        "its stereo RMS of %.2f px is %.1f times the views' median; are all its pictures of one pose?",
+        *worst, *worst / usual);
     out_.reports[at->index].used = false;
     out_.reports[at->index].why = why;
     working_.erase(at);

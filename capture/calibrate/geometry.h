@@ -17,11 +17,15 @@ namespace relievo {
 
 struct GeometryOptions {
   BundlePriors priors;
-  /// A view whose stereo RMS is over `bad_view` times the median of all and over `bad_view_px` is left out,
-  /// the worst first, while more than `min_views` are left. A corner off by more than `bad_corner` robust
+  /// A view whose stereo RMS is over `bad_view` times the median of all and over `bad_view_px`, or over
+  /// `stray_view` times it and `stray_view_px`, is left out, the worst first, while more than `min_views` are
+  /// left. A corner off by more than `bad_corner` robust
   /// sigmas and `bad_corner_px` in either device is left out.
   double bad_view = 2.5;
   double bad_view_px = 0.5;
+  double stray_view = 4;
+  double stray_view_px =
+      0.1;  // of views this clean, one far worse has a picture of another pose among its own
   double bad_corner = 5;
   double bad_corner_px = 1;
   std::size_t min_views = 3;

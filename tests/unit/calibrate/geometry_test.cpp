@@ -184,6 +184,19 @@ TEST(Geometry, ABadViewIsNamedAndLeftOut) {
   EXPECT_LT(geometry->stereo_rms, 0.1);
 }
 
+// Too little off for a corner to be left out, and enough to shift depths by a millimetre.
+TEST(Geometry, AViewWithAPictureOfAnotherPoseIsLeftOutOfCleanOnes) {
+  const Rig rig = truth();
+  auto views = ideal_views(rig, 8, 0.02);
+  for (std::size_t i = 0; i < views[2].corners.size(); ++i)
+    views[2].corners[i].projector_px[1] += i % 2 == 0 ? 0.25 : -0.25;
+  const auto geometry = calibrate(rig, views);
+  ASSERT_TRUE(geometry.ok()) << geometry.error().message;
+  for (std::size_t v = 0; v < views.size(); ++v)
+    EXPECT_EQ(geometry->reports[v].used, v != 2) << geometry->reports[v].why;
+  EXPECT_NE(geometry->reports[2].why.find("of one pose"), std::string::npos) << geometry->reports[2].why;
+}
+
 TEST(Geometry, BadCornersAreLeftOut) {
   const Rig rig = truth();
   auto views = ideal_views(rig, 6, 0.05);
