@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -174,6 +175,16 @@ class ThreadedPipeline final : public Pipeline {
     return std::max(kSilentAtLeast_ns, static_cast<std::int64_t>(kSilentFrames * 1e9 / rate));
   }
 
+  /// By how much a gap in the time stamps is, which hours may be: nobody waits for them.
+  std::int64_t too_long(std::int64_t gap_ns) const {
+    const std::int64_t too_long_ns = gap_ns - silence_ns();
+    if (too_long_ns <= 0) return 0;
+    log_info(label_ + source_.info().name + " has a gap of " + std::to_string(std::llround(seconds(gap_ns))) +
+             " s in its time stamps: it goes on after " +
+             std::to_string(std::llround(seconds(silence_ns()))) + " s");
+    return too_long_ns;
+  }
+
   /// False once stopping.
   bool sleep_until(std::int64_t steady_ns) {
     std::unique_lock lock(mutex_);
@@ -186,6 +197,7 @@ class ThreadedPipeline final : public Pipeline {
     const bool paced = options_.paced && !info.live;
     ClockSteps clock;
     std::optional<std::int64_t> epoch_ns;  // of the source's time 0, by the monotonic clock
+    std::int64_t before_ns = 0;            // of the source's last frame, by its stamp
     std::uint64_t delivered = 0, lost = 0;
     int errors_in_a_row = 0;
     Error last_error;
@@ -215,6 +227,8 @@ class ThreadedPipeline final : public Pipeline {
       } else if (paced) {
         const std::int64_t now = steady_now_ns();
         // A source that cannot keep its own pace is played as fast as it comes, not in bursts to catch up.
+        if (epoch_ns) *epoch_ns -= too_long(frame.time_ns - before_ns);
+        before_ns = frame.time_ns;
         if (!epoch_ns || *epoch_ns + frame.time_ns < now - kMaxLate_ns) epoch_ns = now - frame.time_ns;
         const std::int64_t due_ns = *epoch_ns + frame.time_ns;
         if (!sleep_until(due_ns)) return {};

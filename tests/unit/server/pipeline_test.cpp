@@ -408,6 +408,32 @@ TEST_F(PipelineTest, PacedPlaybackKeepsTheTimeStamps) {
   }
 }
 
+// A take of two days, say.
+TEST_F(PipelineTest, AGapOfHoursIsNotWaitedFor) {
+  constexpr std::int64_t kHour_ns = 3600 * kNanosecondsPerSecond;
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 6) return ScriptedSource::end();
+    CapturedFrame frame = frames_(n);
+    if (n >= 3) frame.time_ns += kHour_ns;
+    return std::optional(std::move(frame));
+  });
+  PipelineOptions options;
+  options.lossless = true;
+  const auto pipeline = make(source, {&sink_}, options);
+  ::testing::internal::CaptureStderr();
+  Running running(*pipeline);
+  const bool ended = running.ended();
+  pipeline->stop();
+  const std::string said = ::testing::internal::GetCapturedStderr();
+  ASSERT_TRUE(ended) << said;
+  EXPECT_NE(said.find("a gap of 3600 s"), std::string::npos) << said;
+  const auto got = sink_.frames();
+  ASSERT_EQ(numbers(got), range(1, 6));
+  EXPECT_GE(got[2].capture_time_ns - got[1].capture_time_ns, kNanosecondsPerSecond);
+  EXPECT_LT(got[2].capture_time_ns - got[1].capture_time_ns, kHour_ns);
+  EXPECT_GT(read_frame_header(*got[2].data)->time_ns, kHour_ns);  // the take's own time stays in the frame
+}
+
 TEST_F(PipelineTest, ASlowSourceIsNotPlayedInItsOwnPast) {
   // A frame a millisecond by its stamps, one in 40 ms in truth: latency is from when a frame came.
   std::vector<std::int64_t> came;
