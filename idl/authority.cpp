@@ -372,9 +372,9 @@ Status renew_keys(const fs::path& folder) {
   if (!holders) return holders.error();
   const auto revoked = revocation_list(*authority, *holders);
   if (!revoked) return revoked.error();
+  // Where it is damaged or gone, which renewing mends, they are this machine's as those made first.
   const auto before = openssl::read_certificate(folder / key_files::kIdentity);
-  if (!before) return before.error();
-  const std::string name = openssl::name_of(before->get());
+  const std::string name = before ? openssl::name_of(before->get()) : this_machine();
   auto fresh = NewFolder::create(folder / "renewed");  // never kept: what is in it moves up
   if (!fresh) return fresh.error();
   std::string holder;

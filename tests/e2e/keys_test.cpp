@@ -124,6 +124,17 @@ TEST_F(UserKeys, WhatRootChangesStaysItsOwners) {
   }
 }
 
+TEST_F(UserKeys, RenewingReplacesADamagedCertificate) {
+  make_keys(where_);
+  const fs::path identity = fs::path(where_) / "identity.pem";
+  for (const bool gone : {false, true}) {
+    gone ? static_cast<void>(fs::remove(identity)) : fs::resize_file(identity, 100);
+    const auto renewed = run({"relievo", "keys", "renew", "--keys", where_});
+    ASSERT_EQ(renewed.status, 0) << renewed.err;
+    EXPECT_EQ(run({"relievo", "keys", "list", "--keys", where_}).status, 0);
+  }
+}
+
 class ClosedKeys : public UserKeys {
  protected:
   void SetUp() override {
