@@ -48,10 +48,10 @@ AVRational rational(double rate) {
   return av_d2q(rate, 1'000'000);
 }
 
-/// An output file that is removed unless it is kept.
+/// An output file that is under a name of its own until it is whole, and removed unless it is kept.
 class Muxer {
  public:
-  explicit Muxer(fs::path file) : file_(std::move(file)) {}
+  explicit Muxer(fs::path name) : name_(std::move(name)), file_(unfinished_name(name_)) {}
   Muxer(const Muxer&) = delete;
   Muxer& operator=(const Muxer&) = delete;
   ~Muxer() {
@@ -64,15 +64,15 @@ class Muxer {
     if (const int code = avformat_alloc_output_context2(&context_, nullptr, "matroska", nullptr); code < 0)
       return Error{"no Matroska writer: " + text_of(code)};
     if (const int code = avio_open(&context_->pb, file_.c_str(), AVIO_FLAG_WRITE); code < 0)
-      return Error{file_.string() + " cannot be written: " + text_of(code)};
+      return Error{name_.string() + " cannot be written: " + text_of(code)};
     return {};
   }
-  Status keep_as(const fs::path& name) {
+  Status keep() {
     if (const int code = close(); code < 0)
-      return Error{file_.string() + " cannot be written to its end: " + text_of(code)};
+      return Error{name_.string() + " cannot be written to its end: " + text_of(code)};
     std::error_code failed;
-    fs::rename(file_, name, failed);
-    if (failed) return Error{name.string() + " cannot be written: " + failed.message()};
+    fs::rename(file_, name_, failed);
+    if (failed) return Error{name_.string() + " cannot be written: " + failed.message()};
     file_.clear();
     return {};
   }
@@ -88,7 +88,7 @@ class Muxer {
     return code;
   }
 
-  fs::path file_;
+  fs::path name_, file_;
   AVFormatContext* context_ = nullptr;
 };
 
@@ -175,7 +175,7 @@ Result<SlideVideo> write_slide_video(const fs::path& file, const Pattern& patter
     }
   }
 
-  Muxer muxer(unfinished_name(file));
+  Muxer muxer(file);
   if (auto opened = muxer.open(); !opened) return opened.error();
   AVStream* stream = avformat_new_stream(muxer.get(), nullptr);
   avcodec_parameters_from_context(stream->codecpar, codec->get());
@@ -201,7 +201,7 @@ Result<SlideVideo> write_slide_video(const fs::path& file, const Pattern& patter
   }
   if (const int code = av_write_trailer(muxer.get()); code < 0)
     return Error{file.string() + " cannot be finished: " + text_of(code)};
-  if (auto kept = muxer.keep_as(file); !kept) return kept.error();
+  if (auto kept = muxer.keep(); !kept) return kept.error();
   return out;
 }
 

@@ -80,6 +80,14 @@ Status check_free(const fs::path& take, const fs::path& target) {
   return Error{take.string() + " exists already: give a new folder or remove it"};
 }
 
+/// What fails is told by the name that was asked for, not by that of the folder until it is whole.
+Status named(Status status, const fs::path& partial, const fs::path& take) {
+  if (status) return status;
+  std::string message = status.error().message;
+  if (message.starts_with(partial.string())) message.replace(0, partial.string().size(), take.string());
+  return Error{std::move(message)};
+}
+
 /// `target`, or NAME-2 and so on beside it where something is there by now.
 fs::path free_like(const fs::path& target) {
   fs::path out = target;
@@ -126,7 +134,7 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
   PartialFolder partial(partial_name(whole.parent_path(), whole));
   for (const char* folder : {"frames", "truth"}) {
     if (!fs::create_directories(partial.path() / folder, code) && code) {
-      return Error{partial.path().string() + " cannot be created: " + code.message()};
+      return Error{take.string() + " cannot be created: " + code.message()};
     }
   }
 
@@ -140,7 +148,7 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
     if (!frame) return frame.error();
     if (!*frame) break;
     if (stamps.empty() && source.info().live) first_ns = (*frame)->time_ns;
-    failed = write_frame(partial.path(), stamps.size(), **frame, truth());
+    failed = named(write_frame(partial.path(), stamps.size(), **frame, truth()), partial.path(), take);
     if (!failed && !options.keep_written) return failed;
     stamps.push_back(stamp_of(stamps.size(), (*frame)->time_ns - first_ns));
     if (!failed) break;
@@ -153,11 +161,14 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
   if (!with_truth) fs::remove(partial.path() / "truth", code);
   if (!failed) remove_last(partial.path(), source.info().rig.scan, stamps);
   if (stamps.empty()) return failed;
-  Status finished = write_texts(partial.path(), source.info(), stamps);
+  const auto finish = [&] {
+    return named(write_texts(partial.path(), source.info(), stamps), partial.path(), take);
+  };
+  Status finished = finish();
   while (!finished && options.keep_written && stamps.size() > 1) {
     if (failed) failed = finished;
     remove_last(partial.path(), source.info().rig.scan, stamps);  // makes room
-    finished = write_texts(partial.path(), source.info(), stamps);
+    finished = finish();
   }
   if (!finished) return finished;
   const fs::path there = options.keep_written ? free_like(whole) : whole;

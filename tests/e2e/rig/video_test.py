@@ -83,7 +83,7 @@ class Video(unittest.TestCase):
     def test_refusals(self):
         done = run("--out", self.path / "none" / "a.mkv")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("cannot be written", done.stderr)
+        self.assertIn(str(self.path / "none" / "a.mkv") + " cannot be written", done.stderr)
         self.assertEqual(run("--out", self.path / "a.mkv", "--gray").returncode, 2)
         self.assertEqual(list(self.path.iterdir()), [])
 

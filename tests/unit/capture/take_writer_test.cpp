@@ -17,6 +17,7 @@ namespace relievo {
 namespace {
 
 using testing::HasSubstr;
+using testing::StartsWith;
 
 std::unique_ptr<SimSource> small_sim(const std::string& more) {
   auto source = make_sim("object,width=64,height=48,stripes=20,frames=5" + more, {.truth = true});
@@ -223,6 +224,8 @@ TEST(TakeWriter, OfNoFrameNothingIsKept) {
   const Status failed = write_take(folder.path() / "take", *source, {.keep_written = true});
   ASSERT_FALSE(failed);
   EXPECT_THAT(failed.error().message, HasSubstr("is the disk full?"));
+  EXPECT_THAT(failed.error().message, StartsWith((folder.path() / "take" / "").string()))
+      << "not the name that it has until it is whole";
   EXPECT_EQ(entries(folder.path()), 0u);
 }
 
