@@ -155,6 +155,21 @@ void warn_of_pictures(const GrayStack& stack, const GrayMaps& maps, const Option
       "nothing move?");
 }
 
+/// Both rays of a point are told by other pictures: of a calibration that fits they meet within a pixel or
+/// two.
+void warn_of_gap(const DensePoints& dense, const Report& report, const Options& options) {
+  constexpr double kMostOfDepth = 0.003;  // of some pixels
+  std::vector<float> depths;
+  for (const Vec3f& p : dense.cloud.positions) depths.push_back(p[2]);
+  const double depth_mm = quantiles_of(std::move(depths)).median;
+  if (report.gap.median <= kMostOfDepth * depth_mm) return;
+  char text[96];
+  std::snprintf(text, sizeof text, "half of the rays miss each other by %.1f mm or more, %.0f mm away",
+                report.gap.median, depth_mm);
+  log_warning(text + (": does " + options.calibration) +
+              " belong to these pictures, and is none of them in the place of another?");
+}
+
 /// Where results go among the pictures, none of these is replaced.
 Status check_picture(const Options& options) {
   std::error_code ignored;
@@ -207,6 +222,7 @@ Status run(const Options& options, StopSignal& stop) {
     auto points = triangulate(options, rig->rig, *maps, stack->picture, report);
     if (!points) return points.error();
     dense = *std::move(points);
+    warn_of_gap(*dense, report, options);
   }
   if (reference) {
     if (const Status same = check_units(dense->cloud, *reference, options); !same) return same;

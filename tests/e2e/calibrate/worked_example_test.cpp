@@ -183,6 +183,24 @@ TEST(CalibrationExample, CharucoBoardUnderGrayCode) {
   EXPECT_THAT(without.err, HasSubstr("view view_01 is left out"));
 }
 
+TEST(CalibrationExample, RaysThatMissEachOtherAreWarnedOf) {
+  const TempFolder folder;
+  report({"calibrate", "example", "--out", folder.path().string(), "--code", "gray", "--views", "3", "--rig",
+          "plane,width=320,height=240", "--json"});
+  const fs::path view = folder / "views" / "view_00";
+  const auto warnings = [&] {
+    const Finished done = server({"import", "gray", view.string(), "--calibration",
+                                  (folder / "truth.yaml").string(), "--out", (folder / "maps").string()});
+    EXPECT_EQ(done.status, 0) << done.err;
+    return done.err;
+  };
+  EXPECT_THAT(warnings(), Not(HasSubstr("miss each other")));
+  fs::rename(view / "gray_04.png", folder / "inverse.png");
+  fs::rename(view / "gray_05.png", view / "gray_04.png");
+  fs::rename(folder / "inverse.png", view / "gray_05.png");
+  EXPECT_THAT(warnings(), HasSubstr("miss each other"));
+}
+
 TEST(CalibrationExample, BoardToPrintHasTheSizeAskedFor) {
   const TempFolder folder;
   const std::string file = (folder / "board.png").string();
