@@ -2,6 +2,7 @@
 #include "codec/video_file.h"
 
 #include <cstring>
+#include <limits>
 #include <string>
 
 extern "C" {
@@ -19,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr AVRational kTicks{1, 90'000};     // a second; what MP4 counts in, Matroska rounds to milliseconds
+constexpr AVRational kTicks{1, 90'000};  // a second; what MP4 counts in, Matroska rounds to milliseconds
+constexpr std::int64_t kLongestTicks = std::numeric_limits<std::int32_t>::max();  // of a picture in MP4: 6 h
 constexpr std::int64_t kUsualTicks = 3000;  // of a picture after which none comes, and none came before
 
 std::string text_of(int code) {
@@ -138,6 +140,10 @@ Status VideoFile::add(std::span<const std::uint8_t> section, int width, int heig
   if (!is_first) {
     if (ticks <= s.ticks) return Error{"a frame is not later than the one before it"};
     s.duration_ticks = ticks - s.ticks;
+    if (s.file.extension() == ".mp4" && s.duration_ticks > kLongestTicks)
+      return Error{s.file.string() + " cannot be written: a gap of " +
+                   std::to_string(s.duration_ticks / kTicks.den / 3600) +
+                   " h between two frames is longer than MP4 holds; with a name that ends in .mkv it can be"};
     if (auto status = s.write_last(); !status) return status;
   }
   s.ticks = ticks;

@@ -204,6 +204,20 @@ class Export(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(self.probed(file)["packets"]), 2)
 
+    def test_a_gap_that_mp4_cannot_hold_is_said(self):
+        take, recording = self.path / "take", self.path / "days.mcap"
+        subprocess.run([SERVER, "simulate", "--scene", "plane,width=192,height=144,stripes=30", "--frames", "4", "--out", take],
+                       check=True, capture_output=True)
+        take.joinpath("timestamps.csv").write_text("frame,time_s\n0,0\n1,0.033\n2,86400\n3,86400.033\n")
+        subprocess.run([SERVER, "serve", "--source", f"take:{take}", "--fast", "--web", "none", "--domain", DOMAIN,
+                        "--interface", "lo", "--record", recording], check=True, capture_output=True)
+        done = {ending: subprocess.run([RELIEVO, "export", recording, "--format", "video", "--out", self.path / f"days.{ending}"],
+                                       capture_output=True, text=True) for ending in ("mp4", "mkv")}
+        self.assertEqual(done["mp4"].returncode, 1)
+        self.assertRegex(done["mp4"].stderr, r"a gap of 23 h .* \.mkv")
+        self.assertEqual(done["mkv"].returncode, 0, done["mkv"].stderr)
+        self.assertEqual(sorted(f.name for f in self.path.glob("days.m*")), ["days.mcap", "days.mkv"])
+
     def test_other_endings_are_refused(self):
         done = subprocess.run([RELIEVO, "export", self.path / "h264.mcap", "--format", "video", "--out",
                                self.path / "a.avi"], capture_output=True, text=True)
