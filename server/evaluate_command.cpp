@@ -336,6 +336,9 @@ Status run(const Options& options, StopSignal& stop) {
         evaluation.filters());
     return scored ? shown : scored;
   }
+  if (score.of == 0 && options.skip >= evaluation.done())
+    return Error{"no frame of " + options.take + " could be scored: --skip " + std::to_string(options.skip) +
+                 " leaves out all " + std::to_string(evaluation.done())};
   if (score.frames == 0)
     return Error{"no frame of " + options.take + " could be scored: none with truth was reconstructed"};
   if (judges.pictures) {

@@ -163,6 +163,10 @@ TEST_F(ServerFault, NoTruthToScoreAgainst) {
   expect_one_error(run(server({"evaluate", take_.string()})), "truth");
 }
 
+TEST_F(ServerFault, ATakeOfWhichAllIsSkipped) {
+  expect_one_error(run(server({"evaluate", take_.string(), "--skip", "100"})), "--skip 100 leaves out all");
+}
+
 TEST_F(ServerFault, ATakeOfWhichNothingDecodes) {
   // So bright that slides and white look the same: neither scored nor crashed.
   const std::string bright = (folder_.path() / "bright").string();
