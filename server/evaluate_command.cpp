@@ -48,6 +48,12 @@ Result<ImageF> read_truth(const fs::path& file, const PinholeModel& camera) {
   return truth;
 }
 
+/// Also where that cannot be told: reading it says why.
+bool has_truth(const fs::path& file) {
+  std::error_code unknown;
+  return fs::exists(file, unknown) || unknown;
+}
+
 void print(const Score& s, const FilterCounts& filters, bool json) {
   if (json) {
     nlohmann::json counts;
@@ -243,14 +249,14 @@ class Evaluation {
   Status score(const CapturedFrame& frame, const CapturedFrame& shown, bool decodable,
                std::optional<Frame3D> completed) {
     const fs::path file = take_truth(options_.take, frame.number);
-    if (frame.number < options_.skip || !fs::exists(file)) {
+    if (frame.number < options_.skip || !has_truth(file)) {
       previous_truth_ = ImageF();
       return {};
     }
     auto truth = read_truth(file, info_.rig.camera);
     if (!truth) return truth.error();
     const bool regrouped = reconstructor_.report().step.regrouped;
-    if (regrouped && previous_truth_.empty() && fs::exists(take_truth(options_.take, frame.number - 1))) {
+    if (regrouped && previous_truth_.empty() && has_truth(take_truth(options_.take, frame.number - 1))) {
       auto before = read_truth(take_truth(options_.take, frame.number - 1), info_.rig.camera);
       if (!before) return before.error();
       previous_truth_ = *std::move(before);
@@ -304,7 +310,8 @@ Status run(const Options& options, StopSignal& stop) {
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
   const SourceInfo& info = (*source)->info();
-  if (!fs::is_directory(fs::path(options.take) / "truth")) {
+  std::error_code ignored;
+  if (!fs::is_directory(fs::path(options.take) / "truth", ignored)) {
     return Error{options.take +
                  " has no truth/ folder to score against; relievo-server simulate writes takes with truth"};
   }

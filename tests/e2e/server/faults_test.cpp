@@ -163,6 +163,13 @@ TEST_F(ServerFault, NoTruthToScoreAgainst) {
   expect_one_error(run(server({"evaluate", take_.string()})), "truth");
 }
 
+TEST_F(ServerFault, TruthThatCannotBeLookedAt) {
+  const fs::path truth = take_ / "truth" / "000002.npy";
+  fs::remove(truth);
+  fs::create_symlink("000002.npy", truth);
+  expect_one_error(run(server({"evaluate", take_.string()})), truth.string() + " cannot be opened");
+}
+
 TEST_F(ServerFault, ATakeOfWhichAllIsSkipped) {
   expect_one_error(run(server({"evaluate", take_.string(), "--skip", "100"})), "--skip 100 leaves out all");
 }
