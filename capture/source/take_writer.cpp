@@ -65,7 +65,9 @@ Status write_frame(const fs::path& take, std::uint64_t number, const CapturedFra
 /// Where links lead, and without the slash of "take/".
 fs::path target_of(const fs::path& take) {
   std::error_code code;
-  const fs::path target = fs::weakly_canonical(fs::absolute(take, code), code);
+  const fs::path named = fs::absolute(take, code);
+  fs::path target = fs::weakly_canonical(named, code);
+  if (code) target = named;  // links in a circle: check_free() says it
   return target.has_filename() ? target : target.parent_path();
 }
 
@@ -76,6 +78,8 @@ fs::path partial_name(const fs::path& folder, const fs::path& target) {
 
 Status check_free(const fs::path& take, const fs::path& target) {
   std::error_code code;
+  if (!fs::exists(target, code) && code)
+    return Error{take.string() + " cannot be created: " + code.message()};
   if (!fs::exists(target, code) || (fs::is_directory(target, code) && fs::is_empty(target, code))) return {};
   return Error{take.string() + " exists already: give a new folder or remove it"};
 }

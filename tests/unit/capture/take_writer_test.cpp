@@ -101,6 +101,10 @@ TEST(TakeWriter, WhetherATakeCanBeThereIsToldBeforehand) {
   EXPECT_THAT(refusal(folder.path()), HasSubstr("exists already"));
   EXPECT_THAT(refusal(folder.path() / "file"), HasSubstr("exists already"));
   EXPECT_THAT(refusal(folder.path() / "file/take"), HasSubstr("cannot be created"));
+  std::filesystem::create_symlink("circle", folder.path() / "circle");
+  EXPECT_THAT(refusal(folder.path() / "circle"), StartsWith((folder.path() / "circle cannot").string()));
+  EXPECT_THAT(refusal(folder.path() / "circle/take"),
+              StartsWith((folder.path() / "circle/take cannot").string()));
   EXPECT_THAT(refusal("/proc/take"), HasSubstr("cannot be created in /proc: "));
 }
 
