@@ -175,7 +175,7 @@ class ThreadedPipeline final : public Pipeline {
     return std::max(kSilentAtLeast_ns, static_cast<std::int64_t>(kSilentFrames * 1e9 / rate));
   }
 
-  /// By how much a gap in the time stamps is, which hours may be: nobody waits for them.
+  /// By how much a gap in the time stamps is longer than a source may be silent: nobody waits for hours.
   std::int64_t too_long(std::int64_t gap_ns) const {
     const std::int64_t too_long_ns = gap_ns - silence_ns();
     if (too_long_ns <= 0) return 0;
@@ -226,9 +226,9 @@ class ThreadedPipeline final : public Pipeline {
         capture_time_ns = frame.time_ns + clock.set_by_ns();
       } else if (paced) {
         const std::int64_t now = steady_now_ns();
-        // A source that cannot keep its own pace is played as fast as it comes, not in bursts to catch up.
         if (epoch_ns) *epoch_ns -= too_long(frame.time_ns - before_ns);
         before_ns = frame.time_ns;
+        // A source that cannot keep its own pace is played as fast as it comes, not in bursts to catch up.
         if (!epoch_ns || *epoch_ns + frame.time_ns < now - kMaxLate_ns) epoch_ns = now - frame.time_ns;
         const std::int64_t due_ns = *epoch_ns + frame.time_ns;
         if (!sleep_until(due_ns)) return {};
