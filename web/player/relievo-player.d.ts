@@ -3,7 +3,7 @@
 export type Mode = 'textured' | 'shaded' | 'wireframe' | 'points' | 'normals' | 'depth' | 'confidence';
 export type Theme = 'auto' | 'dark' | 'light';
 
-/** `idle`: no src, or not in a page. `live` and `stalled`: a live stream. `behind`: a live stream as it was. `file`: a recording. */
+/** `idle`: no src, or not in a page. `live` and `stalled`: a live stream; `stalled` also a recording of which nothing comes. `behind`: a live stream as it was. `file`: a recording. */
 export type PlayerState = 'idle' | 'loading' | 'live' | 'stalled' | 'ended' | 'lost' | 'behind' | 'file' | 'failed';
 
 export interface FrameDetail {

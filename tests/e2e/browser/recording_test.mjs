@@ -366,6 +366,43 @@ const checks = {
     }
   },
 
+  async 'what of a recording does not come is told, waited for, and gone on with'() {
+    // Above 16 MB, so that most of it is read where it is needed.
+    const options = ['--texture', 'png'];
+    const large = recordObject(serverPath, join(scratch, 'large.mcap'), { rate: 6, frames: 36, size: 'width=640,height=480,stripes=60', options });
+    assert.ok(statSync(large).size > 17e6, `${statSync(large).size} bytes`);
+    const { address, stop } = await startWeb(relievoPath, large);
+    try {
+      const page = await newPage();
+      let status = 200;
+      await page.route('**/recordings/*', (route) => (status === 200 ? route.continue() : route.fulfill({ status, body: 'no' })));
+      await page.goto(address);
+      await shownPast(page, 3);
+      status = 503;
+      await seek(page, 30);
+      await inState(page, 'stalled');
+      await page.waitForFunction(() => /HTTP 503.*goes on by itself/.test(document.querySelector('#card-text').textContent));
+      const { position, playing } = await playback(page);
+      await page.waitForTimeout(1000);
+      assert.deepEqual([(await playback(page)).position, playing], [position, true]);
+      status = 200;
+      await inState(page, 'file');
+      await page.waitForFunction(() => window.relievo.diagnostics().playback.index >= 30);
+      assert.equal((await look(page)).errors, 0);
+      await page.keyboard.press('Space');
+      status = 404;
+      await seek(page, 20);
+      await inState(page, 'stalled');
+      assert.match(await page.textContent('#card-text'), /It is not there \(HTTP 404\)\.$/);
+      status = 200;
+      await page.keyboard.press('.');
+      await inState(page, 'file');
+      await page.close();
+    } finally {
+      await stop();
+    }
+  },
+
   async 'a link to a recording of the server restores time, view and whether it plays'() {
     const { address, stop } = await startWeb(relievoPath, recorded);
     const { open: openThere } = pagesOf(browser, address.replace(/\/$/, ''), complaints);

@@ -4,6 +4,7 @@ import { kDefaultDisplay, kModes, kThemes, type Mode, type Theme } from '../../v
 import { make, setText, windowOf } from '../../viewer/src/dom';
 import { listenToKeys } from '../../viewer/src/keys';
 import { LiveSource } from '../../viewer/src/liveSource';
+import { NoAnswer } from '../../viewer/src/missing';
 import { openRemote, type OpenedRecording } from '../../viewer/src/openFile';
 import { wantedQuality } from '../../viewer/src/protocol';
 import { NoGraphics } from '../../viewer/src/resolution';
@@ -375,7 +376,7 @@ export class RelievoPlayer extends HTMLElement implements RelievoPlayerElement {
       const { url, stream } = addressed(this.src);
       if (stream === null) {
         const opened = await openRemote(url).catch((error: unknown) => {
-          throw error instanceof TypeError ? new Error(text.player.noAnswer) : error; // the browser says no more
+          throw error instanceof NoAnswer ? new Error(text.player.noAnswer) : error; // the browser says no more
         });
         if (opening !== this.opening) return; // something else is to be shown meanwhile
         session.watch(opened.source);

@@ -5,6 +5,7 @@ import { FileError } from './fileError';
 import { kTextureH264, parseFrame } from './frame';
 import { publishMsOf, type FrameStore, type Sample, type StoredFrame } from './frameStore';
 import { openAdded, openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
+import { Final, Unavailable } from './missing';
 import type { StreamInfo } from './protocol';
 import { text } from './strings';
 import { videoTextureIsKey } from './videoTexture';
@@ -14,6 +15,7 @@ const kInfoTopic = 'relievo/info';
 const kTogether = 64; // heads read at a time
 const kApartMs = 1; // between two frames, at least: links are of whole milliseconds
 const kFarHeadMs = 8; // between those of a remote file
+const kFarAgainMs = 2000; // before what did not come is asked for again
 const kFarSayMs = 500; // between marks drawn meanwhile
 const kMostFarHeads = 20_000; // that are asked for one by one; of longer ones those have marks that were shown
 
@@ -124,13 +126,14 @@ export class Recording implements FrameStore {
     for (let i = 0; i < this.count; ++i) {
       if (this.heads[i] !== undefined) continue;
       await new Promise((resolve) => setTimeout(resolve, kFarHeadMs));
-      const some = await readMessageHead(this.file, this.frames[i]!, kFrameHeadBytes, true).catch(() => null);
-      if (some !== null) {
-        try {
-          this.heads[i] ??= readFrameHead(some);
-        } catch {
-          // what is damaged has no mark
-        }
+      try {
+        this.heads[i] ??= readFrameHead(await readMessageHead(this.file, this.frames[i]!, kFrameHeadBytes, true));
+      } catch (error) {
+        if (error instanceof Final) return;
+        if (error instanceof Unavailable) {
+          --i;
+          await new Promise((resolve) => setTimeout(resolve, kFarAgainMs));
+        } // else it is damaged, and has no mark
       }
       if (performance.now() - saidAt < kFarSayMs) continue;
       saidAt = performance.now();

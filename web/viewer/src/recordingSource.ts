@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording as a source of frames. One of the server that is still being written grows, and who is at its end goes
 // on with what comes.
+import { Unavailable } from './missing';
 import type { FramePrefix, StreamInfo, Written } from './protocol';
 import type { Recording } from './recording';
 import type { FrameSource, Moment, Playback, SourceEvents } from './source';
@@ -83,8 +84,7 @@ export class RecordingSource extends StorePlayer implements FrameSource {
       if (grew) this.grew();
       this.settled = !isWritten;
     } catch (error) {
-      // The network may be back the next time; what the server refuses, it refuses again.
-      if (!(error instanceof TypeError)) {
+      if (!(error instanceof Unavailable)) {
         this.refused = true;
         if (!this.stopped) this.events.nonsense(error instanceof Error ? error.message : String(error));
       }

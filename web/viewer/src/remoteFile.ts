@@ -2,10 +2,12 @@
 // A file of the server, read in parts: what is asked for comes in blocks, of which the last ones are kept, and the
 // next one is fetched ahead. It may grow there meanwhile.
 import type { Bytes } from './mcap';
+import { Final, NoAnswer, Unavailable } from './missing';
 
 export const kBlock = 2 ** 18; // bytes
 const kKept = 64; // blocks
 const kTries = 4;
+const kPatienceMs = 16_000; // with one part: a gateway gives up after 15 s
 const kFirstWaitMs = 300; // before a second try; twice as long before each further one
 const kChanged = 'the recording has changed on the server: open it anew';
 
@@ -37,8 +39,12 @@ export class RemoteFile implements Bytes {
   }
 
   /** Throws where the server has no such file, or does not give parts of it. */
-  static async open(url: URL, fetch: Fetch = (at, init) => window.fetch(at, init)): Promise<RemoteFile> {
-    const first: RequestInit = { headers: { Range: 'bytes=0-0' }, cache: 'no-store' };
+  static async open(url: URL, by: Fetch = (at, init) => window.fetch(at, init)): Promise<RemoteFile> {
+    let fetch: Fetch = (at, init) =>
+      by(at, { cache: 'no-store', signal: AbortSignal.timeout(kPatienceMs), ...init }).catch(() => {
+        throw new NoAnswer();
+      });
+    const first: RequestInit = { headers: { Range: 'bytes=0-0' } };
     let head = await fetch(url, first);
     if (head.status === 401 && url.origin !== window.location.origin) {
       // Of another site a person's token is sent where that site wants one.
@@ -54,7 +60,7 @@ export class RemoteFile implements Bytes {
   async grow(end: number): Promise<void> {
     // One byte says how much there is now. The rest is read where it is needed.
     const headers = { Range: `bytes=${end}-${end}`, 'If-None-Match': this.etag };
-    const head = await this.fetch(this.url, { headers, cache: 'no-store' });
+    const head = await this.fetch(this.url, { headers });
     if (head.status === 304) return;
     if (head.status !== 206) await head.body?.cancel();
     if (head.status === 200) throw new Final(kChanged);
@@ -123,14 +129,18 @@ export class RemoteFile implements Bytes {
 
   private async ask(at: number, end: number): Promise<Uint8Array> {
     const headers = { Range: `bytes=${at}-${end - 1}`, 'If-Range': this.etag };
-    const response = await this.fetch(this.url, { headers, cache: 'no-store' });
+    const response = await this.fetch(this.url, { headers });
     if (response.status === 200 || response.status === 416) {
       await response.body?.cancel();
       throw new Final(kChanged);
     }
     if (response.status !== 206) throw refused(response.status, 'the server does not give the recording');
-    const bytes = new Uint8Array(await response.arrayBuffer());
-    if (bytes.length !== end - at) throw new Error('a part of the recording came short');
+    const bytes = new Uint8Array(
+      await response.arrayBuffer().catch(() => {
+        throw new NoAnswer();
+      }),
+    );
+    if (bytes.length !== end - at) throw new Unavailable('a part of the recording came short');
     return bytes;
   }
 }
@@ -148,8 +158,6 @@ function versionOf(head: Response): { size: number; etag: string } {
 function refused(status: number, otherwise: string): Error {
   if (status === 401) return new Final('the server wants a token for it: load this page anew to sign in');
   if (status === 404) return new Final('it is not there (HTTP 404)');
-  return new Error(`${otherwise} (HTTP ${status})`);
+  const why = `${otherwise} (HTTP ${status})`;
+  return status >= 500 || status === 429 ? new Unavailable(why) : new Final(why);
 }
-
-/** Asking again does not help. */
-class Final extends Error {}

@@ -94,6 +94,7 @@ export class Session {
       quietMs: this.rests ? 0 : performance.now() - this.lastFrameAt, // else nothing is asked for
       frameRate: info?.frame_rate ?? 0,
       file: following === null ? playing : null,
+      missing: source?.missing ?? null,
       shifted: following === false ? playing : null,
     };
   }

@@ -20,6 +20,12 @@ export interface SourceEvents {
   readonly timers?: Window | undefined;
 }
 
+/** Why a recording's next frame does not come; '': it has not for a while. `passing`: it is asked for again. */
+export interface Missing {
+  readonly why: string;
+  readonly passing: boolean;
+}
+
 export interface FrameSource {
   readonly connected: boolean;
   /** Whole seconds until the next attempt; null while connected or connecting for the first time. */
@@ -27,6 +33,7 @@ export interface FrameSource {
   /** Why the server lets nobody in, where it says so. */
   readonly refusal?: Refusal | null;
   readonly playback: Playback;
+  readonly missing?: Missing | null;
   /** Whether what comes now is of now: what is missing was lost, its age is a latency. */
   readonly live: boolean;
   /** What is kept of a live stream; null: a recording. */

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page tells a person, derived from what it knows. Pure.
+import { sentence } from './sentence';
+import type { Missing } from './source';
 import { text } from './strings';
 
 export type State =
@@ -35,6 +37,7 @@ export interface Facts {
   frameRate: number; // nominal; 0: not known
   hint: string;
   file: 'playing' | 'paused' | 'surface' | null; // what is shown is no stream
+  missing?: Missing | null; // of a recording: why its next frame does not come
   shifted: 'playing' | 'paused' | null; // what is shown is of a stream, but was before
 }
 
@@ -70,6 +73,11 @@ export function present(facts: Facts): Presentation {
   const say = text.states;
   if (facts.problem !== null) {
     return make('unsupported', say.unsupported[0], { title: say.unsupported[1], text: facts.problem, dim: true });
+  }
+  if (facts.file !== null && (facts.missing ?? null) !== null) {
+    const { why, passing } = facts.missing!;
+    const [label, title, late] = say.late;
+    return make('stalled', label, { title, text: [why === '' ? late : sentence(why), passing ? say.lateGoesOn : ''].join(' ').trim(), dim: true });
   }
   if (facts.file !== null) {
     const { playing, paused, surface } = text.file;

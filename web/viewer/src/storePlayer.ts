@@ -2,10 +2,12 @@
 // Plays stored frames. Like a live stream it sends only what the page has credit for, so a slow page skips frames and
 // stays in time.
 import type { FrameStore } from './frameStore';
+import { Final, Unavailable } from './missing';
 import { PlayClock, type Loop } from './playback';
 import type { FramePrefix } from './protocol';
-import type { Playback, SourceEvents } from './source';
+import type { Missing, Playback, SourceEvents } from './source';
 
+const kLateMs = 1500; // a frame that takes longer to come is waited for
 const kLongestWaitMs = 2 ** 30; // browsers take what is twice as long for none
 
 /** What the decoder holds: the key frame, and the last frame that was decoded after it. */
@@ -43,6 +45,8 @@ export class StorePlayer implements Playback {
   private decoded: Decoded = { key: -1, last: -1 };
   private sending = false;
   private running = false;
+  private late = false; // the clock stands until the frame that is being read has come
+  private failure: Missing | null = null; // of the frame that was read last
   private timer = 0;
   protected stopped = false;
   changed: () => void = () => undefined;
@@ -79,6 +83,10 @@ export class StorePlayer implements Playback {
   get playing(): boolean {
     return this.running;
   }
+  /** Why the frame that is to be shown next does not come; null: it does. */
+  get missing(): Missing | null {
+    return this.failure ?? (this.late ? { why: '', passing: true } : null);
+  }
   get speed(): number {
     return this.clock.speed;
   }
@@ -95,7 +103,7 @@ export class StorePlayer implements Playback {
 
   play(): void {
     this.running = true;
-    this.clock.play(performance.now());
+    if (!this.late) this.clock.play(performance.now());
     this.pump();
   }
 
@@ -108,7 +116,7 @@ export class StorePlayer implements Playback {
   seek(atMs: number): void {
     const now = performance.now();
     this.clock.seek(atMs, now);
-    if (!this.clock.playing) this.running = false; // also where it has just come to the end
+    if (!this.clock.playing && !this.late) this.running = false; // also where it has just come to the end
     this.wanted = this.due(now);
     ++this.runs;
     this.pump();
@@ -181,6 +189,7 @@ export class StorePlayer implements Playback {
   private async send(index: number): Promise<void> {
     this.sending = true;
     this.last = index;
+    const late = this.timers.setTimeout(() => this.wait(index), kLateMs);
     try {
       const key = await this.store.keyBefore(index);
       if (key === null) throw new Error('this frame builds on one that is not there');
@@ -191,13 +200,51 @@ export class StorePlayer implements Playback {
       }
       await this.hand(index, false);
       this.decoded = { key, last: index };
+      this.arrived();
     } catch (error) {
       ++this.credits;
-      if (!this.stopped) this.handed.nonsense(error instanceof Error ? error.message : String(error));
+      if (!this.stopped) this.fail(index, error);
+    } finally {
+      this.timers.clearTimeout(late);
     }
     this.sending = false;
     if (!this.stopped) this.handed.sent?.(index);
     this.pump();
+  }
+
+  // As a <video> does, the clock goes on from the frame that did not come.
+  private wait(index: number): void {
+    if (this.stopped || this.late) return;
+    const now = performance.now();
+    this.late = true;
+    this.clock.pause(now);
+    if (this.running && this.wanted === null) this.clock.seek(this.times[index - this.first]!, now);
+    this.changed();
+  }
+
+  private arrived(): void {
+    const { late } = this;
+    this.late = false;
+    this.failure = null;
+    const now = performance.now();
+    if (late && this.running && this.clock.position(now) < (this.loop?.to ?? this.clock.end)) this.clock.play(now);
+  }
+
+  private fail(index: number, error: unknown): void {
+    const why = error instanceof Error ? error.message : String(error);
+    if (error instanceof Unavailable) {
+      this.failure = { why, passing: true };
+      this.wait(index);
+      this.wanted ??= index; // asked for again
+      return;
+    }
+    this.arrived();
+    if (error instanceof Final) {
+      this.failure = { why, passing: false };
+      this.running = false;
+      this.clock.pause(performance.now());
+    }
+    this.handed.nonsense(why);
   }
 
   private async hand(index: number, forLater: boolean): Promise<void> {

@@ -451,6 +451,8 @@ export const text = {
     starting: ['Starting', 'Waiting for the first frame'],
     announced: (name: string) => `“${name}” is announced; its first surface needs two camera frames.`,
     stalled: ['Stalled', 'The stream has stalled'],
+    late: ['Stalled', 'The recording does not come', 'Nothing of it has come for a while.'],
+    lateGoesOn: 'It goes on by itself when more comes.',
     silent: (s: number) => `No frame for ${s} s. `,
     comesBack: 'It continues by itself when the camera does.',
     live: 'Live',

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: a file of the server reads as one of this device, in few requests, and never as a mixture of two.
-import { describe, expect, it } from 'vitest';
+import { describe, expect, it, vi } from 'vitest';
+import { NoAnswer, Unavailable } from '../src/missing';
 import { kBlock, RemoteFile, type Fetch } from '../src/remoteFile';
 
 const url = new URL('http://host/recordings/a.mcap');
@@ -76,6 +77,38 @@ describe('RemoteFile', () => {
     expect(asked).toBe(1);
   });
 
+  it('waits no longer than a server does for what has stopped coming, and asks again', async () => {
+    const server = new Server();
+    const impatient = vi.spyOn(AbortSignal, 'timeout').mockImplementation((ms) => {
+      expect(ms).toBeGreaterThan(15_000);
+      const now = new AbortController();
+      setTimeout(() => now.abort(), 20);
+      return now.signal;
+    });
+    let stopped = 0;
+    const file = await RemoteFile.open(url, async (at, init) => {
+      const whole = await server.fetch(at, init);
+      if (init.headers === undefined || stopped === 2 || !new Headers(init.headers).has('if-range')) return whole;
+      const never = new Promise<void>((_, reject) => init.signal!.addEventListener('abort', () => reject(new DOMException('', 'AbortError'))));
+      if (++stopped === 1) return never as never;
+      return new Response(new ReadableStream({ start: (body) => (body.enqueue(new Uint8Array(99)), void never.catch((why) => body.error(why))) }), { status: 206 });
+    });
+    expect(await file.read(3 * kBlock, 4)).toEqual(server.bytes.slice(3 * kBlock, 3 * kBlock + 4));
+    expect(stopped).toBe(2);
+    impatient.mockRestore();
+  });
+
+  it('tells what may come later from what does not', async () => {
+    for (const [status, passing] of [[503, true], [429, true], [404, false], [403, false]] as const) {
+      const server = new Server();
+      const file = await RemoteFile.open(url, server.fetch);
+      const { fetch } = server;
+      Object.assign(file, { fetch: async (at: URL, init: RequestInit) => (new Headers(init.headers).has('if-range') ? new Response('', { status }) : fetch(at, init)) });
+      const error: unknown = await file.readLittle(3 * kBlock, 4).catch((why: unknown) => why);
+      expect([String(error).includes(`HTTP ${status}`), error instanceof Unavailable]).toEqual([true, passing]);
+    }
+  });
+
   it('reads on where it has grown, anew only what may have changed', async () => {
     const server = new Server();
     const file = await RemoteFile.open(url, server.fetch);
@@ -99,7 +132,7 @@ describe('RemoteFile', () => {
     const file = await RemoteFile.open(url, server.fetch);
     const { size } = file;
     server.failures = 1;
-    await expect(file.grow(10)).rejects.toThrow(TypeError);
+    await expect(file.grow(10)).rejects.toThrow(NoAnswer);
     const gone = await RemoteFile.open(url, async (_, init) => {
       const isAsked = new Headers(init.headers).has('if-none-match');
       return isAsked ? new Response('gone', { status: 404 }) : server.fetch(url, init);

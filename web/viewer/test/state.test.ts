@@ -75,6 +75,14 @@ describe('present', () => {
     expect(label({ quietMs: 1e9 })).toBe('Paused'); // nothing is shown of what comes
   });
 
+  it('says that a recording does not come, and why', () => {
+    const missing = (why: string, passing: boolean): object => present({ ...live, file: 'playing', missing: { why, passing } });
+    expect(missing('', true)).toMatchObject({ state: 'stalled', title: 'The recording does not come', dim: true });
+    expect(missing('', true)).toMatchObject({ text: 'Nothing of it has come for a while. It goes on by itself when more comes.' });
+    expect(missing('the server does not answer', true)).toMatchObject({ text: 'The server does not answer. It goes on by itself when more comes.' });
+    expect(missing('it has changed', false)).toMatchObject({ text: 'It has changed.' });
+  });
+
   it('is patient with slow streams', () => {
     expect(patienceMs(30)).toBe(2000);
     expect(patienceMs(1)).toBe(10_000);

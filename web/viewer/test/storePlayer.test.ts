@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import type { FrameStore } from '../src/frameStore';
+import { Final, Unavailable } from '../src/missing';
 import { framesBefore, StorePlayer } from '../src/storePlayer';
 
 const kNothing = { key: -1, last: -1 };
@@ -97,5 +98,67 @@ describe('StorePlayer', () => {
     expect(looks).toBeLessThan(5);
     for (const [, wait] of timers.mock.calls) expect(wait).toBeLessThan(2 ** 31); // which browsers take for none
     player.stop();
+  });
+
+  describe('of frames that are read over a network', () => {
+    /** `answer`: what reading a frame comes to. */
+    function playing(answer: { read: () => Promise<void> }): { player: StorePlayer; sent: number[]; complaints: string[] } {
+      const [sent, complaints]: [number[], string[]] = [[], []];
+      const far = { ...store, times: Float64Array.of(0, 1000, 2000, 3000), read: async () => (await answer.read(), { prefix, message: new ArrayBuffer(48) }) } as unknown as FrameStore;
+      const player = new StorePlayer(far, { frame: () => (sent.push(player.index), player.credit()), nonsense: (why) => complaints.push(why) });
+      return { player, sent, complaints };
+    }
+    const kTries = 2100; // ms that a remote file takes for its own
+    const refused = (error: Error) => () => new Promise<void>((_, reject) => setTimeout(() => reject(error), kTries));
+
+    it('stands until they come, and goes on from there', async () => {
+      let come = (): void => undefined;
+      const answer = { read: async (): Promise<void> => undefined };
+      const { player, sent } = playing(answer);
+      player.play();
+      await vi.advanceTimersByTimeAsync(500);
+      answer.read = () => new Promise((resolve) => (come = resolve));
+      await vi.advanceTimersByTimeAsync(60_000);
+      expect(player.missing).toEqual({ why: '', passing: true });
+      expect([player.position, player.playing]).toEqual([1000, true]);
+      answer.read = async () => undefined;
+      come();
+      await vi.advanceTimersByTimeAsync(10);
+      expect([player.missing, sent]).toEqual([null, [0, 1]]);
+      await vi.advanceTimersByTimeAsync(1500);
+      expect(sent).toEqual([0, 1, 2]);
+      await vi.advanceTimersByTimeAsync(3000);
+      expect([sent, player.playing]).toEqual([[0, 1, 2, 3], false]);
+    });
+
+    it('asks again for those that may come later, also where it stands still', async () => {
+      const answer = { read: refused(new Unavailable('HTTP 503')) };
+      const { player, sent, complaints } = playing(answer);
+      player.seek(2000);
+      await vi.advanceTimersByTimeAsync(20_000);
+      expect(player.missing).toEqual({ why: 'HTTP 503', passing: true });
+      expect(player.position).toBe(2000);
+      player.seek(3000); // elsewhere meanwhile
+      player.play();
+      player.seek(1000);
+      answer.read = async () => undefined;
+      await vi.advanceTimersByTimeAsync(kTries + 100);
+      expect([sent[0], player.missing, player.playing, complaints]).toEqual([1, null, true, []]);
+    });
+
+    it('stops at one that never comes, and says why until another has come', async () => {
+      const answer = { read: async (): Promise<void> => undefined };
+      const { player, sent, complaints } = playing(answer);
+      player.play();
+      await vi.advanceTimersByTimeAsync(500);
+      answer.read = refused(new Final('it has changed'));
+      await vi.advanceTimersByTimeAsync(10_000);
+      expect(player.missing).toEqual({ why: 'it has changed', passing: false });
+      expect([player.playing, complaints]).toEqual([false, ['it has changed']]);
+      answer.read = async () => undefined;
+      player.seek(0);
+      await vi.advanceTimersByTimeAsync(10);
+      expect([sent, player.missing]).toEqual([[0, 0], null]);
+    });
   });
 });
