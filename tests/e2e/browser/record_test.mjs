@@ -185,6 +185,40 @@ const checks = {
     await other.close();
   },
 
+  async 'a link to a moment of a live stream shows it where the server has recorded it'() {
+    const page = await openRecording();
+    const kept = (frames) => page.waitForFunction((least) => window.relievo.diagnostics().playback?.times.length >= least, frames);
+    /** A link to the first frame that is kept. */
+    const linked = async () => {
+      await page.keyboard.press('Home');
+      await inState(page, 'shifted');
+      await page.waitForFunction(() => !window.relievo.diagnostics().busy && !window.relievo.diagnostics().playback.playing);
+      await page.waitForFunction(() => window.relievo.diagnostics().playback.index === window.relievo.diagnostics().playback.first);
+      return page.evaluate(() => ({ path: window.relievo.link().slice(location.origin.length), number: window.relievo.surface().number }));
+    };
+    await kept(6);
+    const { path, number } = await linked();
+    assert.match(path, /^\/\?stream=kept#.*&time=\d{4}-/);
+    await order('start');
+    const newest = () => page.evaluate(async () => (await (await fetch('api/recordings')).json()).recordings[0]);
+    await eventually('what is being recorded is not listed', async () => (await newest())?.recording === true);
+    for (const where of ['while it is written', 'once it is whole']) {
+      const other = await openRecording(path);
+      await inState(other, 'file');
+      await other.waitForFunction((n) => window.relievo.diagnostics().frame === n, number);
+      assert.deepEqual([(await playback(other)).playing, /recording=kept-.*\.mcap/.test(other.url())], [false, true], where);
+      await other.close();
+      if (where === 'while it is written') await order('stop');
+    }
+    const late = await openRecording(path.replace(/time=[^&]*/, 'time=2020-01-01T00:00:00.000Z'));
+    await inState(late, 'live');
+    await late.waitForFunction(() => /is not kept any more/.test(document.querySelector('#source')?.textContent));
+    await late.close();
+    await page.close();
+    const [file] = readdirSync(folder).sort().reverse();
+    rmSync(join(folder, file)); // the others are looked at below
+  },
+
   async 'one that a crash cut short is listed so, and plays as far as it is whole'() {
     const [whole] = readdirSync(folder);
     const bytes = readFileSync(join(folder, whole));

@@ -17,6 +17,12 @@ export interface Sample {
 
 export const publishMsOf = ({ publishNs }: Sample): number => Number(publishNs / 1000n) / 1000;
 
+const kPlausibleAgeMs = 60_000; // a frame captured longer before it was published is of a take, and has the take's time
+
+/** Of a live frame: when it was captured. */
+export const utcMsOf = ({ captureMs, publishMs }: { readonly captureMs: number; readonly publishMs: number }): number =>
+  Math.abs(publishMs - captureMs) < kPlausibleAgeMs ? captureMs : publishMs;
+
 /** A frame keeps its index: of a live stream the first ones go and others come. */
 export interface FrameStore {
   readonly stream: string;

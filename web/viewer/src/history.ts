@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The last frames of a live stream as they came, so that a person can go back to them. Bounded in time and in bytes.
 import { kTextureH264, parseFrame } from './frame';
-import type { FrameStore, Sample, StoredFrame } from './frameStore';
+import { utcMsOf, type FrameStore, type Sample, type StoredFrame } from './frameStore';
 import type { FramePrefix, StreamInfo } from './protocol';
 import { videoTextureIsKey } from './videoTexture';
 
@@ -11,7 +11,6 @@ export interface HistoryLimits {
 }
 export const kHistoryLimits: Readonly<HistoryLimits> = { ms: 60_000, bytes: 256e6 };
 
-const kPlausibleAgeMs = 60_000; // a frame captured longer before it was published is of a take, and has the take's time
 const kNewClockMs = 1000; // a step back of more than this is another clock
 
 interface Kept {
@@ -69,7 +68,7 @@ export class History implements FrameStore {
     if (last !== undefined && prefix.sequence <= last.prefix.sequence && prefix.captureMs <= last.prefix.captureMs) return null;
     const dependence = dependenceOf(new Uint8Array(message, prefix.bytes));
     if (dependence === null) return null;
-    const utcMs = Math.abs(prefix.publishMs - prefix.captureMs) < kPlausibleAgeMs ? prefix.captureMs : prefix.publishMs;
+    const utcMs = utcMsOf(prefix);
     if (last !== undefined && utcMs - this.startMs < last.atMs - kNewClockMs) this.clear();
     if (this.kept.length === 0) {
       if (!dependence.isKey) return null; // nothing could ever show it

@@ -12,12 +12,12 @@ import { fillHelp } from './helpPanel';
 import { addImmersive, addStatistics, addTake, Measuring, Rest, Streams } from './laterParts';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
-import { openFile, openRemote, type Opened } from './openFile';
+import { openFile, openRemote, recordingUrl, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame, Notice } from './messages';
 import { rigPlace, type Placement } from './placement';
-import { wantedQuality, writtenOf, type Quality } from './protocol';
+import { wantedQuality, writtenOf, type ListedStream, type Quality } from './protocol';
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { diagnosticsOf, report } from './reports';
@@ -102,7 +102,7 @@ class Viewer {
       hint: (hint) => (this.server.hint = hint),
       unusable: (message) => (this.problem = text.noDecoder(message)),
     });
-    const picker = new FilePicker((file) => void this.openFile(file));
+    const picker = new FilePicker((file) => void this.showFile(file.name, () => openFile(file)));
     this.panels.action('open', () => picker.ask());
     this.record = new RecordControl(this.panels.action('record', () => undefined));
     this.companions = this.view === null ? null : new Companions(this.view, () => this.refresh());
@@ -311,7 +311,7 @@ class Viewer {
   private async preferRecording(): Promise<void> {
     const listed = this.server.find(this.stream);
     if (this.triedRecording || listed === undefined) return;
-    if (typeof listed.recording !== 'string') return this.missMoment();
+    if (typeof listed.recording !== 'string') return this.findMoment(listed);
     this.triedRecording = true;
     try {
       const opened = await openRemote(new URL(listed.recording, document.baseURI));
@@ -328,19 +328,18 @@ class Viewer {
     this.refresh();
   }
 
-  // A live stream is kept by the pages that watched it, not by the server.
-  private missMoment(): void {
-    if ((this.shared?.moment ?? null) === null) return;
-    this.shared = { ...this.shared!, moment: null };
-    this.note = text.momentGone;
+  // A live stream is kept by the pages that watched it; the server has what it recorded.
+  private async findMoment(listed: ListedStream): Promise<void> {
+    const { shared } = this;
+    if (shared === null || shared.moment === null) return;
+    this.shared = { ...shared, moment: null };
+    const found = await (await import('./recordedMoment')).recordedAt(listed, shared.moment);
+    if (this.stream !== listed.name) return;
+    if (found === null) this.note = text.momentGone;
+    else await this.openServerFile(found.file, { ...shared, moment: found.moment }, async () => found.opened);
   }
 
-  private openFile(file: File): Promise<boolean> {
-    return this.showFile(file.name, () => openFile(file));
-  }
-
-  private async openServerFile(name: string, shared: Shared | null): Promise<void> {
-    const open = (): Promise<Opened> => openRemote(new URL(`recordings/${encodeURIComponent(name)}`, document.baseURI));
+  private async openServerFile(name: string, shared: Shared | null, open: () => Promise<Opened> = () => openRemote(recordingUrl(name))): Promise<void> {
     if (!(await this.showFile(name, open, shared))) return;
     this.serverFile = name;
     this.writeAddress();
@@ -362,6 +361,7 @@ class Viewer {
       if (this.view !== null) this.view.name = name;
       this.choice.opened();
       this.view?.restart(null, false);
+      this.posed = false;
       this.record.watch(null);
       this.session.watch(opened.kind === 'recording' ? (events) => opened.source(events, shared?.moment) : null);
       this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';

@@ -14,6 +14,8 @@ export interface OpenedRecording {
   kind: 'recording';
   source(events: SourceEvents, begin?: Moment | null): FrameSource;
   note: string | null;
+  /** As a live stream's frames have it: at which of `times` the last frame until then is; null: it has not recorded then. */
+  timeOf(utcMs: number): Promise<number | null>;
   /** Whether more is being written behind what there is now. */
   isGrowing(): boolean;
 }
@@ -25,8 +27,11 @@ export type Opened =
 async function openRecording(bytes: Bytes, isGrowing = (): boolean => false, note: string | null = null): Promise<OpenedRecording> {
   const [{ Recording }, { RecordingSource }] = await Promise.all([import('./recording'), import('./recordingSource')]);
   const recording = await Recording.open(bytes);
-  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage ?? note, isGrowing };
+  return { kind: 'recording', source: (events, begin) => new RecordingSource(recording, events, begin), note: recording.damage ?? note, timeOf: (utcMs) => recording.timeOf(utcMs), isGrowing };
 }
+
+/** Of one in the server's folder. */
+export const recordingUrl = (file: string): URL => new URL(`recordings/${encodeURIComponent(file)}`, document.baseURI);
 
 /** A recording of the server. Throws with what a person should know. */
 export async function openRemote(url: URL, fetch?: Fetch): Promise<OpenedRecording> {

@@ -133,6 +133,7 @@ export function offeredRungs(status: StreamStatus | null): Rung[] {
 export interface ListedRecording {
   file: string;
   bytes: number;
+  modified_ns: number; // UTC
   recording: boolean; // it grows
   cut: boolean; // it has no end
 }

@@ -3,9 +3,10 @@
 import { kFrameHeadBytes, readFrameHead, readStreamInfo, type FrameHead } from './cdr';
 import { FileError } from './fileError';
 import { kTextureH264, parseFrame } from './frame';
-import { publishMsOf, type FrameStore, type Sample, type StoredFrame } from './frameStore';
+import { publishMsOf, utcMsOf, type FrameStore, type Sample, type StoredFrame } from './frameStore';
 import { openAdded, openMcap, readMessage, readMessageHead, readSample, type Bytes, type McapFile, type McapMessage } from './mcap';
 import { Final, Unavailable } from './missing';
+import { frameAt } from './playback';
 import type { StreamInfo } from './protocol';
 import { text } from './strings';
 import { videoTextureIsKey } from './videoTexture';
@@ -105,6 +106,15 @@ export class Recording implements FrameStore {
 
   async head(index: number): Promise<FrameHead> {
     return (this.heads[index] ??= readFrameHead(await readMessageHead(this.file, this.frames[index]!, kFrameHeadBytes)));
+  }
+
+  /** At which of `times` the last frame is that was captured by then (ms UTC); null: before the first, or behind the last. */
+  async timeOf(utcMs: number): Promise<number | null> {
+    const capturedMs = async (index: number): Promise<number> => utcMsOf(await this.head(index));
+    let index = frameAt(this.times, utcMs - this.startMs); // it came some time after
+    while (index + 1 < this.count && (await capturedMs(index + 1)) <= utcMs) ++index;
+    const behindMs = utcMs - (await capturedMs(index));
+    return behindMs < 0 || (index + 1 === this.count && behindMs > kApartMs) ? null : this.times[index]!;
   }
 
   /**

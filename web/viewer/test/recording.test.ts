@@ -49,3 +49,12 @@ it('has a time of its own for each frame, whatever the clock did, of which a lin
   expect(times[0]).toBe(0);
   expect(times[6]).toBe(500);
 });
+
+it('finds the frame that was captured at a moment, which came later, and no moment that it does not have', async () => {
+  const recording = await Recording.open(bytesOf(await recorded(kSources)));
+  for (const [i, time] of recording.times.entries()) {
+    expect(await recording.timeOf(publishMs(i))).toBe(time);
+    expect(await recording.timeOf(publishMs(i) - 0.5)).toBe(i === 0 ? null : recording.times[i - 1]);
+  }
+  expect(await recording.timeOf(publishMs(kSources.length - 1) + 2)).toBeNull();
+});
