@@ -389,6 +389,8 @@ const checks = {
   async 'the page draws by itself where workers do not, also after the driver took the picture away'(page) {
     const workers = page.workers().length;
     const near = await newPage({ viewport: { width: 800, height: 500 } });
+    const warnings = [];
+    near.on('console', (message) => warnings.push(message.text()));
     await near.addInitScript(() => delete HTMLCanvasElement.prototype.transferControlToOffscreen);
     await near.goto(origin);
     await loaded(near);
@@ -401,7 +403,12 @@ const checks = {
     await near.evaluate(() => window.taken.restoreContext());
     await inState(near, 'live');
     await more(near, 2);
-    assert.ok((await look(near)).pixels.covered > kCovered);
+    for (const key of ['3', '7', '1']) {
+      await near.keyboard.press(key);
+      await more(near, 2);
+      assert.ok((await look(near)).pixels.covered > kCovered / (key === '3' ? 4 : 1), `mode ${key}`);
+    }
+    assert.deepEqual(warnings.filter((text) => /does not belong/.test(text)), []);
     await near.close();
   },
 

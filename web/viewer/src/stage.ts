@@ -37,7 +37,11 @@ export class Stage {
     this.camera.matrixAutoUpdate = false;
     this.scene.add(this.ground.object, this.camera, this.head);
     this.light();
-    canvas.addEventListener('webglcontextlost', () => events.contextLost(true));
+    canvas.addEventListener('webglcontextlost', () => {
+      // Now that it costs nothing: given back later, it would be to a context that it is not of.
+      for (const mesh of this.meshes.values()) mesh.dispose();
+      events.contextLost(true);
+    });
     canvas.addEventListener('webglcontextrestored', () => events.contextLost(false));
   }
 
