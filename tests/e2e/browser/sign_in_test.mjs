@@ -110,6 +110,17 @@ checks['a browser that keeps no cookies is told so'] = async () => {
   await strict.close();
 };
 
+checks['a page that is let in already stays, though the small picture of a list is not any more'] = async () => {
+  const refused = page.waitForResponse((response) => response.status() === 401 && response.url().endsWith('/ws/object'));
+  await page.evaluate(() => void (window.kept_ = true));
+  writeFileSync(tokens, 'another-token-for-this-test\n');
+  await page.keyboard.press('n');
+  await refused;
+  await shownPast(page, (await page.evaluate(() => window.relievo.diagnostics().shown)) + 5);
+  assert.ok(await page.evaluate(() => window.kept_), 'it was loaded anew');
+  writeFileSync(tokens, `${kToken}\n`);
+};
+
 checks['one that was kept, and is not known any more, is asked for anew, also in the page of the rig'] = async () => {
   await page.goto(`${server.address}/rig?stream=object`);
   await page.waitForFunction(() => document.querySelector('#picture').width > 4);

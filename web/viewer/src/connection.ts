@@ -16,11 +16,8 @@ const kRefusals: Record<number, Refusal> = { 400: 'name', 401: 'token', 503: 'pl
 
 /** A WebSocket that is refused does not say why; who asks for the same without one is told. */
 async function refusalOf(stream: string, server: string): Promise<Refusal | null> {
-  const own = server === document.baseURI; // a page that embeds a stream of elsewhere stays
-  const credentials = own ? 'same-origin' : 'include'; // as with a WebSocket
+  const credentials = server === document.baseURI ? 'same-origin' : 'include'; // as with a WebSocket
   const response = await fetch(streamUrl(stream, server), { cache: 'no-store', credentials }).catch(() => null);
-  // It wants a token that the page does not have (any more): the page that it answers with asks for it.
-  if (own && response?.status === 401) location.reload();
   return kRefusals[response?.status ?? 0] ?? null;
 }
 
@@ -141,7 +138,9 @@ export class Connection {
 
   private async askWhy(): Promise<void> {
     const refusal = await refusalOf(this.stream, this.server);
-    if (!this.connected) this.refusal = refusal;
+    if (this.connected || this.stopped) return;
+    this.refusal = refusal;
+    if (refusal === 'token') this.events.signIn?.();
   }
 
   private tick(): void {

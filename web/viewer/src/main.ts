@@ -101,6 +101,7 @@ class Viewer {
       ready: () => this.view?.invalidate(),
       hint: (hint) => (this.server.hint = hint),
       unusable: (message) => (this.problem = text.noDecoder(message)),
+      signIn: () => location.reload(), // the page that the server answers with asks for a token
     });
     const picker = new FilePicker((file) => void this.showFile(file.name, () => openFile(file)));
     this.panels.action('open', () => picker.ask());

@@ -19,6 +19,8 @@ export interface SessionEvents {
   ready(): void;
   hint(text: string): void;
   unusable(message: string): void;
+  /** As SourceEvents has it. */
+  signIn?(): void;
 }
 
 interface Waiting {
@@ -129,6 +131,7 @@ export class Session {
       kept: (bytes) => this.meter.came(bytes, performance.now()),
       clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
       nonsense: (message) => this.meter.failed(message),
+      signIn: () => this.events.signIn?.(),
       timers: this.page.defaultView ?? window,
     });
     this.source.rest?.(this.rests);

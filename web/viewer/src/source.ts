@@ -16,6 +16,8 @@ export interface SourceEvents {
   clock(t0: number, serverMs: number, t1: number): void;
   /** Something makes no sense; if it was a frame, its credit is given back. */
   nonsense(message: string): void;
+  /** The server lets nobody in without a token, which the page does not have (any more). */
+  signIn?(): void;
   /** Of the window that shows it: those of one in the background come late. */
   readonly timers?: Window | undefined;
 }
