@@ -29,17 +29,20 @@ export class RecordingSource extends StorePlayer implements FrameSource {
   ) {
     super(recording, events);
     // Not before the caller holds the source.
-    queueMicrotask(() => {
-      if (this.stopped) return;
-      events.open();
-      this.describe(-Infinity);
-      const at = begin === null ? -1 : begin.atMs - (begin.utc ? this.startMs : 0);
-      const { times } = this;
-      const has = at >= times[0]! && at < times[times.length - 1]! + 1; // links are of whole milliseconds
-      if (has) this.seek(at);
-      if (!has || begin!.playing) this.play();
-    });
+    queueMicrotask(() => void this.begin(begin));
     void this.mark();
+  }
+
+  private async begin(moment: Moment | null): Promise<void> {
+    if (this.stopped) return;
+    this.events.open();
+    this.describe(-Infinity);
+    const at = moment?.utc === true ? await this.recording.timeOf(moment.atMs).catch(() => null) : (moment?.atMs ?? null);
+    if (this.stopped) return;
+    const { times } = this;
+    const has = at !== null && at >= times[0]! && at < times[times.length - 1]! + 1; // links are of whole milliseconds
+    if (has) this.seek(at);
+    if (!has || moment!.playing) this.play();
   }
 
   /** At the end of what is still being written, too, where it goes on by itself. */

@@ -4,6 +4,7 @@ import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import type { ServerRecording } from '../src/protocol';
 import type { Recording } from '../src/recording';
 import { RecordingSource } from '../src/recordingSource';
+import type { Moment } from '../src/source';
 
 const kStepMs = 100;
 
@@ -13,6 +14,8 @@ class Growing {
   times = Float64Array.of(0, kStepMs, 2 * kStepMs);
   first = 0;
   startMs = 0;
+  /** Captured 40 ms before they came. */
+  timeOf = async (utcMs: number): Promise<number | null> => this.times.find((time) => time - 40 === utcMs) ?? null;
   /** Of frames from there on, 100 ms each. */
   infos = new Map<number, { source: string }>();
   infoAt = (publishMs: number): unknown => [...this.infos].filter(([from]) => from <= Math.max(0, publishMs)).at(-1)?.[1] ?? null;
@@ -54,7 +57,7 @@ describe('RecordingSource', () => {
   });
 
   /** A page that shows each frame at once while `quick`, else when its credit is given by hand. */
-  function playing(file = new Growing()): { file: Growing; source: RecordingSource; shown: (number | string)[]; page: { quick: boolean } } {
+  function playing(file = new Growing(), begin: Moment | null = null): { file: Growing; source: RecordingSource; shown: (number | string)[]; page: { quick: boolean } } {
     const shown: (number | string)[] = [];
     const page = { quick: true };
     const nothing = (): void => undefined;
@@ -64,7 +67,7 @@ describe('RecordingSource', () => {
     };
     const message = (said: { type: string; source?: string }): void => void shown.push(said.source ?? said.type);
     const events = { open: nothing, lost: nothing, message, clock: nothing, nonsense: nothing, frame };
-    const source = new RecordingSource(file as unknown as Recording, events);
+    const source = new RecordingSource(file as unknown as Recording, events, begin);
     return { file, source, shown, page };
   }
 
@@ -124,5 +127,14 @@ describe('RecordingSource', () => {
     await vi.advanceTimersByTimeAsync(1000);
     expect(shown.at(-1)).toBe(2);
     expect(source.playing).toBe(true);
+  });
+
+  it('is at the frame that was captured at a time of day, or plays from its start where it has none', async () => {
+    const { source, shown } = playing(new Growing(), { atMs: kStepMs - 40, utc: true, playing: false });
+    await vi.advanceTimersByTimeAsync(1000);
+    expect([shown, source.position, source.playing]).toEqual([[1], kStepMs, false]);
+    const other = playing(new Growing(), { atMs: 1e12, utc: true, playing: false });
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(other.shown).toEqual([0, 1, 2]);
   });
 });
