@@ -43,6 +43,13 @@ std::filesystem::path unfinished_name(const std::filesystem::path& path) {
   return path.string() + ".part" + std::to_string(::getpid());
 }
 
+Error told_of(const std::filesystem::path& path, Error error, const std::filesystem::path& unfinished) {
+  const std::string name = unfinished.string();
+  if (const auto at = error.message.find(name); at != std::string::npos)
+    error.message.replace(at, name.size(), path.string());
+  return error;
+}
+
 Status write_whole_file(const std::filesystem::path& named, std::span<const std::uint8_t> bytes) {
   const auto leads = where_it_leads(named);
   if (!leads) return leads.error();

@@ -16,6 +16,9 @@ namespace relievo {
 /// Where to write what is to be `path` once it is whole: beside it, under a name of this process.
 std::filesystem::path unfinished_name(const std::filesystem::path& path);
 
+/// What failed under the name `unfinished`, told of `path`, the one that somebody gave.
+Error told_of(const std::filesystem::path& path, Error error, const std::filesystem::path& unfinished);
+
 /// Writes under a temporary name beside `path`, then renames: replaces a file of that name, or what a link of
 /// that name leads to, leaves nothing behind on failure. Refuses to replace what is no file. The error names
 /// the file.

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/whole_file.h"
 #include "codec/recording.h"
 
 namespace relievo {
@@ -30,8 +31,10 @@ class PartFile {
     }
     auto writer = RecordingWriter::create(part_, {});
     made_ = writer.ok();
+    if (!writer) return failed(writer.error());
     return writer;
   }
+  Error failed(const Error& error) const { return told_of(whole_, error, part_); }
   Status complete() {
     std::error_code error;
     fs::rename(part_, whole_, error);
@@ -69,7 +72,7 @@ Result<RecoveredRecording> recover_recording(const fs::path& damaged, const fs::
   PartFile part(copy);
   auto writer = part.create();
   if (!writer) return writer.error();
-  if (const Status copied = copy_description(from, **writer); !copied) return copied.error();
+  if (const Status copied = copy_description(from, **writer); !copied) return part.failed(copied.error());
 
   RecoveredRecording out{
       .attachments = from.attachments.size(), .lost_bytes = from.lost_bytes, .recordings = from.recordings};
@@ -81,12 +84,12 @@ Result<RecoveredRecording> recover_recording(const fs::path& damaged, const fs::
       continue;
     }
     if (!*message) break;
-    if (const Status written = (*writer)->write(**message); !written) return written.error();
+    if (const Status written = (*writer)->write(**message); !written) return part.failed(written.error());
     ++out.messages;
     out.stopped = !progress(out.messages);
     if (out.stopped) return out;
   }
-  if (const Status finished = (*writer)->finish(); !finished) return finished.error();
+  if (const Status finished = (*writer)->finish(); !finished) return part.failed(finished.error());
   if (const Status complete = part.complete(); !complete) return complete.error();
   return out;
 }

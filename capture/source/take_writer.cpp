@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/whole_file.h"
 #include "capture/source/npy.h"
 #include "capture/source/take_files.h"
 
@@ -86,10 +87,7 @@ Status check_free(const fs::path& take, const fs::path& target) {
 
 /// What fails is told by the name that was asked for, not by that of the folder until it is whole.
 Status named(Status status, const fs::path& partial, const fs::path& take) {
-  if (status) return status;
-  std::string message = status.error().message;
-  if (message.starts_with(partial.string())) message.replace(0, partial.string().size(), take.string());
-  return Error{std::move(message)};
+  return status ? status : told_of(take, status.error(), partial);
 }
 
 /// `target`, or NAME-2 and so on beside it where something is there by now.

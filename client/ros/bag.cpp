@@ -19,7 +19,7 @@ Result<RosBag> RosBag::create(const fs::path& file, const std::string& stream, s
   bag.rig_ = std::move(rig);
   const fs::path unfinished = unfinished_name(file);
   auto writer = RecordingWriter::create(unfinished, {.sync_ns = -1, .profile = "ros2"});
-  if (!writer) return bag.of_file(writer.error(), unfinished);
+  if (!writer) return told_of(file, writer.error(), unfinished);
   bag.unfinished_ = unfinished;
   bag.writer_ = *std::move(writer);
   return bag;
@@ -30,14 +30,6 @@ RosBag::~RosBag() {
   writer_.reset();
   std::error_code ignored;
   fs::remove(unfinished_, ignored);
-}
-
-/// By the name that somebody gave it.
-Error RosBag::of_file(Error error, const fs::path& unfinished) const {
-  const std::string name = unfinished.string();
-  if (const auto at = error.message.find(name); at != std::string::npos)
-    error.message.replace(at, name.size(), file_.string());
-  return error;
 }
 
 Result<std::uint16_t> RosBag::channel_of(const RosTopicType& type) {
@@ -58,14 +50,14 @@ Status RosBag::add(const Frame3D& frame) {
     if (!channel) return channel.error();
     if (auto status = writer_->write({*channel, frames_, frame.time_ns, frame.time_ns, **std::move(message)});
         !status)
-      return of_file(status.error(), unfinished_);
+      return told_of(file_, status.error(), unfinished_);
   }
   ++frames_;
   return {};
 }
 
 Status RosBag::finish() {
-  if (auto status = writer_->finish(); !status) return of_file(status.error(), unfinished_);
+  if (auto status = writer_->finish(); !status) return told_of(file_, status.error(), unfinished_);
   std::error_code failed;
   fs::rename(unfinished_, file_, failed);
   if (failed) return Error{file_.string() + " cannot be written: " + failed.message()};

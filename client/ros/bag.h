@@ -32,7 +32,6 @@ class RosBag {
 
  private:
   RosBag() = default;
-  Error of_file(Error error, const std::filesystem::path& unfinished) const;
   Result<std::uint16_t> channel_of(const RosTopicType& type);
 
   std::filesystem::path file_, unfinished_;

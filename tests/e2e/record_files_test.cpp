@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 std::vector<std::string> record(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {program("relievo"), "record", "face"});
@@ -193,6 +194,12 @@ TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
   const auto again = run({program("relievo"), "recover", folder / "face.mcap"});
   EXPECT_EQ(again.status, 1);
   EXPECT_THAT(again.err, HasSubstr("exists already"));
+
+  const fs::path nowhere = folder / "none" / "copy.mcap";
+  const auto refused = run({program("relievo"), "recover", folder / "face.mcap", "--out", nowhere});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.err, HasSubstr(nowhere.string()));
+  EXPECT_THAT(refused.err, Not(HasSubstr(".part")));
 }
 
 }  // namespace
