@@ -155,6 +155,20 @@ void warn_of_pictures(const GrayStack& stack, const GrayMaps& maps, const Option
       "nothing move?");
 }
 
+Error nothing_decoded(const GrayStack& stack, const GrayMaps& maps, const Options& options) {
+  constexpr int kDark = 32;  // of 255; 12 bits come to 15 where they are the lower ones of 16
+  const Image8& picture = stack.picture;
+  const int brightest = *std::max_element(picture.data(), picture.data() + picture.size());
+  const std::string nothing = "nothing in " + options.folder + " could be decoded: ";
+  if (brightest < kDark)
+    return Error{
+        nothing + "the pictures are dark, " + std::to_string(brightest) +
+        " of 255 at their brightest; expose them for longer, or, where 10 or 12 bits lie in files of "
+        "16, multiply them by 64 or 16"};
+  return Error{nothing + std::to_string(maps.lit) +
+               " pixels are lit by the projector; check the pictures' order, or lower --min-contrast"};
+}
+
 /// Both rays of a point are told by other pictures: of a calibration that fits they meet within a pixel or
 /// two.
 void warn_of_gap(const DensePoints& dense, const Report& report, const Options& options) {
@@ -210,10 +224,7 @@ Status run(const Options& options, StopSignal& stop) {
   WorkerPool pool(options.threads);
   auto maps = decode_gray(*stack, options.decode, pool);
   if (!maps) return maps.error().in(options.folder);
-  if (maps->decoded == 0) {
-    return Error{"nothing in " + options.folder + " could be decoded: " + std::to_string(maps->lit) +
-                 " pixels are lit by the projector; check the pictures' order, or lower --min-contrast"};
-  }
+  if (maps->decoded == 0) return nothing_decoded(*stack, *maps, options);
   if (stop.stopped()) return {};
   warn_of_pictures(*stack, *maps, options);
   Report report{.lit = maps->lit, .decoded = maps->decoded, .uncertain = maps->uncertain, .lone = maps->lone};

@@ -322,6 +322,23 @@ TEST(CalibrationExample, PicturesThatAreNotWhatTheyShouldBeAreWarnedOf) {
   EXPECT_THAT(warnings(slides), HasSubstr("the pictures of column bit 5 and of its inverse hardly differ"));
 }
 
+TEST(CalibrationExample, DarkPicturesAreToldFromWronglyOrderedOnes) {
+  const TempFolder folder;
+  const fs::path slides = folder / "slides";
+  report({"pattern", "--gray", "--size", "64x48", "--out", slides.string(), "--json"});
+  for (const auto& slide : fs::directory_iterator(slides)) {
+    if (slide.path().extension() != ".png") continue;
+    auto picture = read_rgb(slide.path());
+    ASSERT_TRUE(picture) << picture.error().message;
+    for (std::size_t i = 0; i < picture->size(); ++i) picture->data()[i] /= 16;
+    ASSERT_TRUE(write_png(slide.path(), *picture));
+  }
+  const Finished dark = server(
+      {"import", "gray", slides.string(), "--projector", "64x48", "--out", (folder / "maps").string()});
+  EXPECT_EQ(dark.status, 1);
+  EXPECT_THAT(dark.err, HasSubstr("15 of 255 at their brightest")) << dark.err;
+}
+
 TEST(CalibrationExample, CloudsToCompareAreOfTheSameUnit) {
   const TempFolder folder;
   const std::string out = (folder / "example").string(), maps = (folder / "maps").string();
