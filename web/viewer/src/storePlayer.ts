@@ -102,8 +102,10 @@ export class StorePlayer implements Playback {
   }
 
   play(): void {
+    const now = performance.now();
     this.running = true;
-    if (!this.late) this.clock.play(performance.now());
+    this.clock.play(now);
+    if (this.late) this.clock.pause(now);
     this.pump();
   }
 
@@ -115,8 +117,8 @@ export class StorePlayer implements Playback {
 
   seek(atMs: number): void {
     const now = performance.now();
+    if (this.late ? this.isOver(now) : !this.clock.playing) this.running = false; // also where it has just come to the end
     this.clock.seek(atMs, now);
-    if (!this.clock.playing && !this.late) this.running = false; // also where it has just come to the end
     this.wanted = this.due(now);
     ++this.runs;
     this.pump();
@@ -227,7 +229,11 @@ export class StorePlayer implements Playback {
     this.late = false;
     this.failure = null;
     const now = performance.now();
-    if (late && this.running && this.clock.position(now) < (this.loop?.to ?? this.clock.end)) this.clock.play(now);
+    if (late && this.running && !this.isOver(now)) this.clock.play(now);
+  }
+
+  private isOver(now: number): boolean {
+    return this.clock.position(now) >= (this.loop?.to ?? this.clock.end);
   }
 
   private fail(index: number, error: unknown): void {

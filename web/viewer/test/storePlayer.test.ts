@@ -146,6 +146,20 @@ describe('StorePlayer', () => {
       expect([sent[0], player.missing, player.playing, complaints]).toEqual([1, null, true, []]);
     });
 
+    it('has ended where somebody goes to its end, also before that frame comes', async () => {
+      let come = (): void => undefined;
+      const { player, sent } = playing({ read: () => new Promise((resolve) => (come = resolve)) });
+      player.play();
+      await vi.advanceTimersByTimeAsync(2000);
+      player.seek(Infinity);
+      player.seek(0);
+      for (let i = 0; i < 3; ++i) {
+        come();
+        await vi.advanceTimersByTimeAsync(2000);
+      }
+      expect([player.position, player.playing, sent.at(-1)]).toEqual([0, false, 0]);
+    });
+
     it('stops at one that never comes, and says why until another has come', async () => {
       const answer = { read: async (): Promise<void> => undefined };
       const { player, sent, complaints } = playing(answer);
