@@ -9,7 +9,7 @@ import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
-import { look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
+import { inState, look, pagesOf, runChecks, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { startWeb } from './web.mjs';
 
@@ -76,6 +76,7 @@ async function onFrame(page, index) {
   await still(page);
 }
 async function begin(page) {
+  await inState(page, 'file'); // before, the stream that it is played as may be shown
   await shownPast(page, 1);
   await page.keyboard.press('End');
   await page.keyboard.press('c');
@@ -217,7 +218,8 @@ const onBall = {
     await page.keyboard.press('t'); // which closes the panel of measuring
     const link = new URL(await page.evaluate(() => window.relievo.link()));
     const other = await pagesOf(browser, link.origin, complaints).open(link.pathname + link.search + link.hash, kWide);
-    await measured(other, ({ shape, frames }) => shape === 'sphere' && frames === 1);
+    await inState(other, 'file');
+    await measured(other, ({ shape, frames, centre_mm }) => shape === 'sphere' && frames === 1 && Math.abs(centre_mm[0].median - said.centre_mm[0].median) < 1e-4);
     alike(await flatness(other), said);
     assert.equal(await region(other), kBall.join());
     await other.close();
@@ -322,11 +324,12 @@ const withoutMeasurer = {
     await page.route(/assets\/shape\.worker/, (route) => (++tried, comes ? route.continue() : route.abort()));
     await begin(page);
     await page.waitForFunction(() => /cannot be loaded/.test(document.querySelector('#panel-measure .flatness .warn').textContent));
-    await still(page);
-    const { drawn } = await look(page);
-    const before = tried;
-    await eventually('it is not tried again', async () => tried > before + 1);
-    assert.equal((await look(page)).drawn, drawn, 'the picture is drawn anew at each try');
+    let [before, drawn] = [tried, 0];
+    await eventually('it is not tried again, or the picture is drawn anew at each try', async () => {
+      const now = (await look(page)).drawn;
+      if (now !== drawn) [before, drawn] = [tried, now]; // once more where a word has gone from over it
+      return tried > before + 1;
+    });
     comes = true;
     await measured(page, ({ shape }) => shape === 'plane');
     await page.waitForFunction(() => document.querySelector('#panel-measure .flatness .warn').hidden);
