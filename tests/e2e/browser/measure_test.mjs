@@ -8,7 +8,7 @@ import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, kLongPatienceMs, launchChromium } from './chromium.mjs';
-import { Feeder, isRim, loaded, look, pagesOf, pointOf, restingPlace, runChecks, shownPast, still } from './feeder.mjs';
+import { Feeder, inState, isRim, loaded, look, pagesOf, pointOf, restingPlace, runChecks, shownPast, still } from './feeder.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
 import { startWeb } from './web.mjs';
@@ -400,6 +400,7 @@ try {
   const recorded = recordObject(serverPath, join(folder, 'cube.mcap'), { rate: 5, frames: 6, size: 'width=640,height=480,rays=6' });
   web = await startWeb(relievoPath, recorded);
   const ofFile = await pagesOf(browser, web.address.replace(/\/$/, ''), complaints).open('/', kPage);
+  await inState(ofFile, 'file');
   await shownPast(ofFile, 1);
   failed += await runChecks(inRecording, ofFile);
   await ofFile.close();
