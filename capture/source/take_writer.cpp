@@ -79,9 +79,9 @@ fs::path partial_name(const fs::path& folder, const fs::path& target) {
 
 Status check_free(const fs::path& take, const fs::path& target) {
   std::error_code code;
-  if (!fs::exists(target, code) && code)
-    return Error{take.string() + " cannot be created: " + code.message()};
-  if (!fs::exists(target, code) || (fs::is_directory(target, code) && fs::is_empty(target, code))) return {};
+  const bool there = fs::exists(target, code);
+  if (code) return Error{take.string() + " cannot be created: " + code.message()};
+  if (!there || (fs::is_directory(target, code) && fs::is_empty(target, code))) return {};
   return Error{take.string() + " exists already: give a new folder or remove it"};
 }
 
