@@ -7,7 +7,8 @@ import { backoffS, type Refusal } from './state';
 import { VideoTextures } from './videoTexture';
 
 const kClockEveryMs = 4000;
-const kClockSoonMs = 500; // again, where the gateway does not know the server's clock yet
+const kClockSoonMs = 500; // at first, since a page that is being built up answers late and lopsided, and where the gateway does not know yet
+const kClocksSoon = 6;
 const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
@@ -28,6 +29,7 @@ export class Connection {
   private retryAt: number | null = null; // performance.now()
   private lastHeard = 0;
   private lastClock = -Infinity;
+  private clocks = 0; // compared since the socket opened
   private stopped = false;
   private readonly timer: number;
   private wanted: Quality | null = null;
@@ -99,6 +101,7 @@ export class Connection {
       this.refusal = null;
       this.lastHeard = performance.now();
       this.lastClock = -Infinity;
+      this.clocks = 0;
       this.sayWhatIsWanted();
       this.events.open();
       this.tick();
@@ -124,8 +127,9 @@ export class Connection {
   }
 
   private compareClocks(t0: number, serverMs: number | null): void {
-    if (serverMs !== null) this.events.clock(t0, serverMs, utcNow());
-    else this.lastClock = performance.now() - kClockEveryMs + kClockSoonMs;
+    if (serverMs === null) return;
+    ++this.clocks;
+    this.events.clock(t0, serverMs, utcNow());
   }
 
   private onLost(): void {
@@ -150,7 +154,7 @@ export class Connection {
       return;
     }
     if (now - this.lastHeard > kSilenceMs) return this.onLost();
-    if (this.connected && now - this.lastClock > kClockEveryMs) {
+    if (this.connected && now - this.lastClock > (this.clocks < kClocksSoon ? kClockSoonMs : kClockEveryMs)) {
       this.lastClock = now;
       this.send({ type: 'time', t0: utcNow() });
     }

@@ -17,7 +17,7 @@ export class Meter {
   private drops = new DropCounter();
   private readonly frames = new Rate();
   private readonly bytes = new Rate();
-  private readonly latency = new RollingMedian();
+  private readonly ages = new RollingMedian(); // by this machine's clock, however far it is off
   private readonly decode = new RollingMedian();
   private received = 0;
   private shownFrames = 0;
@@ -42,7 +42,7 @@ export class Meter {
     this.drops.restart();
     this.frames.clear();
     this.bytes.clear();
-    this.latency.clear();
+    this.ages.clear();
     this.journal.clear();
   }
 
@@ -79,8 +79,14 @@ export class Meter {
     if (offset === null || !live) return;
     this.journal.shown(prefix, utcMs, offset);
     const age = utcMs + offset - prefix.captureMs;
-    if (age > -1000 && age < kLiveMs) this.latency.add(age);
-    else this.latency.clear();
+    if (age > -1000 && age < kLiveMs) this.ages.add(utcMs - prefix.captureMs);
+    else this.ages.clear();
+  }
+
+  /** From the exposure to the drawing, median; null while unknown, as where the clocks are compared too roughly yet to have it above 0. */
+  private latency(): number | null {
+    const [age, offset] = [this.ages.get(), this.clock.get()];
+    return age === null || offset === null || age + offset < 0 ? null : age + offset;
   }
 
   failed(message: string): void {
@@ -111,7 +117,7 @@ export class Meter {
       drops: { link: this.drops.link, gaps: this.drops.gaps, viewer: this.skipped },
       vertices: this.vertices,
       triangles: this.triangles,
-      latencyMs: this.latency.get(),
+      latencyMs: this.latency(),
       decodeMs: this.decode.get(),
       parts: this.journal.parts,
       stages: this.journal.medians(),
@@ -132,7 +138,7 @@ export class Meter {
       [viewer, 'viewer'],
       [gaps, 'gaps'],
     ].flatMap(([count, place]) => (count === 0 ? [] : [`${count} ${place}`]));
-    const latency = this.latency.get();
+    const latency = this.latency();
     const say = text.badge;
     const statistics: Statistic[] = [
       { label: say.frame[0], value: String(this.number), title: say.frame[1] },

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: the figures of the statistics line mean what they say.
 import { describe, expect, it } from 'vitest';
+import type { DecodedFrame } from '../src/messages';
 import { Meter } from '../src/meter';
 import { ClockOffset, DropCounter, Rate, RollingMedian, ServerDrops } from '../src/statistics';
 import { parseFramePrefix, parseServerMessage, type StreamStatus } from '../src/protocol';
@@ -91,6 +92,18 @@ describe('Meter', () => {
     meter.begin();
     expect(said(meter, 'drops')).toBe('0');
     expect(said(meter, 'errors')).toBeUndefined();
+  });
+  it('knows a latency once the clocks are compared well enough, also of frames before', () => {
+    const meter = new Meter();
+    const frame = { number: 1, positions: new Float32Array(0), triangles: new Uint32Array(0), decodeMs: 1 } as unknown as DecodedFrame;
+    const shown = (captureMs: number): void =>
+      meter.shown(frame, { bytes: 48, sequence: 1, captureMs, publishMs: 0, sentMs: 0, drops: 0 }, captureMs + 30, 0, true);
+    expect(said(meter, 'latency')).toBe('–');
+    meter.clock.add(0, 50, 200); // 50 off by a slow way back
+    shown(10_000);
+    expect(said(meter, 'latency')).toBe('–'); // no frame is seen before it was taken
+    meter.clock.add(5000, 5005, 5010);
+    expect(said(meter, 'latency')).toBe('30 ms');
   });
 });
 
