@@ -52,8 +52,41 @@ bool read_rows(png_structp png, png_infop info, PngInput& input, Image8& out) {
   return true;
 }
 
-struct TurboClose {
-  void operator()(void* handle) const { tjDestroy(handle); }
+/// Of one picture. A damaged one leaves libjpeg-turbo 2.1.5 in the middle of it, for good.
+class JpegDecoder {
+ public:
+  explicit JpegDecoder(std::span<const std::uint8_t> file) : file_(file) {}
+
+  Result<JpegSize> size() const {
+    JpegSize out{};
+    int subsampling = 0, colours = 0;
+    if (!turbo_) return Error{"cannot be decoded: memory is short"};
+    if (tjDecompressHeader3(turbo_.get(), file_.data(), file_.size(), &out.width, &out.height, &subsampling,
+                            &colours) != 0)
+      return damaged();
+    return out;
+  }
+
+  Status decode(JpegSize size, std::uint8_t* rgb, std::ptrdiff_t stride) const {
+    if (!turbo_) return Error{"cannot be decoded: memory is short"};
+    if (tjDecompress2(turbo_.get(), file_.data(), file_.size(), rgb, size.width, static_cast<int>(stride),
+                      size.height, TJPF_RGB, TJFLAG_ACCURATEDCT) == 0)
+      return {};
+    // A warning is damage too, the rest of such a picture is grey; but for bytes too many between the parts
+    // of a file, which many cameras write.
+    const bool is_warning = tjGetErrorCode(turbo_.get()) == TJERR_WARNING;
+    if (is_warning && std::strstr(tjGetErrorStr2(turbo_.get()), "extraneous bytes") != nullptr) return {};
+    return damaged();
+  }
+
+ private:
+  struct Close {
+    void operator()(void* handle) const { tjDestroy(handle); }
+  };
+  Error damaged() const { return Error{std::string("is damaged: ") + tjGetErrorStr2(turbo_.get())}; }
+
+  const std::span<const std::uint8_t> file_;
+  const std::unique_ptr<void, Close> turbo_{tjInitDecompress()};
 };
 
 }  // namespace
@@ -69,24 +102,20 @@ Result<Image8> decode_png(std::span<const std::uint8_t> file) {
   return out;
 }
 
+Result<JpegSize> jpeg_size(std::span<const std::uint8_t> file) {
+  return JpegDecoder(file).size();
+}
+
+Status decode_jpeg(std::span<const std::uint8_t> file, JpegSize size, std::uint8_t* rgb,
+                   std::ptrdiff_t stride) {
+  return JpegDecoder(file).decode(size, rgb, stride);
+}
+
 Result<Image8> decode_jpeg(std::span<const std::uint8_t> file) {
-  const std::unique_ptr<void, TurboClose> turbo(tjInitDecompress());
-  if (!turbo) return Error{"cannot be decoded: memory is short"};
-  const auto damaged = [&] { return Error{std::string("is damaged: ") + tjGetErrorStr2(turbo.get())}; };
-  int width = 0, height = 0, subsampling = 0, colours = 0;
-  const auto size = static_cast<unsigned long>(file.size());
-  if (tjDecompressHeader3(turbo.get(), file.data(), size, &width, &height, &subsampling, &colours) != 0)
-    return damaged();
-  Image8 out(width, height, 3);
-  const auto decode = [&](int flags) {
-    return tjDecompress2(turbo.get(), file.data(), size, out.data(), width, static_cast<int>(out.stride()),
-                         height, TJPF_RGB, TJFLAG_ACCURATEDCT | flags) == 0;
-  };
-  // A warning is damage too, the rest of such a picture is grey; but for bytes too many between the parts of
-  // a file, which some cameras write.
-  if (decode(TJFLAG_STOPONWARNING)) return out;
-  if (std::strstr(tjGetErrorStr2(turbo.get()), "extraneous bytes") == nullptr) return damaged();
-  if (!decode(0) && tjGetErrorCode(turbo.get()) != TJERR_WARNING) return damaged();
+  const auto size = jpeg_size(file);
+  if (!size) return size.error();
+  Image8 out(size->width, size->height, 3);
+  if (const Status done = decode_jpeg(file, *size, out.data(), out.stride()); !done) return done.error();
   return out;
 }
 

@@ -3,6 +3,7 @@
 // picture of which a part is missing. Any thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -17,5 +18,17 @@ Result<Image8> decode_png(std::span<const std::uint8_t> file);
 
 /// The same of a JPEG, grey or in colours.
 Result<Image8> decode_jpeg(std::span<const std::uint8_t> file);
+
+struct JpegSize {
+  int width, height;
+
+  bool operator==(const JpegSize&) const = default;
+};
+/// What a JPEG says of itself.
+Result<JpegSize> jpeg_size(std::span<const std::uint8_t> file);
+
+/// A JPEG of that size, into rows of RGB that begin `stride` bytes one behind the other.
+Status decode_jpeg(std::span<const std::uint8_t> file, JpegSize size, std::uint8_t* rgb,
+                   std::ptrdiff_t stride);
 
 }  // namespace relievo

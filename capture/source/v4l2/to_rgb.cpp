@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/source/v4l2/to_rgb.h"
 
-#include <turbojpeg.h>
-
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <opencv2/imgproc.hpp>
+#include <span>
+
+#include "capture/picture_decode.h"
 
 namespace relievo::v4l2 {
 namespace {
@@ -123,10 +123,6 @@ Status bayer_to_rgb(const RawView& raw, const RgbRows& out, int code) {
   return {};
 }
 
-struct TurboClose {
-  void operator()(void* handle) const { tjDestroy(handle); }
-};
-
 }  // namespace
 
 Status rgb24_to_rgb(const RawView& raw, const RgbRows& out) {
@@ -176,22 +172,13 @@ Status gbrg_to_rgb(const RawView& raw, const RgbRows& out) {
 }
 
 Status jpeg_to_rgb(const RawView& raw, const RgbRows& out) {
-  thread_local const std::unique_ptr<void, TurboClose> turbo(tjInitDecompress());
-  if (!turbo) return Error{"the JPEG decoder cannot be started: is memory short?"};
-  const auto damaged = [] { return Error{std::string("a damaged JPEG: ") + tjGetErrorStr2(turbo.get())}; };
-  const RawView::Plane& plane = raw.planes[0];
-  int width = 0, height = 0, subsampling = 0, colourspace = 0;
-  if (tjDecompressHeader3(turbo.get(), plane.data, plane.bytes, &width, &height, &subsampling,
-                          &colourspace) != 0)
-    return damaged();
-  if (width != raw.width || height != raw.height)
-    return Error{"a JPEG of " + std::to_string(width) + "x" + std::to_string(height) + " instead of " +
-                 std::to_string(raw.width) + "x" + std::to_string(raw.height)};
-  // A warning is damage too: the rest of such a picture is grey.
-  if (tjDecompress2(turbo.get(), plane.data, plane.bytes, out.data, width, static_cast<int>(out.stride),
-                    height, TJPF_RGB, TJFLAG_ACCURATEDCT) != 0)
-    return damaged();
-  return {};
+  const std::span file(raw.planes[0].data, raw.planes[0].bytes);
+  const auto size = jpeg_size(file);
+  if (!size) return size.error().in("a JPEG");
+  if (*size != JpegSize{raw.width, raw.height})
+    return Error{"a JPEG of " + std::to_string(size->width) + "x" + std::to_string(size->height) +
+                 " instead of " + std::to_string(raw.width) + "x" + std::to_string(raw.height)};
+  return decode_jpeg(file, *size, out.data, out.stride);
 }
 
 }  // namespace relievo::v4l2

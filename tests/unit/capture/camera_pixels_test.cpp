@@ -5,11 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <random>
 #include <vector>
 
+#include "base/stream.h"
 #include "capture/source/v4l2/capture_format.h"
 #include "capture/source/v4l2/raw_picture.h"
+#include "tests/support/make_surface.h"
 
 namespace relievo::v4l2 {
 namespace {
@@ -199,21 +203,80 @@ TEST(Coding, IsWhatTheDriverStates) {
   EXPECT_FALSE(coding_of(V4L2_COLORSPACE_SRGB, V4L2_YCBCR_ENC_BT2020_CONST_LUM, 0, true));
 }
 
-TEST(Jpeg, HostileBytesAreDamage) {
-  CaptureFormat format;
-  format.pixels = pixel_format(std::string_view("MJPEG"));
-  format.width = 16;
-  format.buffer_height = 16;
-  Image8 out(16, 16, 3);
-  std::mt19937 random(3);
-  for (std::size_t size = 0; size < 300; ++size) {
-    std::vector<std::uint8_t> bytes(size);
-    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
-    if (size > 3) bytes[0] = 0xff, bytes[1] = 0xd8, bytes[2] = 0xff;
+class Jpeg : public testing::Test {
+ protected:
+  static constexpr int kWidth = 40, kHeight = 24;
+
+  Jpeg() {
+    format_.pixels = pixel_format(std::string_view("MJPEG"));
+    format_.width = kWidth;
+    format_.buffer_height = kHeight;
+  }
+  /// As many cameras give it: in many parts.
+  static Bytes coded() {
+    const Image8 picture = test::picture(kWidth, kHeight);
+    const cv::Mat rgb(kHeight, kWidth, CV_8UC3, const_cast<std::uint8_t*>(picture.data()));
+    Bytes out;
+    EXPECT_TRUE(cv::imencode(".jpg", rgb, out, {cv::IMWRITE_JPEG_RST_INTERVAL, 1}));
+    return out;
+  }
+  /// Nothing where it is damaged.
+  std::optional<Bytes> read(const Bytes& bytes) const {
+    Image8 out(kWidth, kHeight, 3);
     Filled filled;
     filled.planes[0] = {bytes.data(), bytes.size(), bytes.size()};
-    EXPECT_FALSE(write_picture(filled, format, {.picture = &out})) << size;
+    if (!write_picture(filled, format_, {.picture = &out})) return std::nullopt;
+    return Bytes(out.data(), out.data() + out.size());
   }
+
+  CaptureFormat format_;
+};
+
+TEST_F(Jpeg, HostileBytesAreDamage) {
+  std::mt19937 random(3);
+  for (std::size_t size = 0; size < 300; ++size) {
+    Bytes bytes(size);
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+    if (size > 3) bytes[0] = 0xff, bytes[1] = 0xd8, bytes[2] = 0xff;
+    EXPECT_FALSE(read(bytes)) << size;
+  }
+}
+
+TEST_F(Jpeg, ADamagedOneSpoilsNoneBehindIt) {
+  const Bytes whole = coded();
+  const auto expected = read(whole);
+  ASSERT_TRUE(expected);
+  std::mt19937 random(4);
+  for (std::size_t i = 2; i < whole.size(); ++i) {
+    Bytes cut = whole, changed = whole;
+    cut.resize(i);
+    changed[i] = static_cast<std::uint8_t>(random());
+    read(cut);
+    read(changed);
+    ASSERT_EQ(read(whole), expected) << "cut or changed at byte " << i;
+  }
+}
+
+/// Logitech's, for example, in most pictures.
+TEST_F(Jpeg, BytesTooManyBetweenItsPartsAreNoDamage) {
+  const Bytes whole = coded();
+  const auto expected = read(whole);
+  ASSERT_TRUE(expected);
+  int parts = 0;
+  for (std::size_t i = 2; i + 1 < whole.size(); ++i) {
+    const bool ends_part = whole[i] == 0xff && whole[i + 1] >= 0xd0 && whole[i + 1] <= 0xd9;
+    if (!ends_part) continue;
+    Bytes longer = whole;
+    longer.insert(longer.begin() + static_cast<std::ptrdiff_t>(i), 12, 0);
+    EXPECT_EQ(read(longer), expected) << "before marker " << int{whole[i + 1]};
+    ++parts;
+  }
+  EXPECT_GT(parts, 3);
+}
+
+TEST_F(Jpeg, WhatEndsEarlyIsDamage) {
+  const Bytes whole = coded();
+  EXPECT_FALSE(read({whole.begin(), whole.end() - 40}));
 }
 
 }  // namespace

@@ -140,10 +140,10 @@ TEST_F(PictureFile, AJpegThatIsCutShortIsRefusedInOneLine) {
 }
 
 /// As some cameras write them.
-TEST_F(PictureFile, AJpegWithAByteTooManyIsRead) {
+TEST_F(PictureFile, AJpegWithBytesTooManyIsRead) {
   const Bytes whole = encoded(".jpg");
   Bytes longer = whole;
-  longer.insert(longer.end() - 2, 0);  // before the end's marker
+  longer.insert(longer.end() - 2, 12, 0);  // before the end's marker
   const auto expected = read(whole), picture = read(longer);
   ASSERT_TRUE(expected.ok() && picture.ok()) << picture.error().message;
   EXPECT_TRUE(std::equal(picture->data(), picture->data() + picture->size(), expected->data()));
