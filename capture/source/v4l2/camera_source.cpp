@@ -70,17 +70,18 @@ class CameraSource final : public FieldSource {
       }
       if (const Status signal = look_at_signal(); !signal) return signal.error();
       const auto filled = session_->stream->take(kWait_ms);
-      if (!filled) {
-        if (!session_->stream->ended()) {
-          if (const Status heard = look_at_silence(); !heard) return heard.error();
-          continue;
-        }
+      if (!filled && session_->stream->ended()) {
         if (const Status goes_on = after_the_end(); !goes_on) return goes_on.error();
         continue;
       }
-      restarts_in_a_row_ = 0;
-      silent_since_ns_.reset();
-      if (auto frame = consume(*filled)) return frame;
+      if (filled) {
+        restarts_in_a_row_ = 0;
+        if (auto frame = consume(*filled)) {
+          silence_.reset();
+          return frame;
+        }
+      }
+      if (const Status heard = look_at_silence(filled.has_value()); !heard) return heard.error();
     }
     return std::optional<CapturedFrame>{};
   }
@@ -96,14 +97,14 @@ class CameraSource final : public FieldSource {
       return frame;
     }
     if (filled.damaged) {
-      ++counts_.damaged_pictures;
+      note_damage("the driver says");
     } else {
       const Place place = assembler_.place({filled.sequence, filled.field, start_of(filled)});
       if (place.picture != nullptr) {
-        if (write_picture(filled, format_, place)) {
+        if (const Status written = write_picture(filled, format_, place); written) {
           frame = assembler_.finish();
         } else {
-          ++counts_.damaged_pictures;
+          note_damage(written.error().message);
         }
       }
     }
@@ -136,18 +137,35 @@ class CameraSource final : public FieldSource {
     return {};
   }
 
-  /// Fails once when the camera has given nothing for long, though nothing says that it does not work.
-  Status look_at_silence() {
+  void note_damage(const std::string& what) {
+    ++counts_.damaged_pictures;
+    damage_ = what;
+  }
+
+  /// Fails once when there has been no frame for long, though nothing says that the camera does not work.
+  Status look_at_silence(bool picture_came) {
     const std::int64_t now = io_.monotonic_ns();
-    if (!silent_since_ns_) {
-      silent_since_ns_ = now;
-      silence_told_ = false;
+    if (no_signal_) {
+      silence_.reset();
+      return {};
     }
+    if (!silence_) silence_ = {.since_ns = now, .damaged_before = counts_.damaged_pictures};
+    silence_->pictures += picture_came;
     const std::int64_t most = std::max(kSilent_ns, kSilentPictures * format_.picture_ns);
-    if (no_signal_ || silence_told_ || now - *silent_since_ns_ < most) return {};
-    silence_told_ = true;
-    return Error{path_ + ": no picture for " + std::to_string(most / 1'000'000'000) +
-                 " s; capture goes on when one comes: does it wait for a trigger, or hang?"};
+    if (silence_->told || now - silence_->since_ns < most) return {};
+    silence_->told = true;
+    const std::string lasted = std::to_string(most / 1'000'000'000) + " s";
+    if (silence_->pictures == 0)
+      return Error{path_ + ": no picture for " + lasted +
+                   "; capture goes on when one comes: does it wait for a trigger, or hang?"};
+    const std::uint64_t damaged = counts_.damaged_pictures - silence_->damaged_before;
+    const std::string what =
+        path_ + ": no frame for " + lasted + ": of " + std::to_string(silence_->pictures) + " pictures ";
+    if (damaged == 0)
+      return Error{what +
+                   "none is followed by its other half: is every second one lost? Ask for a lower --rate"};
+    return Error{what + std::to_string(damaged) + " are damaged (" + damage_ +
+                 "): try another --format, --size or cable"};
   }
 
   /// Streaming ended by itself: starts it again where that can be, and fails where the camera is gone.
@@ -184,7 +202,7 @@ class CameraSource final : public FieldSource {
     assembler_.restart();
     look_again_ns_ = 0;
     no_signal_ = false;
-    silent_since_ns_.reset();
+    silence_.reset();
     ++counts_.reconnects;
     return {};
   }
@@ -209,8 +227,14 @@ class CameraSource final : public FieldSource {
   std::int64_t last_time_ns_ = 0;
   std::int64_t look_again_ns_ = 0;  // at the signal
   bool no_signal_ = false;
-  std::optional<std::int64_t> silent_since_ns_;
-  bool silence_told_ = false;
+  /// Since the last frame.
+  struct Silence {
+    std::int64_t since_ns = 0;
+    std::uint64_t pictures = 0, damaged_before = 0;
+    bool told = false;
+  };
+  std::optional<Silence> silence_;
+  std::string damage_;  // of the last damaged picture
   int restarts_in_a_row_ = 0;
 };
 

@@ -404,6 +404,41 @@ TEST(CameraSource, ACameraThatGivesNothingIsSaidOnce) {
   EXPECT_SAYS(failure(*source), "no picture for 5 s");  // another time
 }
 
+TEST(CameraSource, ACameraWhosePicturesMakeNoFrameIsSaidOnce) {
+  FakeCamera camera;
+  const auto source = open(camera);
+  camera.film(0, 2);
+  EXPECT_EQ(next(*source).number, 0u);
+  camera.film(2, 1500);  // 15 s
+  for (auto shot = camera.shots.begin(); shot != camera.shots.end(); ++shot) shot->short_by = 1;
+  const std::string damaged = failure(*source);
+  // The other half of one that is damaged is not looked at.
+  EXPECT_SAYS(damaged,
+              "/dev/video0: no frame for 5 s: of 501 pictures 250 are damaged (a buffer of 95 bytes");
+  EXPECT_LT(camera.now_ns, 8'000'000'000);
+  camera.film(1502, 2);
+  EXPECT_EQ(next(*source).number, 751u);
+
+  for (std::uint32_t i = 0; i < 750; ++i) camera.film(1504 + 2 * i, 1);
+  const std::string unpaired = failure(*source);
+  EXPECT_SAYS(unpaired, " pictures none is followed by its other half");
+  camera.film(3004, 2);
+  EXPECT_EQ(next(*source).number, 1502u);
+}
+
+TEST(CameraSource, NoFrameIsAskedForWhileThereIsNoSignal) {
+  FakeCamera camera;
+  camera.input_status = V4L2_IN_ST_NO_SIGNAL;
+  const auto source = open(camera);
+  EXPECT_SAYS(failure(*source), "no signal");
+  camera.film(0, 800);  // noise
+  camera.on_idle = [&] {
+    camera.input_status = 0;
+    if (camera.now_ns > 12'000'000'000) camera.film(800, 2);
+  };
+  EXPECT_EQ(next(*source).picture.row(0)[0], 800 % 256);
+}
+
 TEST(CameraSource, StopEndsAWaitAndStaysTheEnd) {
   FakeCamera camera;
   const auto source = open(camera);
