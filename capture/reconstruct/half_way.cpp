@@ -78,7 +78,7 @@ void HalfWay::place_line(const DecodedGrid& grid, int line, DecodedGrid& out) {
 }
 
 bool HalfWay::place(const DecodedGrid& now, std::int64_t time_ns, std::int64_t longest_ns, DecodedGrid& out) {
-  const bool follows = time_ns_ != 0 && time_ns > time_ns_ && time_ns - time_ns_ <= longest_ns;
+  const bool follows = time_ns_ && time_ns > *time_ns_ && time_ns - *time_ns_ <= longest_ns;
   if (follows)
     for (int line = 0; line < now.lines(); ++line) place_line(now, line, out);
   before_ = now;

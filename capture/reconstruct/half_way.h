@@ -16,8 +16,8 @@ class HalfWay {
  public:
   HalfWay(int boundaries, int lines);
 
-  /// Of the frame before; 0: there is none yet.
-  std::int64_t time_ns() const { return time_ns_; }
+  /// Of the frame before, if there is one.
+  std::optional<std::int64_t> time_ns() const { return time_ns_; }
 
   /// `out` becomes the boundaries half way between a frame's and those of the frame before: half way between
   /// their columns where both frames have them, and as their neighbours go where one has, unless
@@ -33,7 +33,7 @@ class HalfWay {
   void place_line(const DecodedGrid& now, int line, DecodedGrid& out);
   std::optional<float> went(const DecodedGrid& now, int line, int boundary) const;
 
-  std::int64_t time_ns_ = 0;
+  std::optional<std::int64_t> time_ns_;
   DecodedGrid before_;
   std::vector<Column> columns_;  // a line's that both frames have, left to right
 };

@@ -244,11 +244,11 @@ void Reconstructor::State::make_texture(const CapturedFrame& frame, Image8& out)
 /// one's. Nothing where a frame was lost between.
 std::optional<Frame3D> Reconstructor::State::surface_between(const CapturedFrame& frame) {
   const std::int64_t frame_ns = std::llround(1e9 / rig.frame_rate);
-  const std::int64_t time_ns = half_way.time_ns();
+  const std::optional<std::int64_t> before_ns = half_way.time_ns();
   if (!half_way.place(decoded, frame.time_ns, frame_ns * 3 / 2, decoded_between)) return std::nullopt;
   Frame3D out = blank_frame();
   out.number = frame.number;
-  out.time_ns = time_ns + (frame.time_ns - time_ns) / 2;
+  out.time_ns = *before_ns + (frame.time_ns - *before_ns) / 2;
   out.between = true;
   second_half_way(second_before, decoder.second_places(), second_between);
   make_surface(decoded_between, second_between, out.surface);

@@ -100,6 +100,14 @@ TEST_F(HalfWayTest, NorWhatNothingTellsTheWayOf) {
   EXPECT_FALSE(at(out, 5, 8));
 }
 
+TEST_F(HalfWayTest, TheFirstFrameMayBeOfTime0) {
+  DecodedGrid frame = blank(), out = blank();
+  add(frame, 0, 9, 0);
+  EXPECT_FALSE(half_way_.place(frame, 0, kFrame_ns * 3 / 2, out));
+  EXPECT_TRUE(half_way_.place(frame, kFrame_ns, kFrame_ns * 3 / 2, out));
+  EXPECT_EQ(known(out), 10 * kLines);
+}
+
 TEST_F(HalfWayTest, OverALostFrameNothingIsPlaced) {
   DecodedGrid frame = blank(), out = blank();
   add(frame, 0, 9, 0);
