@@ -273,6 +273,11 @@ Result<Reconstructor> Reconstructor::create(const Rig& rig, const Pattern& patte
                  " slides; two frames in a row decode one or two: use a pattern with slides: 2"};
   }
   if (pattern.stripes() < 2) return Error{"the pattern has no boundary: it needs two stripes or more"};
+  if (pattern.stripes() > rig.projector.width) {
+    return Error{"the pattern has " + std::to_string(pattern.stripes()) +
+                 " stripes and the rig's projector " + std::to_string(rig.projector.width) +
+                 " columns: are they of one rig?"};
+  }
   if (auto status = check_lines(options.line_stride); !status) return status.error();
   if (pattern.scheme == Scheme::kOneSlide && options.decoder == Decoder::kPaper) {
     return Error{

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "capture/evaluate/score.h"
+#include "capture/pattern/repeating.h"
 #include "capture/reconstruct/detection_lines.h"
 #include "tests/support/striped_scene.h"
 
@@ -275,6 +276,17 @@ TEST(Reconstructor, RefusesPatternsItCannotDecode) {
   scene = test::striped_scene();
   scene.pattern.sequence.resize(1);
   EXPECT_FALSE(Reconstructor::create(scene.rig, scene.pattern, {}));
+}
+
+TEST(Reconstructor, RefusesAPatternOfAnotherProjector) {
+  StripedScene scene = test::striped_scene();
+  scene.pattern = *make_repeating_pattern(6, 0, scene.rig.projector.width + 1);
+  const auto made = Reconstructor::create(scene.rig, scene.pattern, {});
+  ASSERT_FALSE(made.ok());
+  EXPECT_EQ(made.error().message,
+            "the pattern has 257 stripes and the rig's projector 256 columns: are they of one rig?");
+  scene.pattern = *make_repeating_pattern(6, 0, scene.rig.projector.width);
+  EXPECT_TRUE(Reconstructor::create(scene.rig, scene.pattern, {}).ok());
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ReconstructorTest,
