@@ -123,7 +123,7 @@ void GridEstimator::add_neighbours(const StripeGrid& grid, int lines_apart, int 
   const auto stride = static_cast<std::size_t>(grid.stride());
   const auto away =
       static_cast<std::size_t>(lines_apart) * stride + static_cast<std::size_t>(boundaries_apart);
-  const std::size_t begin = std::max(away, stride), end = column_.size() - away;
+  const std::size_t begin = std::max(away, stride), end = column_.size() - std::min(away, column_.size());
   std::ranges::fill(count_, 0.F);
   std::ranges::fill(squares_, 0.F);
   const auto difference = [&](std::size_t i) {

@@ -116,6 +116,23 @@ TEST(GridEstimator, NothingIsSmoothedAcrossADepthStep) {
   }
 }
 
+TEST(GridEstimator, APictureMayHaveFewLines) {
+  for (const int lines : {1, 2, 3, 4, 8}) {
+    const test::GridScene scene{.height = 2 * lines};
+    const GridCalibration calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
+    const Frame3D frame = test::grid_frame(scene);
+    GridEstimator estimator;
+    StripeGrid grid;
+    std::vector<std::uint8_t> tolerance;
+    ASSERT_TRUE(to_grid(frame.surface, calibration, {.step_bits = kStepBits}, grid).ok());
+    estimator.estimate(frame.surface, grid, tolerance);
+    for (const GridPoint& p : frame.surface.grid)
+      EXPECT_NEAR(static_cast<float>(grid.columns[grid.at(p.line, p.boundary)]) / (1 << kStepBits),
+                  p.column_px, 0.3F)
+          << lines;
+  }
+}
+
 TEST(GridEstimator, StartsAnewOnAnotherGridAndWhenToldTo) {
   const test::GridScene scene;
   const GridCalibration calibration = grid_calibration(test::grid_rig(scene), test::grid_pattern(scene));
