@@ -327,6 +327,7 @@ Status run(const Options& options, StopSignal& stop) {
 
   Judges judges{Scorer(reconstructor->rig(), reconstructor->pattern())};
   if (!options.pictures.empty()) {
+    if (const Status apart = check_apart(options.pictures, options.take); !apart) return apart;
     auto made = EvaluationPictures::create(options.pictures, reconstructor->rig(), reconstructor->pattern());
     if (!made) return made.error();
     judges.pictures = *std::move(made);

@@ -188,6 +188,9 @@ Status run(const Options& options, StopSignal& stop) {
                                               .line_stride = options.line_stride,
                                               .surface = options.surface});
   if (!reconstructor) return reconstructor.error();
+  if (uri.starts_with(kTake)) {
+    if (const Status apart = check_apart(options.out, uri.substr(kTake.size())); !apart) return apart;
+  }
   std::error_code failed;
   const bool made = fs::create_directories(options.out, failed);
   if (failed) return Error{"cannot make the folder " + options.out + ": " + failed.message()};

@@ -57,6 +57,15 @@ std::filesystem::path take_truth(const std::filesystem::path& take, std::uint64_
   return take / "truth" / numbered(number, ".npy");
 }
 
+Status check_apart(const std::filesystem::path& folder, const std::filesystem::path& take) {
+  for (const char* part : {"", "frames", "truth"}) {
+    std::error_code not_there;
+    if (std::filesystem::equivalent(folder, take / part, not_there))
+      return Error{folder.string() + " holds the take's own files: give the results a folder of their own"};
+  }
+  return {};
+}
+
 Result<std::vector<TakeStamp>> read_timestamps(const std::filesystem::path& file) {
   const std::string name = file.string();
   const auto text = read_whole_file(file, kMostTimestampBytes);

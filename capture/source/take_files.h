@@ -21,6 +21,10 @@ struct TakeStamp {
 std::filesystem::path take_picture(const std::filesystem::path& take, std::uint64_t number);
 std::filesystem::path take_truth(const std::filesystem::path& take, std::uint64_t number);
 
+/// Fails where results for `folder` would lie among the take's own files: that is the take, or its frames/ or
+/// truth/.
+Status check_apart(const std::filesystem::path& folder, const std::filesystem::path& take);
+
 /// At least one line; frames and times strictly increasing. Errors name the file and the line.
 Result<std::vector<TakeStamp>> read_timestamps(const std::filesystem::path& file);
 

@@ -229,6 +229,21 @@ TEST_F(ServerFault, AFileWhereAFolderShouldBe) {
   EXPECT_EQ(read_text(out_), "mine\n");
 }
 
+TEST_F(ServerFault, ResultsAreNotPutAmongTheTakesOwnFiles) {
+  const fs::path link = folder_ / "link";
+  fs::create_directory_symlink(take_, link);
+  const std::set<std::string> before = names_in(take_);
+  for (const std::string& out : {take_.string(), take_.string() + "/.", link.string(),
+                                 (take_ / "frames").string() + "/", (take_ / "truth").string()}) {
+    for (const std::string& take : {take_.string(), "take:" + take_.string()})
+      expect_one_error(run(server({"reconstruct", take, "--out", out})), out + " holds the take's own files");
+    expect_one_error(run(server({"evaluate", take_.string(), "--pictures", out})), "the take's own files");
+  }
+  EXPECT_EQ(names_in(take_), before);
+  EXPECT_EQ(names_in(take_ / "frames").size(), 12U);
+  EXPECT_EQ(run(server({"reconstruct", take_.string(), "--out", (take_ / "surfaces").string()})).status, 0);
+}
+
 TEST_F(ServerFault, SurfacesOfAnEarlierRunAreReplacedOrSpokenOf) {
   const auto reconstruct = [&] {
     return run(server({"reconstruct", take_.string(), "--out", out_.string()}));
