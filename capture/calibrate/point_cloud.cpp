@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -17,6 +16,8 @@ namespace relievo {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kMostBytes = std::size_t{1} << 33;  // of hundreds of millions of points
 
 struct Property {
   std::string type, name;
@@ -207,8 +208,9 @@ float median(std::vector<float> values) {
 }  // namespace
 
 Result<PointCloud> read_ply_points(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return Error{file.string() + " cannot be opened"};
+  auto content = read_whole_file(file, kMostBytes);
+  if (!content) return content.error();
+  std::istringstream in(*std::move(content));
   auto cloud = read_points(in);
   if (!cloud) return cloud.error().in(file.string());
   return cloud;

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <string>
 
 #include "base/whole_file.h"
@@ -16,40 +15,34 @@ static_assert(std::endian::native == std::endian::little, "truth is written as i
 
 constexpr char kMagic[] = "\x93NUMPY\x01";  // and a zero: version 1.0
 constexpr std::size_t kPreamble = 10;       // magic, version, length of the header
+constexpr std::size_t kMostBytes = (std::size_t{1} << 30) + (1 << 17);  // of the largest picture
 
 }  // namespace
 
 Result<ImageF> read_npy(const std::filesystem::path& file) {
   const std::string name = file.string();
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return Error{name + " cannot be opened"};
-  char preamble[kPreamble];
-  if (!in.read(preamble, kPreamble) || std::memcmp(preamble, kMagic, 8) != 0) {
+  const auto content = read_whole_file(file, kMostBytes);
+  if (!content) return content.error();
+  if (content->size() < kPreamble || std::memcmp(content->data(), kMagic, 8) != 0) {
     return Error{name + " is no .npy file of version 1.0"};
   }
   const auto byte = [&](std::size_t i) {
-    return static_cast<std::size_t>(static_cast<unsigned char>(preamble[i]));
+    return static_cast<std::size_t>(static_cast<unsigned char>((*content)[i]));
   };
-  std::string header(byte(8) + 256 * byte(9), '\0');
-  if (!in.read(header.data(), static_cast<std::streamsize>(header.size())))
-    return Error{name + " is cut short"};
+  const std::string header = content->substr(kPreamble, byte(8) + 256 * byte(9));
   const std::size_t shape = header.find("'shape': (");
   int height = 0, width = 0, used = 0;
   if (header.find("'<f4'") == std::string::npos ||
       header.find("'fortran_order': False") == std::string::npos || shape == std::string::npos ||
       std::sscanf(header.c_str() + shape, "'shape': (%d, %d)%n", &height, &width, &used) != 2 || used == 0 ||
-      height <= 0 || width <= 0 || height > 1 << 16 || width > 1 << 16) {
+      height <= 0 || width <= 0 || height > 1 << 14 || width > 1 << 14) {
     return Error{name + " must hold float32 of shape (height, width) in C order"};
   }
-  std::error_code code;
+  const std::size_t at = kPreamble + header.size();
   const auto bytes = static_cast<std::uintmax_t>(height) * static_cast<std::uintmax_t>(width) * sizeof(float);
-  if (std::filesystem::file_size(file, code) != kPreamble + header.size() + bytes || code) {
-    return Error{name + " does not have the size that its header says"};
-  }
+  if (content->size() - at != bytes) return Error{name + " does not have the size that its header says"};
   ImageF image(width, height, 1);
-  if (!in.read(reinterpret_cast<char*>(image.data()), static_cast<std::streamsize>(bytes))) {
-    return Error{name + " is cut short"};
-  }
+  std::memcpy(image.data(), content->data() + at, content->size() - at);
   return image;
 }
 

@@ -11,12 +11,14 @@
 #include <optional>
 #include <sstream>
 
+#include "base/whole_file.h"
 #include "capture/picture_file.h"
 
 namespace relievo::sim {
 namespace {
 
 constexpr std::size_t kMost = 100'000'000;  // vertices or triangles: more is a damaged count
+constexpr std::size_t kMostBytes = std::size_t{1} << 35;
 
 /// Thrown only within this file.
 struct Bad {
@@ -289,13 +291,10 @@ Result<MeshFile> read_mesh(const std::filesystem::path& file) {
                  [](unsigned char c) { return std::tolower(c); });
   if (extension != ".ply" && extension != ".obj")
     return Error{name + " is no mesh: give a .ply or .obj file"};
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(file, code)) return Error{name + " is missing"};
-  std::ifstream in(file, std::ios::binary);
-  const std::string content{std::istreambuf_iterator<char>(in), {}};
-  if (!in) return Error{name + " cannot be read"};
+  const auto content = read_whole_file(file, kMostBytes);
+  if (!content) return content.error();
   try {
-    MeshFile mesh = extension == ".ply" ? read_ply(content) : read_obj(content, file.parent_path());
+    MeshFile mesh = extension == ".ply" ? read_ply(*content) : read_obj(*content, file.parent_path());
     if (mesh.colours.size() != mesh.positions.size()) mesh.colours.clear();
     check(mesh);
     return mesh;

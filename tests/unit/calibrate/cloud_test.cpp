@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <fstream>
@@ -88,6 +89,12 @@ TEST(PointCloud, PointsThatAreNoneAreSkipped) {
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->positions, (std::vector<Vec3f>{{1, 2, 3}, {4, 5, 6}}));
   EXPECT_EQ(read->colours, (std::vector<std::array<std::uint8_t, 3>>{{1, 1, 1}, {3, 3, 3}}));
+}
+
+TEST(PointCloud, APipeIsRefusedWithoutWaiting) {
+  const TempFolder folder;
+  ASSERT_EQ(mkfifo((folder / "pipe.ply").c_str(), 0600), 0);
+  EXPECT_THAT(read_ply_points(folder / "pipe.ply").error().message, testing::HasSubstr("it is a pipe"));
 }
 
 TEST(PointCloud, HostilePlyIsAnError) {

@@ -217,6 +217,14 @@ TEST(TakeSource, OpeningNamesWhatIsMissing) {
   EXPECT_THAT(open_source("video:x", {}).error().message, HasSubstr("take:DIR"));
 }
 
+TEST(Npy, APipeOrAFolderInItsPlaceIsSaid) {
+  test::TempFolder folder;
+  ASSERT_EQ(mkfifo((folder.path() / "pipe.npy").c_str(), 0600), 0);
+  EXPECT_THAT(read_npy(folder.path() / "pipe.npy").error().message, HasSubstr("pipe.npy: it is a pipe"));
+  std::filesystem::create_directory(folder.path() / "folder.npy");
+  EXPECT_THAT(read_npy(folder.path() / "folder.npy").error().message, HasSubstr("it is a folder"));
+}
+
 TEST(Npy, ReadsBackAndRefusesOtherFiles) {
   test::TempFolder folder;
   const auto file = folder.path() / "a.npy";
