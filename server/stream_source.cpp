@@ -134,9 +134,9 @@ Result<std::unique_ptr<FieldSource>> open_calibration_source(const StreamConfig&
   }
   const auto comma = config.source.find(',');
   const std::string keys = comma == std::string::npos ? "" : config.source.substr(comma);
-  // Poses enough for a calibration; a key said twice is the last one's.
+  const std::string poses = keys.find(",period=") == std::string::npos ? ",period=240" : "";  // enough
   const std::string uri =
-      kind == CalibrationKind::kColour ? "sim:sheet" + keys : "sim:board:" + board + ",period=240" + keys;
+      kind == CalibrationKind::kColour ? "sim:sheet" + keys : "sim:board:" + board + poses + keys;
   return open_source(uri, {.loop = true});
 }
 

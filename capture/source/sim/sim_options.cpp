@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <set>
 #include <string_view>
 #include <variant>
 
@@ -132,8 +133,7 @@ std::size_t end_of_scene(const std::string& spec) {
 
 Result<SimOptions> parse_sim_options(const std::string& spec) {
   SimOptions options;
-  bool slides_given = false;
-  bool period_given = false;
+  std::set<std::string> given;
   std::size_t at = end_of_scene(spec);
   options.scene = spec.substr(0, at);
   while (at != std::string::npos) {
@@ -142,15 +142,13 @@ Result<SimOptions> parse_sim_options(const std::string& spec) {
     const std::size_t equals = item.find('=');
     if (equals == std::string::npos)
       return Error{"\"" + item + "\" is no key=value; keys are " + key_names()};
-    if (const Status status = set(options, item.substr(0, equals), item.substr(equals + 1)); !status) {
-      return status.error();
-    }
-    slides_given = slides_given || item.starts_with("slides=");
-    period_given = period_given || item.starts_with("period=");
+    const std::string name = item.substr(0, equals);
+    if (!given.insert(name).second) return Error{name + " is given twice"};
+    if (const Status status = set(options, name, item.substr(equals + 1)); !status) return status.error();
     at = end;
   }
   if (options.scheme == Scheme::kOneSlide) {
-    if (slides_given && options.slides != 1)
+    if (given.contains("slides") && options.slides != 1)
       return Error{"slides=" + std::to_string(options.slides) + ": scheme=one-slide has one"};
     options.slides = 1;
   }
@@ -159,7 +157,7 @@ Result<SimOptions> parse_sim_options(const std::string& spec) {
                  " at least to either side"};
   const bool white_frame = options.scheme == Scheme::kWhiteFrame;
   const int cycle = options.slides + (white_frame ? 1 : 0);
-  if (white_frame && !period_given) options.period = kWhiteFramePeriod / cycle * cycle;
+  if (white_frame && !given.contains("period")) options.period = kWhiteFramePeriod / cycle * cycle;
   if (options.period % cycle != 0 || options.period % 2 != 0) {
     return Error{"period=" + std::to_string(options.period) + ": give an even number that " +
                  (white_frame ? "slides + 1 (scheme=white-frame) = " : "slides=") + std::to_string(cycle) +

@@ -110,6 +110,8 @@ TEST(SimOptions, EveryRefusalSaysWhatIsValid) {
       {"face,stripes=900", "stripes=900: give at most half"},
       {"face,stripes=500,first=600", "900"},
       {"face,path=short", "give clear or paper"},
+      {"face,width=320,noise=1,width=640", "width is given twice"},
+      {"face,scheme=one-slide,scheme=one-slide", "scheme is given twice"},
       {"mesh:nothing.ply", "nothing.ply is missing"},
       {"mesh:nothing.stl", "give a .ply or .obj file"},
   };

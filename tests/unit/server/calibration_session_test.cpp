@@ -35,9 +35,9 @@ class FakeStreams final : public StreamPauses {
 
 class CalibrationSessionTest : public testing::Test {
  protected:
-  std::unique_ptr<CalibrationSession> start(const std::string& kind, const std::string& keys = "") {
+  std::unique_ptr<CalibrationSession> start(const std::string& kind, const std::string& keys = ",rate=60") {
     StreamConfig config;
-    config.source = "sim:object,width=160,height=120,scan=progressive,stripes=24,rate=60" + keys;
+    config.source = "sim:object,width=160,height=120,scan=progressive,stripes=24" + keys;
     config.camera.rig = rig_.string();
     return std::make_unique<CalibrationSession>(
         place_, config, CalibrationOrder{"start", "face", kind, "chessboard:5x4:50mm"});
@@ -79,7 +79,7 @@ TEST_F(CalibrationSessionTest, ColoursAreTakenAndKept) {
 }
 
 TEST_F(CalibrationSessionTest, TooMuchLightIsSaid) {
-  const auto session = start("colour", ",exposure=4");
+  const auto session = start("colour", ",rate=60,exposure=4");
   ASSERT_TRUE(reaches(*session, CalibrationPhase::kWatching));
   ASSERT_TRUE(session->order("take"));
   ASSERT_TRUE(eventually([&] { return !session->state().views.empty(); }));
@@ -99,7 +99,7 @@ TEST_F(CalibrationSessionTest, TooFewViewsAreNotCalculated) {
 
 TEST_F(CalibrationSessionTest, InTheDarkNothingIsTaken) {
   place_.rest_within = std::chrono::milliseconds(300);
-  const auto session = start("geometry", ",exposure=0.02");
+  const auto session = start("geometry", ",rate=60,exposure=0.02");
   ASSERT_TRUE(reaches(*session, CalibrationPhase::kWatching));
   ASSERT_TRUE(session->order("take"));
   ASSERT_TRUE(eventually([&] { return !session->state().message.empty(); }));
@@ -120,7 +120,7 @@ TEST_F(CalibrationSessionTest, WhereFramesComeSlowlyTimeAloneRefusesNothing) {
 }
 
 TEST_F(CalibrationSessionTest, AnOverexposedBoardIsNotUsed) {
-  const auto session = start("geometry", ",exposure=6");
+  const auto session = start("geometry", ",rate=60,exposure=6");
   ASSERT_TRUE(reaches(*session, CalibrationPhase::kWatching));
   ASSERT_TRUE(session->order("take"));
   ASSERT_TRUE(eventually([&] { return !session->state().views.empty(); }));
