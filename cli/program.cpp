@@ -16,6 +16,8 @@
 namespace relievo {
 namespace {
 
+constexpr std::size_t kMostOfALine = 2000;
+
 struct Verbosity {
   bool verbose = false;
   bool quiet = false;
@@ -32,12 +34,19 @@ void add_common_flags(CLI::App& app, Verbosity& verbosity) {
       "--version", [] { throw CLI::CallForVersion(RELIEVO_VERSION, 0); }, "Print the version and exit");
 }
 
+/// Of what is as long as a whole file, given for an argument, the start and the end.
 std::string one_line(std::string text) {
   while (!text.empty() && text.back() == '\n') text.pop_back();
   for (char& c : text) {
     if (c == '\n') c = ' ';
   }
-  return text;
+  if (text.size() <= kMostOfALine) return text;
+  const auto whole_letters = [&](std::size_t at) {  // of UTF-8
+    while (at < text.size() && (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80) ++at;
+    return at;
+  };
+  const std::size_t cut = whole_letters(kMostOfALine / 2);
+  return text.replace(cut, whole_letters(text.size() - kMostOfALine / 2) - cut, " [...] ");
 }
 
 /// The one line that says what was not done, and who says it.

@@ -130,6 +130,22 @@ TEST(Program, WrongUsageIsExitTwoAndOneLine) {
   }
 }
 
+TEST(Program, OverlongArgumentsAreNotRepeatedWhole) {
+  std::string letters;
+  for (int i = 0; i < 50'000; ++i) letters += "\u00e9";
+  const auto commands =
+      one_command([&](int, StopSignal&) { return Status(Error{"no file " + letters + ": give another"}); });
+  for (const auto& [arguments, end] :
+       {std::pair<std::vector<std::string>, std::string>{{letters}, "--help)\n"},
+        {{"work", "--count", letters}, "--help)\n"},
+        {{"work"}, ": give another\n"}}) {
+    const auto o = run(commands, arguments);
+    EXPECT_LT(o.err.size(), 2200U);
+    EXPECT_THAT(o.err,
+                AllOf(testing::StartsWith("tool"), HasSubstr("\u00e9 [...] \u00e9"), testing::EndsWith(end)));
+  }
+}
+
 TEST(Program, ACommandWithinACommandIsNamedAndTakesTheCommonFlags) {
   const std::vector<Command> commands = {
       {"calibrate", "calibrates", [](CLI::App& app) {
