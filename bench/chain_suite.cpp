@@ -382,7 +382,7 @@ Command chain_suite() {
                 ->check(number(0.1, 86400))
                 ->capture_default_str();
             app.add_option("--frames", options->frames, "Camera frames, instead of --seconds")
-                ->check(CLI::PositiveNumber);
+                ->check(whole_number(1, 1'000'000));
             app.add_option("--domain", options->domain.domain, "DDS domain (default: one of its own)")
                 ->check(CLI::Range(0, 230));
             app.add_option("--interface", options->domain.interface,

@@ -12,6 +12,7 @@
 #include "bench/usage.h"
 #include "capture/reconstruct/quick_difference.h"
 #include "capture/reconstruct/quick_sequence.h"
+#include "cli/checks.h"
 #include "cli/size_option.h"
 #include "server/options.h"
 
@@ -176,7 +177,7 @@ Command reconstruct_suite() {
                 ->check(CLI::Range(2, 8192));
             add_threads_option(app, options->threads);
             app.add_option("--frames", options->frames, "Timed frames (default 100 and 3 s at least)")
-                ->check(CLI::PositiveNumber);
+                ->check(whole_number(1, 1'000'000));
             add_decoder_option(app, options->decoder);
             add_half_lines_option(app, options->line_stride);
             add_json_option(app, options->json);

@@ -266,7 +266,10 @@ TEST(Bench, FailuresAreOneLine) {
   EXPECT_THAT(missing.err, testing::HasSubstr("nowhere"));
   const Finished unknown = bench({"everything"});
   EXPECT_EQ(unknown.status, 2);
-  for (const Finished& f : {shaped, missing, unknown}) {
+  const Finished none = bench({"chain", "--frames", "0"});
+  EXPECT_EQ(none.status, 2);
+  EXPECT_THAT(none.err, testing::HasSubstr("no whole number from 1 to 1000000 "));
+  for (const Finished& f : {shaped, missing, unknown, none}) {
     EXPECT_EQ(f.out, "");
     EXPECT_EQ(std::count(f.err.begin(), f.err.end(), '\n'), 1) << f.err;
   }
