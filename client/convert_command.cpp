@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
@@ -245,10 +246,9 @@ void report(const Options& options, const Converted& converted, const RecordedSt
     std::puts(json_text(j).c_str());
     return;
   }
-  std::printf("%s: %llu frames\n", options.out.c_str(), static_cast<unsigned long long>(converted.frames));
+  std::printf("%s: %s\n", options.out.c_str(), counted(converted.frames, "frame").c_str());
   if (converted.unreadable > 0)
-    std::printf("%llu frames could not be decoded and were left out\n",
-                static_cast<unsigned long long>(converted.unreadable));
+    std::printf("%s could not be decoded: left out\n", counted(converted.unreadable, "frame").c_str());
 }
 
 Status run(const Options& options, StopSignal& stop) {

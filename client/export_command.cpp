@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
@@ -142,7 +143,8 @@ Status run(const Options& options, StopSignal& stop) {
   recorded->warn_if_cut();
   auto exported = export_frames(options, *recorded, stop);
   if (!exported) return exported.error();
-  const std::string written = std::to_string(exported->written) + " frames are in " + options.out.string();
+  const std::string written = counted(exported->written, "frame") + " " + is_or_are(exported->written) +
+                              " in " + options.out.string();
   if (exported->stopped) return Error{"stopped early: " + written};
   const LeftOut& left_out = exported->left_out;
   if (left_out.unreadable > 0) return Error{left_out.text() + "; the other " + written};

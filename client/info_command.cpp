@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
@@ -159,10 +160,10 @@ void print_info(const StreamInfo& info) {
               info.rig.camera.height, std::string(to_string(info.rig.scan)).c_str(), info.rig.frame_rate,
               info.rig.camera.fx());
   const auto& t = info.rig.projector_from_camera_translation;
-  std::printf("projector   %d x %d, %.3f m from the camera; %d stripes, base %d, %d slides\n",
+  std::printf("projector   %d x %d, %.3f m from the camera; %d stripes, base %d, %s\n",
               info.rig.projector.width, info.rig.projector.height,
               std::sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]), info.pattern.stripes(), info.pattern.base,
-              info.pattern.slides);
+              counted(static_cast<std::uint64_t>(info.pattern.slides), "slide").c_str());
 }
 
 void print_frames(const FrameTotals& totals) {
@@ -183,8 +184,8 @@ void print_frames(const FrameTotals& totals) {
                 joined(totals.texture_codecs).c_str(), totals.texture_width, totals.texture_height);
   }
   if (totals.unreadable > 0) {
-    std::printf("unreadable  %llu frames are of no format this version reads\n",
-                static_cast<unsigned long long>(totals.unreadable));
+    std::printf("unreadable  %s %s of no format this version reads\n",
+                counted(totals.unreadable, "frame").c_str(), is_or_are(totals.unreadable));
   }
 }
 
@@ -266,9 +267,9 @@ Status describe_file(const Options& options, StopSignal& stop) {
               utc_text(summary.start_ns).c_str(), duration_text(duration_s).c_str());
   for (std::size_t i = 0; i < infos->size(); ++i) {
     if (infos->size() > 1)
-      std::printf("session %-3zu from %.3f s on, %llu frames\n", i + 1,
+      std::printf("session %-3zu from %.3f s on, %s\n", i + 1,
                   seconds((*infos)[i].sample.receive_time_ns - summary.start_ns),
-                  static_cast<unsigned long long>(session_frames[i]));
+                  counted(session_frames[i], "frame").c_str());
     print_info((*infos)[i].info);
   }
   print_frames(totals);
@@ -286,8 +287,8 @@ Status describe_file(const Options& options, StopSignal& stop) {
   }
   for (const std::string& line : summary.damage) std::printf("damaged     %s\n", line.c_str());
   if (recorded->damaged() > 0) {
-    std::printf("damaged     %llu parts could not be read; `relievo recover` writes a copy without them\n",
-                static_cast<unsigned long long>(recorded->damaged()));
+    std::printf("damaged     %s could not be read; `relievo recover` writes a copy without\n",
+                counted(recorded->damaged(), "part").c_str());
   }
   return {};
 }

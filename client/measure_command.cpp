@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "cli/checks.h"
@@ -106,8 +107,8 @@ void print_text(const Options& options, const ShapeReport& r) {
     std::printf("sphere  radius %.3f mm (%.3f from frame to frame), centre %.2f %.2f %.2f mm\n",
                 r.size_m.median * 1e3, r.size_m.deviation * 1e3, r.centre_m[0].median * 1e3,
                 r.centre_m[1].median * 1e3, r.centre_m[2].median * 1e3);
-  std::printf("points  %.0f a frame, %llu frames; %.2f %% of the region has surface\n", r.points.median,
-              static_cast<unsigned long long>(r.frames), 100 * r.filled);
+  std::printf("points  %.0f a frame, %s; %.2f %% of the region has surface\n", r.points.median,
+              counted(r.frames, "frame").c_str(), 100 * r.filled);
   std::printf("error   RMS %.4f mm", r.rms_m.median * 1e3);
   if (r.expected_m) std::printf(" (%.4f by the points' own standard deviations)", r.expected_m->median * 1e3);
   std::printf(", 99.7 %% within %.4f mm, %.2f %% off it\n", r.span_m.median * 1e3, 100 * r.off.median);
@@ -136,7 +137,7 @@ Status run(const Options& options, StopSignal& stop) {
         " in the region: fewer than 50 points lie in it, or on no one shape. Give another --region; `relievo "
         "shot --view rig` shows the camera's picture"};
   if (report.without_shape > 0)
-    log_warning(std::to_string(report.without_shape) + " frames had no " + options.shape + " in the region");
+    log_warning(counted(report.without_shape, "frame") + " had no " + options.shape + " in the region");
   if (report.off.median > kMostOff)
     log_warning("much of what is in the region is no part of one " + options.shape + ": is --region on it?");
   if (!options.picture.empty()) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
@@ -40,7 +41,7 @@ void wait_for_readers(const Options& options, const RawPublisher& publisher, Sto
     const std::int64_t waited_ns = steady_now_ns() - start_ns;
     if (options.readers < 0 && waited_ns > kBriefWait_ns) return;
     if (!said && waited_ns > kBriefWait_ns) {
-      log_info("waiting for " + std::to_string(wanted) + " readers");
+      log_info("waiting for " + counted(static_cast<std::uint64_t>(wanted), "reader"));
       said = true;
     }
   }
@@ -95,7 +96,7 @@ Status run(const Options& options, StopSignal& stop) {
                                         {"damaged", recorded->damaged()}}))
                   .c_str());
   } else {
-    std::printf("%llu frames played\n", static_cast<unsigned long long>(frames));
+    std::printf("%s played\n", counted(frames, "frame").c_str());
   }
   return {};
 }

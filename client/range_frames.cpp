@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/counted.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -19,8 +20,9 @@ bool is_between(const FrameView& frame, const std::optional<RawSample>& followin
 
 std::string LeftOut::text() const {
   const std::string why =
-      unreadable > 0 ? first_problem : "the key frame that they build on is damaged, or not in the recording";
-  return std::to_string(frames()) + " frames could not be decoded and were left out: " + why;
+      unreadable > 0 ? first_problem : "the key frame before is damaged, or not in the recording";
+  return counted(frames(), "frame") + " could not be decoded and " + (frames() == 1 ? "was" : "were") +
+         " left out: " + why;
 }
 
 Result<RangeFrames> RangeFrames::open(RecordedStream& recorded, const TimeRange& range) {

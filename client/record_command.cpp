@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
@@ -112,13 +113,12 @@ void report(const Options& options, const Recorder& recorder) {
     std::string name = files.front().string();
     if (files.size() > 1)
       name += " to " + files.back().filename().string() + " (" + std::to_string(files.size()) + " files)";
-    std::printf("%s: %llu frames in %s, %s, %llu lost\n", name.c_str(),
-                static_cast<unsigned long long>(counts.frames), duration_text(counts.duration_s).c_str(),
-                bytes_text(counts.bytes).c_str(), static_cast<unsigned long long>(counts.lost));
+    std::printf("%s: %s in %s, %s, %llu lost\n", name.c_str(), counted(counts.frames, "frame").c_str(),
+                duration_text(counts.duration_s).c_str(), bytes_text(counts.bytes).c_str(),
+                static_cast<unsigned long long>(counts.lost));
     if (removed > 0)
-      std::printf(
-          "of these, what was in the first %llu files was removed, as --keep-size and --keep-for say\n",
-          static_cast<unsigned long long>(removed));
+      std::printf("of these, what was in the first %s was removed, as --keep-size and --keep-for say\n",
+                  removed == 1 ? "file" : counted(removed, "file").c_str());
   }
 }
 
@@ -147,14 +147,12 @@ Status run(Options options, StopSignal& stop) {
   if (!finished) {
     const std::string missed =
         counts.missed > 0 ? " and missed " + std::to_string(counts.missed) : std::string();
-    return finished.error().in("recording stopped after " + std::to_string(counts.frames) + " frames" +
-                               missed);
+    return finished.error().in("recording stopped after " + counted(counts.frames, "frame") + missed);
   }
   if (!watched) return watched;
   if (counts.lost > 0) {
-    log_warning(std::to_string(counts.lost) +
-                " frames were lost before they could be recorded: the network or the "
-                "disk was too slow");
+    log_warning(counted(counts.lost, "frame") + (counts.lost == 1 ? " was" : " were") +
+                " lost before recording: the network or the disk was too slow");
   }
   report(options, recorder);
   return {};

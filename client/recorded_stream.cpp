@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "base/counted.h"
 #include "base/log.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
@@ -55,7 +56,7 @@ std::string what_else(const RecordingSummary& summary) {
   }
   const std::size_t more = topics.size() > kMostTopics ? topics.size() - kMostTopics : 0;
   while (topics.size() > kMostTopics) topics.erase(std::prev(topics.end()));
-  return ", but " + joined(topics) + (more > 0 ? " and " + std::to_string(more) + " more topics" : "") +
+  return ", but " + joined(topics) + (more > 0 ? " and " + counted(more, "more topic") : "") +
          (of_ros
               ? ": it is a bag of ROS 2, for `ros2 bag play -s mcap`; a stream is in the recording that it "
                 "was made of"

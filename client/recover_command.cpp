@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "cli/progress.h"
 #include "client/commands.h"
@@ -34,15 +35,14 @@ void report(const Options& options, const RecoveredRecording& recovered) {
     std::puts(json_text(j).c_str());
     return;
   }
-  std::printf("%s: %llu messages and %llu attachments\n", options.out.c_str(),
-              static_cast<unsigned long long>(recovered.messages),
-              static_cast<unsigned long long>(recovered.attachments));
+  std::printf("%s: %s and %s\n", options.out.c_str(), counted(recovered.messages, "message").c_str(),
+              counted(recovered.attachments, "attachment").c_str());
   if (recovered.recordings > 1)
     std::printf("of %zu recordings that lay one behind the other\n", recovered.recordings);
   for (const std::string& line : recovered.left_out) std::printf("left out: %s\n", line.c_str());
   if (recovered.lost_bytes > 0) {
-    std::printf("%llu bytes of the file are no part of a recording\n",
-                static_cast<unsigned long long>(recovered.lost_bytes));
+    std::printf("%s of the file %s no part of a recording\n", counted(recovered.lost_bytes, "byte").c_str(),
+                is_or_are(recovered.lost_bytes));
   } else if (recovered.left_out.empty()) {
     std::puts("all of the file was readable");
   }

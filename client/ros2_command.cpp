@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "cli/checks.h"
@@ -76,7 +77,7 @@ Status publish(const LatestFrame::Taken& taken, const std::string& name, RosPubl
 void report(const Options& options, const std::string& name, std::uint64_t frames,
             const std::array<std::uint64_t, 4>& sent) {
   if (!options.json) {
-    std::printf("%llu frames, of which ROS read %llu as points\n", static_cast<unsigned long long>(frames),
+    std::printf("%s, of which ROS read %llu as points\n", counted(frames, "frame").c_str(),
                 static_cast<unsigned long long>(sent[0]));
     return;
   }

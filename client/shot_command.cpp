@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "cli/checks.h"
@@ -89,7 +90,8 @@ Status run(const Options& options, StopSignal& stop) {
   if (output.count() > 0) {
     if (const Status finished = output.finish(); !finished) return finished;
   }
-  const std::string written = std::to_string(output.count()) + " pictures are in " + options.out;
+  const std::string written =
+      counted(output.count(), "picture") + " " + is_or_are(output.count()) + " in " + options.out;
   if (stop.stopped() && !output.full()) return Error{"stopped early: " + written};
   if (options.json) {
     nlohmann::json j{{"pictures", output.count()},

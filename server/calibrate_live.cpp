@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/colour.h"
@@ -178,7 +179,8 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
     if (!watched) return watched.error();
   }
   progress.finish();
-  const std::string kept = std::to_string(taker.taken()) + " views of this run are in " + options.folder;
+  const std::string kept =
+      counted(taker.taken(), "view") + " of this run " + is_or_are(taker.taken()) + " in " + options.folder;
   if (stop.stopped()) {
     log_info(kept + ": the same command takes more, without --source it calibrates from what is there");
     return info;

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "capture/source/field_source.h"
@@ -117,13 +118,13 @@ Status run(const Options& options, StopSignal& stop) {
                                  {"reconnects", counts.reconnects}};
     std::puts(json_text(json).c_str());
   } else {
-    std::printf("%zu frames in %s; lost %llu, damaged pictures %llu\n", frames, options.out.c_str(),
-                static_cast<unsigned long long>(counts.lost_frames),
+    std::printf("%s in %s; lost %llu, damaged pictures %llu\n", counted(frames, "frame").c_str(),
+                options.out.c_str(), static_cast<unsigned long long>(counts.lost_frames),
                 static_cast<unsigned long long>(counts.damaged_pictures));
   }
   if (filled) return {};
-  return Error{filled.error().message + "; " + options.out + " has the " + std::to_string(frames) +
-               " frames before"};
+  return Error{filled.error().message + "; " + options.out + " has the " + counted(frames, "frame") +
+               " before"};
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "capture/evaluate/frame_places.h"
@@ -340,7 +341,7 @@ Status run(const Options& options, StopSignal& stop) {
     // A score of a part would not be comparable, but the pictures that there are want their page.
     if (!judges.pictures || score.frames == 0) return scored;
     const Status shown = judges.pictures->finish(
-        options.take + ": its first " + std::to_string(evaluation.done()) + " frames, broken off", score,
+        options.take + ": its first " + counted(evaluation.done(), "frame") + ", broken off", score,
         evaluation.filters());
     return scored ? shown : scored;
   }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/whole_file.h"
@@ -257,7 +258,8 @@ Status run(const Options& options, StopSignal& stop) {
                   .c_str());
     return {};
   }
-  std::printf("%d stripes on %d slides, %dx%d, in %s\n", pattern->stripes(), pattern->slides, width, height,
+  std::printf("%d stripes on %s, %dx%d, in %s\n", pattern->stripes(),
+              counted(static_cast<std::uint64_t>(pattern->slides), "slide").c_str(), width, height,
               options.out.c_str());
   std::printf("project, a %s each, again and again:", options.interlaced ? "frame" : "field");
   for (const std::string& name : order) std::printf(" %s", name.c_str());

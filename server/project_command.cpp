@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "capture/calibrate/sheet_colours.h"
@@ -121,10 +122,9 @@ Status report(const ShowReport& shown, const Options& options, const DisplayOutp
                                  {"counted_by_display", shown.counted}};
     std::puts(json_text(json).c_str());
   } else {
-    std::printf("%llu pictures in %llu refreshes of %.2f Hz on %s, %llu missed\n",
-                static_cast<unsigned long long>(shown.pictures),
-                static_cast<unsigned long long>(shown.refreshes), shown.refresh_hz, output.name.c_str(),
-                static_cast<unsigned long long>(shown.missed));
+    std::printf("%s in %llu refreshes of %.2f Hz on %s, %llu missed\n",
+                counted(shown.pictures, "picture").c_str(), static_cast<unsigned long long>(shown.refreshes),
+                shown.refresh_hz, output.name.c_str(), static_cast<unsigned long long>(shown.missed));
   }
   return {};
 }

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "base/time.h"
@@ -105,19 +106,18 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
                 static_cast<unsigned long long>(t.reconstructed), static_cast<unsigned long long>(t.frames),
                 options.out.c_str(), per_frame, t.total_ms.median());
   } else {
-    std::printf(
-        "%s: %llu surfaces and %llu textures from %llu frames into %s, %.0f vertices each, %.2f ms a frame\n",
-        std::string(to_string(t.scheme)).c_str(), static_cast<unsigned long long>(t.reconstructed),
-        static_cast<unsigned long long>(t.textures), static_cast<unsigned long long>(t.frames),
-        options.out.c_str(), per_frame, t.total_ms.median());
+    std::printf("%s: %s and %s from %s into %s, %.0f vertices each, %.2f ms a frame\n",
+                std::string(to_string(t.scheme)).c_str(), counted(t.reconstructed, "surface").c_str(),
+                counted(t.textures, "texture").c_str(), counted(t.frames, "frame").c_str(),
+                options.out.c_str(), per_frame, t.total_ms.median());
   }
   if (t.same_slide > 0) {
-    std::printf("%llu frames showed the slide of the frame before: dropped frames in capture\n",
-                static_cast<unsigned long long>(t.same_slide));
+    std::printf("%s showed the slide of the frame before: dropped frames in capture\n",
+                counted(t.same_slide, "frame").c_str());
   }
   if (steps.status().mixed > 0) {
-    std::printf("%llu frames dropped for mixed exposures: %s\n",
-                static_cast<unsigned long long>(steps.status().mixed), steps.advice().c_str());
+    std::printf("%s dropped for mixed exposures: %s\n", counted(steps.status().mixed, "frame").c_str(),
+                steps.advice().c_str());
   }
   if (t.most_excess > ReconstructReport::kNotableExcess) {
     std::printf(

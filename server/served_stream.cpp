@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "capture/source/field_source.h"
@@ -28,7 +29,7 @@ void say(const std::string& label, const std::string& line) {
 }
 
 void say_drops(const std::string& label, const ServerStatus& s) {
-  say(label, std::to_string(s.frames_captured) + " frames captured, " + std::to_string(s.frames_published) +
+  say(label, counted(s.frames_captured, "frame") + " captured, " + std::to_string(s.frames_published) +
                  " published; dropped: " + std::to_string(s.drops_capture) + " in capture, " +
                  std::to_string(s.drops_reconstruct) + " before reconstruction, " +
                  std::to_string(s.drops_encode) + " before encoding, " + std::to_string(s.drops_publish) +
@@ -37,9 +38,9 @@ void say_drops(const std::string& label, const ServerStatus& s) {
 
 void say_camera(const std::string& label, const SourceCounts& c) {
   if (c.damaged_pictures + c.restarts + c.reconnects == 0) return;
-  say(label, "camera: " + std::to_string(c.damaged_pictures) + " damaged pictures, " +
-                 std::to_string(c.restarts) + " restarts of its driver, unplugged " +
-                 std::to_string(c.reconnects) + " times");
+  say(label, "camera: " + counted(c.damaged_pictures, "damaged picture") + ", " +
+                 counted(c.restarts, "restart") + " of its driver, unplugged " +
+                 counted(c.reconnects, "time"));
 }
 
 /// The server's own recorder: a reader of the stream like any other.
@@ -76,10 +77,10 @@ struct Recording {
     const Status done = recorder->finish();
     const Recorder::Counts counts = recorder->counts();
     if (!done)
-      return done.error().in("the recording stopped after " + std::to_string(counts.frames) +
-                             " frames; the " + std::to_string(counts.missed) + " after them are not in it");
-    say(label, "recorded " + std::to_string(counts.frames) + " frames, " + std::to_string(counts.lost) +
-                   " lost" + (counts.files > 1 ? ", in " + std::to_string(counts.files) + " files" : ""));
+      return done.error().in("the recording stopped after " + counted(counts.frames, "frame") + "; the " +
+                             std::to_string(counts.missed) + " after them are not in it");
+    say(label, "recorded " + counted(counts.frames, "frame") + ", " + std::to_string(counts.lost) + " lost" +
+                   (counts.files > 1 ? ", in " + std::to_string(counts.files) + " files" : ""));
     return {};
   }
 };
@@ -115,8 +116,8 @@ class OnRequest {
     if (!cut || last_.activity != RecordingActivity::kOff || last_.file.empty()) return;
     last_.activity = RecordingActivity::kFailed;  // nobody asked for its end
     last_.message = "it ended with the stream, which has begun anew since: start another";
-    say(label, "the recording " + last_.file + " ended with the stream, after " +
-                   std::to_string(last_.frames) + " frames");
+    say(label,
+        "the recording " + last_.file + " ended with the stream, after " + counted(last_.frames, "frame"));
   }
 
  private:

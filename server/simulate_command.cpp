@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
 #include "capture/source/sim/scene.h"
@@ -59,8 +60,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (options.json) {
     std::puts(json_text(nlohmann::json({{"take", options.out}, {"frames", written}})).c_str());
   } else {
-    std::printf("%llu frames with truth in %s\n", static_cast<unsigned long long>(written),
-                options.out.c_str());
+    std::printf("%s with truth in %s\n", counted(written, "frame").c_str(), options.out.c_str());
   }
   return {};
 }

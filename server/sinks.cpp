@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "base/counted.h"
 #include "base/log.h"
 #include "base/time.h"
 #include "cli/service_manager.h"
@@ -71,7 +72,7 @@ class ServiceSink final : public FrameSink {
     const bool stuck = status.frames_published == published_ && dropped > dropped_;
     published_ = status.frames_published;
     dropped_ = dropped;
-    std::string line = std::string(to_string(status.state)) + ", " + std::to_string(published_) + " frames";
+    std::string line = std::string(to_string(status.state)) + ", " + counted(published_, "frame");
     if (!status.message.empty()) line += ": " + status.message;
     board_.say(stream_, line, !stuck);
     return {};

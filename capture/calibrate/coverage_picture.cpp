@@ -2,6 +2,7 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
+#include "base/counted.h"
 #include "capture/calibrate/coverage.h"
 
 namespace relievo {
@@ -83,7 +84,7 @@ Image8 Coverage::draw() const {
     draw_tilt(whole, {x, kHeight + 60}, side, tilts_[side]);
     write(whole, std::string(kSides[side]) + " side away", {x - 58, kHeight + 125}, 0.5);
   }
-  write(whole, std::to_string(added_.size()) + " views", {70 + 150 * 4, kHeight + 65}, 0.8);
+  write(whole, counted(added_.size(), "view"), {70 + 150 * 4, kHeight + 65}, 0.8);
   return out;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/counted.h"
 #include "base/whole_file.h"
 #include "capture/source/npy.h"
 #include "capture/source/take_files.h"
@@ -177,7 +178,7 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
   if (finished = partial.rename_to(there); !finished) return finished;
   if (!failed)
     return Error{failed.error().message + " " + there.string() + " has the first " +
-                 std::to_string(stamps.size()) + " frames"};
+                 counted(stamps.size(), "frame")};
   if (there != whole) return Error{take.string() + " exists by now: the frames are in " + there.string()};
   return {};
 }
