@@ -10,6 +10,7 @@
 #include <optional>
 #include <string_view>
 
+#include "base/counted.h"
 #include "base/time.h"
 #include "client/options.h"
 
@@ -83,9 +84,10 @@ std::string check_frames(const std::string& text) {
 }
 
 Error no_frame(const RecordedStream& recorded) {
+  if (recorded.frames() == 0) return {"the recording holds no frame"};
   const RecordingSummary& summary = recorded.summary();
-  return {"the recording has no frame in that range: it holds " + std::to_string(recorded.frames()) +
-          " frames in " + duration_text(seconds(summary.end_ns - summary.start_ns)) + ", from " +
+  return {"the recording has no frame in that range: it holds " + counted(recorded.frames(), "frame") +
+          " in " + duration_text(seconds(summary.end_ns - summary.start_ns)) + ", from " +
           utc_text(summary.start_ns) + " on"};
 }
 

@@ -129,6 +129,15 @@ TEST_F(RecordedStreamTest, RangesAreTimesOrPositionsOrBoth) {
   }
 }
 
+TEST(RecordedRange, OfARecordingWithoutFramesThereIsNone) {
+  const test::TempFolder folder;
+  test::MadeRecording(folder / "empty.mcap").finish();
+  auto stream = RecordedStream::open(folder / "empty.mcap", "");
+  ASSERT_TRUE(stream.ok()) << stream.error().message;
+  for (const RangeOptions& range : {RangeOptions{}, RangeOptions{.from = "1"}})
+    EXPECT_EQ(find_range(range, *stream).error().message, "the recording holds no frame");
+}
+
 TEST(RecordedTime, WhatIsNoTimeIsRefused) {
   for (const char* text :
        {"", "-1", "1e3", "1:2", "nan", "12345678901", "1.0000000001", "2026-01-02", "2026-13-02T00:00:00Z",
