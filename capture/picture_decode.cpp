@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/picture_decode.h"
 
+// libjpeg's headers want this first
+#include <cstdio>
+
+#include <jerror.h>
+#include <jpeglib.h>
 #include <png.h>
-#include <turbojpeg.h>
 
 #include <csetjmp>
 #include <cstring>
-#include <memory>
 #include <string>
 
 namespace relievo {
@@ -52,41 +55,65 @@ bool read_rows(png_structp png, png_infop info, PngInput& input, Image8& out) {
   return true;
 }
 
-/// Of one picture. A damaged one leaves libjpeg-turbo 2.1.5 in the middle of it, for good.
+struct JpegWatch {
+  jpeg_error_mgr errors;  // first: libjpeg knows no other
+  std::jmp_buf back;
+  char trouble[JMSG_LENGTH_MAX] = "memory is short";
+};
+
+void leave_jpeg(j_common_ptr jpeg) {
+  auto* const watch = reinterpret_cast<JpegWatch*>(jpeg->err);
+  jpeg->err->format_message(jpeg, watch->trouble);
+  std::longjmp(watch->back, 1);
+}
+
+/// A warning is damage too, the rest of such a picture is grey; but for bytes too many between the parts of a
+/// file, which many cameras write.
+void judge_jpeg(j_common_ptr jpeg, int level) {
+  if (level < 0 && jpeg->err->msg_code != JWRN_EXTRANEOUS_DATA) leave_jpeg(jpeg);
+}
+
+/// One picture. libjpeg jumps out of the functions that are false then: nothing in them may have a
+/// destructor.
 class JpegDecoder {
  public:
-  explicit JpegDecoder(std::span<const std::uint8_t> file) : file_(file) {}
+  explicit JpegDecoder(std::span<const std::uint8_t> file) : file_(file) {
+    jpeg_.err = jpeg_std_error(&watch_.errors);
+    watch_.errors.error_exit = leave_jpeg;
+    watch_.errors.emit_message = judge_jpeg;
+  }
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+  ~JpegDecoder() { jpeg_destroy_decompress(&jpeg_); }
 
-  Result<JpegSize> size() const {
-    JpegSize out{};
-    int subsampling = 0, colours = 0;
-    if (!turbo_) return Error{"cannot be decoded: memory is short"};
-    if (tjDecompressHeader3(turbo_.get(), file_.data(), file_.size(), &out.width, &out.height, &subsampling,
-                            &colours) != 0)
-      return damaged();
-    return out;
+  bool read_head() {
+    if (setjmp(watch_.back) != 0) return false;
+    jpeg_create_decompress(&jpeg_);
+    jpeg_mem_src(&jpeg_, file_.data(), file_.size());
+    jpeg_read_header(&jpeg_, TRUE);
+    return true;
+  }
+  bool read_rows(std::uint8_t* rgb, std::ptrdiff_t stride) {
+    if (setjmp(watch_.back) != 0) return false;
+    jpeg_.out_color_space = JCS_RGB;
+    jpeg_start_decompress(&jpeg_);
+    while (jpeg_.output_scanline < jpeg_.output_height) {
+      JSAMPROW row = rgb + static_cast<std::ptrdiff_t>(jpeg_.output_scanline) * stride;
+      jpeg_read_scanlines(&jpeg_, &row, 1);
+    }
+    jpeg_finish_decompress(&jpeg_);
+    return true;
   }
 
-  Status decode(JpegSize size, std::uint8_t* rgb, std::ptrdiff_t stride) const {
-    if (!turbo_) return Error{"cannot be decoded: memory is short"};
-    if (tjDecompress2(turbo_.get(), file_.data(), file_.size(), rgb, size.width, static_cast<int>(stride),
-                      size.height, TJPF_RGB, TJFLAG_ACCURATEDCT) == 0)
-      return {};
-    // A warning is damage too, the rest of such a picture is grey; but for bytes too many between the parts
-    // of a file, which many cameras write.
-    const bool is_warning = tjGetErrorCode(turbo_.get()) == TJERR_WARNING;
-    if (is_warning && std::strstr(tjGetErrorStr2(turbo_.get()), "extraneous bytes") != nullptr) return {};
-    return damaged();
-  }
+  /// Once the head was read.
+  int width() const { return static_cast<int>(jpeg_.image_width); }
+  int height() const { return static_cast<int>(jpeg_.image_height); }
+  Error damage() const { return Error{std::string("is damaged: ") + watch_.trouble}; }
 
  private:
-  struct Close {
-    void operator()(void* handle) const { tjDestroy(handle); }
-  };
-  Error damaged() const { return Error{std::string("is damaged: ") + tjGetErrorStr2(turbo_.get())}; }
-
   const std::span<const std::uint8_t> file_;
-  const std::unique_ptr<void, Close> turbo_{tjInitDecompress()};
+  jpeg_decompress_struct jpeg_{};
+  JpegWatch watch_{};
 };
 
 }  // namespace
@@ -102,21 +129,24 @@ Result<Image8> decode_png(std::span<const std::uint8_t> file) {
   return out;
 }
 
-Result<JpegSize> jpeg_size(std::span<const std::uint8_t> file) {
-  return JpegDecoder(file).size();
-}
-
-Status decode_jpeg(std::span<const std::uint8_t> file, JpegSize size, std::uint8_t* rgb,
-                   std::ptrdiff_t stride) {
-  return JpegDecoder(file).decode(size, rgb, stride);
-}
-
 Result<Image8> decode_jpeg(std::span<const std::uint8_t> file) {
-  const auto size = jpeg_size(file);
-  if (!size) return size.error();
-  Image8 out(size->width, size->height, 3);
-  if (const Status done = decode_jpeg(file, *size, out.data(), out.stride()); !done) return done.error();
+  JpegDecoder jpeg(file);
+  if (!jpeg.read_head()) return jpeg.damage();
+  Image8 out(jpeg.width(), jpeg.height(), 3);
+  if (!jpeg.read_rows(out.data(), out.stride())) return jpeg.damage();
   return out;
+}
+
+Status decode_jpeg(std::span<const std::uint8_t> file, int width, int height, std::uint8_t* rgb,
+                   std::ptrdiff_t stride) {
+  JpegDecoder jpeg(file);
+  if (!jpeg.read_head()) return jpeg.damage();
+  if (jpeg.width() != width || jpeg.height() != height) {
+    const auto text = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
+    return Error{"is " + text(jpeg.width(), jpeg.height()) + " instead of " + text(width, height)};
+  }
+  if (!jpeg.read_rows(rgb, stride)) return jpeg.damage();
+  return {};
 }
 
 }  // namespace relievo

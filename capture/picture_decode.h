@@ -19,16 +19,8 @@ Result<Image8> decode_png(std::span<const std::uint8_t> file);
 /// The same of a JPEG, grey or in colours.
 Result<Image8> decode_jpeg(std::span<const std::uint8_t> file);
 
-struct JpegSize {
-  int width, height;
-
-  bool operator==(const JpegSize&) const = default;
-};
-/// What a JPEG says of itself.
-Result<JpegSize> jpeg_size(std::span<const std::uint8_t> file);
-
-/// A JPEG of that size, into rows of RGB that begin `stride` bytes one behind the other.
-Status decode_jpeg(std::span<const std::uint8_t> file, JpegSize size, std::uint8_t* rgb,
+/// One that must be of this size, into rows of RGB that begin `stride` bytes one behind the other.
+Status decode_jpeg(std::span<const std::uint8_t> file, int width, int height, std::uint8_t* rgb,
                    std::ptrdiff_t stride);
 
 }  // namespace relievo

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <span>
 
 #include "capture/picture_decode.h"
 
@@ -172,13 +171,11 @@ Status gbrg_to_rgb(const RawView& raw, const RgbRows& out) {
 }
 
 Status jpeg_to_rgb(const RawView& raw, const RgbRows& out) {
-  const std::span file(raw.planes[0].data, raw.planes[0].bytes);
-  const auto size = jpeg_size(file);
-  if (!size) return size.error().in("a JPEG");
-  if (*size != JpegSize{raw.width, raw.height})
-    return Error{"a JPEG of " + std::to_string(size->width) + "x" + std::to_string(size->height) +
-                 " instead of " + std::to_string(raw.width) + "x" + std::to_string(raw.height)};
-  return decode_jpeg(file, *size, out.data, out.stride);
+  const RawView::Plane& plane = raw.planes[0];
+  const Status decoded = decode_jpeg({plane.data, plane.bytes}, raw.width, raw.height, out.data,
+                                     static_cast<std::ptrdiff_t>(out.stride));
+  if (!decoded) return Error{"a JPEG " + decoded.error().message};
+  return {};
 }
 
 }  // namespace relievo::v4l2

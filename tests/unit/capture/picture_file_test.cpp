@@ -149,6 +149,22 @@ TEST_F(PictureFile, AJpegWithBytesTooManyIsRead) {
   EXPECT_TRUE(std::equal(picture->data(), picture->data() + picture->size(), expected->data()));
 }
 
+/// libjpeg tells its first warning.
+TEST_F(PictureFile, AJpegWithAPartMissingIsDamagedThoughBytesTooManyComeBefore) {
+  Bytes broken = encoded(".jpg", {cv::IMWRITE_JPEG_RST_INTERVAL, 1});
+  const auto marker = [&](int low) {
+    const auto is_marker = [low](int a, int b) { return a == 0xff && b == low; };
+    return std::adjacent_find(broken.begin(), broken.end(), is_marker);
+  };
+  const auto before = marker(0xd0), after = marker(0xd1);
+  ASSERT_TRUE(before != broken.end() && after - before > 6);
+  broken.erase(before + 4, after);
+  broken.insert(marker(0xd0), 12, 0);
+  const auto picture = read(broken);
+  ASSERT_FALSE(picture.ok());
+  EXPECT_THAT(picture.error().message, HasSubstr("is damaged: "));
+}
+
 TEST_F(PictureFile, PngsOfOtherKindsBecomeRgb) {
   const cv::Mat grey16(2, 3, CV_16UC1, cv::Scalar(0x1234));
   const cv::Mat alpha(2, 3, CV_8UC4, cv::Scalar(3, 2, 1, 77));  // BGR and alpha
