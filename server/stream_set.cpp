@@ -201,13 +201,13 @@ Status StreamSet::run_once(Entry& entry) {
   entry.again = entry.again || opened;
   {
     const std::lock_guard lock(mutex_);
-    if (opened && !entry.stopping) entry.stream = opened->get();
     entry.opened = entry.opened || opened;
     entry.tried = true;
     changed_.notify_all();
     if (entry.stopping || entry.paused) return {};
+    if (!opened) return opened.error();
+    entry.stream = opened->get();
   }
-  if (!opened) return opened.error();
   const std::string label = around_.config.streams.empty() ? "" : name_of(config) + ": ";
   if (comes_later) log_info(label + "streaming from " + config.source);
   if (config.record != entry.config.record)
