@@ -51,7 +51,8 @@ std::vector<std::uint32_t> ids_in(const nlohmann::json& message, const char* nam
 
 class FoxgloveFeed : public WsFeed {
  public:
-  FoxgloveFeed(Hub& hub, const SampleFormat& format) : hub_(hub), format_(format) {}
+  FoxgloveFeed(Hub& hub, const SampleFormat& format, std::string session)
+      : hub_(hub), format_(format), session_(std::move(session)) {}
   FoxgloveFeed(const FoxgloveFeed&) = delete;
   FoxgloveFeed& operator=(const FoxgloveFeed&) = delete;
   ~FoxgloveFeed() override {
@@ -82,6 +83,7 @@ class FoxgloveFeed : public WsFeed {
 
   Hub& hub_;
   const SampleFormat& format_;
+  const std::string session_;
   std::function<void()> wake_;
   std::shared_ptr<std::atomic<bool>> changed_ =
       std::make_shared<std::atomic<bool>>(true);  // the list of streams
@@ -101,7 +103,7 @@ void FoxgloveFeed::start(std::function<void()> wake) {
                             {"capabilities", Json::array()},
                             {"supportedEncodings", Json::array()},
                             {"metadata", Json::object()},
-                            {"sessionId", std::to_string(utc_now_ns())}}));
+                            {"sessionId", session_}}));
   list_watch_ = hub_.watch_list([changed = changed_, wake_up = wake_] {
     *changed = true;
     wake_up();
@@ -216,8 +218,8 @@ void FoxgloveFeed::on_sent(const WsOutgoing& message) {
 
 }  // namespace
 
-std::unique_ptr<WsFeed> make_foxglove_feed(Hub& hub, const SampleFormat& format) {
-  return std::make_unique<FoxgloveFeed>(hub, format);
+std::unique_ptr<WsFeed> make_foxglove_feed(Hub& hub, const SampleFormat& format, std::string session) {
+  return std::make_unique<FoxgloveFeed>(hub, format, std::move(session));
 }
 
 }  // namespace relievo

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include "web/gateway/connection.h"
@@ -17,8 +18,9 @@ namespace relievo {
 inline constexpr std::array<std::string_view, 2> kFoxgloveProtocols = {"foxglove.sdk.v1",
                                                                        "foxglove.websocket.v1"};
 
-/// `hub` and `format` must outlive it. A frame follows as soon as the one before it was taken by the system,
-/// and those that come meanwhile are dropped and counted as for want of credit.
-std::unique_ptr<WsFeed> make_foxglove_feed(Hub& hub, const SampleFormat& format);
+/// `hub` and `format` must outlive it. `session`: the same for all clients of a server, another one of each.
+/// A frame follows as soon as the one before it was taken by the system, and those that come meanwhile are
+/// dropped and counted as for want of credit.
+std::unique_ptr<WsFeed> make_foxglove_feed(Hub& hub, const SampleFormat& format, std::string session);
 
 }  // namespace relievo

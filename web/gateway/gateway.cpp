@@ -112,7 +112,7 @@ class Server : public Gateway, private ConnectionHost {
   GatewayCounts& counts() override { return counts_; }
   HttpReply answer(const HttpRequest& request, const Peer& peer) override;
   std::unique_ptr<WsFeed> make_feed(const HttpReply& reply) override {
-    if (reply.websocket->stream.empty()) return make_foxglove_feed(hub_, *options_.samples);
+    if (reply.websocket->stream.empty()) return make_foxglove_feed(hub_, *options_.samples, session_);
     return make_stream_feed(hub_, reply.websocket->stream);
   }
   std::chrono::milliseconds request_time() const override { return options_.request_time; }
@@ -133,7 +133,8 @@ class Server : public Gateway, private ConnectionHost {
   void shut_down();
 
   const GatewayOptions options_;
-  WebOptions web_;  // as they are now
+  const std::string session_ = std::to_string(utc_now_ns());  // by which clients know this run again
+  WebOptions web_;                                            // as they are now
   Credentials credentials_;
   std::optional<Tokens> made_;  // for this run
   Hub hub_;

@@ -78,6 +78,19 @@ TEST_F(Foxglove, AChannelAStreamAndItsFrames) {
   EXPECT_TRUE(eventually([&] { return metric("relievo_gateway_stream_clients{stream=\"face\"}") == 0; }));
 }
 
+// By this a client tells whether it has lost its connection alone, or all that it knows is of another server.
+TEST_F(Foxglove, WhoComesBackIsToldThatItIsTheSameServer) {
+  const auto session = [this] {
+    WsClient client = connect();
+    return next(client, "serverInfo")["sessionId"];
+  };
+  const Json first = session();
+  EXPECT_TRUE(first.is_string());
+  EXPECT_EQ(session(), first);
+  SetUp();
+  EXPECT_NE(session(), first) << "it is another one";
+}
+
 TEST_F(Foxglove, StreamsComeAndGo) {
   WsClient client = connect();
   ASSERT_FALSE(next(client, "serverInfo").is_null());
