@@ -9,6 +9,7 @@
 #include "idl/cdr.h"
 #include "idl/clock.h"
 #include "idl/domain.h"
+#include "idl/frame_writer.h"
 #include "idl/live_streams.h"
 #include "idl/raw_type.h"
 #include "idl/security.h"
@@ -106,9 +107,7 @@ class DdsRawPublisher final : public RawPublisher {
   }
 
   int matched_readers() const override {
-    dds_publication_matched_status_t status{};
-    dds_get_publication_matched_status(writers_[static_cast<std::size_t>(Topic::kFrame)].get(), &status);
-    return static_cast<int>(status.current_count);
+    return matched_readers_of(writers_[static_cast<std::size_t>(Topic::kFrame)].get());
   }
 
  private:

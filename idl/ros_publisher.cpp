@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "idl/domain.h"
+#include "idl/frame_writer.h"
 #include "idl/raw_type.h"
 #include "idl/topics.h"
 #include "ros.h"
@@ -50,9 +51,7 @@ class DdsRosPublisher final : public RosPublisher {
   }
 
   bool has_readers(std::size_t index) const override {
-    dds_publication_matched_status_t status{};
-    dds_get_publication_matched_status(topics_[index].writer.get(), &status);
-    return status.current_count > 0;
+    return matched_readers_of(topics_[index].writer.get()) > 0;
   }
 
   Status publish(std::size_t index, const Bytes& cdr) override {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The built viewer, embedded in the program: the only files the gateway serves, so no path leads elsewhere;
-// and texts of its own.
+// The built viewer, embedded in the program, so that no path of it leads to a file; and texts of its own.
 #pragma once
 
 #include <span>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each HTTP request is answered, sockets apart. Pure but for the hub's snapshot.
+// What each HTTP request is answered, sockets apart: of the hub's snapshot, and of what those say who record,
+// see the cameras and calibrate, and are told to do.
 #pragma once
 
 #include <cstdint>
