@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// capture -> reconstruct -> encode -> publish: one thread a stage, bounded queues between them. Beside
-// stream_set.*, which runs a pipeline for each stream, and ladder.*, which makes its lower qualities, the
-// only place in the server that has threads.
+// capture -> reconstruct -> encode -> publish: one thread a stage, bounded queues between them. What else
+// may take long, as lower qualities, looks at the rig and disks, has threads of its own that no stage waits
+// for.
 #pragma once
 
 #include <cstdint>

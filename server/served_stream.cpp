@@ -3,14 +3,18 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <functional>
+#include <mutex>
 #include <optional>
+#include <stop_token>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "base/counted.h"
 #include "base/log.h"
+#include "base/thread_name.h"
 #include "base/time.h"
 #include "capture/source/field_source.h"
 #include "capture/upright.h"
@@ -22,6 +26,8 @@
 
 namespace relievo {
 namespace {
+
+constexpr std::chrono::milliseconds kLook{100};  // at a recorder, in between
 
 /// "12 frames captured, ..." or, of one of several, "left: 12 frames captured, ...".
 void say(const std::string& label, const std::string& line) {
@@ -43,10 +49,23 @@ void say_camera(const std::string& label, const SourceCounts& c) {
                  counted(c.reconnects, "time"));
 }
 
+/// On a thread of its own: a slow disk keeps that waiting, and not the stream.
+std::jthread beside_the_stream(std::unique_ptr<FrameSink> recorder_sink) {
+  return std::jthread([sink = std::move(recorder_sink)](const std::stop_token& ended) {
+    name_this_thread("recording");
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any wake;
+    while (!wake.wait_for(lock, ended, kLook, [&] { return ended.stop_requested(); }))
+      static_cast<void>(sink->consume(ServerStatus()));
+  });
+}
+
 /// The server's own recorder: a reader of the stream like any other.
 struct Recording {
   std::optional<Recorder> recorder;
   std::unique_ptr<Subscriber> subscriber;
+  std::jthread beside;  // keeps its chunks short
 
   Status start(const std::string& file, const std::string& stream, const ServeConfig& config,
                const Publisher& publisher, const std::atomic<bool>& stop) {
@@ -74,6 +93,7 @@ struct Recording {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     subscriber.reset();
+    beside = {};
     const Status done = recorder->finish();
     const Recorder::Counts counts = recorder->counts();
     if (!done)
@@ -268,7 +288,13 @@ Status RunningStream::announce(const std::string& uri) {
     announced_ = true;
     sinks_.push_back(make_gateway_sink(*around_.gateway, name_));
   }
-  if (recording_.recorder) sinks_.push_back(make_recorder_sink(*recording_.recorder, wish));
+  if (recording_.recorder) {
+    auto sink = make_recorder_sink(*recording_.recorder, wish);
+    if (config_.fast)
+      sinks_.push_back(std::move(sink));  // nothing is to be lost: the stream waits for the disk
+    else
+      recording_.beside = beside_the_stream(std::move(sink));
+  }
   sinks_.push_back(make_service_sink(around_.board, name_));
   return {};
 }

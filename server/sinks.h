@@ -25,7 +25,8 @@ std::unique_ptr<FrameSink> make_gateway_sink(Gateway& gateway, const std::string
 
 /// Keeps `recorder`'s chunks short in time; it reads the frames themselves off DDS, as any recorder does. A
 /// failing recording is logged once and does not end the stream. `key_frame_wanted` is called where it wants
-/// one. `recorder` must outlive it.
+/// one. `recorder` must outlive it. Waits for the disk: to be called with each frame of a stream that may, or
+/// else about ten times a second, with any.
 std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder, std::function<void()> key_frame_wanted);
 
 /// What the service manager is told of all streams together. Any thread.
