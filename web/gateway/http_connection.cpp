@@ -201,6 +201,7 @@ void HttpSession::on_request() {
 
 void HttpSession::answer(HttpReply content, bool head, unsigned version, bool keep_alive) {
   if (!content.from_disk) return reply(std::move(content), head, version, keep_alive);
+  transport_->expire_never();  // the disk is waited for, not the client
   const auto made = std::make_shared<HttpReply>();
   host_.from_disk(
       [self = shared_from_this(), make = std::move(content.from_disk), made] { *made = make(); },
@@ -260,6 +261,7 @@ void HttpSession::send_file(std::uint64_t offset, bool keep_alive) {
     return on_replied(keep_alive);
   }
   file_bytes_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kFileAtOnce, left)));
+  transport_->expire_never();  // as in answer()
   const auto n = std::make_shared<std::size_t>(0);
   host_.from_disk([self = shared_from_this(), file = content_.file, offset,
                    n] { *n = file->read(offset, self->file_bytes_); },

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <thread>
 #include <utility>
 
 #include "codec/recording.h"
@@ -82,6 +83,7 @@ class OneStream final : public RecordingControl {
     ends_when_asked_ = true;
   }
   bool is_open(const std::string& file) const override {
+    std::this_thread::sleep_for(answers_after);
     const std::lock_guard lock(mutex_);
     if (std::exchange(ends_when_asked_, false)) {
       EXPECT_TRUE(const_cast<OneStream*>(this)->stop("face"));
@@ -92,6 +94,8 @@ class OneStream final : public RecordingControl {
     const std::lock_guard lock(mutex_);
     return state_.file == file ? growing_ : nullptr;
   }
+
+  std::chrono::milliseconds answers_after{0};  // set before it is asked whether a file is open
 
  private:
   const std::filesystem::path folder_;
@@ -214,6 +218,13 @@ TEST_F(RecordingApi, WhatIsFinishedWhileItIsListedHasItsWholeSize) {
   EXPECT_EQ(one["recording"], false);
   EXPECT_EQ(one["bytes"], std::filesystem::file_size(folder / "face-1.mcap"));
   EXPECT_EQ(one["bytes"], get().body.size());
+}
+
+TEST_F(RecordingApi, AFolderOnASlowDiskIsListed) {
+  ASSERT_EQ(post_json(port, kFace, kStart).status, 200);
+  start({.port = 0, .recordings = &control, .request_time = 300ms});
+  control.answers_after = 600ms;
+  EXPECT_EQ(listed(), std::vector<std::string>{"face-1.mcap"});
 }
 
 TEST_F(RecordingApi, WhatACrashCutShortIsListedSoAndNoCacheKeepsIt) {

@@ -137,6 +137,18 @@ TEST_F(Recordings, ASlowDiskHoldsNobodyElseUp) {
   stuck_disk.unlock();  // its last read ends with the gateway gone
 }
 
+// A disk that has to spin up takes longer than a client may: that is not the client's fault.
+TEST_F(Recordings, ADiskTakesItsTime) {
+  start({.port = 0, .request_time = 300ms});
+  gateway->announce(make_info());
+  gateway->offer("face", {.file = file});
+  stuck_disk.lock();
+  std::jthread reader([&] { EXPECT_TRUE(get().body == content); });
+  EXPECT_TRUE(eventually([] { return waiting_reads == 1; }));
+  std::this_thread::sleep_for(600ms);
+  stuck_disk.unlock();
+}
+
 TEST_F(Recordings, AreListedAndReadInParts) {
   const auto stream = nlohmann::json::parse(request(port, "GET", "/api/streams").body)["streams"][0];
   EXPECT_EQ(stream["recording"], "recordings/face.mcap");
