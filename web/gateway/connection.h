@@ -62,7 +62,7 @@ class ConnectionHost {
   virtual GatewayCounts& counts() = 0;
   virtual HttpReply answer(const HttpRequest& request, const Peer& peer) = 0;
   virtual std::unique_ptr<WsFeed> make_feed(const HttpReply& reply) = 0;
-  /// How long a request may take to arrive whole, and each part of its answer to leave.
+  /// How long a request may take to arrive whole, and how long its answer may stand still.
   virtual std::chrono::milliseconds request_time() const = 0;
   /// How long a WebSocket message may take to leave.
   virtual std::chrono::milliseconds message_time() const = 0;

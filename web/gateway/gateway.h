@@ -47,7 +47,7 @@ struct GatewayOptions {
   RigControl* rigs = nullptr;                      // likewise; null: no camera is here
   CalibrationControl* calibrations = nullptr;      // likewise
   const StageReport* stages = nullptr;             // likewise; null: no stream is made here
-  std::chrono::milliseconds request_time{15'000};  // for a request to arrive whole, and its answer to leave
+  std::chrono::milliseconds request_time{15'000};  // for a request to arrive; its answer may stand still
   std::chrono::milliseconds message_time{20'000};  // for a WebSocket message to leave
 };
 

@@ -243,7 +243,7 @@ void HttpSession::reply(HttpReply content, bool head, unsigned version, bool kee
   text << response.base();
   head_ = text.str();
 
-  transport_->expire_after(host_.request_time());
+  transport_->expire_where_stuck(host_.request_time());
   const std::array parts{bytes_of(head_), bytes_of(head || no_body ? std::string_view() : content_.bytes())};
   if (head) content_.file.reset();
   transport_->write(parts, [self = shared_from_this(), keep_alive](Io io, std::size_t) {
@@ -273,7 +273,7 @@ void HttpSession::send_file(std::uint64_t offset, bool keep_alive) {
 void HttpSession::send_part(std::uint64_t offset, std::size_t n, bool keep_alive) {
   if (n == 0) return finish();  // it has become shorter: the client sees that some is missing
   waiting_since_ns_ = steady_now_ns();
-  transport_->expire_after(host_.request_time());
+  transport_->expire_where_stuck(host_.request_time());
   const std::array parts{Transport::Part(file_bytes_.data(), n)};
   transport_->write(parts, [self = shared_from_this(), offset, n, keep_alive](Io io, std::size_t) {
     if (self->finished_) return;

@@ -9,6 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "web/gateway/acknowledged_bytes.h"
+
 namespace relievo {
 namespace {
 
@@ -20,8 +22,9 @@ using namespace std::chrono_literals;
 
 constexpr auto kLingerTime = 1s;
 constexpr std::size_t kLingerBytes = 256 * 1024;
-constexpr auto kAcceptPause = 100ms;              // after accept() failed, as for want of descriptors
-constexpr std::uint8_t kTlsHandshakeRecord = 22;  // RFC 8446, 5.1
+constexpr std::uint64_t kNotStuck_bytes = 4 * 1024;  // taken until a deadline
+constexpr auto kAcceptPause = 100ms;                 // after accept() failed, as for want of descriptors
+constexpr std::uint8_t kTlsHandshakeRecord = 22;     // RFC 8446, 5.1
 
 Peer peer_of(const tcp::socket& socket) {
   ErrorCode error;
@@ -51,7 +54,10 @@ class TcpTransport : public Transport, public std::enable_shared_from_this<TcpTr
   bool is_tls() const override { return tls_.has_value(); }
   void read_some(std::span<std::uint8_t> into, Done done) override;
   void write(std::span<const Part> parts, Done done) override;
-  void expire_after(std::chrono::milliseconds time) override;
+  void expire_after(std::chrono::milliseconds time) override { set_deadline(time, std::nullopt); }
+  void expire_where_stuck(std::chrono::milliseconds time) override {
+    set_deadline(time, acknowledged_bytes(socket_.native_handle()));
+  }
   void expire_never() override;
   void linger(std::function<void()> done) override;
   void close() override;
@@ -61,6 +67,7 @@ class TcpTransport : public Transport, public std::enable_shared_from_this<TcpTr
   Io outcome(const ErrorCode& error) const {
     return !error ? Io::kDone : timed_out_ ? Io::kTimeout : Io::kClosed;
   }
+  void set_deadline(std::chrono::milliseconds time, std::optional<std::uint64_t> acknowledged);
   void drain(std::shared_ptr<std::function<void()>> done);
 
   tcp::socket socket_;
@@ -120,12 +127,16 @@ void TcpTransport::write(std::span<const Part> parts, Done done) {
   }
 }
 
-void TcpTransport::expire_after(std::chrono::milliseconds time) {
+/// `acknowledged`: by then, of which a client that is not stuck acknowledges more; nothing: none has more
+/// time.
+void TcpTransport::set_deadline(std::chrono::milliseconds time, std::optional<std::uint64_t> acknowledged) {
   const std::uint64_t deadline = ++deadline_;
   timer_.expires_after(time);
-  timer_.async_wait([weak = weak_from_this(), deadline](ErrorCode error) {
+  timer_.async_wait([weak = weak_from_this(), deadline, time, acknowledged](ErrorCode error) {
     const auto self = weak.lock();
     if (error || !self || self->deadline_ != deadline) return;
+    if (acknowledged && acknowledged_bytes(self->socket_.native_handle()) >= *acknowledged + kNotStuck_bytes)
+      return self->expire_where_stuck(time);
     self->timed_out_ = true;
     self->close();
   });

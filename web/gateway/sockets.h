@@ -52,6 +52,9 @@ class Transport {
 
   /// From now: what is under way then ends with kTimeout, and the connection is closed. The last call counts.
   virtual void expire_after(std::chrono::milliseconds time) = 0;
+  /// The same while something is written; but the client has as long again where it has taken 4 kB until
+  /// then.
+  virtual void expire_where_stuck(std::chrono::milliseconds time) = 0;
   virtual void expire_never() = 0;
 
   /// Says that nothing more is sent, and waits, a second at most, until the client closes too: closing with

@@ -3,7 +3,9 @@
 // them.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <deque>
+#include <thread>
 
 #include "tests/support/noise.h"
 #include "tests/unit/web/gateway_fixture.h"
@@ -110,6 +112,21 @@ TEST_F(GatewayCrowd, WhoDoesNotReadHisAnswerIsCutOff) {
   for (int i = 0; i < 100; ++i) requests += "GET /nothing HTTP/1.1\r\nHost: localhost\r\n\r\n";
   ASSERT_TRUE(eventually([&] { return !greedy.send(requests) || refused("slow") > 0; }));
   EXPECT_TRUE(eventually([&] { return refused("slow") > 0; }));
+}
+
+TEST_F(GatewayCrowd, WhoReadsHisAnswerSlowlyGetsAllOfIt) {
+  constexpr std::size_t kBytes = 20'000'000;  // more than the system's buffers take
+  constexpr double kBytesPerSecond = 5e6;
+  start({.port = 0, .empty_hint = std::string(kBytes, 'x'), .request_time = 1s});
+  TcpClient slow(port, 4096);
+  slow.send("GET /api/streams HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+  const auto began = std::chrono::steady_clock::now();
+  while (slow.receive()) {
+    const std::chrono::duration<double> due(static_cast<double>(slow.buffer().size()) / kBytesPerSecond);
+    std::this_thread::sleep_until(began + std::chrono::duration_cast<std::chrono::nanoseconds>(due));
+  }
+  EXPECT_GT(slow.buffer().size(), kBytes);
+  EXPECT_EQ(refused("slow"), 0);
 }
 
 TEST_F(GatewayCrowd, AnAddressHasItsShareOfConnections) {
