@@ -337,7 +337,7 @@ class Viewer {
     const found = await (await import('./recordedMoment')).recordedAt(listed, shared.moment);
     if (this.stream !== listed.name) return;
     if (found === null) this.note = text.momentGone;
-    else await this.openServerFile(found.file, { ...shared, moment: found.moment }, async () => found.opened);
+    else await this.openServerFile(found.file, shared, async () => found.opened);
   }
 
   private async openServerFile(name: string, shared: Shared | null, open: () => Promise<Opened> = () => openRemote(recordingUrl(name))): Promise<void> {

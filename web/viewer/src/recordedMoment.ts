@@ -7,11 +7,10 @@ import type { Moment } from './source';
 export interface Found {
   readonly file: string;
   readonly opened: OpenedRecording;
-  readonly moment: Moment;
 }
 
 /** By the clock of the stream's server. Null: none has it. */
-export async function recordedAt({ name, recorder }: ListedStream, { utc, atMs, playing }: Moment): Promise<Found | null> {
+export async function recordedAt({ name, recorder }: ListedStream, { utc, atMs }: Moment): Promise<Found | null> {
   if (!utc || (recorder ?? null) === null) return null; // there is no folder
   try {
     const response = await fetch(new URL('api/recordings', document.baseURI), { cache: 'no-store' });
@@ -22,8 +21,7 @@ export async function recordedAt({ name, recorder }: ListedStream, { utc, atMs, 
     const file = since[since.length - 1]?.file;
     if (file === undefined) return null;
     const opened = await openRemote(recordingUrl(file));
-    const time = await opened.timeOf(atMs);
-    return time === null ? null : { file, opened, moment: { atMs: time, utc: false, playing } };
+    return (await opened.timeOf(atMs)) === null ? null : { file, opened };
   } catch {
     return null;
   }
