@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: who has no token is asked for it by a page that looks like the viewer, light and dark, on
 // a phone too; a wrong one is said to be wrong, without being shown or kept; a right one leads to what was asked for,
-// and a browser that keeps no cookies is told of it.
+// and a browser that keeps no cookies is told of it. A recording
+// whose token is not known any more goes on once somebody has signed in, in another tab.
 // Run as: in_own_domain node sign_in_test.mjs RELIEVO_SERVER [FOLDER for screenshots], in web/viewer. Exit 77: no Chromium
 // here.
 import assert from 'node:assert/strict';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { kPatienceMs, launchChromium } from './chromium.mjs';
-import { runChecks, shownPast } from './feeder.mjs';
+import { inState, runChecks, shownPast } from './feeder.mjs';
+import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
+import { seek } from './timeline.mjs';
 
 const [serverPath, shots] = process.argv.slice(2);
 const kToken = 'a-token-for-this-test';
@@ -19,7 +22,11 @@ const kWrong = 'a-token-that-is-none-here';
 const scratch = mkdtempSync(join(tmpdir(), 'relievo-sign-in-'));
 const tokens = join(scratch, 'tokens');
 writeFileSync(tokens, `${kToken}\n`, { mode: 0o600 });
-const server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=5', '--stream', 'object', '--token-file', tokens]);
+const folder = join(scratch, 'folder');
+mkdirSync(folder);
+// Above 16 MB, so that most of it is read where it is needed.
+recordObject(serverPath, join(folder, 'long.mcap'), { rate: 6, frames: 36, size: 'width=640,height=480,stripes=60', options: ['--texture', 'png'] });
+const server = await Server.start(serverPath, ['--source', 'sim:object,width=320,height=240,stripes=60,rate=5', '--stream', 'object', '--token-file', tokens, '--record-dir', folder]);
 const browser = await launchChromium();
 const page = await browser.newPage({ viewport: { width: 1000, height: 640 } });
 page.setDefaultTimeout(kPatienceMs);
@@ -119,6 +126,26 @@ checks['a page that is let in already stays, though the small picture of a list 
   await shownPast(page, (await page.evaluate(() => window.relievo.diagnostics().shown)) + 5);
   assert.ok(await page.evaluate(() => window.kept_), 'it was loaded anew');
   writeFileSync(tokens, `${kToken}\n`);
+};
+
+checks['a recording that is refused goes on by itself, and the list says why it is not known, until somebody signs in elsewhere'] = async () => {
+  const kOther = 'one-more-token-for-this-test';
+  await page.goto(`${server.address}/?recording=long.mcap#time=0&play=0`);
+  await shownPast(page, 1);
+  await page.evaluate(() => void (window.kept_ = true));
+  writeFileSync(tokens, `${kOther}\n`);
+  await page.keyboard.press('n');
+  await seek(page, 18);
+  await inState(page, 'stalled');
+  await page.waitForFunction(() => /wants a token/.test(document.querySelector('#card-text').textContent));
+  await page.waitForFunction(() => /wants a token/.test(document.querySelector('.streams small')?.textContent));
+  await screenshot('refused recording');
+  await page.context().request.get(`${server.address}/?token=${kOther}`); // as another tab of this browser does
+  await inState(page, 'file');
+  await page.waitForFunction(() => window.relievo.diagnostics().playback.index === 18 && !/wants a token/.test(document.querySelector('.streams small').textContent));
+  assert.ok(await page.evaluate(() => window.kept_), 'it was loaded anew');
+  writeFileSync(tokens, `${kToken}\n`);
+  await page.context().request.get(`${server.address}/?token=${kToken}`);
 };
 
 checks['one that was kept, and is not known any more, is asked for anew, also in the page of the rig'] = async () => {

@@ -43,10 +43,10 @@ export function endHeld(): void {
   held.clear();
 }
 
-/** Throws where the server does not answer in time, or with something else. `server`: the address of its page. */
+/** Throws where the server does not answer in time, or with something else, whose status is the error's cause. `server`: the address of its page. */
 export async function fetchList(server: string): Promise<StreamList> {
   const response = await fetch(urlOf('api/streams', server), { cache: 'no-store', signal: AbortSignal.timeout(kListPatienceMs) });
-  if (!response.ok) throw new Error(`HTTP ${response.status}`);
+  if (!response.ok) throw new Error(`HTTP ${response.status}`, { cause: response.status });
   return (await response.json()) as StreamList;
 }
 

@@ -38,6 +38,8 @@ export interface FrameStore {
   /** Whether it holds video that builds on the frame before it. */
   buildsOnFrameBefore(index: number): Promise<boolean>;
   read(index: number): Promise<StoredFrame>;
+  /** Nobody waits any more for what was asked for and has not come. */
+  giveUp?(): void;
   /** The same as a recording would hold it. */
   sample(index: number): Promise<Sample>;
   /** What describes the stream's frames that were published then (ms UTC), likewise; null: the store does not have it. */

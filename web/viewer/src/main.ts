@@ -59,7 +59,6 @@ class Viewer {
   private shared: Shared | null; // by the link that was opened, until something else is chosen
   private pictureAlone = false; // what comes is no surface
   private posed = false; // the link's view is shown
-
   private problem: string | null = null;
   private readonly choice = new Choice();
   private chosenByPerson = false; // the stream, by the address or the picker
@@ -456,11 +455,11 @@ class Viewer {
     this.presentation = this.choice.presented(told);
     this.ui.showState(this.presentation, seen, this.choice.hasFailed);
     this.showNotice();
-    const { streams, arrived } = this.server;
-    this.streams.panel?.show(streams, this.stream, this.companions?.names ?? [], arrived && (!offline || facts.refusal !== null));
+    const { streams } = this.server;
+    this.streams.panel?.show(streams, this.stream, this.companions?.names ?? [], this.server.whyUnknown(offline && facts.refusal === null));
     this.streams.panel?.showRecordings(streams, this.serverFile);
     const besides = this.companions?.tell() ?? new Map<string, Presentation>();
-    this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
+    this.ui.showStreams(streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
     this.qualityControl.show(this.offered);
     this.pictures.watch(this.liveCamera);
     this.view?.refresh();
@@ -471,6 +470,7 @@ class Viewer {
   private async list(): Promise<void> {
     if (!(await this.server.refresh())) return;
     if (this.server.arrived) this.useList();
+    else if (this.server.wantsToken && this.session.source === null && this.file === null) location.reload();
     this.refresh();
   }
 

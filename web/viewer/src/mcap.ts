@@ -14,6 +14,8 @@ export interface Bytes {
   read(at: number, length: number): Promise<Uint8Array>;
   /** Only this, where it is not there already. */
   readLittle?(at: number, length: number): Promise<Uint8Array>;
+  /** What was asked for and has not come is not waited for any more: it is asked for anew. */
+  giveUp?(): void;
   /** It may have changed from `end` on, where it then is read anew; `size` says how much there is. */
   grow?(end: number): Promise<void>;
 }

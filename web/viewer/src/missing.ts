@@ -11,5 +11,12 @@ export class NoAnswer extends Unavailable {
   }
 }
 
+/** The server lets nobody in without a token. A page gets one when a person signs in, in any tab. */
+export class NoToken extends Unavailable {
+  constructor() {
+    super('the server wants a token for it: load this page anew to sign in');
+  }
+}
+
 /** Asking again does not help. */
 export class Final extends Error {}

@@ -164,6 +164,10 @@ export class Recording implements FrameStore {
     return readSample(this.file, this.frames[index]!);
   }
 
+  giveUp(): void {
+    this.file.giveUp?.();
+  }
+
   held(): FrameStore {
     return this;
   }

@@ -2,7 +2,7 @@
 // A file of the server, read in parts: what is asked for comes in blocks, of which the last ones are kept, and the
 // next one is fetched ahead. It may grow there meanwhile.
 import type { Bytes } from './mcap';
-import { Final, NoAnswer, Unavailable } from './missing';
+import { Final, NoAnswer, NoToken, Unavailable } from './missing';
 
 export const kBlock = 2 ** 18; // bytes
 const kKept = 64; // blocks
@@ -16,6 +16,7 @@ export type Fetch = (url: URL, init: RequestInit) => Promise<Response>;
 export class RemoteFile implements Bytes {
   readonly isRemote = true;
   private readonly blocks = new Map<number, Promise<Uint8Array>>(); // the one used last is the last
+  private readonly asking = new Set<AbortController>(); // parts that have not come
 
   private constructor(
     private readonly url: URL,
@@ -97,6 +98,11 @@ export class RemoteFile implements Bytes {
     return (await kept).slice(at - first * kBlock, end - first * kBlock);
   }
 
+  /** What has not come is asked for anew, behind what is asked for now: connections are few. */
+  giveUp(): void {
+    for (const asking of this.asking) asking.abort();
+  }
+
   private block(index: number): Promise<Uint8Array> {
     let block = this.blocks.get(index);
     this.blocks.delete(index);
@@ -121,15 +127,26 @@ export class RemoteFile implements Bytes {
       try {
         return await this.ask(at, end);
       } catch (error) {
-        if (error instanceof Final || tried === kTries) throw error;
+        if (error instanceof Final || error instanceof NoToken || tried === kTries) throw error;
         await new Promise((resolve) => setTimeout(resolve, kFirstWaitMs * 2 ** (tried - 1)));
       }
     }
   }
 
   private async ask(at: number, end: number): Promise<Uint8Array> {
+    const asking = new AbortController();
+    AbortSignal.timeout(kPatienceMs).addEventListener('abort', () => asking.abort());
+    this.asking.add(asking);
+    try {
+      return await this.askUntil(asking.signal, at, end);
+    } finally {
+      this.asking.delete(asking);
+    }
+  }
+
+  private async askUntil(signal: AbortSignal, at: number, end: number): Promise<Uint8Array> {
     const headers = { Range: `bytes=${at}-${end - 1}`, 'If-Range': this.etag };
-    const response = await this.fetch(this.url, { headers });
+    const response = await this.fetch(this.url, { headers, signal });
     if (response.status === 200 || response.status === 416) {
       await response.body?.cancel();
       throw new Final(kChanged);
@@ -156,7 +173,7 @@ function versionOf(head: Response): { size: number; etag: string } {
 }
 
 function refused(status: number, otherwise: string): Error {
-  if (status === 401) return new Final('the server wants a token for it: load this page anew to sign in');
+  if (status === 401) return new NoToken();
   if (status === 404) return new Final('it is not there (HTTP 404)');
   const why = `${otherwise} (HTTP ${status})`;
   return status >= 500 || status === 429 ? new Unavailable(why) : new Final(why);

@@ -8,6 +8,7 @@ import type { FramePrefix } from './protocol';
 import type { Missing, Playback, SourceEvents } from './source';
 
 const kLateMs = 1500; // a frame that takes longer to come is waited for
+const kAgainMs = 1000; // before what did not come is asked for again
 const kLongestWaitMs = 2 ** 30; // browsers take what is twice as long for none
 
 /** What the decoder holds: the key frame, and the last frame that was decoded after it. */
@@ -44,6 +45,8 @@ export class StorePlayer implements Playback {
   private run_ = 0; // of `last`
   private decoded: Decoded = { key: -1, last: -1 };
   private sending = false;
+  private sends = 0; // begun
+  private overdue = false; // what is being sent does not come
   private running = false;
   private late = false; // the clock stands until the frame that is being read has come
   private failure: Missing | null = null; // of the frame that was read last
@@ -121,6 +124,7 @@ export class StorePlayer implements Playback {
     this.clock.seek(atMs, now);
     this.wanted = this.due(now);
     ++this.runs;
+    if (this.overdue) this.giveUp();
     this.pump();
   }
 
@@ -188,29 +192,57 @@ export class StorePlayer implements Playback {
     this.handed.ended?.();
   }
 
+  // What has not come for a while, since something else is wanted.
+  private giveUp(): void {
+    ++this.sends;
+    ++this.credits;
+    this.sending = this.overdue = false;
+    this.store.giveUp?.();
+  }
+
   private async send(index: number): Promise<void> {
+    const id = ++this.sends;
     this.sending = true;
     this.last = index;
-    const late = this.timers.setTimeout(() => this.wait(index), kLateMs);
+    const late = this.timers.setTimeout(() => this.beLate(index), kLateMs);
     try {
       const key = await this.store.keyBefore(index);
       if (key === null) throw new Error('this frame builds on one that is not there');
       for (const before of framesBefore(index, key, this.decoded, await this.store.buildsOnFrameBefore(index))) {
-        await this.hand(before, true);
-        if (this.stopped) return;
+        await this.hand(before, true, id);
+        if (this.isLeft(id)) return;
         this.decoded = { key, last: before };
       }
-      await this.hand(index, false);
+      await this.hand(index, false, id);
+      if (this.isLeft(id)) return;
       this.decoded = { key, last: index };
       this.arrived();
     } catch (error) {
+      if (this.isLeft(id)) return;
+      this.fail(index, error);
+      if (error instanceof Unavailable) {
+        this.beLate(index);
+        await new Promise((resolve) => this.timers.setTimeout(resolve, kAgainMs));
+        if (this.isLeft(id)) return;
+      }
       ++this.credits;
-      if (!this.stopped) this.fail(index, error);
     } finally {
       this.timers.clearTimeout(late);
     }
-    this.sending = false;
-    if (!this.stopped) this.handed.sent?.(index);
+    this.sending = this.overdue = false;
+    this.handed.sent?.(index);
+    this.pump();
+  }
+
+  private isLeft(id: number): boolean {
+    return this.stopped || id !== this.sends;
+  }
+
+  private beLate(index: number): void {
+    this.overdue = true;
+    this.wait(index);
+    if (this.wanted === null || this.wanted === index) return;
+    this.giveUp();
     this.pump();
   }
 
@@ -253,9 +285,9 @@ export class StorePlayer implements Playback {
     this.handed.nonsense(why);
   }
 
-  private async hand(index: number, forLater: boolean): Promise<void> {
+  private async hand(index: number, forLater: boolean, id: number): Promise<void> {
     const { prefix, message } = await this.store.read(index);
-    if (this.stopped) return;
+    if (this.isLeft(id)) return;
     this.handing(prefix);
     this.handed.frame(prefix, message, forLater);
   }

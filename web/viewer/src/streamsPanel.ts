@@ -78,8 +78,8 @@ export class StreamsPanel {
     }
   }
 
-  /** `first`: shown, and `besides` it; `known`: what is listed is so now. */
-  show(listed: readonly ListedStream[], first: string | null, besides: readonly string[], known: boolean): void {
+  /** `first`: shown, and `besides` it; `unknown`: why what is listed may not be so now; empty: it is. */
+  show(listed: readonly ListedStream[], first: string | null, besides: readonly string[], unknown: string): void {
     if (!this.isOpen) return;
     const gone = besides.filter((name) => !listed.some((s) => s.name === name));
     const streams: ListedStream[] = [...listed, ...gone.map((name) => ({ name, source: '', state: say.gone }))];
@@ -94,7 +94,7 @@ export class StreamsPanel {
     }
     for (const stream of streams) {
       const row = this.rows.get(stream.name) ?? this.add(stream.name);
-      const state = !known ? say.notKnown : typeof stream.recording === 'string' ? say.recording : stream.state;
+      const state = unknown !== '' ? unknown : typeof stream.recording === 'string' ? say.recording : stream.state;
       setText(row.about, say.withWord(stream.source, state));
       const isFirst = stream.name === first;
       row.item.classList.toggle('shown', isFirst);

@@ -293,6 +293,7 @@ export const text = {
     cutTitle: 'What recorded it ended before it was finished: it plays as far as it is whole, and relievo recover makes a sound copy',
     gone: 'gone',
     notKnown: 'not known: the server does not answer',
+    notTold: 'not known: the server wants a token, load this page anew to sign in',
     withWord: (name: string, word: string) => [name, word].filter((part) => part !== '').join(' · '),
     show: 'Show',
     showTitle: (name: string) => `Show ${name} alone`,

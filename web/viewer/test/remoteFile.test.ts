@@ -64,17 +64,20 @@ describe('RemoteFile', () => {
     await expect(file.read(0, 4)).rejects.toThrow('changed');
   });
 
-  it('says at once that a token is wanted, where there is one since', async () => {
+  it('says at once that a token is wanted, where there is one since, and goes on once there is one', async () => {
     const server = new Server();
     let asked = 0;
     const file = await RemoteFile.open(url, async (at, init) => {
-      if (server.etag === '"one"') return server.fetch(at, init);
+      if (server.etag !== '') return server.fetch(at, init);
       ++asked;
       return new Response('a token is wanted', { status: 401 });
     });
     server.etag = '';
-    await expect(file.read(3 * kBlock, 4)).rejects.toThrow('sign in');
+    const error: unknown = await file.read(3 * kBlock, 4).catch((why: unknown) => why);
+    expect([String(error).includes('sign in'), error instanceof Unavailable]).toEqual([true, true]);
     expect(asked).toBe(1);
+    server.etag = '"one"';
+    expect(await file.read(3 * kBlock, 4)).toEqual(server.bytes.slice(3 * kBlock, 3 * kBlock + 4));
   });
 
   it('waits no longer than a server does for what has stopped coming, and asks again', async () => {
@@ -96,6 +99,25 @@ describe('RemoteFile', () => {
     expect(await file.read(3 * kBlock, 4)).toEqual(server.bytes.slice(3 * kBlock, 3 * kBlock + 4));
     expect(stopped).toBe(2);
     impatient.mockRestore();
+  });
+
+  it('asks anew for what was given up, at once for what is wanted next', async () => {
+    const server = new Server();
+    let hang = true;
+    const asked: string[] = [];
+    const file = await RemoteFile.open(url, async (at, init) => {
+      asked.push(new Headers(init.headers).get('range')!);
+      if (!hang || !new Headers(init.headers).has('if-range')) return server.fetch(at, init);
+      return new Promise((_, reject) => init.signal!.addEventListener('abort', () => reject(new DOMException('', 'AbortError')))) as never;
+    });
+    const waiting = file.read(3 * kBlock, 4);
+    await Promise.resolve();
+    hang = false;
+    asked.length = 0;
+    file.giveUp();
+    expect(await file.read(0, 4)).toEqual(server.bytes.slice(0, 4));
+    expect(await waiting).toEqual(server.bytes.slice(3 * kBlock, 3 * kBlock + 4));
+    expect(asked.map((range) => Number(/=(\d+)/.exec(range)![1]) / kBlock)).toEqual([0, 1, 3]);
   });
 
   it('tells what may come later from what does not', async () => {

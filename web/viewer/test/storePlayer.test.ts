@@ -102,11 +102,12 @@ describe('StorePlayer', () => {
 
   describe('of frames that are read over a network', () => {
     /** `answer`: what reading a frame comes to. */
-    function playing(answer: { read: () => Promise<void> }): { player: StorePlayer; sent: number[]; complaints: string[] } {
+    function playing(answer: { read: () => Promise<void> }): { player: StorePlayer; sent: number[]; complaints: string[]; givenUp: () => number } {
       const [sent, complaints]: [number[], string[]] = [[], []];
-      const far = { ...store, times: Float64Array.of(0, 1000, 2000, 3000), read: async () => (await answer.read(), { prefix, message: new ArrayBuffer(48) }) } as unknown as FrameStore;
+      const giveUp = vi.fn();
+      const far = { ...store, times: Float64Array.of(0, 1000, 2000, 3000), giveUp, read: async () => (await answer.read(), { prefix, message: new ArrayBuffer(48) }) } as unknown as FrameStore;
       const player = new StorePlayer(far, { frame: () => (sent.push(player.index), player.credit()), nonsense: (why) => complaints.push(why) });
-      return { player, sent, complaints };
+      return { player, sent, complaints, givenUp: () => giveUp.mock.calls.length };
     }
     const kTries = 2100; // ms that a remote file takes for its own
     const refused = (error: Error) => () => new Promise<void>((_, reject) => setTimeout(() => reject(error), kTries));
@@ -142,8 +143,47 @@ describe('StorePlayer', () => {
       player.play();
       player.seek(1000);
       answer.read = async () => undefined;
-      await vi.advanceTimersByTimeAsync(kTries + 100);
+      await vi.advanceTimersByTimeAsync(200); // not what was asked for before that
       expect([sent[0], player.missing, player.playing, complaints]).toEqual([1, null, true, []]);
+    });
+
+    it('gives up what does not come for what somebody goes to, also where that was before it was late', async () => {
+      let come = (): void => undefined;
+      const answer = { read: async (): Promise<void> => undefined };
+      const { player, sent, givenUp } = playing(answer);
+      player.seek(0);
+      await vi.advanceTimersByTimeAsync(10);
+      const hang = (): Promise<void> => new Promise((resolve) => (come = resolve));
+      for (const isLate of [true, false]) {
+        answer.read = hang;
+        player.seek(3000);
+        await vi.advanceTimersByTimeAsync(isLate ? 5000 : 100);
+        answer.read = async () => undefined;
+        player.seek(1000);
+        await vi.advanceTimersByTimeAsync(isLate ? 10 : 2000);
+        expect([sent, player.missing, givenUp()]).toEqual([[0, 1], null, isLate ? 1 : 2]);
+        come(); // after all
+        await vi.advanceTimersByTimeAsync(1000);
+        expect([sent.splice(1), player.position]).toEqual([[1], 1000]);
+      }
+      player.seek(2000);
+      await vi.advanceTimersByTimeAsync(10);
+      expect([sent, givenUp()]).toEqual([[0, 2], 2]);
+    });
+
+    it('does not ask all the time for what is refused at once', async () => {
+      let asked = 0;
+      const answer = { read: (): Promise<void> => (++asked, Promise.reject(new Unavailable('a token is wanted'))) };
+      const { player, sent } = playing(answer);
+      player.seek(0);
+      await vi.advanceTimersByTimeAsync(10_000);
+      expect(asked).toBeGreaterThan(2);
+      expect(asked).toBeLessThan(20);
+      expect(player.missing).toEqual({ why: 'a token is wanted', passing: true });
+      answer.read = async () => undefined;
+      player.seek(2000); // at once
+      await vi.advanceTimersByTimeAsync(10);
+      expect([sent, player.missing]).toEqual([[2], null]);
     });
 
     it('has ended where somebody goes to its end, also before that frame comes', async () => {
