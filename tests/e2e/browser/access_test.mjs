@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves, in headless Chromium: who uses a keyboard or a screen reader gets at all of the page: each control of each
 // panel has a name, the tabulator reaches them and shows where it is; the sheet lists the keys; times are told since
-// the start and by the day; what was measured is copied; in forced colours it shows what is chosen; and in small windows no
-// part lies over another or is cut off.
+// the start and by the day; what was measured is copied; in forced colours it shows what is chosen; and in small windows, and
+// where the browser writes larger, no part lies over another or is cut off.
 // Run as: node access_test.mjs GATEWAY_FEEDER, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -25,6 +25,37 @@ const nameless = (page) =>
     const controls = [...document.querySelectorAll('button, input, select, a[href], [role=slider]')].filter(isShown);
     return { count: controls.length, without: controls.filter((e) => !/\p{L}|\d/u.test(name(e))).map((e) => e.outerHTML.slice(0, 120)) };
   });
+
+/** No part of the page lies over another, or is cut off. */
+async function fits(page, what) {
+  const wrong = () => page.evaluate(() => {
+    const box = (e) => e.getBoundingClientRect();
+    const parts = [...document.querySelectorAll('header > *, footer > *, #rail, #legend')].filter((e) => e.getClientRects().length > 0);
+    const name = (e) => e.id || e.textContent || e.tagName;
+    // What lies in a row that is scrolled is brought into sight first.
+    const isCut = (e) => {
+      e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+      return box(e).right > innerWidth + 0.5 || box(e).bottom > innerHeight + 0.5;
+    };
+    const isCovered = (e) => {
+      e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+      const { left, top, width: across, height: high } = box(e);
+      return !e.contains(document.elementFromPoint(left + across / 2, top + high / 2));
+    };
+    const buttons = [...document.querySelectorAll('header button, footer button, #rail button')].filter((e) => e.getClientRects().length > 0);
+    const overlap = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
+    return {
+      cut: [...parts, ...buttons].filter(isCut).map(name),
+      covered: buttons.filter(isCovered).map(name),
+      over: parts.flatMap((a, i) => parts.slice(i + 1).filter((b) => overlap(box(a), box(b))).map((b) => `${name(a)}, ${name(b)}`)),
+    };
+  });
+  let found;
+  await eventually(() => `${what}: ${JSON.stringify(found)}`, async () => {
+    found = await wrong(); // parts follow the header
+    return found.cut.length + found.covered.length + found.over.length === 0;
+  });
+}
 
 const checks = {
   async 'each control of each panel has a name'(page) {
@@ -233,34 +264,39 @@ const checks = {
       await page.keyboard.press('6');
       await page.keyboard.press('x');
       for (const part of ['#recording', '#legend', '#timeline']) await page.waitForSelector(part, { state: 'visible' });
-      const wrong = () => page.evaluate(() => {
-        const box = (e) => e.getBoundingClientRect();
-        const parts = [...document.querySelectorAll('header > *, footer > *, #rail, #legend')].filter((e) => e.getClientRects().length > 0);
-        const name = (e) => e.id || e.textContent || e.tagName;
-        // What lies in a row that is scrolled is brought into sight first.
-        const isCut = (e) => {
-          e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
-          return box(e).right > innerWidth + 0.5 || box(e).bottom > innerHeight + 0.5;
-        };
-        const isCovered = (e) => {
-          e.scrollIntoView({ block: 'nearest', inline: 'nearest' });
-          const { left, top, width: across, height: high } = box(e);
-          return !e.contains(document.elementFromPoint(left + across / 2, top + high / 2));
-        };
-        const buttons = [...document.querySelectorAll('header button, footer button, #rail button')].filter((e) => e.getClientRects().length > 0);
-        const overlap = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
-        return {
-          cut: [...parts, ...buttons].filter(isCut).map(name),
-          covered: buttons.filter(isCovered).map(name),
-          over: parts.flatMap((a, i) => parts.slice(i + 1).filter((b) => overlap(box(a), box(b))).map((b) => `${name(a)}, ${name(b)}`)),
-        };
-      });
-      let found;
-      await eventually(() => `${width}x${height}: ${JSON.stringify(found)}`, async () => {
-        found = await wrong(); // parts follow the header
-        return found.cut.length + found.covered.length + found.over.length === 0;
-      });
+      await fits(page, `${width}x${height}`);
       await page.close();
+    }
+  },
+
+  async 'who has their browser write larger gets all of it larger, and still no part over another'() {
+    for (const size_px of [16, 24, 32]) {
+      const large = await launchChromium([`--blink-settings=defaultFontSize=${size_px}`]);
+      try {
+        const { open: openLarge } = pagesOf(large, `http://127.0.0.1:${feeder.port}`, complaints);
+        for (const [width, height] of [[1440, 900], [390, 844]]) {
+          const page = await openLarge('/?stream=ball', { viewport: { width, height } });
+          await shownPast(page, 2);
+          await page.keyboard.press('6');
+          for (const part of ['#legend', '#timeline']) await page.waitForSelector(part, { state: 'visible' });
+          const sizes = await page.evaluate(() => ['#badge', '#timeline', '#overlay'].map((of) => parseFloat(getComputedStyle(document.querySelector(of)).fontSize)));
+          assert.deepEqual(sizes.map((px) => Math.round((px * 16) / size_px)), [13, 12, 11], `${sizes}`);
+          await fits(page, `letters of ${size_px}, ${width}x${height}`);
+          for (const [key, name] of Object.entries(kPanels)) {
+            await page.keyboard.press(key);
+            await page.waitForSelector(`#panel-${name} .body > *`, { state: 'attached' });
+            const { scrollWidth, clientWidth } = await page.evaluate((of) => {
+              const { scrollWidth, clientWidth } = document.querySelector(of);
+              return { scrollWidth, clientWidth };
+            }, `#panel-${name}`);
+            assert.ok(scrollWidth <= clientWidth + 1, `letters of ${size_px}, ${width}x${height}: ${name} is ${scrollWidth} px wide in ${clientWidth}`);
+            await page.keyboard.press('Escape');
+          }
+          await page.close();
+        }
+      } finally {
+        await large.close();
+      }
     }
   },
 

@@ -35,8 +35,6 @@ export function placesOf(points: readonly Place[]): Place[] {
 }
 
 const kApart = 3; // pixels between two words
-const kLine = 11;
-const kFont = '11px system-ui, sans-serif';
 
 export class Overlay {
   private readonly context: CanvasRenderingContext2D;
@@ -60,25 +58,26 @@ export class Overlay {
     const c = this.context;
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.clearRect(0, 0, clientWidth, clientHeight);
-    c.font = kFont;
     c.textBaseline = 'middle';
     c.textAlign = 'center';
     const style = getComputedStyle(this.canvas);
+    const line = parseFloat(style.fontSize);
+    c.font = `${line}px system-ui, sans-serif`;
     const halo = style.getPropertyValue('--halo');
     const accent = style.getPropertyValue('--mark');
     const taken: Box[] = [...this.covers];
     for (const { at, text, colour } of labels) {
       const place = project(at);
       if (place === null) continue;
-      const box = { x: place.x, y: place.y + 9, width: c.measureText(text).width + kApart, height: kLine };
+      const box = { x: place.x, y: place.y + 0.8 * line, width: c.measureText(text).width + kApart, height: line };
       if (taken.some((other) => overlap(box, other))) continue; // neither could be read
       taken.push(box);
       this.text(text, box.x, box.y, style.getPropertyValue(colour), halo);
     }
-    for (const mark of this.marks()) this.mark(mark, project, taken, [accent, halo]);
+    for (const mark of this.marks()) this.mark(mark, project, taken, [accent, halo, line]);
   }
 
-  private mark({ points, dots, ring, text }: Mark, project: Project, taken: Box[], [accent, halo]: readonly [string, string]): void {
+  private mark({ points, dots, ring, text }: Mark, project: Project, taken: Box[], [accent, halo, line]: readonly [string, string, number]): void {
     const places = points.map(project);
     const seen = places.filter((p) => p !== null);
     if (seen.length === 0) return;
@@ -115,9 +114,9 @@ export class Overlay {
     }
     if (text === '') return;
     const width = this.context.measureText(text).width + kApart;
-    const free = placesOf(seen).find(({ x, y }) => !taken.some((other) => overlap({ x, y, width, height: kLine }, other)));
+    const free = placesOf(seen).find(({ x, y }) => !taken.some((other) => overlap({ x, y, width, height: line }, other)));
     const { x, y } = free ?? placesOf(seen)[0]!;
-    taken.push({ x, y, width, height: kLine });
+    taken.push({ x, y, width, height: line });
     this.text(text, x, y, accent, halo);
   }
 

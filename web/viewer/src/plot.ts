@@ -2,7 +2,7 @@
 // Small plots in panels, in the page's colours and the screen's resolution.
 import { metres, niceStep, ticks, type Range } from './palette';
 
-const kMargin = { left: 38, right: 8, top: 8, bottom: 20 };
+const kMargin = { left: 3.8, right: 0.8, top: 0.8, bottom: 2 }; // of the letters' size
 
 export interface Line {
   points: readonly (readonly [number, number])[]; // NaN ends a stretch
@@ -24,30 +24,32 @@ export function plot(canvas: HTMLCanvasElement, { x, y, unit }: Axes, lines: rea
   const c = canvas.getContext('2d')!;
   c.scale(ratio, ratio);
   const style = getComputedStyle(canvas);
-  const inner = { width: width - kMargin.left - kMargin.right, height: height - kMargin.top - kMargin.bottom };
-  const atX = (v: number): number => kMargin.left + ((v - x.from) / (x.to - x.from)) * inner.width;
-  const atY = (v: number): number => kMargin.top + (1 - (v - y.from) / (y.to - y.from)) * inner.height;
-  c.font = '10px system-ui, sans-serif';
+  const em = parseFloat(style.fontSize);
+  const [left, right, top, bottom] = [kMargin.left * em, kMargin.right * em, kMargin.top * em, kMargin.bottom * em];
+  const inner = { width: width - left - right, height: height - top - bottom };
+  const atX = (v: number): number => left + ((v - x.from) / (x.to - x.from)) * inner.width;
+  const atY = (v: number): number => top + (1 - (v - y.from) / (y.to - y.from)) * inner.height;
+  c.font = `${em}px system-ui, sans-serif`;
   c.fillStyle = style.getPropertyValue('--quiet');
   c.strokeStyle = style.getPropertyValue('--line');
   c.textBaseline = 'middle';
   c.textAlign = 'right';
   const stepY = niceStep(y.to - y.from, 4);
   for (const v of ticks(y, stepY)) {
-    rule(c, [kMargin.left, atY(v)], [width - kMargin.right, atY(v)]);
-    c.fillText(metres(v, stepY), kMargin.left - 5, atY(v));
+    rule(c, [left, atY(v)], [width - right, atY(v)]);
+    c.fillText(metres(v, stepY), left - em / 2, atY(v));
   }
   c.textAlign = 'center';
   const stepX = niceStep(x.to - x.from, 5);
   for (const v of ticks(x, stepX)) {
-    rule(c, [atX(v), kMargin.top], [atX(v), height - kMargin.bottom]);
-    c.fillText(metres(v, stepX), atX(v), height - kMargin.bottom + 10);
+    rule(c, [atX(v), top], [atX(v), height - bottom]);
+    c.fillText(metres(v, stepX), atX(v), height - bottom + em);
   }
   c.textAlign = 'left';
-  c.fillText(unit, 2, height - kMargin.bottom + 10);
+  c.fillText(unit, 2, height - bottom + em);
   c.save();
   c.beginPath();
-  c.rect(kMargin.left, kMargin.top, inner.width, inner.height);
+  c.rect(left, top, inner.width, inner.height);
   c.clip();
   c.lineWidth = 1.5;
   c.lineJoin = 'round';
@@ -74,7 +76,7 @@ export function plot(canvas: HTMLCanvasElement, { x, y, unit }: Axes, lines: rea
   const half = c.measureText(said).width / 2;
   c.fillStyle = style.getPropertyValue('--text');
   c.textAlign = 'center';
-  c.fillText(said, Math.min(Math.max(atX(beyond[0]), kMargin.left + half), width - kMargin.right - half), kMargin.top + 5);
+  c.fillText(said, Math.min(Math.max(atX(beyond[0]), left + half), width - right - half), top + em / 2);
 }
 
 function rule(c: CanvasRenderingContext2D, from: [number, number], to: [number, number]): void {

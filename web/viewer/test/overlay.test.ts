@@ -27,7 +27,7 @@ it('dots are where they are said to be, not at the ends of a line', () => {
   };
   const context = new Proxy(drawn, { get: (of, name: string) => of[name] ?? (() => undefined), set: () => true });
   vi.stubGlobal('window', { devicePixelRatio: 1 });
-  vi.stubGlobal('getComputedStyle', () => ({ getPropertyValue: () => 'red' }));
+  vi.stubGlobal('getComputedStyle', () => ({ getPropertyValue: () => 'red', fontSize: '11px' }));
   const overlay = new Overlay({ getContext: () => context, clientWidth: 100, clientHeight: 100 } as unknown as HTMLCanvasElement);
   const line: Vec3[] = [[10, 10, 1], [20, 12, 1], [30, 12, 1], [40, 10, 1], [50, 10, 1]];
   overlay.marks = () => [{ points: line, dots: [[8, 10, 1], [55, 10, 1], [70, 10, -1]], text: '' }];
@@ -41,7 +41,7 @@ it('text that would lie over other text stands elsewhere on its mark', () => {
   const drawn: Record<string, unknown> = { fillText: (_: string, x: number, y: number) => texts.push([x, y]), measureText: () => ({ width: 30 }) };
   const context = new Proxy(drawn, { get: (of, name: string) => of[name] ?? (() => undefined), set: () => true });
   vi.stubGlobal('window', { devicePixelRatio: 1 });
-  vi.stubGlobal('getComputedStyle', () => ({ getPropertyValue: () => 'red' }));
+  vi.stubGlobal('getComputedStyle', () => ({ getPropertyValue: () => 'red', fontSize: '11px' }));
   const overlay = new Overlay({ getContext: () => context, clientWidth: 400, clientHeight: 400 } as unknown as HTMLCanvasElement);
   const diagonals: Vec3[][] = [[[100, 100, 1], [300, 300, 1]], [[100, 300, 1], [300, 100, 1]], [[200, 100, 1], [200, 300, 1]]];
   overlay.marks = () => diagonals.map((points) => ({ points, dots: [], text: 'a length' }));
