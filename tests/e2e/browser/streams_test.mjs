@@ -408,6 +408,27 @@ const checks = {
     await page.close();
   },
 
+  async 'of a long list only those in sight are read for their pictures'() {
+    const page = await open('/', {});
+    await shownPast(page, 2);
+    await page.route('**/api/streams', async (route) => {
+      const listed = await (await route.fetch()).json();
+      for (let i = 0; i < 40; ++i) listed.streams.push({ ...listed.streams[0], name: `more-${i}` });
+      await route.fulfill({ json: listed });
+    });
+    const asked = []; // none of the others has frames, so that each takes some seconds
+    page.on('websocket', (socket) => asked.push(new URL(socket.url()).pathname));
+    await page.keyboard.press('n');
+    await eventually('no picture of the others is asked for', () => asked.includes('/ws/more-0'));
+    await page.evaluate(() => document.querySelector('.streams li:last-child').scrollIntoView());
+    const before = asked.length;
+    await eventually('the last are not asked for', () => asked.includes('/ws/more-39'));
+    const between = asked.slice(before).filter((path) => /more-/.test(path)).map((path) => Number(/\d+$/.exec(path)));
+    assert.ok(between.filter((i) => i < 20).length <= 1, `asked for ${between}`); // which was the next
+    await page.unrouteAll({ behavior: 'ignoreErrors' });
+    await page.close();
+  },
+
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder of recordings.
     assert.deepEqual(complaints.filter((c) => !/status of 404/.test(c)), []);

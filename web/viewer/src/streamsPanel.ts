@@ -11,7 +11,7 @@ import type { View } from './view';
 
 const say = text.streams;
 const kFreshMs = 15_000; // between pictures of a stream that is not shown
-const kAhead = '50%'; // of the panel's height: pictures of recordings so far out of sight are read, too
+const kAhead = '50%'; // of the panel's height: pictures so far out of sight are read, too
 
 export interface StreamsPanelEvents {
   choose(name: string): void;
@@ -29,7 +29,9 @@ interface Row {
   rig: HTMLAnchorElement; // the page that shows what its camera sees
   beside: HTMLButtonElement | null; // recordings of the folder are shown alone
   place: HTMLButtonElement | null;
+  file: string | null; // in the folder
   pictureAt: number; // when it was asked for
+  isNear: boolean; // in sight, or soon
 }
 
 export class StreamsPanel {
@@ -45,7 +47,8 @@ export class StreamsPanel {
   private listings = 0; // of the folder, asked for
   private shownFile: string | null = null;
   private readonly thumbnails = new Thumbnails();
-  private readonly inSight: IntersectionObserver; // which of the folder's pictures
+  private readonly inSight: IntersectionObserver; // which of the pictures
+  private readonly rowOf = new WeakMap<Element, Row>(); // by its picture
   private isOpen = false;
   private readonly aligner: Aligner | null;
   private readonly aligning = make('p', { hidden: true, className: 'aligning' });
@@ -57,7 +60,7 @@ export class StreamsPanel {
     private readonly events: StreamsPanelEvents,
     private readonly view: View | null,
   ) {
-    this.inSight = new IntersectionObserver((entries) => this.ask(entries), { root: body.parentElement, rootMargin: `${kAhead} 0px` });
+    this.inSight = new IntersectionObserver((entries) => this.look(entries), { root: body.parentElement, rootMargin: `${kAhead} 0px` });
     this.aligner = view === null ? null : new Aligner(view, (now) => this.showAligning(now));
     this.buttons = make('div', { className: 'buttons', hidden: true }, this.apply, button(say.cancel, say.cancel, () => this.aligner?.begin(null)));
     this.aligning.setAttribute('role', 'status');
@@ -89,7 +92,7 @@ export class StreamsPanel {
     setText(this.note, isKnown ? say.knownPlaces : say.unknownPlaces);
     for (const [name, row] of this.rows) {
       if (streams.some((s) => s.name === name)) continue;
-      row.item.remove();
+      this.remove(row);
       this.rows.delete(name);
     }
     for (const stream of streams) {
@@ -103,7 +106,7 @@ export class StreamsPanel {
       row.beside!.disabled = isFirst;
       row.place!.hidden = this.aligner === null || !besides.includes(stream.name);
       row.rig.hidden = stream.camera !== true;
-      if (!gone.includes(stream.name)) this.draw(row, stream.name, stream.recording ?? null);
+      if (!gone.includes(stream.name) && row.isNear) this.draw(row, stream.name, stream.recording ?? null);
     }
   }
 
@@ -148,6 +151,7 @@ export class StreamsPanel {
     const row = makeRow(name, () => this.events.choose(name), beside, place);
     this.rows.set(name, row);
     this.live.append(row.item);
+    this.watch(row);
     return row;
   }
 
@@ -172,31 +176,43 @@ export class StreamsPanel {
   }
 
   private addRecording(file: string): Row {
-    const row = makeRow(file, () => this.events.recording(file));
+    const row = { ...makeRow(file, () => this.events.recording(file)), file };
     this.recordings.set(file, row);
-    this.inSight.observe(row.picture);
+    this.watch(row);
     return row;
   }
 
   /** Recordings that are none of these are gone. */
   private drop(files: readonly string[]): void {
     const there = new Set(files);
-    for (const [file, { item, picture }] of this.recordings) {
+    for (const [file, row] of this.recordings) {
       if (there.has(file)) continue;
-      this.inSight.unobserve(picture);
-      this.thumbnails.forget(picture);
-      item.remove();
+      this.remove(row);
       this.recordings.delete(file);
     }
   }
 
-  // Of hundreds of recordings those that nobody looks at are not read.
-  private ask(entries: readonly IntersectionObserverEntry[]): void {
+  private watch(row: Row): void {
+    this.rowOf.set(row.picture, row);
+    this.inSight.observe(row.picture);
+  }
+
+  private remove({ item, picture }: Row): void {
+    this.inSight.unobserve(picture);
+    this.thumbnails.forget(picture);
+    item.remove();
+  }
+
+  // Of hundreds of streams and recordings those that nobody looks at are not read.
+  private look(entries: readonly IntersectionObserverEntry[]): void {
     for (const { target, isIntersecting } of entries) {
-      const onto = target as HTMLCanvasElement;
-      const file = [...this.recordings].find(([, { picture }]) => picture === onto)?.[0];
-      if (!isIntersecting || file === undefined) this.thumbnails.forget(onto);
-      else if (onto.dataset['drawn'] === undefined) this.thumbnails.ask({ stream: null, recording: `recordings/${encodeURIComponent(file)}`, onto });
+      const row = this.rowOf.get(target)!;
+      const { picture, file } = row;
+      row.isNear = isIntersecting;
+      if (!isIntersecting) this.thumbnails.forget(picture);
+      if (picture.dataset['drawn'] !== undefined) continue;
+      if (!isIntersecting) row.pictureAt = -Infinity;
+      else if (file !== null) this.thumbnails.ask({ stream: null, recording: `recordings/${encodeURIComponent(file)}`, onto: picture });
     }
   }
 }
@@ -211,5 +227,5 @@ function makeRow(name: string, choose: () => void, beside: HTMLButtonElement | n
   const rig = make('a', { href: rigPage(name), title: say.rigTitle, hidden: true }, say.rig);
   const buttons = make('div', { className: 'buttons' }, show, ...(beside === null ? [] : [beside]), ...(place === null ? [] : [place]), rig);
   const item = make('li', {}, picture, make('div', {}, make('b', { title: name }, name), about, buttons));
-  return { item, picture, about, show, rig, beside, place, pictureAt: -Infinity };
+  return { item, picture, about, show, rig, beside, place, file: null, pictureAt: -Infinity, isNear: false };
 }
