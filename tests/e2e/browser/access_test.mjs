@@ -300,6 +300,28 @@ const checks = {
     }
   },
 
+  async 'all that is on the page is in its main part or its footer'() {
+    feeder.say('start ball');
+    const page = await open();
+    await shownPast(page, 2);
+    assert.equal(await page.locator('main').count(), 1);
+    const outside = await page.evaluate(() => [...document.body.children].filter((e) => e.checkVisibility() && !e.matches('main, footer')).map((e) => e.outerHTML.slice(0, 80)));
+    assert.deepEqual(outside, []);
+    await page.close();
+  },
+
+  async 'without JavaScript the page says so, and nothing else'() {
+    const context = await browser.newContext({ javaScriptEnabled: false });
+    const page = await context.newPage();
+    for (const path of ['/', '/rig']) {
+      const response = await page.goto(`http://127.0.0.1:${feeder.port}${path}`);
+      if (response.status() === 404) continue; // a gateway without a rig
+      const shown = await page.locator('body').innerText();
+      assert.match(shown.trim(), /^This page needs JavaScript[^\n]*$/, path);
+    }
+    await context.close();
+  },
+
   async 'no error, no request to another host'() {
     // Chromium tells of what the server refuses: that it has no folder of recordings.
     assert.deepEqual(complaints.filter((c) => !/status of 404/.test(c)), []);
