@@ -4,6 +4,7 @@
 // in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { mkdirSync, mkdtempSync, rmSync } from 'node:fs';
+import { connect, createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -255,6 +256,30 @@ const checks = {
     await page.waitForFunction(() => /left the network/.test(document.querySelector('#card')?.textContent));
     feeder.say('start ball');
     await inState(page, 'live');
+  },
+
+  async 'far from its server it gets the frames that there are, not two in each round trip'() {
+    const kWay_ms = 400;
+    const late = createServer((near) => {
+      const far = connect(feeder.port, '127.0.0.1');
+      for (const [from, to] of [[near, far], [far, near]]) {
+        from.on('data', (data) => void setTimeout(() => to.write(data), kWay_ms));
+        from.on('close', () => to.destroy()).on('error', () => to.destroy());
+      }
+    });
+    await new Promise((listening) => late.listen(0, '127.0.0.1', listening));
+    feeder.say('start ball');
+    const page = await newPage({ viewport: { width: 400, height: 300 } });
+    await page.goto(`http://127.0.0.1:${late.address().port}/`);
+    await shownPast(page, 1);
+    // Two would be 2.5 a second, of 8 that there are.
+    await eventually('no more come than two in a round trip', async () => {
+      const { received } = await look(page);
+      await page.waitForTimeout(4000);
+      return (await look(page)).received - received > 16;
+    });
+    await page.close();
+    late.close();
   },
 
   async 'a stream that does not exist is waited for'() {

@@ -41,10 +41,17 @@ export class LiveSource implements FrameSource, Playback {
         if (this.live) events.lost(); // what was is still there to be seen
       },
       message: (message) => {
-        if (message.type === 'info') this.history.info = message;
+        if (message.type === 'info') {
+          this.history.info = message;
+          this.underWay.frameRate = message.frame_rate;
+        }
         events.message(message);
       },
       frame: (prefix, message) => this.onFrame(prefix, message),
+      clock: (t0, serverMs, t1) => {
+        this.underWay.wentRound(t1 - t0);
+        events.clock(t0, serverMs, t1);
+      },
     };
     this.history = new History(undefined, stream);
     this.connection = new Connection(stream, received, server);
@@ -204,6 +211,7 @@ export class LiveSource implements FrameSource, Playback {
 
   private onOpen(): void {
     this.withServer = 0;
+    this.underWay.opened();
     if (this.live) {
       this.withPage = 0; // the page forgets them with the old connection
       this.events.open();

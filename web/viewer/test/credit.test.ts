@@ -43,6 +43,29 @@ describe('frames under way', () => {
     expect(credit.frames).toBe(2);
   });
 
+  it('are as many more as a long way holds, once that is known, unless the page is slow', () => {
+    const credit = new Credit();
+    credit.frameRate = 30;
+    credit.opened();
+    credit.wentRound(900); // while the page was being loaded
+    expect(credit.frames).toBe(2);
+    credit.wentRound(100);
+    credit.wentRound(350); // behind frames
+    expect(credit.frames).toBe(5);
+    run(credit, 100, 33, 100, () => 0);
+    expect(credit.frames).toBe(5);
+    run(credit, 10, 200, 5, () => 3);
+    expect(credit.frames).toBe(1);
+    run(credit, 20, 200, 150, () => 0);
+    expect(credit.frames).toBe(5);
+    credit.wentRound(0.4);
+    expect(credit.frames).toBe(2);
+    credit.opened(); // another way, perhaps
+    credit.wentRound(10);
+    credit.wentRound(5000);
+    expect(credit.frames).toBe(7);
+  });
+
   it('a pause of one frame says nothing', () => {
     const credit = new Credit();
     for (let i = 0; i < 20; ++i) {
