@@ -10,6 +10,7 @@ const kStep = 0.8;
 const kLeast = 0.5;
 const kIgnored = 4; // drawings after a change, which makes new buffers, and at the start, which compiles shaders
 const kEnough = 6; // more of them to judge by
+const kLong_ms = 3000; // of drawings, that are enough, too, however few
 const kWeight = 0.2; // of the newest drawing in the mean
 
 export class Resolution {
@@ -17,21 +18,24 @@ export class Resolution {
   scale = 1;
   private mean_ms = 0;
   private count = 0;
+  private passed_ms = 0; // in as many drawings
 
   /** One drawing of a moving picture took `ms`. True where the scale has changed. */
   took(ms: number): boolean {
-    if (++this.count <= kIgnored) return false;
-    this.mean_ms = this.count === kIgnored + 1 ? ms : this.mean_ms + kWeight * (ms - this.mean_ms);
-    if (this.count < kIgnored + kEnough) return false;
+    this.passed_ms += ms;
+    const isLong = ++this.count > 1 && this.passed_ms > kLong_ms;
+    if (this.count <= kIgnored && !isLong) return false;
+    this.mean_ms = this.count <= kIgnored + 1 ? ms : this.mean_ms + kWeight * (ms - this.mean_ms);
+    if (this.count < kIgnored + kEnough && !isLong) return false;
     const scale =
       this.mean_ms > kSlow_ms
-        ? Math.max(kLeast, this.scale * kStep)
+        ? Math.max(kLeast, this.scale * Math.min(kStep, Math.sqrt(kSlow_ms / this.mean_ms)))
         : this.mean_ms < kFast_ms
           ? Math.min(1, this.scale / kStep)
           : this.scale;
     if (scale === this.scale) return false;
     this.scale = scale;
-    this.count = 0;
+    this.count = this.passed_ms = 0;
     return true;
   }
 }

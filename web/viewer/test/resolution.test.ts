@@ -29,6 +29,16 @@ describe('Resolution', () => {
     settle(resolution, 50, 500);
     expect(resolution.scale).toBe(0.5);
   });
+  it('falls at once where each drawing takes seconds', () => {
+    const resolution = new Resolution();
+    let passed_ms = 0;
+    for (let i = 0; resolution.scale > 0.5 && i < 100; ++i) {
+      const ms = 4000 * resolution.scale ** 2;
+      passed_ms += ms;
+      resolution.took(ms);
+    }
+    expect(passed_ms).toBeLessThan(13_000);
+  });
   it('rises again', () => {
     const resolution = new Resolution();
     settle(resolution, 5, 60);
