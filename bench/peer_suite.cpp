@@ -44,11 +44,17 @@ struct Times {
   std::vector<double> ms, cpu_ms;
 };
 
+/// How often, unless it is stopped.
+struct Runs {
+  int count;
+  const StopSignal& stop;
+};
+
 /// Calls `decode` as often, and once before, untimed.
-Times timed(int runs, const std::function<void()>& decode) {
+Times timed(const Runs& runs, const std::function<void()>& decode) {
   decode();
   Times out;
-  for (int i = 0; i < runs; ++i) {
+  for (int i = 0; i == 0 || (i < runs.count && !runs.stop.stopped()); ++i) {
     const std::int64_t cpu = process_cpu_ns(), begin = steady_now_ns();
     decode();
     out.ms.push_back(milliseconds(steady_now_ns() - begin));
@@ -109,7 +115,7 @@ Row row_of(const std::string& name, std::size_t pictures_first, std::size_t pict
            {"rms_um_per_m", q.rms_um_per_m}}};
 }
 
-Row opencv_row(const StillScene& scene, int runs) {
+Row opencv_row(const StillScene& scene, const Runs& runs) {
   const GrayStack& gray = scene.gray;
   const auto peer =
       cv::structured_light::GrayCodePattern::create(gray.projector_width, gray.projector_height);
@@ -142,7 +148,7 @@ Row opencv_row(const StillScene& scene, int runs) {
   return row_of("opencv-getProjPixel", count, count, times, quality_of(scene, columns, rows));
 }
 
-Row gray_row(const StillScene& scene, int runs) {
+Row gray_row(const StillScene& scene, const Runs& runs) {
   WorkerPool pool(1);
   std::optional<Result<GrayMaps>> maps;
   const Times times = timed(runs, [&] { maps = decode_gray(scene.gray, {}, pool); });
@@ -152,7 +158,7 @@ Row gray_row(const StillScene& scene, int runs) {
                 decoded ? quality_of(scene, (*maps)->columns, (*maps)->rows) : Quality{});
 }
 
-Result<Row> stripes_row(const StillScene& scene, int runs) {
+Result<Row> stripes_row(const StillScene& scene, const Runs& runs) {
   auto reconstructor = Reconstructor::create(scene.rig, scene.pattern, {.texture = false});
   if (!reconstructor) return reconstructor.error();
   std::uint64_t number = 0;
@@ -169,7 +175,7 @@ Result<Row> stripes_row(const StillScene& scene, int runs) {
     }
   };
   for (std::size_t i = 0; i < 2 * scene.stripes.size(); ++i) next();
-  const Times times = timed(20 * runs, next);
+  const Times times = timed({20 * runs.count, runs.stop}, next);
   if (!failed) return failed.error();
   if (!made) return Error{"the stripes could not be reconstructed"};
   Scorer scorer(scene.rig, scene.pattern);
@@ -181,15 +187,17 @@ Result<Row> stripes_row(const StillScene& scene, int runs) {
 }
 
 Status run(const Options& options, StopSignal& stop) {
-  auto scene = render_still_scene(options.scene);
+  auto scene = render_still_scene(options.scene, stop);
   if (!scene) return scene.error();
   if (stop.stopped()) return {};
-  auto stripes = stripes_row(*scene, options.runs);
+  const Runs runs{options.runs, stop};
+  auto stripes = stripes_row(*scene, runs);
   if (!stripes) return stripes.error();
   if (stop.stopped()) return {};
-  Row gray = gray_row(*scene, options.runs);
+  Row gray = gray_row(*scene, runs);
   if (stop.stopped()) return {};
-  Row peer = opencv_row(*scene, options.runs);
+  Row peer = opencv_row(*scene, runs);
+  if (stop.stopped()) return {};
   const Report report{
       .suite = "peer",
       .settings = {{"scene", options.scene},

@@ -46,16 +46,17 @@ Rig rolled(const Rig& rig) {
 
 class StillRenderer {
  public:
-  StillRenderer(const sim::SimOptions& options, std::shared_ptr<const sim::Scene> scene)
-      : options_(options), scene_(std::move(scene)) {}
+  StillRenderer(const sim::SimOptions& options, std::shared_ptr<const sim::Scene> scene,
+                const StopSignal& stop)
+      : options_(options), scene_(std::move(scene)), stop_(stop) {}
 
-  /// Every slide of the pattern with its complement.
+  /// Every slide of the pattern with its complement; the first one alone once it is stopped.
   std::vector<sim::RenderedFrame> under(const Rig& rig, const Pattern& pattern, bool noise = true) const {
     sim::SimOptions options = options_;
     if (!noise) options.noise = 0;
     const sim::Renderer renderer(options, rig, pattern, scene_);
     std::vector<sim::RenderedFrame> out;
-    for (int slide = 0; slide < pattern.slides; ++slide)
+    for (int slide = 0; slide == 0 || (slide < pattern.slides && !stop_.stopped()); ++slide)
       out.push_back(renderer.render(static_cast<std::uint64_t>(slide), slide == 0));
     return out;
   }
@@ -63,6 +64,7 @@ class StillRenderer {
  private:
   sim::SimOptions options_;
   std::shared_ptr<const sim::Scene> scene_;
+  const StopSignal& stop_;
 };
 
 /// Coarsest bit first in, [bit] out.
@@ -75,7 +77,7 @@ std::vector<GrayPair> pairs_of(const std::vector<sim::RenderedFrame>& frames) {
 
 }  // namespace
 
-Result<StillScene> render_still_scene(const std::string& spec) {
+Result<StillScene> render_still_scene(const std::string& spec, const StopSignal& stop) {
   auto options = sim::parse_sim_options(spec);
   if (!options) return options.error();
   auto scene = sim::make_scene(options->scene);
@@ -88,7 +90,7 @@ Result<StillScene> render_still_scene(const std::string& spec) {
   StillScene out;
   out.rig = sim::make_rig(*options, (*scene)->view());
   out.pattern = *std::move(pattern);
-  const StillRenderer renderer(*options, *scene);
+  const StillRenderer renderer(*options, *scene, stop);
 
   std::uint64_t number = 0;
   for (sim::RenderedFrame& rendered : renderer.under(out.rig, out.pattern)) {

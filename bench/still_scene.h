@@ -11,6 +11,7 @@
 #include "base/rig.h"
 #include "capture/pattern/gray_decode.h"
 #include "capture/source/field_source.h"
+#include "cli/stop_signal.h"
 
 namespace relievo::bench {
 
@@ -25,7 +26,7 @@ struct StillScene {
   std::vector<std::uint8_t> lit;
 };
 
-/// `spec`: SCENE[,key=value...] as for sim: sources. Errors as theirs.
-Result<StillScene> render_still_scene(const std::string& spec);
+/// `spec`: SCENE[,key=value...] as for sim: sources. Errors as theirs. Once stopped, pictures are missing.
+Result<StillScene> render_still_scene(const std::string& spec, const StopSignal& stop);
 
 }  // namespace relievo::bench

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/own_domain.h"
@@ -273,6 +274,16 @@ TEST(Bench, FailuresAreOneLine) {
     EXPECT_EQ(f.out, "");
     EXPECT_EQ(std::count(f.err.begin(), f.err.end(), '\n'), 1) << f.err;
   }
+}
+
+TEST(PeerSuite, AnInterruptEndsIt) {
+  // Minutes for each decoder; after some seconds it is at the first.
+  Process process(
+      {program("relievo-bench").string(), "peer", "--scene", "plane,rays=1,noise=0", "--runs", "1000"});
+  ASSERT_EQ(process.wait(4s), std::nullopt) << process.err();
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait(), 0) << process.err();
+  EXPECT_EQ(process.out(), "");
 }
 
 TEST(PeerSuite, OursIsMoreExactAndMoreCompleteThanGetProjPixelOnOneScene) {
