@@ -12,8 +12,6 @@ namespace {
 std::string value_text(const std::string& type_name) {
   const std::size_t colon = type_name.find(':');
   std::string kind = type_name.substr(0, colon);
-  const bool is_number = kind == "INT" || kind == "UINT" || kind == "FLOAT";
-  if (!is_number && kind != "TEXT") return type_name;  // a name of our own
   const std::string limits = colon == std::string::npos ? "" : type_name.substr(colon + 1);
   if (limits.starts_with('{') && limits.ends_with('}')) {
     std::string choices = limits.substr(1, limits.size() - 2);
@@ -26,7 +24,8 @@ std::string value_text(const std::string& type_name) {
     return limits.substr(open + 1, dash - open - 1) + ".." +
            limits.substr(dash + 3, limits.size() - dash - 4);
   }
-  return is_number ? "N" : kind;
+  if (kind == "INT" || kind == "UINT" || kind == "FLOAT") return "N";
+  return kind == "TEXT" ? kind : type_name;  // or a name of our own
 }
 
 class HelpFormatter final : public CLI::Formatter {

@@ -300,7 +300,7 @@ Command convert_command() {
             ->check(number(0.01, 8))
             ->type_name("PX");
         app.add_option("--step-bits", options->step_bits,
-                       "Of grid, metric and draco-grid: steps of 1/2^N pixel (default 6)")
+                       "Of grid, metric and draco-grid: steps of 1/2^bits pixel (default 6)")
             ->check(CLI::Range(0, 8));
         app.add_option(
                "--key-interval", options->key_interval,

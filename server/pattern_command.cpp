@@ -291,7 +291,6 @@ Command pattern_command() {
         app.add_option("--field-order", o->field_order,
                        "With --interlaced: bottom puts the first field on the odd rows")
             ->check(CLI::IsMember({"top", "bottom"}))
-            ->type_name("top|bottom")
             ->capture_default_str()
             ->needs(interlaced);
         auto* both = app.add_flag(

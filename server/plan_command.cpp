@@ -188,7 +188,6 @@ void add_rig_options(CLI::App& app, Options& o) {
   add_size_option(app, "--camera", o.camera, "The camera's pixels (default 640x480)")->excludes(rig);
   app.add_option("--scan", o.scan, "How the camera takes a frame's two fields")
       ->check(CLI::IsMember({"interlaced", "progressive"}))
-      ->type_name("interlaced|progressive")
       ->capture_default_str()
       ->excludes(rig);
   app.add_option("--rate", o.frame_rate, "Frames (field pairs) a second")

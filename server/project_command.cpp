@@ -222,7 +222,6 @@ Command project_command() {
                                         "A frame's two fields in one picture, for an interlaced output");
         app.add_option("--field-order", o->field_order, "With --interlaced: the field that comes first")
             ->check(CLI::IsMember({"top", "bottom"}))
-            ->type_name("top|bottom")
             ->capture_default_str()
             ->needs(interlaced);
         auto* pictures = app.add_option("--pictures", o->pictures, "End after so many (default: never)")

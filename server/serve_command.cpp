@@ -249,9 +249,9 @@ Command serve_command() {
               return set_geometry_profile(name, unused) ? "" : "give " + geometry_profile_names();
             })
             ->type_name("NAME");
-        app.add_option(
-               "--step-bits", f->step_bits,
-               "Of grid, metric and draco-grid: columns are sent in steps of 1/2^N pixel (default 6: 1/64)")
+        app.add_option("--step-bits", f->step_bits,
+                       "Of grid, metric and draco-grid: columns are sent in steps of 1/2^bits pixel (default "
+                       "6: 1/64)")
             ->check(CLI::Range(0, 8))
             ->type_name("N");
         app.add_option("--bound", f->bound_px,

@@ -186,6 +186,23 @@ TEST(Program, HelpAndVersionBehindTheVerbToo) {
   EXPECT_THAT(help.out, AllOf(HasSubstr("--count"), HasSubstr("--quiet"), HasSubstr("--version")));
 }
 
+TEST(Program, HelpSaysWhatAnOptionTakes) {
+  const std::vector<Command> commands = {
+      {"work", "does work", [](CLI::App& app) {
+         auto text = std::make_shared<std::string>();
+         auto number = std::make_shared<int>();
+         app.add_option("--where", *text)->type_name("HOST:PORT");
+         app.add_option("--kind", *text)->check(CLI::IsMember({"a", "b"}));
+         app.add_option("--named", *text)->check(CLI::IsMember({"c", "d"}))->type_name("NAME");
+         app.add_option("--count", *number)->check(CLI::Range(2, 7));
+         app.add_option("--most", *number)->check(CLI::Range(2, 9))->type_name("N");
+         return [text, number](StopSignal&) { return Status(); };
+       }}};
+  EXPECT_THAT(run(commands, {"work", "--help"}).out,
+              AllOf(HasSubstr("--where HOST:PORT "), HasSubstr("--kind a|b "), HasSubstr("--named c|d "),
+                    HasSubstr("--count 2..7 "), HasSubstr("--most 2..9 ")));
+}
+
 TEST(Program, SignalStopsTheCommandCleanly) {
   std::atomic<int> called = 0;
   const auto o = run(one_command([&](int, StopSignal& stop) {
