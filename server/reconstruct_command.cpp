@@ -102,8 +102,8 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
     return;
   }
   if (t.scheme == Scheme::kComplementary || t.scheme == Scheme::kOneSlide) {
-    std::printf("%llu of %llu frames reconstructed into %s, %.0f vertices each, %.2f ms a frame\n",
-                static_cast<unsigned long long>(t.reconstructed), static_cast<unsigned long long>(t.frames),
+    std::printf("%llu of %s reconstructed into %s, %.0f vertices each, %.2f ms a frame\n",
+                static_cast<unsigned long long>(t.reconstructed), counted(t.frames, "frame").c_str(),
                 options.out.c_str(), per_frame, t.total_ms.median());
   } else {
     std::printf("%s: %s and %s from %s into %s, %.0f vertices each, %.2f ms a frame\n",
