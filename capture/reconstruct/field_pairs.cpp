@@ -137,7 +137,7 @@ std::array<float, 9> FieldPairs::ambient_of_white(const CapturedFrame& frame) co
       const Eigen::Vector3f share = colour(slide, x, y).cwiseQuotient(w);
       for (int c = 0; c < 3; ++c) {
         const float place = (share[c] + 0.25F) * (kBins / 1.5F);  // -0.25 .. 1.25
-        if (place < 0 || place >= kBins) continue;
+        if (!(place >= 0 && place < kBins)) continue;             // nor where all is black
         ++histograms[static_cast<std::size_t>(c)][static_cast<std::size_t>(place)];
       }
     }

@@ -3,6 +3,7 @@
 // exact.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -176,6 +177,19 @@ INSTANTIATE_TEST_SUITE_P(
         if (c == '-') c = '_';
       return name;
     });
+
+TEST(Schemes, WhiteFieldGoesOnBehindABlackFrame) {
+  const StripedScene plane = scene_of(Scheme::kWhiteField, Scan::kInterlaced, FieldOrder::kTop);
+  Reconstructor reconstructor = make(plane);
+  add(reconstructor, draw_scheme_frame(plane, 0));
+  CapturedFrame black = draw_scheme_frame(plane, 1);
+  std::fill_n(black.picture.data(), black.picture.size(), std::uint8_t{0});
+  for (const Frame3D& made : add(reconstructor, black)) EXPECT_TRUE(made.surface.positions.empty());
+  std::vector<Frame3D> made;
+  for (std::uint64_t n = 2; n < 6; ++n) made = add(reconstructor, draw_scheme_frame(plane, n));
+  ASSERT_FALSE(made.empty());
+  for (const Frame3D& frame : made) expect_the_plane(plane, frame);
+}
 
 TEST(Schemes, WhiteFieldTakesAmbientLightOffTheSlides) {
   // As bright as a fourth of the projector's light: zero crossings would lie a tenth of a stripe off.
