@@ -85,7 +85,7 @@ void messages(std::string_view rest, bool foxglove) {
   static const SampleFormat format{"relievo::Frame", "struct Frame {};",
                                    [](const std::string&, const FrameMessage&) { return Bytes(4); }};
   const auto hub = hub_with_a_frame();
-  const auto feed = foxglove ? make_foxglove_feed(*hub, format) : make_stream_feed(*hub, "face");
+  const auto feed = foxglove ? make_foxglove_feed(*hub, format, "1") : make_stream_feed(*hub, "face");
   feed->start([] {});
   for (int i = 0; i < kMostMessages && !rest.empty(); ++i) {
     const std::string_view line = take_line(rest);
