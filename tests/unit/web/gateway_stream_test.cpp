@@ -223,6 +223,24 @@ TEST_F(GatewayStream, TimeIsAnswered) {
   EXPECT_LE(json["server_ms"].get<double>(), milliseconds(utc_now_ns()) + 1);
 }
 
+// A page asks twice a second at first, and over a narrow way a frame takes longer than that.
+TEST_F(GatewayStream, WhoAsksForTheTimeWhileAFrameIsOnItsWayKeepsTheConnection) {
+  gateway->announce(make_info());
+  gateway->publish("face", make_frame(0, 20'000'000));  // more than the system's buffers take
+  WsClient client(port, "face", {}, 4096);
+  ASSERT_TRUE(client.next_of("info"));
+  client.credit(1);
+  constexpr int kQuestions = 60;
+  for (int i = 1; i <= kQuestions; ++i) client.send(R"({"type":"time","t0":)" + std::to_string(i) + "}");
+  ASSERT_TRUE(client.next_of("frame"));
+  double answered = 0;
+  while (answered < kQuestions) {
+    const auto message = client.next_of("time");
+    ASSERT_TRUE(message) << answered;
+    answered = Json::parse(message->data)["t0"];
+  }
+}
+
 TEST_F(GatewayStream, WrongMessagesCloseTheConnection) {
   gateway->announce(make_info());
   const struct {
