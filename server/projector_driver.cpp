@@ -2,6 +2,7 @@
 #include "server/projector_driver.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -10,9 +11,11 @@
 #include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 #include "base/log.h"
+#include "base/time.h"
 #include "base/whole_file.h"
 
 namespace relievo {
@@ -20,6 +23,8 @@ namespace {
 
 constexpr const char* kProgram = "/proc/self/exe";
 constexpr std::size_t kMostSaid = 4096;  // bytes of what a process says that are kept
+constexpr int kLook_ms = 100;            // at a process that says nothing, whether it was told to end
+constexpr std::int64_t kHangs_ns = 2 * kNanosecondsPerSecond;  // after that it does not by itself
 constexpr const char* kHow =
     "this server drives no projector: start it with --projector NAME (`relievo-server project --list` has "
     "the "
@@ -140,8 +145,14 @@ Status ProjectorDriver::stop() {
 /// With the lock held.
 void ProjectorDriver::end_child() {
   if (child_ == 0) return;
-  told_to_end_ = true;
+  if (!std::exchange(told_to_end_, true)) ends_by_ns_ = steady_now_ns() + kHangs_ns;
   kill(child_, SIGTERM);
+}
+
+/// A display that hangs keeps a process from hearing.
+void ProjectorDriver::look_at_child() {
+  const std::lock_guard lock(mutex_);
+  if (told_to_end_ && steady_now_ns() > ends_by_ns_) kill(child_, SIGKILL);
 }
 
 void ProjectorDriver::work() {
@@ -203,8 +214,14 @@ std::string ProjectorDriver::run(const Order& order, int& exit_code) {
   }
   std::string said;
   std::array<char, 512> part{};
-  for (ssize_t n = 0; (n = read(pipe_ends[0], part.data(), part.size())) > 0;) {
-    said.append(part.data(), static_cast<std::size_t>(n));
+  for (ssize_t n = 1; n > 0;) {
+    pollfd more{.fd = pipe_ends[0], .events = POLLIN, .revents = 0};
+    if (poll(&more, 1, kLook_ms) == 0) {
+      look_at_child();
+      continue;
+    }
+    n = read(pipe_ends[0], part.data(), part.size());
+    if (n > 0) said.append(part.data(), static_cast<std::size_t>(n));
     if (said.size() > kMostSaid) said.erase(0, said.size() - kMostSaid);
   }
   close(pipe_ends[0]);

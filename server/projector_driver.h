@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include <condition_variable>
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -47,14 +48,16 @@ class ProjectorDriver {
   /// On the worker's thread: the process's end, and what it said at its end.
   std::string run(const Order& order, int& exit_code);
   void end_child();
+  void look_at_child();
 
   const ProjectorConfig config_;
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable changed_;
   ProjectorState state_;
-  std::optional<Order> next_;  // to be shown
-  pid_t child_ = 0;            // 0: none
-  bool told_to_end_ = false;   // the child
+  std::optional<Order> next_;    // to be shown
+  pid_t child_ = 0;              // 0: none
+  bool told_to_end_ = false;     // the child,
+  std::int64_t ends_by_ns_ = 0;  // or else it is killed
   bool ending_ = false;
   std::thread thread_;
 };

@@ -5,6 +5,7 @@
 // of a server that allows it. Run as: in_own_domain node rig_test.mjs RELIEVO_SERVER [SCREENSHOTS], in
 // web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
+import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
@@ -183,13 +184,24 @@ const checks = {
           });
           assert.equal(again.status, 409);
           await page.context().close();
+          const showWhite = async () => {
+            await fetch(`${server.address}/api/projector`, {
+              method: 'POST',
+              headers: { 'content-type': 'application/json' },
+              body: JSON.stringify({ action: 'start', stream: 'rig', show: 'white' }),
+            });
+            await eventually('the screen is not white', () => screen.seen().white > 0.99);
+          };
+          const children = () => {
+            const tasks = `/proc/${server.process.pid}/task`;
+            return readdirSync(tasks).flatMap((task) => readFileSync(`${tasks}/${task}/children`, 'utf8').split(' ').filter(Boolean));
+          };
+          await showWhite();
+          const [hangs] = children();
+          process.kill(Number(hangs), 'SIGSTOP'); // as a display that hangs has it
+          await showWhite();
+          await eventually('one that hangs stays beside the next', () => !existsSync(`/proc/${hangs}`));
           // A server that is killed leaves no projector on.
-          await fetch(`${server.address}/api/projector`, {
-            method: 'POST',
-            headers: { 'content-type': 'application/json' },
-            body: JSON.stringify({ action: 'start', stream: 'rig', show: 'white' }),
-          });
-          await eventually('the screen is not white', () => screen.seen().white > 0.99);
         },
         screen.environment,
       );
