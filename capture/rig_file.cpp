@@ -65,12 +65,20 @@ PinholeModel pinhole(const StorageFile& file, const std::string& name) {
   return model;
 }
 
+/// What is beyond can be in no stream (codec/grid_head.cpp).
+void check_size(std::span<const double> values, const std::string& key) {
+  for (const double value : values)
+    if (!(std::fabs(value) < 1e6)) refuse(key + " holds " + text(value) + ", must be below a million");
+}
+
 void check_lens(const PinholeModel& model, const std::string& name) {
+  check_size(model.matrix, name + "_matrix");
+  check_size(model.distortion, name + "_distortion");
   const auto& m = model.matrix;
   if (m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
     refuse(name + "_matrix must be [fx 0 cx; 0 fy cy; 0 0 1]");
   }
-  if (!(m[0] > 0 && m[4] > 0)) refuse(name + "_matrix has a focal length that is not above 0");
+  if (!(m[0] > 1 && m[4] > 1)) refuse(name + "_matrix has a focal length that is not above a pixel");
 }
 
 void check_rotation(const std::array<double, 9>& rotation, const std::string& key) {
@@ -94,6 +102,7 @@ void check_parts(const Rig& rig) {
   check_rotation(rig.projector_from_camera_rotation, "projector_from_camera_rotation");
   if (rig.world_from_camera) check_rotation(rig.world_from_camera->rotation, "world_from_camera_rotation");
   const auto& t = rig.projector_from_camera_translation;
+  check_size(t, "projector_from_camera_translation, metres,");
   if (std::hypot(t[0], t[1], t[2]) < 1e-6) {
     refuse("projector_from_camera_translation is zero: depth needs a baseline");
   }
