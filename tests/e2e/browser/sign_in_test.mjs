@@ -148,6 +148,37 @@ checks['a recording that is refused goes on by itself, and the list says why it 
   await page.context().request.get(`${server.address}/?token=${kToken}`);
 };
 
+checks['what is stopped is not lost where a lost connection comes back to a token that is not known any more'] = async () => {
+  const kOther = 'a-fourth-token-for-this-test';
+  const stopped = await browser.newPage();
+  stopped.setDefaultTimeout(kPatienceMs);
+  let cut;
+  await stopped.routeWebSocket(/\/ws\//, (socket) => {
+    const far = socket.connectToServer();
+    cut = () => Promise.all([far.close(), socket.close()]);
+  });
+  await stopped.goto(`${server.address}/?stream=object&token=${kToken}`);
+  await shownPast(stopped, 3);
+  await stopped.keyboard.press('Space');
+  await inState(stopped, 'shifted');
+  await stopped.evaluate(() => void (window.kept_ = true));
+  writeFileSync(tokens, `${kOther}\n`);
+  await cut();
+  await stopped.waitForFunction(() => /Token needed/.test(document.querySelector('#badge-text').textContent));
+  await stopped.waitForTimeout(3000);
+  assert.ok(await stopped.evaluate(() => window.kept_), 'it was loaded anew');
+  await stopped.context().request.get(`${server.address}/?token=${kOther}`); // as another tab of this browser does
+  await stopped.waitForFunction(() => !/Token/.test(document.querySelector('#badge-text').textContent));
+  await stopped.keyboard.press('l');
+  await inState(stopped, 'live');
+  assert.ok(await stopped.evaluate(() => window.kept_), 'it was loaded anew at last');
+  // Nothing is lost of what is live.
+  writeFileSync(tokens, `${kToken}\n`);
+  await cut();
+  await stopped.waitForSelector('input[name=token]');
+  await stopped.close();
+};
+
 checks['one that was kept, and is not known any more, is asked for anew, also in the page of the rig'] = async () => {
   await page.goto(`${server.address}/rig?stream=object`);
   await page.waitForFunction(() => document.querySelector('#picture').width > 4);

@@ -28,6 +28,7 @@ import { text } from './strings';
 import { ServerList } from './streamList';
 import { Timeline } from './timeline';
 import { Ui } from './ui';
+import { hasUnsaved } from './unsaved';
 import { View } from './view';
 
 const kRefreshMs = 250;
@@ -100,7 +101,7 @@ class Viewer {
       ready: () => this.view?.invalidate(),
       hint: (hint) => (this.server.hint = hint),
       unusable: (message) => (this.problem = text.noDecoder(message)),
-      signIn: () => location.reload(), // the page that the server answers with asks for a token
+      signIn: () => void (hasUnsaved() || this.measure?.isOpen || location.reload()), // the page that the server answers with asks for a token
     });
     const picker = new FilePicker((file) => void this.showFile(file.name, () => openFile(file)));
     this.panels.action('open', () => picker.ask());
@@ -455,11 +456,10 @@ class Viewer {
     this.presentation = this.choice.presented(told);
     this.ui.showState(this.presentation, seen, this.choice.hasFailed);
     this.showNotice();
-    const { streams } = this.server;
-    this.streams.panel?.show(streams, this.stream, this.companions?.names ?? [], this.server.whyUnknown(offline && facts.refusal === null));
-    this.streams.panel?.showRecordings(streams, this.serverFile);
+    this.streams.panel?.show(this.server.streams, this.stream, this.companions?.names ?? [], this.server.whyUnknown(offline && facts.refusal === null));
+    this.streams.panel?.showRecordings(this.server.streams, this.serverFile);
     const besides = this.companions?.tell() ?? new Map<string, Presentation>();
-    this.ui.showStreams(streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
+    this.ui.showStreams(this.server.streams, this.stream, this.file ?? info?.source ?? '', this.note || besidesText(besides));
     this.qualityControl.show(this.offered);
     this.pictures.watch(this.liveCamera);
     this.view?.refresh();

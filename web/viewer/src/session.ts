@@ -131,7 +131,9 @@ export class Session {
       kept: (bytes) => this.meter.came(bytes, performance.now()),
       clock: (t0, serverMs, t1) => this.meter.clock.add(t0, serverMs, t1),
       nonsense: (message) => this.meter.failed(message),
-      signIn: () => this.events.signIn?.(),
+      signIn: () => {
+        if (this.source?.live === true) this.events.signIn?.(); // else a person looks at what only this page has
+      },
       timers: this.page.defaultView ?? window,
     });
     this.source.rest?.(this.rests);

@@ -10,6 +10,8 @@ export function askBeforeLeaving(what: object): void {
   window.addEventListener('beforeunload', ask);
 }
 
+export const hasUnsaved = (): boolean => unsaved.size > 0;
+
 /** It is saved, or lost. */
 export function mayLeave(what: object): void {
   unsaved.delete(what);
