@@ -3,6 +3,7 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { kFov, type Way } from './display';
+import { windowOf } from './dom';
 import { Fly } from './fly';
 import { freeOf, kClear, kNoInsets, viewOffset, type Insets } from './insets';
 import type { Vec3 } from './pick';
@@ -57,12 +58,14 @@ export class Navigator {
   private placing = false; // the view is being set, by no hand
   private moving = false; // at the last update
   private updated = 0; // when that was
+  private readonly calm: MediaQueryList; // nothing is to move by itself
 
   constructor(
     canvas: HTMLCanvasElement,
     private readonly events: NavigatorEvents,
     keys: EventTarget,
   ) {
+    this.calm = windowOf(canvas).matchMedia('(prefers-reduced-motion: reduce)');
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
     this.controls.zoomToCursor = true;
@@ -273,7 +276,7 @@ export class Navigator {
     const [place, gaze] = [position.clone(), quaternion.clone()];
     // The controls' damping is of each drawing, and drawings may be a second apart.
     const since = this.moving ? now - this.updated : kUsualMs;
-    this.controls.dampingFactor = 1 - Math.exp(-since / kDampingMs);
+    this.controls.dampingFactor = this.calm.matches ? 1 : 1 - Math.exp(-since / kDampingMs);
     this.controls.update();
     // The controls tell of no step below a milliradian or a millimetre, and many such are left of a drag.
     const moved = position.distanceTo(place) / position.distanceTo(this.controls.target) + quaternion.angleTo(gaze);

@@ -55,7 +55,7 @@ it('the axis of the view goes through the middle, without turning or zooming', (
 });
 
 describe('a panel', () => {
-  beforeAll(() => void vi.stubGlobal('window', new EventTarget()));
+  beforeAll(() => void vi.stubGlobal('window', Object.assign(new EventTarget(), { matchMedia: () => ({ matches: false }) })));
   afterAll(() => void vi.unstubAllGlobals());
   const canvas = { addEventListener() {}, removeEventListener() {}, style: {}, getRootNode: () => canvas, ownerDocument: null } as unknown as HTMLCanvasElement;
   const rig = { width: 640, height: 480, fx: 800, fy: 800, cx: 320, cy: 240 };

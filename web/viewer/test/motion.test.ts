@@ -3,7 +3,8 @@
 import { afterAll, beforeAll, expect, it, vi } from 'vitest';
 import { Navigator } from '../src/navigator';
 
-beforeAll(() => void vi.stubGlobal('window', new EventTarget()));
+let calm = false; // asked of the system
+beforeAll(() => void vi.stubGlobal('window', Object.assign(new EventTarget(), { matchMedia: () => ({ matches: calm }) })));
 afterAll(() => void vi.unstubAllGlobals());
 
 const kLongest_ms = 2500;
@@ -45,6 +46,15 @@ function drag(period_ms: number): { ms: number; position: number[] } {
   of.end();
   return { ms: now - begin, position: of.pose.position };
 }
+
+it('ends with the drag for who wants less motion, and leads to the same view', () => {
+  const common = drag(1000 / 60);
+  calm = true;
+  const now = drag(1000 / 60);
+  calm = false;
+  expect(now.ms).toBeLessThan(50);
+  for (const i of [0, 1, 2]) expect(Math.abs(now.position[i]! - common.position[i]!)).toBeLessThan(2e-3);
+});
 
 it.each([4, 8.3, 33, 100, 800])('drawn every %d ms', (period_ms) => {
   const [common, now] = [drag(1000 / 60), drag(period_ms)];
