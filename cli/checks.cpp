@@ -2,9 +2,12 @@
 #include "cli/checks.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <system_error>
 #include <utility>
 
@@ -24,6 +27,13 @@ std::string short_text(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%g", value);
   return text;
+}
+
+/// In small letters.
+std::string ending_of(const std::string& name) {
+  std::string ending = std::filesystem::path(name).extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending;
 }
 
 std::string refusal(const std::string& value, const char* kind, const std::string& least,
@@ -57,6 +67,23 @@ ValueCheck one_of(std::vector<std::string> words) {
     std::string all;
     for (const std::string& word : words) all += (all.empty() ? "" : ", ") + word;
     return "'" + text + "' is none of " + all;
+  };
+}
+
+ValueCheck folder_name() {
+  return [](const std::string& name) {
+    static constexpr std::array kFiles = {".png", ".jpg", ".jpeg", ".webp", ".gif",  ".tif", ".tiff", ".pdf",
+                                          ".mp4", ".mkv", ".avi",  ".mov",  ".webm", ".m4v", ".ply",  ".obj",
+                                          ".glb", ".stl", ".mcap", ".yaml", ".json", ".gltf"};
+    const bool is_file = std::ranges::find(kFiles, ending_of(name)) != kFiles.end();
+    return is_file ? "'" + name + "' is named as a file, and a folder would be made: give a folder's name"
+                   : std::string();
+  };
+}
+
+ValueCheck png_name() {
+  return [](const std::string& name) {
+    return ending_of(name) == ".png" ? std::string() : "'" + name + "' must end in .png: it is a PNG";
   };
 }
 

@@ -19,6 +19,10 @@ ValueCheck whole_number(std::uint64_t least, std::uint64_t most = std::numeric_l
 ValueCheck number(double least, double most = std::numeric_limits<double>::infinity());
 /// One of these words.
 ValueCheck one_of(std::vector<std::string> words);
+/// The name of a folder, not one that ends as a file's: results in a folder a.png would be a surprise.
+ValueCheck folder_name();
+/// The name of a file in PNG.
+ValueCheck png_name();
 /// HOST:PORT; "none" too where `optional`.
 ValueCheck listen_address(bool optional = false);
 

@@ -204,6 +204,12 @@ Command export_command() {
           if (options->draco && !format_named(options->format).has_draco)
             throw CLI::ValidationError(
                 "--draco", "there is no Draco in " + options->format + ": it is of glb and animation");
+          const std::string no_folder = folder_name()(options->out.string());
+          if (!format_named(options->format).is_one_file && !no_folder.empty())
+            throw CLI::ValidationError(
+                "--out",
+                no_folder + (options->format == "glb" ? ", or --format animation for one file of all frames"
+                                                      : ": " + options->format + " is a file a frame"));
           if (options->format == "video" && !is_video_name(options->out))
             throw CLI::ValidationError("--out", "a video's name ends in .mp4 or .mkv");
           if (options->format == "animation" && options->out.extension() != ".glb")

@@ -16,6 +16,7 @@
 #include "client/frame_input.h"
 #include "client/shot/output.h"
 #include "client/shot/render.h"
+#include "codec/video_file.h"
 
 namespace relievo {
 namespace {
@@ -120,6 +121,9 @@ Command shot_command() {
         app.add_option(
                "--out", o->out,
                "NAME.png: one frame; NAME.mp4 or .mkv: a video; anything else: a folder, a picture a frame")
+            ->check([](const std::string& out) {
+              return out.ends_with(".png") || is_video_name(out) ? std::string() : folder_name()(out);
+            })
             ->type_name("NAME.png|NAME.mp4|DIR")
             ->required();
         app.add_option("--mode", o->mode, std::string(shot_mode_names()))

@@ -10,6 +10,7 @@
 #include "base/json_text.h"
 #include "capture/calibrate/board.h"
 #include "capture/calibrate/pictures.h"
+#include "cli/checks.h"
 #include "server/calibrate_commands.h"
 
 namespace relievo {
@@ -74,7 +75,7 @@ std::function<Status(StopSignal&)> define_calibrate_board(CLI::App& app) {
                    "chessboard:COLUMNSxROWS:SIDE (inner corners) or "
                    "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY] (squares)")
       ->required();
-  app.add_option("-o,--out", o->out, "The PNG to write")->required();
+  app.add_option("-o,--out", o->out, "The PNG to write")->check(png_name())->required();
   app.add_option("--dpi", o->dpi, "Dots an inch")->check(CLI::Range(20, 2400))->capture_default_str();
   app.add_flag("--json", o->json, "Print what was written as JSON");
   return [o](StopSignal&) { return run(*o); };

@@ -377,6 +377,7 @@ Command evaluate_command() {
             app.add_option(
                    "--pictures", options->pictures,
                    "Write error maps and pictures of every stage into this folder; open its index.html")
+                ->check(folder_name())
                 ->type_name("DIR");
             app.add_flag("--json", options->json, "Print the score as JSON");
             return [options](StopSignal& stop) { return run(*options, stop); };

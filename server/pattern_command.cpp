@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -208,13 +207,6 @@ bool is_video(const Options& options) {
   return fs::path(options.out).extension() == ".mkv";
 }
 
-/// A folder of such a name would be a surprise.
-bool is_other_file(const Options& options) {
-  const std::string ending = fs::path(options.out).extension().string();
-  static constexpr std::array kOthers = {".mp4", ".avi", ".mov", ".webm", ".m4v", ".png", ".yaml"};
-  return std::ranges::find(kOthers, ending) != kOthers.end();
-}
-
 Status run(const Options& options, StopSignal& stop) {
   if (is_video(options)) {
     const auto pattern = pattern_of(options.pattern);
@@ -312,7 +304,7 @@ Command pattern_command() {
         app.add_flag("--json", o->json, "Print the result as JSON");
         app.final_callback([o] {
           if (!o->gray) check_pattern_options(o->pattern);
-          if (is_other_file(*o))
+          if (!is_video(*o) && !folder_name()(o->out).empty())
             throw CLI::ValidationError("--out", "give a folder, or a video's name that ends in .mkv");
           if (is_video(*o) && (o->gray || o->both_axes))
             throw CLI::ValidationError("--out", "Gray code and --both-axes are pictures: give a folder");

@@ -19,6 +19,7 @@
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
 #include "capture/source/take_files.h"
+#include "cli/checks.h"
 #include "cli/progress.h"
 #include "codec/export.h"
 #include "codec/frame_names.h"
@@ -274,6 +275,7 @@ Command reconstruct_command() {
                "-o,--out", options->out,
                "Folder for NNNNNN.ply, made where it is missing; those of the same frames are replaced")
             ->type_name("DIR")
+            ->check(folder_name())
             ->required();
         app.add_option("--threads", options->threads, "Threads; any number gives the same result")
             ->check(CLI::Range(1, 64))

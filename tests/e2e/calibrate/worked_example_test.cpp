@@ -402,6 +402,7 @@ TEST(CalibrationExample, WrongUsageExitsTwo) {
   wrong({"pattern", "--out", "o", "--base", "7"}, "use a base of 3 to 6");
   for (const std::string out : {"slides.mp4", "slides.png"})
     wrong({"pattern", "--out", out}, "a video's name that ends in .mkv");
+  wrong({"calibrate", "board", "--board", "chessboard:9x7:25mm", "--out", "b.pdf"}, "must end in .png");
   wrong({"plan", "--base", "7"}, "use a base of 3 to 6");
   wrong({"project", "--base", "7"}, "use a base of 3 to 6");
   wrong({"project", "--still", "foo"}, "there is no picture foo");

@@ -31,6 +31,14 @@ TEST(Checks, NumbersAreFiniteAndWithinTheirLimits) {
   EXPECT_EQ(number(0)("inf"), "'inf' is no number of at least 0");
 }
 
+TEST(Checks, FoldersAreNotNamedAsFiles) {
+  for (const char* name : {"a.png", "b/a.PLY", "./x.mcap"}) EXPECT_NE(folder_name()(name), "") << name;
+  for (const char* name : {"a", "a.b", "take.2026", "a.png/b", "../a.png/", "png", ".png"})
+    EXPECT_EQ(folder_name()(name), "") << name;
+  for (const char* name : {"a.png", "a.PNG"}) EXPECT_EQ(png_name()(name), "") << name;
+  for (const char* name : {"a", "a.jpg", "a.png.pdf"}) EXPECT_NE(png_name()(name), "") << name;
+}
+
 TEST(Checks, AddressesToListenAt) {
   EXPECT_EQ(listen_address()("127.0.0.1:8080"), "");
   EXPECT_NE(listen_address()("none"), "");
