@@ -158,6 +158,17 @@ TEST(Doubtful, BesideANarrowStripeSooner) {
   }
 }
 
+TEST(Doubtful, WhereAllStripesAreNarrowNoneIs) {
+  DecodedGrid grid;
+  Frame f;
+  for (int line = 0; line < kLines; ++line)
+    for (int b = 0; b < kBoundaries; ++b) f.edge(line, b).column_px -= 5 * static_cast<float>(b);
+  f.move(7, 5, 0.15F, 0.2F);
+  f.move(13, 3, 0.3F, 0.6F);
+  EXPECT_EQ(doubtful(f, grid), 1U);
+  EXPECT_TRUE(known(grid, 7, 5));
+}
+
 TEST(Doubtful, WhatIsInFrontIsNoNarrowStripe) {
   DecodedGrid grid;
   Frame f;
