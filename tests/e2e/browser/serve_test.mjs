@@ -12,12 +12,15 @@ const [serverPath, screenshot] = process.argv.slice(2);
 
 const domain = process.env.RELIEVO_TEST_DOMAIN;
 assert.ok(domain, 'RELIEVO_TEST_DOMAIN is not set: run this through in_own_domain');
-const server = spawn(
-  serverPath,
-  // All lines, however busy this machine is.
-  ['serve', '--source', 'sim:face', '--decoder', 'quick', '--web', '127.0.0.1:0', '--domain', domain, '--interface', 'lo'],
-  { stdio: ['ignore', 'pipe', 'inherit'] },
-);
+const serve = (source, web) =>
+  spawn(
+    serverPath,
+    // All lines, however busy this machine is.
+    ['serve', '--source', source, '--stream', 'face', '--decoder', 'quick', '--web', web, '--domain', domain, '--interface', 'lo'],
+    { stdio: ['ignore', 'pipe', 'inherit'] },
+  );
+const server = serve('sim:face', '127.0.0.1:0');
+let next;
 const exited = new Promise((resolve) => server.once('exit', (code, signal) => resolve({ code, signal })));
 let browser;
 try {
@@ -129,7 +132,23 @@ try {
   assert.deepEqual(await exited, { code: 0, signal: null });
   await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');
   console.log('the viewer says so when the server has gone');
+
+  const pose = () => page.evaluate(() => window.relievo.pose());
+  await page.focus('#view');
+  await page.keyboard.press('ArrowLeft');
+  await page.waitForFunction(() => !window.relievo.diagnostics().busy);
+  const before = await pose();
+  for (const [source, isAnother] of [['sim:face', false], ['sim:walk', true]]) {
+    const { shown } = await look();
+    next = serve(source, new URL(address).host);
+    await shownPast(shown + 2);
+    assert.equal(JSON.stringify(await pose()) !== JSON.stringify(before), isAnother, `the view of ${source}, from where the face was seen`);
+    next.kill('SIGKILL');
+    await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');
+  }
+  console.log('the view is kept where the stream comes back, and set anew where another scene does');
 } finally {
   await browser?.close();
   server.kill('SIGKILL');
+  next?.kill('SIGKILL');
 }

@@ -13,7 +13,7 @@ import { ServerDrops } from './statistics';
 export interface SessionEvents {
   /** What is known of the source has changed. */
   changed(): void;
-  /** The description of a stream came; `seen`: a frame of it was shown before. */
+  /** The description of a stream came; `seen`: a frame of it was shown before, of the same source. */
   described(info: StreamInfo, seen: boolean): void;
   /** A frame waits to be drawn: take() it. */
   ready(): void;
@@ -38,6 +38,7 @@ export class Session {
   rung: Rung = 'full'; // how much detail comes now
   rungs: readonly Rung[] = ['full']; // and could come, as far as the server has said
   seen = false; // a frame was shown
+  private sourceName = ''; // of the info before
   lastFrameAt = 0;
   everConnected = false;
   run = ''; // of the frame taken last: those of one were played, or came live, one after the other
@@ -169,7 +170,8 @@ export class Session {
       if (this.info === null) this.meter.restart();
       this.info = message;
       this.lastFrameAt = performance.now();
-      this.events.described(message, this.seen);
+      this.events.described(message, this.seen && message.source === this.sourceName);
+      this.sourceName = message.source;
     } else if (message.type === 'status') {
       this.status = this.serverDrops.since(message);
       this.rungs = offeredRungs(message);
