@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include "base/rig.h"
@@ -25,5 +26,15 @@ double sheet_at(const std::array<double, 5>& distortion, double column, double y
 PinholeModel resized(const PinholeModel& model, int width, int height);
 
 bool distorts(const PinholeModel& model);
+
+/// Whether a number of a lens, or metres, may be a rig's: what is beyond goes in no stream. False of NaN.
+inline bool fits_rig(double x) {
+  return std::fabs(x) < 1e6;
+}
+
+/// Whether a lens has focal lengths of more than a pixel, as any that goes in a stream.
+inline bool has_focal_lengths(const PinholeModel& model) {
+  return model.fx() > 1 && model.fy() > 1;
+}
 
 }  // namespace relievo

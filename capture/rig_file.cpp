@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "base/lens.h"
 #include "capture/camera_response.h"
 #include "capture/pattern/pattern_check.h"
 #include "capture/storage_file.h"
@@ -65,10 +66,9 @@ PinholeModel pinhole(const StorageFile& file, const std::string& name) {
   return model;
 }
 
-/// What is beyond can be in no stream (codec/grid_head.cpp).
 void check_size(std::span<const double> values, const std::string& key) {
   for (const double value : values)
-    if (!(std::fabs(value) < 1e6)) refuse(key + " holds " + text(value) + ", must be below a million");
+    if (!fits_rig(value)) refuse(key + " holds " + text(value) + ", must be below a million");
 }
 
 void check_lens(const PinholeModel& model, const std::string& name) {
@@ -78,7 +78,7 @@ void check_lens(const PinholeModel& model, const std::string& name) {
   if (m[1] != 0 || m[3] != 0 || m[6] != 0 || m[7] != 0 || m[8] != 1) {
     refuse(name + "_matrix must be [fx 0 cx; 0 fy cy; 0 0 1]");
   }
-  if (!(m[0] > 1 && m[4] > 1)) refuse(name + "_matrix has a focal length that is not above a pixel");
+  if (!has_focal_lengths(model)) refuse(name + "_matrix has a focal length that is not above a pixel");
 }
 
 void check_rotation(const std::array<double, 9>& rotation, const std::string& key) {

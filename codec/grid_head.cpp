@@ -2,7 +2,6 @@
 #include "codec/grid_head.h"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "base/lens.h"
@@ -49,10 +48,9 @@ void write_calibration(const GridCalibration& c, Bytes& out) {
 }
 
 bool usable(const PinholeModel& m) {
-  const auto finite = [](double x) { return std::isfinite(x) && std::fabs(x) < 1e6; };
   return m.width > 0 && m.width <= kMostPixels && m.height > 0 && m.height <= kMostPixels &&
-         std::ranges::all_of(m.matrix, finite) && std::ranges::all_of(m.distortion, finite) && m.fx() > 1 &&
-         m.fy() > 1;
+         std::ranges::all_of(m.matrix, fits_rig) && std::ranges::all_of(m.distortion, fits_rig) &&
+         has_focal_lengths(m);
 }
 
 Status read_calibration(ByteReader& in, GridHead& head) {
@@ -64,11 +62,10 @@ Status read_calibration(ByteReader& in, GridHead& head) {
   for (double& x : c.projector_from_camera_rotation) x = in.read<float>();
   for (double& x : c.projector_from_camera_translation) x = in.read<float>();
   c.stripes = head.boundaries + 1;
-  const auto finite = [](double x) { return std::isfinite(x) && std::fabs(x) < 1e6; };
   if (!in.ok() || flags > 3 || c.line_step_px < 1 || !usable(c.camera) || !usable(c.projector) ||
       c.lines() * (head.twice ? 2 : 1) != head.lines ||
-      !std::ranges::all_of(c.projector_from_camera_rotation, finite) ||
-      !std::ranges::all_of(c.projector_from_camera_translation, finite))
+      !std::ranges::all_of(c.projector_from_camera_rotation, fits_rig) ||
+      !std::ranges::all_of(c.projector_from_camera_translation, fits_rig))
     return Error{"grid has a calibration that no rig can have"};
   return {};
 }
