@@ -134,6 +134,8 @@ try {
   console.log('the viewer says so when the server has gone');
 
   const pose = () => page.evaluate(() => window.relievo.pose());
+  // Each drawing may round anew.
+  const isOther = (a, b) => ['position', 'target'].some((of) => a[of].some((c, i) => Math.abs(c - b[of][i]) > 1e-6));
   await page.focus('#view');
   await page.keyboard.press('ArrowLeft');
   await page.waitForFunction(() => !window.relievo.diagnostics().busy);
@@ -142,7 +144,7 @@ try {
     const { shown } = await look();
     next = serve(source, new URL(address).host);
     await shownPast(shown + 2);
-    assert.equal(JSON.stringify(await pose()) !== JSON.stringify(before), isAnother, `the view of ${source}, from where the face was seen`);
+    assert.equal(isOther(await pose(), before), isAnother, `the view of ${source}, from where the face was seen`);
     next.kill('SIGKILL');
     await page.waitForFunction(() => window.relievo.diagnostics().state !== 'live');
   }

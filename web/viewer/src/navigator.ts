@@ -56,6 +56,7 @@ export class Navigator {
   private placed = false; // the first view is set
   private moved = false; // by a person, since
   private placing = false; // the view is being set, by no hand
+  private held = false; // by a person, who drags
   private moving = false; // at the last update
   private updated = 0; // when that was
   private readonly calm: MediaQueryList; // nothing is to move by itself
@@ -69,11 +70,23 @@ export class Navigator {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
     this.controls.zoomToCursor = true;
-    this.controls.addEventListener('change', () => {
+    const changed = (): void => {
       if (this.isRigView && !this.placing && this.hasLeftRig) this.byHand();
       events.changed();
+    };
+    this.controls.addEventListener('change', changed);
+    this.controls.addEventListener('start', () => {
+      this.moved = true; // a mere click leaves no camera
+      this.held = true;
     });
-    this.controls.addEventListener('start', () => (this.moved = true)); // a mere click leaves no camera
+    this.controls.addEventListener('end', () => {
+      this.held = false;
+      changed();
+    });
+    // The controls tell of no step below a milliradian or a millimetre, and some take of a drag's last step no more at first.
+    canvas.addEventListener('pointermove', () => {
+      if (this.held) changed();
+    });
     const flown = {
       look: (right: number, up: number) => this.way_ === 'fly' && this.look(right, up),
       moving: () => events.changed(),
@@ -275,10 +288,10 @@ export class Navigator {
     const { position, quaternion } = this.camera;
     const [place, gaze] = [position.clone(), quaternion.clone()];
     // The controls' damping is of each drawing, and drawings may be a second apart.
-    const since = this.moving ? now - this.updated : kUsualMs;
+    const since = this.moving ? Math.max(now - this.updated, 1) : kUsualMs;
     this.controls.dampingFactor = this.calm.matches ? 1 : 1 - Math.exp(-since / kDampingMs);
     this.controls.update();
-    // The controls tell of no step below a milliradian or a millimetre, and many such are left of a drag.
+    // Many steps of which the controls do not tell are left of a drag.
     const moved = position.distanceTo(place) / position.distanceTo(this.controls.target) + quaternion.angleTo(gaze);
     this.moving = moved > kRestPerMs * since;
     this.updated = now;
