@@ -137,44 +137,48 @@ class Walk {
   bool add_chunk(const RecordPlace& record) {
     auto chunk = read_chunk_place(file_, record);
     if (!chunk) return false;
-    if (which_ == ReadChunks::kWhereNeeded && count_by_index(*chunk)) {
-      contents_.chunks.push_back(std::move(*chunk));
-      return true;
-    }
-    if (const auto records = read_chunk_records(file_, *chunk)) {
+    const bool by_index = which_ == ReadChunks::kWhereNeeded;
+    if (const auto places = by_index ? add_index(*chunk) : std::nullopt) {
+      for (const MessagePlace& place : *places) count(place.channel_id, place.log_time);
+    } else if (const auto records = read_chunk_records(file_, *chunk)) {
+      const std::uint64_t before = contents_.statistics.messages;
       count(*records, *chunk);
+      // Others' files say within what their channels are.
+      ChunkIndex with_index = *chunk;
+      const auto of_it = by_index ? add_index(with_index) : std::nullopt;
+      if (of_it && of_it->size() == contents_.statistics.messages - before) chunk = std::move(with_index);
     } else if (!goes_on_at(record.end())) {
       return false;  // its length is wrong too, it may reach over others
     }
-    contents_.chunks.push_back(*chunk);
+    contents_.chunks.push_back(std::move(*chunk));
     return true;
   }
 
-  /// By the message indexes behind the chunk, its own bytes unread. False where they are not all there, or
-  /// the chunk says otherwise of its times: no CRC is over either.
-  bool count_by_index(ChunkIndex& chunk) {
+  /// The message indexes behind the chunk, and what they say of it, its own bytes unread. Nothing where they
+  /// are not all there, or the chunk says otherwise of its times (no CRC is over either), or where a channel
+  /// is not known.
+  std::optional<std::vector<MessagePlace>> add_index(ChunkIndex& chunk) {
     ChunkIndex with_index = chunk;
     const std::uint64_t begin = chunk.offset + chunk.length;
     std::uint64_t at = begin;
     auto next = record_at(at);
     for (; next && next->op == Op::kMessageIndex; next = record_at(at)) {
       const auto channel = file_.read(next->content(), std::min<std::uint64_t>(next->length, 2));
-      if (!channel || channel->size() < 2) return false;
+      if (!channel || channel->size() < 2) return std::nullopt;
       with_index.message_index_offsets.emplace_back(ByteReader(*channel).read<std::uint16_t>(), at);
       at = next->end();
     }
-    if (!next || next->op > Op::kDataEnd || at == begin) return false;
+    if (!next || next->op > Op::kDataEnd || at == begin) return std::nullopt;
     with_index.message_index_length = at - begin;
-    const auto places = read_message_places(file_, with_index);
+    auto places = read_message_places(file_, with_index);
     if (!places || places->empty() || places->front().log_time != chunk.start_time ||
         places->back().log_time != chunk.end_time ||
         !std::ranges::all_of(*places, [&](const MessagePlace& place) {
           return contents_.channels.contains(place.channel_id);
         }))
-      return false;
-    for (const MessagePlace& place : *places) count(place.channel_id, place.log_time);
+      return std::nullopt;
     chunk = std::move(with_index);
-    return true;
+    return *std::move(places);
   }
 
   void count(std::uint16_t channel, std::uint64_t log_time) {

@@ -7,6 +7,8 @@
 
 #include <cstring>
 
+#include "codec/byte_io.h"
+#include "codec/mcap_records.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/codec/sample_recording.h"
 
@@ -84,6 +86,53 @@ TEST_F(Cut, WhereverItIsCutAllThatIsWholeIsRead) {
   EXPECT_GT(with_index, 1000);
 }
 
+/// The data of a recording as other programs write it: what its schemas and channels are stands in the first
+/// chunk.
+Bytes described_within(std::span<const std::uint8_t> data) {
+  Bytes out(data.begin(), data.begin() + 8);
+  Bytes described;
+  int chunks = 0;
+  for (data = data.subspan(8); !data.empty();) {
+    const std::span<const std::uint8_t> before = data;
+    const auto record = mcap::take_record(data);
+    if (!record) break;
+    const auto whole = before.first(before.size() - data.size());
+    const auto& content = record->content;
+    chunks += record->op == mcap::Op::kChunk;
+    if (record->op == mcap::Op::kSchema || record->op == mcap::Op::kChannel) {
+      described.insert(described.end(), whole.begin(), whole.end());
+    } else if (record->op == mcap::Op::kChunk && chunks == 1) {
+      auto [header, at] = *mcap::read_chunk_header(content);
+      Bytes records = described;
+      records.insert(records.end(), content.begin() + static_cast<std::ptrdiff_t>(at), content.end());
+      header.records_size = header.uncompressed_size = records.size();
+      header.uncompressed_crc = mcap::crc32(records);
+      mcap::append_chunk_header(out, header);
+      out.insert(out.end(), records.begin(), records.end());
+    } else if (record->op == mcap::Op::kMessageIndex && chunks == 1) {
+      ByteReader reader(content);
+      mcap::MessageIndex index;
+      index.channel_id = reader.read<std::uint16_t>();
+      reader.read<std::uint32_t>();
+      while (reader.position() < content.size()) {
+        const auto time = reader.read<std::uint64_t>();
+        index.entries.emplace_back(time, reader.read<std::uint64_t>() + described.size());
+      }
+      mcap::append(out, index);
+    } else {
+      out.insert(out.end(), whole.begin(), whole.end());
+    }
+  }
+  return out;
+}
+
+TEST_F(Cut, WhatSaysInItsFirstChunkWhatItHoldsIsReadLikewise) {
+  const Bytes within = described_within(std::span(whole_).first(data_bytes()));
+  const auto index = index_of(within);
+  ASSERT_TRUE(index);
+  EXPECT_TRUE(read_with(*index, within) == read_without(std::span(whole_).first(data_bytes())));
+}
+
 TEST_F(Cut, ZerosThatAPowerLossLeftAreNotRecords) {
   Bytes cut(whole_.begin(), whole_.begin() + static_cast<std::ptrdiff_t>(data_bytes() / 2));
   const auto sound = read_without(cut);
@@ -95,16 +144,18 @@ TEST_F(Cut, ZerosThatAPowerLossLeftAreNotRecords) {
 }
 
 TEST_F(Cut, DamageLeavesNothingOutThatIsSound) {
-  for (std::size_t byte = 8; byte < data_bytes(); ++byte) {
-    Bytes damaged(whole_.begin(), whole_.begin() + static_cast<std::ptrdiff_t>(data_bytes()));
-    damaged[byte] ^= 0x55;
-    const auto index = index_of(damaged);
-    if (!index) continue;
-    const auto end = index->end_at(index->bytes());
-    Bytes now(damaged.begin(), damaged.begin() + static_cast<std::ptrdiff_t>(index->bytes()));
-    now.insert(now.end(), end->begin(), end->end());
-    EXPECT_TRUE(read_without(now) == read_without(damaged)) << "damaged at byte " << byte;
-  }
+  const auto data = std::span(whole_).first(data_bytes());
+  for (const Bytes& sound : {Bytes(data.begin(), data.end()), described_within(data)})
+    for (std::size_t byte = 8; byte < sound.size(); ++byte) {
+      Bytes damaged = sound;
+      damaged[byte] ^= 0x55;
+      const auto index = index_of(damaged);
+      if (!index) continue;
+      const auto end = index->end_at(index->bytes());
+      Bytes now(damaged.begin(), damaged.begin() + static_cast<std::ptrdiff_t>(index->bytes()));
+      now.insert(now.end(), end->begin(), end->end());
+      EXPECT_TRUE(read_without(now) == read_without(damaged)) << "damaged at byte " << byte;
+    }
 }
 
 TEST_F(Cut, WhatHasAnIndexOrIsOfSeveralHasNone) {
