@@ -83,6 +83,9 @@ Result<std::shared_ptr<const GrowingRecording>> index_cut_recording(const std::f
   mcap::Contents& contents = found->front();
   auto& chunks = contents.chunks;
   if (found->size() > 1 || !contents.recovered || chunks.empty()) return none;
+  // Pages read no compressed ones.
+  const auto is_compressed = [](const mcap::ChunkIndex& chunk) { return !chunk.compression.empty(); };
+  if (std::ranges::any_of(chunks, is_compressed)) return none;
   const auto has_index = [](const mcap::ChunkIndex& chunk) { return chunk.message_index_length > 0; };
   if (!std::all_of(chunks.begin(), chunks.end() - 1, has_index)) return none;
 

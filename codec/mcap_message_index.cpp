@@ -23,7 +23,7 @@ Result<std::uint64_t> records_at(const File& file, const ChunkIndex& chunk) {
   if (start->size() <= kRecordHeaderBytes || static_cast<Op>(start->front()) != Op::kChunk)
     return Error{"no chunk is there"};
   const auto header = read_chunk_header(std::span(*start).subspan(kRecordHeaderBytes));
-  if (!header || !header->first.compression.empty()) return Error{"its header cannot be read"};
+  if (!header) return Error{"its header cannot be read"};
   return chunk.offset + kRecordHeaderBytes + header->second;
 }
 
@@ -43,7 +43,9 @@ bool add_entries(std::span<const std::uint8_t> content, const ChunkIndex& chunk,
 }
 
 std::optional<std::vector<MessagePlace>> from_indexes(const File& file, const ChunkIndex& chunk) {
-  if (chunk.message_index_length == 0 || chunk.message_index_length > kMostIndexBytes) return std::nullopt;
+  if (chunk.message_index_length == 0 || chunk.message_index_length > kMostIndexBytes ||
+      !chunk.compression.empty())  // there the index cannot be checked against what there is
+    return std::nullopt;
   const auto base = records_at(file, chunk);
   const auto bytes = file.read(chunk.offset + chunk.length, chunk.message_index_length);
   if (!base || !bytes || chunk.uncompressed_size > chunk.length) return std::nullopt;
@@ -58,7 +60,7 @@ std::optional<std::vector<MessagePlace>> from_indexes(const File& file, const Ch
 }
 
 Result<std::vector<MessagePlace>> from_chunk(const File& file, const ChunkIndex& chunk) {
-  const auto base = records_at(file, chunk);
+  const auto base = chunk.compression.empty() ? records_at(file, chunk) : Result<std::uint64_t>(0U);
   if (!base) return base.error();
   const auto records = read_chunk_records(file, chunk);
   if (!records) return records.error();

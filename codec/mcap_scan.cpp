@@ -13,6 +13,7 @@
 
 #include "base/whole_file.h"
 #include "codec/byte_io.h"
+#include "codec/chunk_compression.h"
 #include "codec/mcap_walk.h"
 
 namespace relievo::mcap {
@@ -195,15 +196,17 @@ Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk) {
   const auto header = read_chunk_header(record->content);
   if (!header || header->first.records_size > record->content.size() - header->second)
     return Error{"its header is malformed"};
-  if (!header->first.compression.empty())
-    return Error{"it is compressed with " + header->first.compression +
-                 ", which is not supported: rewrite the file without compression"};
-  const auto records =
-      record->content.subspan(header->second, static_cast<std::size_t>(header->first.records_size));
-  if (header->first.uncompressed_size != records.size()) return Error{"its sizes disagree"};
-  if (header->first.uncompressed_crc != 0 && header->first.uncompressed_crc != crc32(records))
+  const std::uint64_t size = header->first.uncompressed_size;
+  if (size > kMaxChunkBytes)
+    return Error{"its records of " + std::to_string(size) + " bytes are more than the limit of " +
+                 std::to_string(kMaxChunkBytes)};
+  auto records = decompress(
+      header->first.compression,
+      record->content.subspan(header->second, static_cast<std::size_t>(header->first.records_size)), size);
+  if (!records) return records;
+  if (header->first.uncompressed_crc != 0 && header->first.uncompressed_crc != crc32(*records))
     return Error{"its CRC is wrong"};
-  return Bytes(records.begin(), records.end());
+  return records;
 }
 
 }  // namespace relievo::mcap

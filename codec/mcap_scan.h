@@ -92,7 +92,8 @@ enum class ReadContents {
 /// bytes alone, or cannot be read; a file cut short gives what is whole.
 Result<std::vector<Contents>> read_contents(const File& file, ReadContents how);
 
-/// A chunk's records, checked against its CRC. Errors name no file or place: the caller knows both.
+/// A chunk's records, decompressed and checked against its CRC. Errors name no file or place: the caller
+/// knows both.
 Result<Bytes> read_chunk_records(const File& file, const ChunkIndex& chunk);
 
 }  // namespace relievo::mcap

@@ -246,9 +246,11 @@ class Walk {
     if (!record || record->length > std::min(kMaxChunkBytes, effort_left_)) return false;
     if (record->op == Op::kChunk) {
       const auto chunk = read_chunk_place(file_, *record);
-      if (!chunk || chunk->compressed_size != chunk->uncompressed_size || !chunk->compression.empty())
-        return false;
-      effort_left_ -= record->length;
+      if (!chunk) return false;
+      if (chunk->compression.empty() && chunk->compressed_size != chunk->uncompressed_size) return false;
+      const std::uint64_t effort = std::max(record->length, chunk->uncompressed_size);
+      if (effort > effort_left_) return false;
+      effort_left_ -= effort;
       return read_chunk_records(file_, *chunk).ok();
     }
     const auto sizes = file_.read(record->content(), std::min<std::uint64_t>(record->length, 4096));

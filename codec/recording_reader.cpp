@@ -106,7 +106,7 @@ class Reader final : public RecordingReader {
     for (const Chunk& chunk : chunks_) {
       const auto places = mcap::read_message_places(*file_, chunk);
       if (!places) continue;  // next() says so
-      listed += places->size();
+      if (chunk.compression.empty()) listed += places->size();
       if (listed > file_->size() / kLeastMessageBytes)
         return Error{file_->name() + ": its index lists more messages than it can hold; `relievo recover` " +
                      "writes a sound copy"};
@@ -126,11 +126,15 @@ class Reader final : public RecordingReader {
       const Chunk& chunk = chunks_[i];
       if (chunk.start_time > latest) continue;
       const auto places = mcap::read_message_places(*file_, chunk);
-      if (!places) continue;
+      if (!places || places->empty()) continue;
+      // Their places are in it, not in the file.
+      const auto records =
+          chunk.compression.empty() ? Result<Bytes>(Bytes()) : mcap::read_chunk_records(*file_, chunk);
+      if (!records) continue;
       for (auto place = places->rbegin(); place != places->rend(); ++place) {
         if (place->log_time > latest) continue;
         if (found && place->log_time <= *found) break;
-        if (is_wanted(chunk, *place, wanted)) found = place->log_time;
+        if (is_wanted(chunk, *place, *records, wanted)) found = place->log_time;
       }
     }
     return found ? std::optional(to_ns(*found)) : std::nullopt;
@@ -234,7 +238,7 @@ class Reader final : public RecordingReader {
       return Error{file_->name() + ": the chunk at byte " + std::to_string(chunk.offset) +
                    " cannot be read (" + why + "); its messages are left out"};
     };
-    if (loaded_bytes() + chunk.length > kMaxLoadedBytes)
+    if (loaded_bytes() + std::max(chunk.length, chunk.uncompressed_size) > kMaxLoadedBytes)
       return Error{file_->name() + ": too many chunks overlap in time at byte " +
                    std::to_string(chunk.offset)};
     auto records = mcap::read_chunk_records(*file_, chunk);
@@ -262,11 +266,23 @@ class Reader final : public RecordingReader {
     return {};
   }
 
-  bool is_wanted(const Chunk& chunk, const mcap::MessagePlace& place, const Wanted& wanted) const {
+  /// Its first bytes.
+  Result<Bytes> head_of(const Chunk& chunk, const mcap::MessagePlace& place, const Bytes& records) const {
+    const std::uint64_t size = chunk.compression.empty() ? file_->size() : records.size();
+    if (place.offset >= size) return Error{"it is behind the end"};
+    const std::uint64_t bytes = std::min<std::uint64_t>(kLeastMessageBytes + kHeadBytes, size - place.offset);
+    if (chunk.compression.empty()) return file_->read(place.offset, bytes);
+    const auto head =
+        std::span(records).subspan(static_cast<std::size_t>(place.offset), static_cast<std::size_t>(bytes));
+    return Bytes(head.begin(), head.end());
+  }
+
+  /// `records`: of a compressed chunk.
+  bool is_wanted(const Chunk& chunk, const mcap::MessagePlace& place, const Bytes& records,
+                 const Wanted& wanted) const {
     const std::int32_t channel = channel_of(chunk, place.channel_id);
-    if (place.offset >= file_->size() || channel < 0) return false;
-    const auto head = file_->read(
-        place.offset, std::min<std::uint64_t>(kLeastMessageBytes + kHeadBytes, file_->size() - place.offset));
+    if (channel < 0) return false;
+    const auto head = head_of(chunk, place, records);
     if (!head || head->size() < kLeastMessageBytes) return false;
     ByteReader reader(*head);
     const auto op = static_cast<mcap::Op>(reader.read<std::uint8_t>());

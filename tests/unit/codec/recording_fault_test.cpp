@@ -207,7 +207,7 @@ TEST(RecordingFault, TimesOfChunksThatLieDoNotMixMessages) {
   EXPECT_EQ(numbers(read_all(**rebuilt)), all);
 }
 
-TEST(RecordingFault, ACompressedChunkIsRefusedInWords) {
+TEST(RecordingFault, AChunkCompressedInAnotherWayIsRefusedInWords) {
   const test::TempFolder folder;
   Bytes bytes(mcap::kMagic.begin(), mcap::kMagic.end());
   mcap::append_header(bytes, "", "another writer");
@@ -215,13 +215,13 @@ TEST(RecordingFault, ACompressedChunkIsRefusedInWords) {
                                     .end_time = 2,
                                     .uncompressed_size = 100,
                                     .uncompressed_crc = 0,
-                                    .compression = "zstd",
+                                    .compression = "brotli",
                                     .records_size = 8});
   bytes.insert(bytes.end(), 8, 0x28);
   write_file(folder / "a.mcap", bytes);
   const ReadBack back = read_all(*open(folder / "a.mcap"));
   ASSERT_EQ(back.errors.size(), 1u);
-  EXPECT_NE(back.errors[0].find("compressed with zstd, which is not supported"), std::string::npos);
+  EXPECT_NE(back.errors[0].find("compressed with brotli, which is not supported"), std::string::npos);
 }
 
 /// Bytes that this process has read.

@@ -281,7 +281,7 @@ export const text = {
     noFrames: 'there is no frame of 3D video in it: it is a recording of something else, or ended before the first one',
     noWholeFrame: 'no frame of 3D video in it is whole: it was cut short, or is damaged. Copy it anew, or try relievo recover',
     wasCut: 'it was cut short',
-    compressed: (how: string) => `its chunks are compressed (${how}), which is not read here: save it without compression`,
+    compressed: (how: string) => `its chunks are compressed (${how}), which is not read here: relievo recover writes a copy without`,
   },
   streams: {
     title: 'Streams',
