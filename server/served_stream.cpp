@@ -50,14 +50,13 @@ void say_camera(const std::string& label, const SourceCounts& c) {
 }
 
 /// On a thread of its own: a slow disk keeps that waiting, and not the stream.
-std::jthread beside_the_stream(std::unique_ptr<FrameSink> recorder_sink) {
-  return std::jthread([sink = std::move(recorder_sink)](const std::stop_token& ended) {
+std::jthread beside_the_stream(std::function<void()> care) {
+  return std::jthread([care = std::move(care)](const std::stop_token& ended) {
     name_this_thread("recording");
     std::mutex mutex;
     std::unique_lock lock(mutex);
     std::condition_variable_any wake;
-    while (!wake.wait_for(lock, ended, kLook, [&] { return ended.stop_requested(); }))
-      static_cast<void>(sink->consume(ServerStatus()));
+    while (!wake.wait_for(lock, ended, kLook, [&] { return ended.stop_requested(); })) care();
   });
 }
 
@@ -289,11 +288,11 @@ Status RunningStream::announce(const std::string& uri) {
     sinks_.push_back(make_gateway_sink(*around_.gateway, name_));
   }
   if (recording_.recorder) {
-    auto sink = make_recorder_sink(*recording_.recorder, wish);
-    if (config_.fast)
-      sinks_.push_back(std::move(sink));  // nothing is to be lost: the stream waits for the disk
+    auto care = recorder_care(*recording_.recorder, wish);
+    if (config_.fast)  // nothing is to be lost: the stream waits for the disk
+      sinks_.push_back(make_calling_sink(std::move(care)));
     else
-      recording_.beside = beside_the_stream(std::move(sink));
+      recording_.beside = beside_the_stream(std::move(care));
   }
   sinks_.push_back(make_service_sink(around_.board, name_));
   return {};

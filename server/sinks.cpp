@@ -38,29 +38,19 @@ class GatewaySink final : public FrameSink {
   const std::string stream_;
 };
 
-class RecorderSink final : public FrameSink {
+class CallingSink final : public FrameSink {
  public:
-  RecorderSink(Recorder& recorder, std::function<void()> key_frame_wanted)
-      : recorder_(recorder), key_frame_wanted_(std::move(key_frame_wanted)) {}
-  Status consume(const FrameMessage&) override { return tick(); }
-  Status consume(const ServerStatus&) override { return tick(); }
+  explicit CallingSink(std::function<void()> call) : call_(std::move(call)) {}
+  Status consume(const FrameMessage&) override { return called(); }
+  Status consume(const ServerStatus&) override { return called(); }
 
  private:
-  Status tick() {
-    const std::int64_t now_ns = steady_now_ns();
-    recorder_.tick(now_ns);
-    if (recorder_.wants_key_frame(now_ns)) key_frame_wanted_();
-    if (said_) return {};
-    if (const Status state = recorder_.status(); !state) {
-      said_ = true;  // when it happens; the command fails with it at its end
-      log_warning(state.error().message + "; the stream goes on without a recording");
-    }
+  Status called() {
+    call_();
     return {};
   }
 
-  Recorder& recorder_;
-  const std::function<void()> key_frame_wanted_;
-  bool said_ = false;
+  const std::function<void()> call_;
 };
 
 class ServiceSink final : public FrameSink {
@@ -109,8 +99,21 @@ std::unique_ptr<FrameSink> make_service_sink(ServiceBoard& board, const std::str
   return std::make_unique<ServiceSink>(board, stream);
 }
 
-std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder, std::function<void()> key_frame_wanted) {
-  return std::make_unique<RecorderSink>(recorder, std::move(key_frame_wanted));
+std::function<void()> recorder_care(Recorder& recorder, std::function<void()> key_frame_wanted) {
+  return [&recorder, key_frame_wanted = std::move(key_frame_wanted), said = false]() mutable {
+    const std::int64_t now_ns = steady_now_ns();
+    recorder.tick(now_ns);
+    if (recorder.wants_key_frame(now_ns)) key_frame_wanted();
+    if (said) return;
+    if (const Status state = recorder.status(); !state) {
+      said = true;  // when it happens; the command fails with it at its end
+      log_warning(state.error().message + "; the stream goes on without a recording");
+    }
+  };
+}
+
+std::unique_ptr<FrameSink> make_calling_sink(std::function<void()> call) {
+  return std::make_unique<CallingSink>(std::move(call));
 }
 
 std::unique_ptr<FrameSink> make_dds_sink(Publisher& publisher) {

@@ -25,9 +25,12 @@ std::unique_ptr<FrameSink> make_gateway_sink(Gateway& gateway, const std::string
 
 /// Keeps `recorder`'s chunks short in time; it reads the frames themselves off DDS, as any recorder does. A
 /// failing recording is logged once and does not end the stream. `key_frame_wanted` is called where it wants
-/// one. `recorder` must outlive it. Waits for the disk: to be called with each frame of a stream that may, or
-/// else about ten times a second, with any.
-std::unique_ptr<FrameSink> make_recorder_sink(Recorder& recorder, std::function<void()> key_frame_wanted);
+/// one. To be called about ten times a second, by one thread, which waits for the disk; `recorder` must
+/// outlive it.
+std::function<void()> recorder_care(Recorder& recorder, std::function<void()> key_frame_wanted);
+
+/// Calls that with each frame and status.
+std::unique_ptr<FrameSink> make_calling_sink(std::function<void()> call);
 
 /// What the service manager is told of all streams together. Any thread.
 class ServiceBoard {
