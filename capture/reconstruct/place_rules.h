@@ -95,7 +95,8 @@ class BinnedQuantile {
 /// Standard deviation of an image's values, from second differences over lines so far apart that the low-pass
 /// leaves them independent. Stripes run across lines, so most places look the same there; the 30 % quantile
 /// looks past those that do not. `add(above, here, below, quantile)` puts three lines' second differences
-/// into a quantile, in bins of `per_bin`; one line in `every` is asked.
+/// into a quantile, in bins of `per_bin`; one line in `every` is asked. Above 0, which nobody could weigh
+/// anything by: of an image with too few lines to tell it is what the first bin says.
 template <class Image, class Add>
 float noise_across_lines(const Image& image, int every, float per_bin, Add add) {
   constexpr int kApart = 3;
@@ -104,7 +105,7 @@ float noise_across_lines(const Image& image, int every, float per_bin, Add add) 
   BinnedQuantile<1024> seconds;
   for (int line = 0; line + 2 * kApart < image.lines; line += every)
     add(image.line(line), image.line(line + kApart), image.line(line + 2 * kApart), seconds);
-  return seconds.at(3, 0) * per_bin / (kQuantile30 * kGain);
+  return seconds.at(3, 0.5F) * per_bin / (kQuantile30 * kGain);
 }
 
 /// Share of the projector's light in what is shown beside a boundary at `column_px`, of these colours to the

@@ -267,6 +267,27 @@ TEST_P(ReconstructorTest, HalfOfTheLinesAreEverySecondOneAndAFourthEveryFourth) 
   }
 }
 
+// So few lines that nothing tells a picture's noise.
+TEST_P(ReconstructorTest, AFewLinesAreOfThePlane) {
+  StripedScene scene = test::striped_scene(scan());
+  scene.rig.camera.height = 8;
+  scene.rig.camera.matrix[5] = 3.5;
+  for (const int stride : {1, 2, 4}) {
+    Reconstructor reconstructor = make(scene, {.line_stride = stride});
+    for (std::uint64_t n = 0; n < 4; ++n) {
+      const auto frame = add(reconstructor, draw_frame(scene, n));
+      ASSERT_EQ(frame.has_value(), n > 0);
+      if (!frame) continue;
+      const Surface& s = frame->surface;
+      EXPECT_TRUE(stride > 1 || !s.triangles.empty());
+      for (std::size_t i = 0; i < s.positions.size(); ++i) {
+        ASSERT_NEAR(s.grid[i].column_px, scene.camera_column(s.grid[i].boundary), 0.2) << stride;
+        ASSERT_TRUE(std::isfinite(s.sigmas_m[i])) << stride;
+      }
+    }
+  }
+}
+
 TEST(Reconstructor, RefusesPatternsItCannotDecode) {
   StripedScene scene = test::striped_scene();
   scene.pattern = *make_pattern(3, 3, 0, 16);
