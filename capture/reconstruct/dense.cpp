@@ -73,7 +73,8 @@ void DenseSampler::sample_piece(int first_boundary, int line, const Triangulator
     const float bend = inner * (1 - inner) * kBendShare * std::fabs(a - b);
     const float sl = (1 - inner) * left.sigma_px;
     const float sr = inner * right.sigma_px;
-    const float sigma_px = left.sigma_px > 0 ? std::sqrt(sl * sl + sr * sr + bend * bend) : 0;
+    const bool known = left.sigma_px > 0 && right.sigma_px > 0;  // of a filled one none is
+    const float sigma_px = known ? std::sqrt(sl * sl + sr * sr + bend * bend) : 0;
     const float slope = (nearer_left ? left : right).slope_px;
     ++(interpolated ? scratch.counts.interpolated : scratch.counts.measured);
     const bool steeper = !(pixels.slope(line)[x] >= slope);

@@ -100,6 +100,25 @@ TEST(Dense, EveryPixelBetweenBoundariesLiesOnThePlane) {
   EXPECT_EQ(std::count(sparse.surface.interpolated.begin(), sparse.surface.interpolated.end(), 1), 0);
 }
 
+// Of a filled boundary no standard deviation is known, so none is of what lies between it and the next one.
+TEST(Dense, BesideAFilledBoundaryNoErrorIsKnown) {
+  const auto there = [](int boundary, int line) { return boundary != 7 || line % 2 != 0; };
+  const Built b = build({{striped_scene()}}, {.dense = true, .fill_holes = 2}, there);
+  ASSERT_GT(b.counts.filled, 0U);
+  std::size_t unknown_left = 0;
+  std::size_t unknown_right = 0;
+  for (const GridPoint& at : b.surface.grid) {
+    if (at.sigma_px > 0) {
+      EXPECT_GT(at.sigma_px, 0.03) << at.column_px;  // of two that are each known to 0.05
+    } else {
+      EXPECT_EQ(at.line % 2, 0) << at.column_px;
+      ++(at.boundary < 7 ? unknown_left : unknown_right);
+    }
+  }
+  EXPECT_GT(unknown_left, 0U);
+  EXPECT_GT(unknown_right, 0U);
+}
+
 TEST(Dense, ThreadsDoNotChangeIt) {
   const StripedScene scene = striped_scene();
   const Built one = build({{scene}}, {.dense = true});
