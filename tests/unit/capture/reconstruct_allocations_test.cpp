@@ -2,12 +2,16 @@
 // A warm stream allocates nothing: a program of its own, since it counts every operator new of the process.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <new>
 #include <optional>
+#include <random>
 #include <vector>
 
+#include "capture/pattern/repeating.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "tests/support/striped_scene.h"
 
@@ -78,6 +82,53 @@ INSTANTIATE_TEST_SUITE_P(
     , WarmStream,
     testing::Combine(testing::Values(Decoder::kOrdered, Decoder::kQuick, Decoder::kPaper),
                      testing::Values(Scan::kInterlaced, Scan::kProgressive), testing::Values(1, 3)));
+
+/// The same under every scheme, whose surfaces come from one or two frames each, with noise.
+class WarmScheme : public testing::TestWithParam<std::tuple<Scheme, Decoder>> {};
+
+TEST_P(WarmScheme, AllocatesNothing) {
+  const auto [scheme, decoder] = GetParam();
+  test::StripedScene scene = test::striped_scene();
+  if (scheme == Scheme::kOneSlide) scene.pattern = *make_repeating_pattern(6, 3, 32);
+  scene.pattern.scheme = scheme;
+  std::mt19937 random(4);
+  std::normal_distribution<float> noise(0, 2);
+  std::vector<CapturedFrame> frames;
+  for (std::uint64_t n = 0; n < 6; ++n) {
+    frames.push_back(test::draw_scheme_frame(scene, n));
+    Image8& picture = frames.back().picture;
+    for (std::size_t i = 0; i < picture.size(); ++i)
+      picture.data()[i] = static_cast<std::uint8_t>(
+          std::clamp(static_cast<float>(picture.data()[i]) + noise(random), 0.F, 255.F));
+  }
+  auto made = Reconstructor::create(scene.rig, scene.pattern, {.decoder = decoder, .threads = 3});
+  ASSERT_TRUE(made);
+  std::size_t surfaces = 0;
+  std::uint64_t next = 0;
+  const auto run = [&](int rounds) {
+    for (int i = 0; i < rounds; ++i, ++next) {
+      CapturedFrame& frame = frames[next % frames.size()];
+      frame.time_ns = std::llround(static_cast<double>(next) * 1e9 / scene.rig.frame_rate);
+      auto result = made->add(frame);
+      if (!result) continue;
+      for (std::optional<Frame3D> surface = *std::move(result); surface; surface = made->next()) {
+        surfaces += !surface->surface.triangles.empty();
+        made->recycle(*std::move(surface));
+      }
+    }
+  };
+  run(18);
+  surfaces = 0;
+  const std::size_t warm = allocations;
+  run(12);
+  EXPECT_EQ(allocations, warm);
+  EXPECT_GE(surfaces, 8U);
+}
+
+INSTANTIATE_TEST_SUITE_P(, WarmScheme,
+                         testing::Combine(testing::Values(Scheme::kComplementary, Scheme::kWhiteField,
+                                                          Scheme::kWhiteFrame, Scheme::kOneSlide),
+                                          testing::Values(Decoder::kOrdered, Decoder::kQuick)));
 
 TEST(Recycle, MemoryThatCameBackChangesNothing) {
   const test::StripedScene scene = test::striped_scene();
