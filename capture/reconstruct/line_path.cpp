@@ -225,6 +225,7 @@ constexpr std::size_t kBlock = 1024;  // boundaries looked at at once; a longer 
   std::array<std::uint8_t, kBlock / 8> stays;
   __m256 lane_best;
   std::size_t size = pack_near(colours, edge, rules, boundary_of.data(), gain_of.data(), lane_best);
+  if (size == 0) return 0;  // nothing was written
   const __m256i lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   if (size > kPlaces) {
     __m256 worst = _mm256_min_ps(lane_best, _mm256_permute2f128_ps(lane_best, lane_best, 1));

@@ -3,6 +3,7 @@
 // instructions that this machine has against the portable ones.
 #include "capture/reconstruct/line_path.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -120,6 +121,21 @@ TEST_P(LinePath, ChoosesTheBestBoundaries) {
       }
     }
   }
+}
+
+// And writes none: the path search reads all places of an edge, and what was on the stack is no boundary.
+TEST_P(LinePath, ChoosesNoneWhereNoneAgrees) {
+  const BoundaryColours colours = colours_of(*make_pattern(6, 2, 0, 90));
+  EdgeAgreement edge{};
+  edge.left.fill(-0.5F);
+  edge.right.fill(-0.5F);
+  std::array<std::int32_t, kPathCandidates> boundary;
+  std::array<float, kPathCandidates> gain;
+  boundary.fill(-9);
+  gain.fill(-9);
+  EXPECT_EQ(kernels().choose(colours, edge, kGains, boundary.data(), gain.data()), 0);
+  EXPECT_THAT(boundary, testing::Each(-9));
+  EXPECT_THAT(gain, testing::Each(-9.F));
 }
 
 TEST_P(LinePath, ChoosesFromAVeryLongPattern) {
