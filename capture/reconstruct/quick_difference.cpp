@@ -11,18 +11,25 @@
 namespace relievo {
 namespace {
 
-constexpr float kLeastWeight = -32768;
-constexpr float kMostWeight = 32767;  // a colour matrix may multiply by four
+constexpr double kUnit = 8192;  // of QuickWeights
+constexpr double kMostWeight = 32767;
 
 std::int16_t weight_of(double w) {
-  return static_cast<std::int16_t>(
-      std::clamp(static_cast<float>(std::round(w * 8192)), kLeastWeight, kMostWeight));
+  return static_cast<std::int16_t>(std::lround(w * kUnit));
 }
 
 }  // namespace
 
+std::array<double, 9> quick_matrix(std::array<double, 9> colour_matrix) {
+  double most = kMostWeight / kUnit;
+  for (const double m : colour_matrix) most = std::max(most, std::fabs(m));
+  for (double& m : colour_matrix) m *= kMostWeight / kUnit / most;
+  return colour_matrix;
+}
+
 QuickDifferencer::QuickDifferencer(const std::array<double, 9>& colour_matrix) {
-  for (std::size_t i = 0; i < 9; ++i) weights_.colour[i] = weight_of(colour_matrix[i]);
+  const std::array<double, 9> matrix = quick_matrix(colour_matrix);
+  for (std::size_t i = 0; i < 9; ++i) weights_.colour[i] = weight_of(matrix[i]);
   weights_.luma = {weight_of(0.299), weight_of(0.587), weight_of(0.114)};  // Rec. 601
 }
 
@@ -38,7 +45,7 @@ void QuickDifferencer::difference_of_lines(const DetectionLines& lines, int begi
   }
   QuickWeights weights = weights_;
   if (!lines.shows_slide)
-    for (std::int16_t& w : weights.colour) w = static_cast<std::int16_t>(-std::max<int>(w, -32767));
+    for (std::int16_t& w : weights.colour) w = static_cast<std::int16_t>(-w);
   const int samples = 3 * out.width;
   const auto row = static_cast<std::size_t>(samples);
   scratch.resize(9 * row);

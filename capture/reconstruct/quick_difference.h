@@ -40,6 +40,10 @@ struct QuickImage {
   std::size_t at(int l) const { return static_cast<std::size_t>(l) * static_cast<std::size_t>(stride); }
 };
 
+/// A colour matrix as the quick decoder takes it: in proportion, so small that 16 bits hold it. That of a
+/// camera that sees little has entries above four; what a difference shows, and where, stays the same.
+std::array<double, 9> quick_matrix(std::array<double, 9> colour_matrix);
+
 /// Keeps its scratch memory from frame to frame. One thread.
 class QuickDifferencer {
  public:

@@ -28,7 +28,7 @@ static_assert(kBorder_px > kLumaReach_px && kBorder_px > QuickKernels::kAround);
 }  // namespace
 
 QuickPlacer::QuickPlacer(const std::array<double, 9>& colour_matrix)
-    : placer_(colour_matrix), drawn_px_(kUsualColourBias_px) {}
+    : placer_(quick_matrix(colour_matrix)), drawn_px_(kUsualColourBias_px) {}
 
 /// False where the boundary's colours do not differ in luma.
 bool QuickPlacer::look_at_luma(const QuickFrame& frame, int line, const QuickLine& edges, int edge,

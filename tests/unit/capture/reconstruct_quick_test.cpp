@@ -72,6 +72,30 @@ TEST(QuickDecoder, DecodesWhatHasContrast) {
   }
 }
 
+// As calibration makes it of a camera that sees little.
+TEST(QuickDecoder, AMatrixOfLargeNumbersTellsTheSamePlaces) {
+  test::Simulated object("object,width=320,height=240,stripes=45");
+  using Places = std::map<std::pair<int, int>, float>;
+  const auto places = [&] {
+    Reconstructor reconstructor = quick_of(object);
+    Places out;
+    for (std::uint64_t n = 0; n < 3; ++n) {
+      const auto frame = reconstructor.add(object.frame(n));
+      if (n < 2) continue;
+      for (const GridPoint& p : (*frame)->surface.grid) out[{p.line, p.boundary}] = p.column_px;
+    }
+    return out;
+  };
+  const Places expected = places();
+  for (double& m : object.rig.colour_matrix) m *= 8;
+  std::size_t same = 0;
+  for (const auto& [at, column_px] : places()) {
+    const auto there = expected.find(at);
+    same += there != expected.end() && std::fabs(there->second - column_px) < 0.02;
+  }
+  EXPECT_GT(same, expected.size() * 98 / 100);
+}
+
 // Where frames are dropped: a person who walks at 1 m/s has gone 0.3 m since the other slide was seen, or 33
 // mm where the frame before was observed.
 TEST(QuickDecoder, AnObservedFrameIsTheNextOnesOther) {
