@@ -24,7 +24,7 @@ constexpr float kMore_px = 0.1F;        // standard deviation more
 
 }  // namespace
 
-HalfWay::HalfWay(int boundaries, int lines) {
+HalfWay::HalfWay(int boundaries, int lines, int width_px) : width_px_(width_px) {
   before_.reset(boundaries, lines);
 }
 
@@ -65,6 +65,7 @@ void HalfWay::place_line(const DecodedGrid& grid, int line, DecodedGrid& out) {
     const std::optional<float> px = went(grid, line, b);
     if (!px) continue;
     const float column = known(now[b]) ? now[b] - 0.5F * *px : before[b] + 0.5F * *px;
+    if (!(column > -0.5F && column < static_cast<float>(width_px_) - 0.5F)) continue;
     const auto right = std::ranges::lower_bound(columns_, column, {}, &Column::px);
     const auto is_free = [&](const Column& other) {
       const float room_px = std::abs(other.boundary - b) <= kOwn ? kRoom_px : kOther_px;

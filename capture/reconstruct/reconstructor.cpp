@@ -109,7 +109,7 @@ struct Reconstructor::State {
         depths(p.boundaries(), r.camera.width, lines, kDepthLines),
         white_texture(r.colour_matrix, response, o.decoder == Decoder::kQuick, o.line_stride),
         moving_texture(r.colour_matrix, response, o.line_stride),
-        half_way(p.boundaries(), lines),
+        half_way(p.boundaries(), lines, r.camera.width),
         surface_builder(r, line_step_px(r.scan, o.line_stride), o.surface,
                         o.decoder == Decoder::kPaper ? 0 : SurfaceOptions{}.least_component) {
     decoded.reset(p.boundaries(), lines);
@@ -165,7 +165,7 @@ struct Reconstructor::State {
 void Reconstructor::State::forget() {
   pairs.forget();
   decoder = SlideDecoder(rig, pattern, options);
-  half_way = HalfWay(pattern.boundaries(), lines);
+  half_way = HalfWay(pattern.boundaries(), lines, rig.camera.width);
   second_before.clear();
 }
 

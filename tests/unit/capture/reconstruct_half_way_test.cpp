@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kLines = 12;
 constexpr int kBoundaries = 30;
+constexpr int kWidth_px = 320;
 constexpr std::int64_t kFrame_ns = 33'366'700;
 
 struct Place {
@@ -55,8 +56,25 @@ class HalfWayTest : public ::testing::Test {
     return out;
   }
 
-  HalfWay half_way_{kBoundaries, kLines};
+  HalfWay half_way_{kBoundaries, kLines, kWidth_px};
 };
+
+// What moved on beyond the picture's edge was beyond it half way already: a stream has no place for it.
+TEST_F(HalfWayTest, NothingIsBesideThePicture) {
+  DecodedGrid first = blank(), second = blank();
+  add(first, 0, kBoundaries - 1, -18);
+  add(second, 1, kBoundaries - 1, -24);
+  const DecodedGrid left = between(first, second);
+  EXPECT_FALSE(at(left, 5, 0));  // at -1
+  EXPECT_TRUE(at(left, 5, 1));
+  first = blank(), second = blank();
+  half_way_ = HalfWay(kBoundaries, kLines, kWidth_px);
+  add(first, 0, kBoundaries - 1, 8);
+  add(second, 0, kBoundaries - 2, 14);
+  const DecodedGrid right = between(first, second);
+  EXPECT_FALSE(at(right, 5, kBoundaries - 1));  // at 321
+  EXPECT_TRUE(at(right, 5, kBoundaries - 2));
+}
 
 TEST_F(HalfWayTest, WhatBothFramesHaveIsBetweenItsColumns) {
   DecodedGrid first = blank(), second = blank();
