@@ -80,8 +80,9 @@ HttpReply list(const RecordingControl& control) {
     bool recording;
   };
   std::vector<Found> found;
-  std::error_code error;
-  for (fs::directory_iterator at(control.folder(), error), end; at != end; at.increment(error)) {
+  std::error_code unread;
+  for (fs::directory_iterator at(control.folder(), unread), end; at != end; at.increment(unread)) {
+    std::error_code error;  // of this file alone
     const fs::directory_entry& entry = *at;
     const std::string name = entry.path().filename().string();
     if (entry.symlink_status(error).type() != fs::file_type::regular || !recording_file(name, control))
@@ -98,6 +99,7 @@ HttpReply list(const RecordingControl& control) {
     const std::int64_t modified_ns = error ? 0 : utc_ns(entry.last_write_time(error));
     if (!error) found.push_back({modified_ns, name, bytes, recording});  // else it has just gone
   }
+  if (unread) return text_reply(503, "the folder of recordings cannot be read: " + unread.message());
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
     return std::tie(b.modified_ns, b.name) < std::tie(a.modified_ns, a.name);
   });

@@ -6,7 +6,7 @@
 // Run as: in_own_domain node record_test.mjs RELIEVO_SERVER RELIEVO, in web/viewer. Exit 77: no Chromium here.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, renameSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, launchChromium } from './chromium.mjs';
@@ -389,6 +389,23 @@ const checks = {
     // Chromium tells of what the server refuses: that it has no folder, where the list did not say so before.
     assert.deepEqual(complaints.filter((c) => !/status of 40[45]/.test(c)), []);
     assert.ok(complaints.length <= 3); // once a page, and the picture that could not be had
+  },
+
+  async 'a folder that cannot be listed is asked for again, and it is said why'() {
+    const page = await openRecording();
+    await page.route('**/api/recordings', (route) => route.fulfill({ status: 401, body: 'a token is needed\n' }), { times: 1 });
+    await page.keyboard.press('n');
+    const listed = page.locator('#panel-streams li:has-text(".mcap")');
+    await listed.first().waitFor();
+    const away = `${folder}-away`;
+    renameSync(folder, away);
+    for (const key of ['n', 'n']) await page.keyboard.press(key);
+    const problem = page.locator('#panel-streams p:has-text("The folder of recordings cannot be read: No such file or directory.")');
+    await problem.waitFor();
+    renameSync(away, folder);
+    await problem.waitFor({ state: 'hidden' });
+    await listed.first().waitFor();
+    await page.close();
   },
 
   async 'how long it records is said by the server\'s clock'() {

@@ -480,6 +480,17 @@ TEST_F(RecordingApi, NoNameLeadsOutOfTheFolder) {
   EXPECT_TRUE(listed().empty());
 }
 
+TEST_F(RecordingApi, AFolderThatCannotBeReadIsNotAnEmptyOne) {
+  ASSERT_TRUE(listed().empty());
+  std::filesystem::remove_all(folder.path());
+  std::ofstream(folder.path()) << "no folder";
+  const auto response = request(port, "GET", "/api/recordings");
+  EXPECT_EQ(response.status, 503);
+  EXPECT_EQ(response.body, "the folder of recordings cannot be read: Not a directory\n");
+  std::filesystem::remove(folder.path());
+  EXPECT_THAT(request(port, "GET", "/api/recordings").body, HasSubstr("No such file or directory"));
+}
+
 TEST_F(RecordingApi, MetricsSayWhatItDoes) {
   gateway->announce(make_info());
   EXPECT_EQ(metric("relievo_recording_state{stream=\"face\",state=\"off\"}"), 1);

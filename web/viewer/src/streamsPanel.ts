@@ -5,12 +5,14 @@ import { Aligner, type Aligning } from './aligner';
 import { button, chooser, make, setText } from './dom';
 import { kPlacements, type Placement } from './placement';
 import { rigPage, type ListedRecording, type ListedStream } from './protocol';
+import { sentence } from './sentence';
 import { text } from './strings';
 import { kThumbnail, Thumbnails } from './thumbnails';
 import type { View } from './view';
 
 const say = text.streams;
 const kFreshMs = 15_000; // between pictures of a stream that is not shown
+const kAgainMs = 2000; // before a folder that could not be listed is asked for again
 const kAhead = '50%'; // of the panel's height: pictures so far out of sight are read, too
 
 export interface StreamsPanelEvents {
@@ -38,6 +40,7 @@ export class StreamsPanel {
   private readonly live = make('ul', { className: 'streams' });
   private readonly none = make('p', { className: 'quiet' }, say.none);
   private readonly folderTitle = make('h3', { hidden: true }, say.recordings);
+  private readonly folderProblem = make('p', { className: 'quiet', hidden: true });
   private readonly folder = make('ul', { className: 'streams' });
   private readonly placement: { row: HTMLElement; set(value: Placement): void };
   private readonly note = make('p', { className: 'quiet' }, say.unknownPlaces);
@@ -45,6 +48,7 @@ export class StreamsPanel {
   private readonly recordings = new Map<string, Row>(); // by file
   private recorded = ''; // what the streams' recorders did when the folder was listed
   private listings = 0; // of the folder, asked for
+  private listAgainAt = Infinity; // performance.now()
   private shownFile: string | null = null;
   private readonly thumbnails = new Thumbnails();
   private readonly inSight: IntersectionObserver; // which of the pictures
@@ -69,7 +73,7 @@ export class StreamsPanel {
       kPlacements.map((p) => [p, say.placements[p]] as const),
       (placement) => events.placement(placement),
     );
-    body.append(this.live, this.none, this.aligning, this.buttons, this.placement.row, this.note, this.folderTitle, this.folder);
+    body.append(this.live, this.none, this.aligning, this.buttons, this.placement.row, this.note, this.folderTitle, this.folderProblem, this.folder);
   }
 
   set open(open: boolean) {
@@ -114,7 +118,7 @@ export class StreamsPanel {
   showRecordings(streams: readonly ListedStream[], shown: string | null): void {
     if (!this.isOpen) return;
     const recorded = streams.map(({ recorder }) => `${recorder?.file} ${recorder?.state} ${recorder?.message}`).join();
-    if (recorded !== this.recorded) void this.listFolder();
+    if (recorded !== this.recorded || performance.now() > this.listAgainAt) void this.listFolder();
     this.recorded = recorded;
     this.shownFile = shown;
     this.markRecording();
@@ -158,11 +162,17 @@ export class StreamsPanel {
   // Where the server records into a folder.
   private async listFolder(): Promise<void> {
     const listing = ++this.listings;
-    const response = await fetch(new URL('api/recordings', document.baseURI), { cache: 'no-store' }).catch(() => null);
-    if (response?.ok !== true) return;
-    const { recordings } = (await response.json()) as { recordings: ListedRecording[] };
+    this.listAgainAt = Infinity;
+    const { recordings, problem } = await fetchFolder();
     if (listing !== this.listings) return; // asked for again since: what comes then is newer
-    this.folderTitle.hidden = recordings.length === 0;
+    if (recordings === null) this.listAgainAt = performance.now() + kAgainMs;
+    setText(this.folderProblem, sentence(problem));
+    this.folderProblem.hidden = problem === '';
+    if (recordings !== null) this.listRecordings(recordings);
+    this.folderTitle.hidden = this.recordings.size === 0 && problem === '';
+  }
+
+  private listRecordings(recordings: readonly ListedRecording[]): void {
     this.drop(recordings.map(({ file }) => file));
     for (const [i, { file, bytes, recording, cut }] of recordings.entries()) {
       const row = this.recordings.get(file) ?? this.addRecording(file);
@@ -214,6 +224,18 @@ export class StreamsPanel {
       if (!isIntersecting) row.pictureAt = -Infinity;
       else if (file !== null) this.thumbnails.ask({ stream: null, recording: `recordings/${encodeURIComponent(file)}`, onto: picture });
     }
+  }
+}
+
+/** `recordings` null: not known, with why unless the list of streams says it, too. */
+async function fetchFolder(): Promise<{ recordings: ListedRecording[] | null; problem: string }> {
+  try {
+    const response = await fetch(new URL('api/recordings', document.baseURI), { cache: 'no-store' });
+    if (response.ok) return { ...((await response.json()) as { recordings: ListedRecording[] }), problem: '' };
+    if (response.status === 404) return { recordings: [], problem: '' }; // there is no folder
+    return { recordings: null, problem: response.status === 401 ? '' : (await response.text()).trim() };
+  } catch {
+    return { recordings: null, problem: '' };
   }
 }
 
