@@ -9,7 +9,8 @@ import { VideoTextures } from './videoTexture';
 const kClockEveryMs = 4000;
 const kClockSoonMs = 500; // at first, since a page that is being built up answers late and lopsided, and where the gateway does not know yet
 const kClocksSoon = 6;
-const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
+const kSilenceMs = 30_000; // as the server has: a large frame on a slow line holds up the answers of the clock exchange, and tells of itself once it is whole
+const kOpeningMs = 12_000;
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
@@ -153,7 +154,7 @@ export class Connection {
       if (now >= this.retryAt) this.connect();
       return;
     }
-    if (now - this.lastHeard > kSilenceMs) return this.onLost();
+    if (now - this.lastHeard > (this.connected ? kSilenceMs : kOpeningMs)) return this.onLost();
     if (this.connected && now - this.lastClock > (this.clocks < kClocksSoon ? kClockSoonMs : kClockEveryMs)) {
       this.lastClock = now;
       this.send({ type: 'time', t0: utcNow() });
