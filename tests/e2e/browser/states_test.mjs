@@ -160,10 +160,10 @@ const checks = {
     await inspect('Stalled', made, /stalled.*No signal from the camera/s);
   },
 
-  async 'stalled, while a panel is open: beside it'() {
+  async 'stalled, while a panel is open: beside it, on a phone above it'() {
     feeder.say('start ball\nstatus running');
     const made = [];
-    for (const [width, height] of [[844, 390], [1000, 560], [660, 700]]) {
+    for (const [width, height] of [[844, 390], [1000, 560], [660, 700], [390, 800], [360, 640]]) {
       const page = await open('/', { viewport: { width, height } });
       await shownPast(page, 1);
       await page.keyboard.press('i');
