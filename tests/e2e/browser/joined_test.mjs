@@ -91,6 +91,20 @@ const checks = {
     assert.match(await page.textContent('#source'), /cut short|left out/);
   },
 
+  async 'as PLYs each of their frames has a file of its own, called as relievo export calls it'(page) {
+    const file = joined('whole', ...parts);
+    const folder = join(scratch, 'ply');
+    execFileSync(relievoPath, ['export', file, '--out', folder, '--format', 'ply'], { stdio: 'ignore' });
+    await page.setInputFiles('#file', file);
+    await page.waitForFunction((n) => window.relievo.diagnostics().playback?.times.length === n, whole.length);
+    await page.click('#tool-take');
+    const [zip] = await Promise.all([page.waitForEvent('download'), page.click('#range button:text-is("PLYs")')]);
+    const list = 'import sys, zipfile\nprint(*sorted(zipfile.ZipFile(sys.argv[1]).namelist()))';
+    const names = execFileSync('python3', ['-c', list, await zip.path()], { encoding: 'utf8' }).trim().split(' ');
+    assert.deepEqual(names, readdirSync(folder).filter((name) => name.endsWith('.ply')).sort());
+    assert.equal(new Set(names).size, whole.length);
+  },
+
   async 'no error, no request to another host'() {
     assert.deepEqual(complaints, []);
   },

@@ -7,7 +7,7 @@ import { closePictures } from './frameMemory';
 import { publishMsOf, type FrameStore } from './frameStore';
 import type { DecodedFrame } from './messages';
 import type { StreamInfo } from './protocol';
-import type { RangeFormat } from './rangeFrames';
+import { FrameNames, type RangeFormat } from './rangeFrames';
 import { writeRecording, type DescribedSample } from './recordingFile';
 import { framesBefore } from './storePlayer';
 import { text } from './strings';
@@ -67,6 +67,7 @@ async function asRecording({ store, description, progress, cancelled }: RangeOrd
 async function asSurfaces(order: RangeOrder, before: number[], indices: number[]): Promise<RangeFile> {
   const { store, format, progress, cancelled } = order;
   const zip = new ZipWriter();
+  const names = new FrameNames();
   const frames = new Frames();
   let damaged = 0;
   try {
@@ -79,8 +80,8 @@ async function asSurfaces(order: RangeOrder, before: number[], indices: number[]
       } else {
         const content = format === 'ply' ? plyOf(frame) : await glbOf(frame, jpeg);
         closePictures(frame);
-        const name = `${String(frame.number).padStart(6, '0')}.${format}`;
-        if (!zip.add(name, content)) throw new Error(text.take.tooLarge(done, kMostBytes));
+        const name = names.name(frame.number, await numberOf(store, index + 1));
+        if (!zip.add(`${name}.${format}`, content)) throw new Error(text.take.tooLarge(done, kMostBytes));
       }
       progress(done + 1);
     }
@@ -89,6 +90,17 @@ async function asSurfaces(order: RangeOrder, before: number[], indices: number[]
   }
   if (damaged === indices.length) throw new Error(text.take.allDamaged);
   return { content: zip.finish(), frames: indices.length - damaged, damaged };
+}
+
+/** The camera's number of a frame; null where there is none, or it cannot be read. */
+async function numberOf(store: FrameStore, index: number): Promise<number | null> {
+  if (index >= store.first + store.times.length) return null;
+  try {
+    const { prefix, message } = await store.read(index);
+    return Number(parseFrame(new Uint8Array(message, prefix.bytes)).header.number);
+  } catch {
+    return null;
+  }
 }
 
 /** Frames one after the other, by a decoder of its own. */

@@ -5,7 +5,7 @@ import { writeStreamInfo } from '../src/cdrWriter';
 import { History } from '../src/history';
 import { bytesOf } from '../src/mcap';
 import { exportRange } from '../src/rangeExport';
-import { framesBetween } from '../src/rangeFrames';
+import { FrameNames, framesBetween } from '../src/rangeFrames';
 import { Recording } from '../src/recording';
 import { ZipWriter } from '../src/zip';
 import { kInfo } from './streamInfo';
@@ -19,6 +19,23 @@ describe('framesBetween', () => {
     [150, 250, [8, 9]], // what was on the screen then
     [210, 220, [9, 9]],
   ])('%d to %d', (from, to, wanted) => expect(framesBetween(store, from, to)).toEqual(wanted));
+});
+
+describe('FrameNames', () => {
+  const names = (...numbers: number[]): string[] => {
+    const given = new FrameNames();
+    return numbers.map((number, i) => given.name(number, numbers[i + 1] ?? null));
+  };
+
+  it('are after the cameras frame, of whose two surfaces the first is the one between', () => {
+    expect(names(1, 2, 4)).toEqual(['000001', '000002', '000004']);
+    expect(names(1, 2, 2, 3, 4)).toEqual(['000001', '000002_between', '000002', '000003', '000004']);
+  });
+
+  it('tell numbers that start again apart', () => {
+    expect(names(1, 2, 1, 2, 3, 1)).toEqual(['000001', '000002', '000001-2', '000002-2', '000003', '000001-3']);
+    expect(names(1, 1, 1, 1)).toEqual(['000001_between', '000001', '000001_between-2', '000001-2']);
+  });
 });
 
 describe('a range of a live stream', () => {
