@@ -240,17 +240,19 @@ export function valueText({ tool, value, sigma }: Measurement): string {
 const number = (value: number | null | undefined): string => (value === null || value === undefined ? '' : value.toPrecision(9));
 
 /** A line a measurement; metres and radians, each place in the frame of its own stream's camera; the sigmas of places are their depths'. */
-export function measurementsCsv(measurements: readonly Measurement[]): string {
-  const spot = (i: number): string => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`, `kind${i}`, `stream${i}`].join(',');
-  const lines = [`tool,value,unit,sigma,sigma_surface,sigma_rig,${[1, 2, 3].map(spot).join(',')}`];
+export function measurementsCsv(measurements: readonly Measurement[], separator = ','): string {
+  const head = (i: number): string[] => [`x${i}_m`, `y${i}_m`, `z${i}_m`, `sigma${i}_m`, `kind${i}`, `stream${i}`];
+  const lines = [['tool', 'value', 'unit', 'sigma', 'sigma_surface', 'sigma_rig', ...[1, 2, 3].flatMap(head)]];
   for (const m of measurements) {
     const spots = [0, 1, 2].flatMap((i) => {
       const s = m.spots[i];
       return s === undefined ? ['', '', '', '', '', ''] : [...s.point.map(number), number(depthSigma(s)), s.kind, s.stream];
     });
-    lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), number(m.surface), number(m.rig), ...spots].join(','));
+    lines.push([m.tool, number(m.value), m.tool === 'angle' ? 'rad' : 'm', number(m.sigma), number(m.surface), number(m.rig), ...spots]);
   }
-  return `${lines.join('\n')}\n`;
+  // A file of this device may be called anything.
+  const cell = (text: string): string => (/[\t\n\r",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  return lines.map((line) => `${line.map(cell).join(separator)}\n`).join('');
 }
 
 /** A line a point; an empty line where the surface has a gap. */

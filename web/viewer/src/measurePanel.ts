@@ -110,7 +110,7 @@ export class MeasurePanel {
     this.plot.setAttribute('aria-label', say.plot);
     this.list.setAttribute('aria-live', 'polite');
     const copied = button(say.copy, say.copyTitle, () => {
-      void copy(measurementsCsv(this.measurements).replaceAll(',', '\t')).then((done) => setText(this.hint, done ? say.copied : say.notCopied));
+      void copy(measurementsCsv(this.measurements, '\t')).then((done) => setText(this.hint, done ? say.copied : say.notCopied));
     });
     const csv = button(say.csv, say.csvTitle, () => this.save('measurements', measurementsCsv(this.measurements)));
     const section = button(say.sectionCsv, say.sectionCsvTitle, () => this.save('section', sectionCsv(this.lastSection?.profile ?? [])));

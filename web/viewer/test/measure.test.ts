@@ -202,6 +202,16 @@ describe('text', () => {
     expect(line!.slice(0, 3)).toEqual(['distance', '1.00000000', 'm']);
     expect(line![head!.indexOf('sigma2_m')]).toBe('');
   });
+  it('of a file that is called so has as many columns all the same', () => {
+    const of = { ...spot([0, 0, 1]), stream: 'a, the "second".ply' };
+    const measured = [measure('point', [of], null, eye)];
+    const quoted = '"a, the ""second"".ply"';
+    for (const separator of [',', '\t']) {
+      const [head, line] = measurementsCsv(measured, separator).split('\n');
+      expect(line).toContain(`${separator}${quoted}${separator}`);
+      expect(line!.replace(quoted, '').split(separator)).toHaveLength(head!.split(separator).length);
+    }
+  });
 });
 
 it('a section is of what the eye sees: not of what lies behind', () => {
