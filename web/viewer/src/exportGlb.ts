@@ -10,6 +10,7 @@ export function writeGlb(surface: Surface, jpeg: Uint8Array | null): Uint8Array<
   const vertices = surface.positions.length / 3;
   const positions = surface.positions.map((c, i) => (i % 3 === 0 ? c : -c));
   const textured = jpeg !== null && surface.coordinates !== null;
+  const colours = textured ? null : (surface.colours ?? null);
   const parts: Uint8Array[] = [];
   const bufferViews: object[] = [];
   let length = 0;
@@ -34,12 +35,16 @@ export function writeGlb(surface: Surface, jpeg: Uint8Array | null): Uint8Array<
     attributes['TEXCOORD_0'] = accessors.length;
     accessors.push({ bufferView: add(surface.coordinates!, kVertices), componentType: kFloat, count: vertices, type: 'VEC2' });
   }
+  if (colours !== null) {
+    attributes['COLOR_0'] = accessors.length;
+    accessors.push({ bufferView: add(colours, kVertices), componentType: kFloat, count: vertices, type: 'VEC3' });
+  }
   const primitive: Record<string, unknown> = { attributes, material: 0, mode: surface.triangles.length > 0 ? 4 : 0 };
   if (surface.triangles.length > 0) {
     primitive['indices'] = accessors.length;
     accessors.push({ bufferView: add(surface.triangles, kIndices), componentType: kUnsignedInt, count: surface.triangles.length, type: 'SCALAR' });
   }
-  const pbr = textured ? { baseColorTexture: { index: 0 } } : { baseColorFactor: [0.7, 0.7, 0.7, 1] };
+  const pbr = textured ? { baseColorTexture: { index: 0 } } : { baseColorFactor: colours === null ? [0.7, 0.7, 0.7, 1] : [1, 1, 1, 1] };
   const json = {
     asset: { version: '2.0', generator: 'relievo' },
     extensionsUsed: ['KHR_materials_unlit'],

@@ -8,9 +8,9 @@ export interface Pixels {
   rgba: Uint8ClampedArray;
 }
 
-/** Colours are the picture's nearest pixels; grey without. */
+/** Colours are the picture's nearest pixels; without, those of the vertices, or grey. */
 export function writePly(surface: Surface, picture: Pixels | null): Uint8Array<ArrayBuffer> {
-  const { positions, coordinates, triangles, quality } = surface;
+  const { positions, triangles, quality } = surface;
   const vertices = positions.length / 3;
   const faces = triangles.length / 3;
   const header = [
@@ -33,7 +33,7 @@ export function writePly(surface: Surface, picture: Pixels | null): Uint8Array<A
   let at = head.length;
   for (let v = 0; v < vertices; ++v, at += stride) {
     for (let i = 0; i < 3; ++i) view.setFloat32(at + 4 * i, positions[3 * v + i]!, true);
-    out.set(colourAt(picture, coordinates, v), at + 12);
+    out.set(colourAt(picture, surface, v), at + 12);
     if (quality === null) continue;
     view.setFloat32(at + 15, quality.sigmas[v]!, true);
     out[at + 19] = quality.interpolated[v]!;
@@ -45,8 +45,11 @@ export function writePly(surface: Surface, picture: Pixels | null): Uint8Array<A
   return out;
 }
 
-function colourAt(picture: Pixels | null, coordinates: Float32Array | null, v: number): ArrayLike<number> {
-  if (picture === null || coordinates === null) return [180, 180, 180];
+/** IEC 61966-2-1, of 0..1. */
+const encoded = (linear: number): number => Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
+
+function colourAt(picture: Pixels | null, { coordinates, colours }: Surface, v: number): ArrayLike<number> {
+  if (picture === null || coordinates === null) return colours == null ? [180, 180, 180] : Array.from(colours.subarray(3 * v, 3 * v + 3), encoded);
   const place = (share: number, size: number): number => Math.min(size - 1, Math.max(0, Math.floor(share * size)));
   const column = place(coordinates[2 * v]!, picture.width);
   const row = place(coordinates[2 * v + 1]!, picture.height);

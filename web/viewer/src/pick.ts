@@ -7,6 +7,7 @@ export type Vec3 = [number, number, number];
 export interface Surface {
   positions: Float32Array;
   coordinates: Float32Array | null;
+  colours?: Float32Array | null; // linear RGB a vertex, of files without a picture
   triangles: Uint32Array; // empty: a point cloud
   quality: VertexQuality | null;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: a link brings back what it was made of, whatever else is in it; what is written can be read again.
 import { describe, expect, it } from 'vitest';
+import type { BufferGeometry, Mesh, MeshBasicMaterial } from 'three';
+import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
 import { kDefaultDisplay } from '../src/display';
 import { fileName } from '../src/download';
@@ -120,6 +122,23 @@ describe('PLY', () => {
     expect([...read.getAttribute('color').array].map(Math.round)).toEqual([1, 0, 0, 0, 0, 1, 0, 0, 1]);
     expect([...read.getAttribute('sigma').array]).toEqual([...surface.quality!.sigmas]);
     expect([...read.getAttribute('interpolated').array]).toEqual([0, 1, 0]);
+  });
+});
+
+describe('a surface with a colour a vertex, as of a file of this device', () => {
+  const linear = [1, 0, 0, 0.2140, 0.2140, 0.2140, 0, 0.5, 0.001];
+  const coloured: Surface = { ...surface, coordinates: null, colours: new Float32Array(linear) };
+
+  it('keeps them as PLY', () => {
+    const read = new PLYLoader().parse(writePly(coloured, null).buffer);
+    for (const [i, c] of read.getAttribute('color').array.entries()) expect(c).toBeCloseTo(linear[i]!, 2);
+  });
+
+  it('keeps them as GLB', async () => {
+    const { scene } = await new GLTFLoader().parseAsync(writeGlb(coloured, null).buffer, '');
+    const { geometry, material } = scene.children[0] as Mesh<BufferGeometry, MeshBasicMaterial>;
+    expect([...geometry.getAttribute('color').array]).toEqual([...coloured.colours!]);
+    expect(material.color.toArray()).toEqual([1, 1, 1]); // they are not dimmed
   });
 });
 
