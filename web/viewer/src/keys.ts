@@ -23,16 +23,19 @@ const kArrows: Record<string, readonly [number, number]> = {
   ArrowUp: [0, 1],
   ArrowDown: [0, -1],
 };
+const kOnce = /^[^,.+=_-]$|^(Home|End|Escape)$/; // while it is held down: what goes to and fro with each press would flicker
 const kWayKeys: Record<string, Way> = { o: 'orbit', y: 'fly', c: 'camera' };
 
 export function listenToKeys(actions: KeyActions, of: EventTarget = window): void {
+  let isActed = false; // by the key that is held down
   of.addEventListener('keydown', (e) => {
     const event = e as KeyboardEvent;
     const modified = event.ctrlKey || event.metaKey || event.altKey;
     if (modified) return;
     // Closes panels from within them too.
     if (event.key !== 'Escape' && (isTyping(event.target) || belongsToControl(event))) return;
-    if (act(event, actions)) event.preventDefault();
+    if (!event.repeat || !kOnce.test(event.key)) isActed = act(event, actions);
+    if (isActed) event.preventDefault();
   });
 }
 
