@@ -178,6 +178,24 @@ const onFeeder = {
     await errors(page);
   },
 
+  async 'a range gets its start and its end by the button, though more comes meanwhile'(page) {
+    const { first, times } = await playback(page);
+    const [from, to] = [first + times.length - 6, first + times.length - 2];
+    const range = page.locator('#timeline button:text-is("⟲")');
+    await seek(page, from);
+    await range.click();
+    await kept(page, times.length + 4);
+    await seek(page, to);
+    await range.click();
+    const now = await playback(page);
+    const [begin, end] = [from, to].map((index) => now.times[index - now.first]);
+    assert.ok(now.loop !== null && Math.abs(now.loop.from - begin) < 1 && Math.abs(now.loop.to - end) < 1, JSON.stringify([now.loop, begin, end]));
+    await range.click();
+    assert.equal((await playback(page)).loop, null);
+    await press(page, 'l');
+    await inState(page, 'live');
+  },
+
   async 'the picture under the cursor says how far behind live it is'(page) {
     const { width, height } = await page.locator('#timeline .track').boundingBox();
     for (const share of [0.1, 0.2]) await page.hover('#timeline .track', { position: { x: share * width, y: height / 2 } });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The time line of a source that has one: playing, scrubbing, speed, a range to repeat, marks of key frames and gaps.
 import { button, make, setText, windowOf } from './dom';
-import { clockText, frameAt, kSpeeds } from './playback';
+import { clockText, frameAt, kSpeeds, type Loop } from './playback';
 import type { Preview } from './preview';
 import type { Playback } from './source';
 import { text } from './strings';
@@ -23,6 +23,7 @@ export class Timeline {
   private readonly streams = make('select', { title: say.stream, hidden: true, className: 'stream' });
   private offered = '';
   private playback: Playback | null = null;
+  private begun: Loop | null = null; // without an end of its own yet: what is there grows beyond it
   private absolute = false;
   private dirty = false;
   private readonly timer: number;
@@ -166,8 +167,9 @@ export class Timeline {
   // Its start, then its end, then none.
   private cycleLoop(): void {
     const p = this.playback!;
-    if (p.loop === null) p.setLoop({ from: p.position, to: this.end });
-    else if (p.loop.to >= this.end && p.position > p.loop.from) p.setLoop({ from: p.loop.from, to: p.position });
+    const hasEnd = p.loop !== null && p.loop !== this.begun && p.loop.to < this.end;
+    if (p.loop === null) p.setLoop((this.begun = { from: p.position, to: this.end }));
+    else if (!hasEnd && p.position > p.loop.from) p.setLoop({ from: p.loop.from, to: p.position });
     else p.setLoop(null);
   }
 
