@@ -298,9 +298,12 @@ const checks = {
   async 'a stream is chosen again'(page) {
     feeder.say('start ball');
     await page.waitForFunction(() => document.querySelectorAll('#streams option:enabled').length === 1);
+    await page.setInputFiles('#file', { name: 'none.mcap', mimeType: 'application/octet-stream', buffer: Buffer.from('none') });
+    await page.waitForFunction(() => /none\.mcap/.test(document.querySelector('#card-title').textContent));
     await page.selectOption('#streams', 'ball');
     await inState(page, 'live');
     await page.waitForFunction(() => window.relievo.diagnostics().playback.following === true); // no longer the file's
+    await page.waitForFunction(() => document.querySelector('#card').hidden); // nor what was said of another
   },
 
   async 'a stream that is chosen while a recording opens stays chosen, also when it goes'() {

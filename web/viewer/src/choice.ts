@@ -19,7 +19,7 @@ export class Choice {
   /** A stream. */
   make(): void {
     ++this.count;
-    this.asked = null;
+    this.asked = this.problem = null; // what was said before is of no interest any more
   }
 
   /** A file, from now on until opened() or failed(); gives what to ask stillHolds() with. */
@@ -34,7 +34,7 @@ export class Choice {
   }
 
   opened(): void {
-    this.asked = this.problem = null;
+    this.asked = null;
   }
 
   failed(name: string, error: unknown, overPicture: boolean): void {
