@@ -269,6 +269,26 @@ const checks = {
     }
   },
 
+  async 'in rows that are scrolled what is chosen is in sight, however it was chosen'() {
+    const page = await open('/?stream=ball#mode=confidence', { viewport: { width: 320, height: 400 } });
+    await shownPast(page, 1);
+    const inSight = (chosen) =>
+      page.waitForFunction((words) => {
+        const row = document.querySelector('#modes');
+        const button = row.querySelector('[aria-pressed=true]');
+        const [{ left, right }, { left: from, right: to }] = [button, row].map((e) => e.getBoundingClientRect());
+        return row.scrollWidth > row.clientWidth && button.textContent === words && left >= from && right <= to;
+      }, chosen);
+    await inSight('Confidence');
+    await page.keyboard.press('1');
+    await inSight('Textured');
+    await page.setViewportSize({ width: 1000, height: 700 });
+    await page.click('#modes button:text-is("Confidence")');
+    await page.setViewportSize({ width: 320, height: 400 });
+    await inSight('Confidence');
+    await page.close();
+  },
+
   async 'who has their browser write larger gets all of it larger, and still no part over another'() {
     for (const size_px of [16, 24, 32]) {
       const large = await launchChromium([`--blink-settings=defaultFontSize=${size_px}`]);

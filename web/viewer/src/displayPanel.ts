@@ -8,6 +8,7 @@ export class DisplayPanel {
   private readonly modes: Map<Mode, HTMLButtonElement>;
   private readonly ways: Map<Way, HTMLButtonElement>;
   private readonly set: (display: Display) => void;
+  private chosen = ''; // of both
 
   /** `change` gets what is to differ from now on. */
   constructor(body: HTMLElement, change: (part: Partial<Display>) => void) {
@@ -17,6 +18,9 @@ export class DisplayPanel {
     this.ways = new Map(kWays.map((way) => [way, button(...text.ways[way], () => change({ way }))]));
     element('modes').append(...this.modes.values());
     element('ways').append(...this.ways.values());
+    // In low windows they are rows that are scrolled: also where one has just become so, or is shown again.
+    const rows = new ResizeObserver(() => this.bringIntoSight());
+    for (const row of ['modes', 'ways']) rows.observe(element(row));
 
     const say = text.display;
     const background = chooser(say.background, kBackgrounds.map((b) => [b, text.backgrounds[b]] as const), (value) =>
@@ -51,10 +55,19 @@ export class DisplayPanel {
     for (const [mode, b] of this.modes) b.setAttribute('aria-pressed', String(mode === display.mode));
     for (const [way, b] of this.ways) b.setAttribute('aria-pressed', String(way === display.way));
     this.ways.get('camera')!.disabled = !hasRig;
+    if (`${display.mode} ${display.way}` !== this.chosen) this.bringIntoSight();
+    this.chosen = `${display.mode} ${display.way}`;
     this.set(display);
     const root = document.documentElement;
     root.dataset['theme'] = display.theme;
     root.dataset['background'] = display.background;
     document.body.dataset['split'] = display.split;
+  }
+
+  // However they were chosen.
+  private bringIntoSight(): void {
+    for (const b of [...this.modes.values(), ...this.ways.values()]) {
+      if (b.getAttribute('aria-pressed') === 'true') b.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+    }
   }
 }
