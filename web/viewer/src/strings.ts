@@ -21,6 +21,8 @@ const ways: Record<Way, readonly [string, string]> = {
   camera: ['Camera', "Exactly what the rig's camera sees (C)"],
 };
 
+const counted = (frames: number): string => `${frames} ${frames === 1 ? 'frame' : 'frames'}`;
+
 const placements: Record<Placement, string> = { beside: 'Side by side', together: 'In one frame' };
 const backgrounds: Record<Background, string> = { theme: 'As the theme', black: 'Black', grey: 'Grey', white: 'White' };
 const splits: Record<Split, string> = { none: 'Nothing', picture: "The camera's picture", stripes: 'The stripes', both: 'Both' };
@@ -230,7 +232,7 @@ export const text = {
     range: 'A range of frames',
     rangeAll: 'All there is',
     rangeSet: (from: string, to: string) => `${from} to ${to}`,
-    rangeOf: (words: string, frames: number) => `${words}: ${frames} frames. [ and ] or ⟲ at the time line set the range.`,
+    rangeOf: (words: string, frames: number) => `${words}: ${counted(frames)}. [ and ] or ⟲ at the time line set the range.`,
     rangeFormats: { mcap: 'MCAP', ply: 'PLYs', glb: 'GLBs' },
     rangeTitles: {
       mcap: 'A recording of these frames, as they were sent',
@@ -239,7 +241,7 @@ export const text = {
     },
     rangeEndings: { mcap: 'mcap', ply: 'ply.zip', glb: 'glb.zip' },
     rangeSaved: (name: string, frames: number, bytes: number, damaged: number) =>
-      `${name}: ${frames} frames, ${(bytes / 1e6).toFixed(1)} MB${damaged === 0 ? '' : `; ${damaged} damaged ones are left out`}`,
+      `${name}: ${counted(frames)}, ${(bytes / 1e6).toFixed(1)} MB${damaged === 0 ? '' : `; ${damaged} damaged ${damaged === 1 ? 'one is' : 'ones are'} left out`}`,
     rangeCancelled: 'Cancelled: nothing is saved.',
     rangeFailed: (why: string) => `Nothing is saved: ${why}.`,
     cancel: 'Cancel',
@@ -322,8 +324,8 @@ export const text = {
     startHere: 'Record: save what this page keeps and what follows as a file here (X)',
     stop: 'Stop recording (X)',
     running: (time: string, bytes: number) => `${time}, ${(bytes / 1e6).toFixed(1)} MB`,
-    savedHere: (name: string, frames: number, bytes: number) => `${name}: ${frames} frames, ${(bytes / 1e6).toFixed(1)} MB`,
-    savedThere: (name: string, frames: number) => `${name}: ${frames} frames, on the server`,
+    savedHere: (name: string, frames: number, bytes: number) => `${name}: ${counted(frames)}, ${(bytes / 1e6).toFixed(1)} MB`,
+    savedThere: (name: string, frames: number) => `${name}: ${counted(frames)}, on the server`,
     video: (running: string) => `video ${running}`,
     unknown: (last: string) => `Not known whether the server still records; at last ${last}`,
     failed: (why: string) => `Not recorded: ${why}`,
