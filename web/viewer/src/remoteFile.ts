@@ -7,7 +7,7 @@ import { Final, NoAnswer, NoToken, Unavailable } from './missing';
 export const kBlock = 2 ** 18; // bytes
 const kKept = 64; // blocks
 const kTries = 4;
-const kPatienceMs = 16_000; // with one part: a gateway gives up after 15 s
+const kPatienceMs = 16_000; // while nothing of a part comes: a gateway gives up after 15 s
 const kFirstWaitMs = 300; // before a second try; twice as long before each further one
 const kChanged = 'the recording has changed on the server: open it anew';
 
@@ -135,16 +135,22 @@ export class RemoteFile implements Bytes {
 
   private async ask(at: number, end: number): Promise<Uint8Array> {
     const asking = new AbortController();
-    AbortSignal.timeout(kPatienceMs).addEventListener('abort', () => asking.abort());
+    let heard = 0;
+    const hear = (): void => {
+      const now = ++heard;
+      AbortSignal.timeout(kPatienceMs).addEventListener('abort', () => now === heard && asking.abort());
+    };
+    hear();
     this.asking.add(asking);
     try {
-      return await this.askUntil(asking.signal, at, end);
+      return await this.askUntil(asking.signal, hear, at, end);
     } finally {
       this.asking.delete(asking);
     }
   }
 
-  private async askUntil(signal: AbortSignal, at: number, end: number): Promise<Uint8Array> {
+  /** `hear` is called whenever something of it has come. */
+  private async askUntil(signal: AbortSignal, hear: () => void, at: number, end: number): Promise<Uint8Array> {
     const headers = { Range: `bytes=${at}-${end - 1}`, 'If-Range': this.etag };
     const response = await this.fetch(this.url, { headers, signal });
     if (response.status === 200 || response.status === 416) {
@@ -152,13 +158,20 @@ export class RemoteFile implements Bytes {
       throw new Final(kChanged);
     }
     if (response.status !== 206) throw refused(response.status, 'the server does not give the recording');
-    const bytes = new Uint8Array(
-      await response.arrayBuffer().catch(() => {
-        throw new NoAnswer();
-      }),
-    );
+    const bytes = await bodyOf(response, hear).catch(() => {
+      throw new NoAnswer();
+    });
     if (bytes.length !== end - at) throw new Unavailable('a part of the recording came short');
     return bytes;
+  }
+}
+
+async function bodyOf({ body }: Response, hear: () => void): Promise<Uint8Array> {
+  const parts: Uint8Array<ArrayBuffer>[] = [];
+  for (const reader = body?.getReader(); ; hear()) {
+    const { value } = (await reader?.read()) ?? {};
+    if (value === undefined) return new Uint8Array(await new Blob(parts).arrayBuffer());
+    parts.push(value);
   }
 }
 

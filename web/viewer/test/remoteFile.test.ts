@@ -101,6 +101,33 @@ describe('RemoteFile', () => {
     impatient.mockRestore();
   });
 
+  it('waits for all of what comes slowly', async () => {
+    const impatient = vi.spyOn(AbortSignal, 'timeout').mockImplementation(() => {
+      const now = new AbortController();
+      setTimeout(() => now.abort(), 200);
+      return now.signal;
+    });
+    const server = new Server();
+    const file = await RemoteFile.open(url, async (at, init) => {
+      const whole = await server.fetch(at, init);
+      const bytes = new Uint8Array(await whole.arrayBuffer());
+      const pieces = Array.from({ length: 10 }, (_, i) => bytes.slice((i * bytes.length) / 10, ((i + 1) * bytes.length) / 10));
+      const body = new ReadableStream<Uint8Array>({
+        pull: async (to) => {
+          await new Promise((resolve) => setTimeout(resolve, 40));
+          if (init.signal!.aborted) to.error(new DOMException('', 'AbortError'));
+          else if (pieces.length === 0) to.close();
+          else to.enqueue(pieces.shift()!);
+        },
+      });
+      return new Response(body, { status: whole.status, headers: whole.headers });
+    });
+    server.asked = [];
+    expect(await file.read(3 * kBlock, 4)).toEqual(server.bytes.slice(3 * kBlock, 3 * kBlock + 4));
+    expect(server.asked).toHaveLength(1);
+    impatient.mockRestore();
+  });
+
   it('asks anew for what was given up, at once for what is wanted next', async () => {
     const server = new Server();
     let hang = true;
