@@ -124,6 +124,18 @@ const checks = {
     await page.keyboard.press('1');
   },
 
+  async 'a slider goes to its ends by Home and End, which leave the time alone'(page) {
+    await page.keyboard.press('b');
+    const slider = page.locator('#panel-display input[type=range]');
+    await slider.focus();
+    for (const [key, to] of [['End', 'max'], ['Home', 'min']]) {
+      await page.keyboard.press(key);
+      assert.equal(await slider.inputValue(), await slider.getAttribute(to), key);
+    }
+    assert.equal((await page.evaluate(() => window.relievo.diagnostics())).playback.following, true);
+    await page.keyboard.press('Escape');
+  },
+
   async 'the sheet lists the keys'(page) {
     await page.keyboard.press('?');
     await page.waitForSelector('#panel-help', { state: 'visible' });

@@ -39,11 +39,12 @@ export function listenToKeys(actions: KeyActions, of: EventTarget = window): voi
   });
 }
 
-// Space and Enter press the button that has the focus, arrows move a slider.
+// Space and Enter press the button that has the focus, arrows move a slider, which Home and End take to its ends; that of time they take there as everywhere.
 function belongsToControl({ target, key }: KeyboardEvent): boolean {
   if (target instanceof HTMLButtonElement) return key === ' ' || key === 'Enter';
-  if (target instanceof HTMLInputElement) return key === ' ' || key.startsWith('Arrow');
-  return false;
+  if (!(target instanceof HTMLInputElement)) return false;
+  const isEnd = target.type === 'range' && /^(Home|End)$/.test(key) && target.closest('.track') === null;
+  return key === ' ' || key.startsWith('Arrow') || isEnd;
 }
 
 function act(event: KeyboardEvent, actions: KeyActions): boolean {
