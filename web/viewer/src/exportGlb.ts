@@ -2,12 +2,14 @@
 // A surface as a binary glTF 2.0 file, with its picture. Pure.
 import type { Surface } from './pick';
 
+const kAsset = { version: '2.0', generator: 'relievo' };
 const kFloat = 5126;
 const kUnsignedInt = 5125;
 
 /** `jpeg`: the picture, or null. In glTF's axes: x right, y up, z backward. */
 export function writeGlb(surface: Surface, jpeg: Uint8Array | null): Uint8Array<ArrayBuffer> {
   const vertices = surface.positions.length / 3;
+  if (vertices === 0) return container({ asset: kAsset, scene: 0, scenes: [{}] }, [], 0); // no accessor may be of nothing
   const positions = surface.positions.map((c, i) => (i % 3 === 0 ? c : -c));
   const textured = jpeg !== null && surface.coordinates !== null;
   const colours = textured ? null : (surface.colours ?? null);
@@ -46,7 +48,7 @@ export function writeGlb(surface: Surface, jpeg: Uint8Array | null): Uint8Array<
   }
   const pbr = textured ? { baseColorTexture: { index: 0 } } : { baseColorFactor: colours === null ? [0.7, 0.7, 0.7, 1] : [1, 1, 1, 1] };
   const json = {
-    asset: { version: '2.0', generator: 'relievo' },
+    asset: kAsset,
     extensionsUsed: ['KHR_materials_unlit'],
     scene: 0,
     scenes: [{ nodes: [0] }],
@@ -58,16 +60,18 @@ export function writeGlb(surface: Surface, jpeg: Uint8Array | null): Uint8Array<
     bufferViews,
     buffers: [{ byteLength: length }],
   };
-  return container(new TextEncoder().encode(JSON.stringify(json)), parts, length);
+  return container(json, parts, length);
 }
 
-function container(json: Uint8Array, parts: Uint8Array[], length: number): Uint8Array<ArrayBuffer> {
+function container(content: object, parts: Uint8Array[], length: number): Uint8Array<ArrayBuffer> {
+  const json = new TextEncoder().encode(JSON.stringify(content));
   const padded = json.length + (-json.length & 3);
-  const out = new Uint8Array(12 + 8 + padded + 8 + length).fill(0x20, 20, 20 + padded);
+  const out = new Uint8Array(12 + 8 + padded + (length === 0 ? 0 : 8 + length)).fill(0x20, 20, 20 + padded);
   const view = new DataView(out.buffer);
   const words = [0x46546c67, 2, out.length, padded, 0x4e4f534a];
   for (const [i, word] of words.entries()) view.setUint32(4 * i, word, true);
   out.set(json, 20);
+  if (length === 0) return out;
   view.setUint32(20 + padded, length, true);
   view.setUint32(24 + padded, 0x004e4942, true);
   let at = 28 + padded;

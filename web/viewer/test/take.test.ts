@@ -143,6 +143,15 @@ describe('a surface with a colour a vertex, as of a file of this device', () => 
 });
 
 describe('GLB', () => {
+  it('without a surface, as where nobody is seen, is a scene with nothing in it', async () => {
+    const nothing = { positions: new Float32Array(), coordinates: new Float32Array(), triangles: new Uint32Array(), quality: null };
+    const bytes = writeGlb(nothing, new Uint8Array([1, 2, 3]));
+    const json = JSON.parse(new TextDecoder().decode(bytes.subarray(20, 20 + new DataView(bytes.buffer).getUint32(12, true))));
+    expect([json.accessors, json.bufferViews, json.buffers]).toEqual([undefined, undefined, undefined]); // glTF allows none of zero length
+    expect(new DataView(bytes.buffer).getUint32(8, true)).toBe(bytes.length);
+    expect((await new GLTFLoader().parseAsync(bytes.buffer, '')).scene.children).toEqual([]);
+  });
+
   it('is laid out as glTF says', () => {
     const jpeg = new Uint8Array([1, 2, 3, 4, 5]);
     const bytes = writeGlb(surface, jpeg);
