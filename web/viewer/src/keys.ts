@@ -30,13 +30,18 @@ export function listenToKeys(actions: KeyActions, of: EventTarget = window): voi
   let isActed = false; // by the key that is held down
   of.addEventListener('keydown', (e) => {
     const event = e as KeyboardEvent;
-    const modified = event.ctrlKey || event.metaKey || event.altKey;
-    if (modified) return;
     // Closes panels from within them too.
     if (event.key !== 'Escape' && (isTyping(event.target) || belongsToControl(event))) return;
+    if (isModified(event)) return;
     if (!event.repeat || !kOnce.test(event.key)) isActed = act(event, actions);
     if (isActed) event.preventDefault();
   });
+}
+
+// Many keyboards have brackets on a key's third level, which AltGr or a Mac's option key reaches.
+function isModified(event: KeyboardEvent): boolean {
+  if (event.getModifierState('AltGraph')) return event.metaKey;
+  return event.ctrlKey || event.metaKey || (event.altKey && !'[]\\'.includes(event.key));
 }
 
 // Space and Enter press the button that has the focus, arrows move a slider, which Home and End take to its ends; that of time they take there as everywhere.

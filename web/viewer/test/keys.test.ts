@@ -15,7 +15,7 @@ listenToKeys(actions, page);
 
 /** Pressed, and held down for two repeats; how many of the three the page keeps from the browser. */
 function hold(key: string, modifiers: object = {}): number {
-  const events = [false, true, true].map((repeat) => Object.assign(new Event('keydown', { cancelable: true }), { key, repeat, ...modifiers }));
+  const events = [false, true, true].map((repeat) => Object.assign(new Event('keydown', { cancelable: true }), { key, repeat, getModifierState: (name: string) => name in modifiers, ...modifiers }));
   for (const event of events) page.dispatchEvent(event);
   return events.filter(({ defaultPrevented }) => defaultPrevented).length;
 }
@@ -31,6 +31,14 @@ it('steps, turns and zooms as long as it is held down', () => {
   for (const key of ['+', '-', '=', '_', 'ArrowLeft']) expect(hold(key)).toBe(3);
   expect(actions.zoom).toHaveBeenCalledTimes(12);
   expect(actions.orbit).toHaveBeenCalledTimes(3);
+});
+
+it('takes brackets however a keyboard has them: by AltGr, which some systems call control and alt, or by option', () => {
+  for (const modifiers of [{ AltGraph: true, ctrlKey: true, altKey: true }, { AltGraph: true }, { altKey: true }]) {
+    for (const key of ['[', ']', '\\']) expect(hold(key, modifiers)).toBe(3);
+  }
+  expect(actions.command.mock.calls.map(([key]) => key).join('')).toBe('[]\\'.repeat(3));
+  for (const modifiers of [{ ctrlKey: true }, { metaKey: true, altKey: true }, { AltGraph: true, metaKey: true }]) expect(hold('[', modifiers)).toBe(0);
 });
 
 it('leaves the browser what it does not know, and what is its own', () => {
