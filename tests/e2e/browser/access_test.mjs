@@ -301,6 +301,18 @@ const checks = {
     await page.close();
   },
 
+  async 'beside a panel in a low window the time line has its buttons in one row'() {
+    const page = await open('/?stream=ball', { viewport: { width: 800, height: 360 } });
+    await shownPast(page, 2);
+    await page.keyboard.press('m');
+    await page.waitForSelector('#panel-measure .segments');
+    await page.waitForFunction(() => {
+      const buttons = [...document.querySelectorAll('#timeline > button')].filter((e) => e.getClientRects().length > 0);
+      return buttons.length > 5 && new Set(buttons.map((e) => Math.round(e.getBoundingClientRect().top))).size === 1;
+    });
+    await page.close();
+  },
+
   async 'who has their browser write larger gets all of it larger, and still no part over another'() {
     for (const size_px of [16, 24, 32]) {
       const large = await launchChromium([`--blink-settings=defaultFontSize=${size_px}`]);
