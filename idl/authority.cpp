@@ -283,35 +283,39 @@ class NewFolder {
     fs::path parent = fs::absolute(path, error).lexically_normal();
     if (!parent.has_filename()) parent = parent.parent_path();
     NewFolder folder;
+    folder.named_ = path;
     folder.final_ = parent;
     folder.path_ = parent;
     folder.path_ += ".part";
     fs::create_directories(parent.parent_path(), error);
-    if (error || !fs::create_directory(folder.path_, error))
-      return Error{"cannot make " + folder.path_.string() + ": " +
-                   (error ? error.message() : "it exists already; remove it")};
+    const bool made = !error && fs::create_directory(folder.path_, error);
+    if (error) return Error{"cannot make " + path.string() + ": " + error.message()};
+    if (!made) return Error{folder.path_.string() + " is in the way: remove it"};
     fs::permissions(folder.path_, fs::perms::owner_all, error);
     return folder;
   }
   NewFolder(NewFolder&& other) noexcept
-      : path_(std::exchange(other.path_, {})), final_(std::exchange(other.final_, {})) {}
+      : named_(std::exchange(other.named_, {})),
+        path_(std::exchange(other.path_, {})),
+        final_(std::exchange(other.final_, {})) {}
   NewFolder& operator=(NewFolder&&) = delete;
   ~NewFolder() {
     std::error_code ignored;
     if (!path_.empty()) fs::remove_all(path_, ignored);
   }
   const fs::path& path() const { return path_; }
+  Error failed(const Error& error) const { return told_of(named_, error, path_); }
   Status keep() {
     std::error_code error;
     fs::rename(path_, final_, error);
-    if (error) return Error{"cannot make " + final_.string() + ": " + error.message()};
+    if (error) return Error{"cannot make " + named_.string() + ": " + error.message()};
     path_.clear();
     return {};
   }
 
  private:
   NewFolder() = default;
-  fs::path path_, final_;
+  fs::path named_, path_, final_;
 };
 
 std::string this_machine() {
@@ -330,15 +334,17 @@ Status create_authority(const fs::path& folder) {
   auto certificate = new_certificate("Relievo authority", key->get(), nullptr, nullptr);
   if (!certificate) return certificate.error();
   const Authority authority{std::move(certificate).value(), std::move(key).value()};
-  if (auto s = write_secret(fresh->path() / key_files::kAuthorityKey, pem(authority.key.get())); !s) return s;
+  if (auto s = write_secret(fresh->path() / key_files::kAuthorityKey, pem(authority.key.get())); !s)
+    return fresh->failed(s.error());
   const auto nobody = revocation_list(authority, {});
   if (!nobody) return nobody.error();
   std::error_code error;
   fs::create_directory(fresh->path() / kHolders, error);
   const std::string name = this_machine();
   std::string holder;
-  if (auto s = write_keys(fresh->path(), authority, name, KeyRole::kPublisher, *nobody, holder); !s) return s;
-  if (auto s = add_holder(fresh->path(), name, holder); !s) return s;
+  if (auto s = write_keys(fresh->path(), authority, name, KeyRole::kPublisher, *nobody, holder); !s)
+    return fresh->failed(s.error());
+  if (auto s = add_holder(fresh->path(), name, holder); !s) return fresh->failed(s.error());
   return fresh->keep();
 }
 
@@ -359,7 +365,8 @@ Status issue_keys(const fs::path& folder, const std::string& name, KeyRole role,
   auto fresh = NewFolder::create(out);
   if (!fresh) return fresh.error();
   std::string holder;
-  if (auto s = write_keys(fresh->path(), *authority, name, role, *revoked, holder); !s) return s;
+  if (auto s = write_keys(fresh->path(), *authority, name, role, *revoked, holder); !s)
+    return fresh->failed(s.error());
   // First, so that no keys are out there that nobody can revoke.
   if (auto s = add_holder(folder, name, holder); !s) return s;
   return fresh->keep();
@@ -379,7 +386,7 @@ Status renew_keys(const fs::path& folder) {
   if (!fresh) return fresh.error();
   std::string holder;
   if (auto s = write_keys(fresh->path(), *authority, name, KeyRole::kPublisher, *revoked, holder); !s)
-    return s;
+    return told_of(folder, s.error(), fresh->path());
   if (auto s = add_holder(folder, name, holder); !s) return s;
   for (const char* file : key_files::kEach) {
     const fs::path made = fresh->path() / file, place = folder / file;

@@ -124,6 +124,23 @@ TEST_F(UserKeys, WhatRootChangesStaysItsOwners) {
   }
 }
 
+TEST_F(UserKeys, AFullDiskIsToldByTheNameAskedFor) {
+  make_keys(where_);
+  for (const std::vector<std::string>& verb :
+       {std::vector<std::string>{"init", "--keys", folder_ / "new"},
+        {"add-client", "anna", "--keys", where_, "--out", folder_ / "new"},
+        {"renew", "--keys", where_}}) {
+    // A limit on the size of files stands for a full disk; an identity is larger, its key is not.
+    std::vector<std::string> command = {"/bin/bash", "-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"",
+                                        program("relievo"), "keys"};
+    command.insert(command.end(), verb.begin(), verb.end());
+    const auto done = test::run(command);
+    EXPECT_EQ(done.status, 1);
+    EXPECT_THAT(done.err, AllOf(HasSubstr("cannot write " + verb.back() + "/"), Not(HasSubstr(".part"))));
+    EXPECT_FALSE(fs::exists(folder_ / "new"));
+  }
+}
+
 TEST_F(UserKeys, RenewingReplacesADamagedCertificate) {
   make_keys(where_);
   const fs::path identity = fs::path(where_) / "identity.pem";
