@@ -102,7 +102,9 @@ void print(const Totals& t, const StepWatch& steps, const Options& options) {
     std::puts(json_text(out).c_str());
     return;
   }
-  if (t.scheme == Scheme::kComplementary || t.scheme == Scheme::kOneSlide) {
+  if (t.reconstructed == 0) {  // nothing is in the folder, which is gone where it was made for this
+    std::printf("0 of %s reconstructed\n", counted(t.frames, "frame").c_str());
+  } else if (t.scheme == Scheme::kComplementary || t.scheme == Scheme::kOneSlide) {
     std::printf("%llu of %s reconstructed into %s, %.0f vertices each, %.2f ms a frame\n",
                 static_cast<unsigned long long>(t.reconstructed), counted(t.frames, "frame").c_str(),
                 options.out.c_str(), per_frame, t.total_ms.median());

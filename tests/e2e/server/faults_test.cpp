@@ -133,6 +133,8 @@ TEST_F(ServerFault, WhereNoPictureCanBeReadThereAreNoOthers) {
   ASSERT_EQ(errors(done.err).size(), 1U) << done.err;
   EXPECT_NE(errors(done.err)[0].find("frames could not be read"), std::string::npos) << done.err;
   EXPECT_EQ(errors(done.err)[0].find("the others"), std::string::npos) << done.err;
+  EXPECT_EQ(done.out, "0 of 12 frames reconstructed\n") << "into no folder: there is none";
+  EXPECT_FALSE(fs::exists(out_));
 }
 
 TEST_F(ServerFault, ATakeRemovedMidRun) {
