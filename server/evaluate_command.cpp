@@ -307,6 +307,14 @@ Status score_frames(FieldSource& source, const Timing& timing, Evaluation& evalu
   return {};
 }
 
+/// Of another size than rig.yaml says, say; for that size what takes seconds would be computed first.
+Status check_first_frame(const std::string& take) {
+  auto source = open_source("take:" + take, {});
+  if (!source) return source.error();
+  const auto first = (*source)->next();
+  return first ? Status() : first.error();
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto source = open_source("take:" + options.take, {});
   if (!source) return source.error();
@@ -316,6 +324,7 @@ Status run(const Options& options, StopSignal& stop) {
     return Error{options.take +
                  " has no truth/ folder to score against; relievo-server simulate writes takes with truth"};
   }
+  if (const Status readable = check_first_frame(options.take); !readable) return readable;
   auto reconstructor = Reconstructor::create(info.rig, info.pattern,
                                              {.decoder = options.decoder,
                                               .threads = options.threads,

@@ -137,6 +137,15 @@ TEST_F(ServerFault, WhereNoPictureCanBeReadThereAreNoOthers) {
   EXPECT_FALSE(fs::exists(out_));
 }
 
+TEST_F(ServerFault, PicturesOfAnotherSizeThanTheRigsAreSaidBeforeAnythingIsComputed) {
+  Rig rig = striped_scene().rig;
+  rig.camera.width = rig.camera.height = 16384;
+  std::ofstream(take_ / "rig.yaml", std::ios::binary) << to_yaml(rig);
+  std::string script = "ulimit -t 3; exec";  // seconds of the processor; it took ten and more
+  for (const std::string& word : server({"evaluate", take_.string()})) script += " '" + word + "'";
+  expect_one_error(run({"/bin/bash", "-c", script}), "is 160 x 120, but rig.yaml says 16384 x 16384");
+}
+
 TEST_F(ServerFault, ATakeRemovedMidRun) {
   Process process(serve(source_, {"--loop"}));
   ASSERT_TRUE(process.wait_for_text("stream take")) << process.err();
