@@ -250,7 +250,7 @@ class Evaluation {
   Status score(const CapturedFrame& frame, const CapturedFrame& shown, bool decodable,
                std::optional<Frame3D> completed) {
     const fs::path file = take_truth(options_.take, frame.number);
-    if (frame.number < options_.skip || !has_truth(file)) {
+    if (done_ <= options_.skip || !has_truth(file)) {
       previous_truth_ = ImageF();
       return {};
     }

@@ -181,6 +181,15 @@ TEST_F(ServerFault, TruthThatCannotBeLookedAt) {
   expect_one_error(run(server({"evaluate", take_.string()})), "cannot read " + truth.string());
 }
 
+TEST_F(ServerFault, FramesAtTheStartAreSkippedWhateverTheirNumbers) {
+  std::string stamps = "frame,time_s\n";
+  for (int i = 4; i < 12; ++i) stamps += std::to_string(i) + "," + std::to_string((i - 4) / 29.97) + "\n";
+  std::ofstream(take_ / "timestamps.csv", std::ios::binary) << stamps;
+  const Finished done = run(server({"evaluate", take_.string(), "--skip", "3", "--json"}));
+  EXPECT_EQ(done.status, 0) << done.err;
+  EXPECT_NE(done.out.find("\"of\": 5"), std::string::npos) << done.out;
+}
+
 TEST_F(ServerFault, ATakeOfWhichAllIsSkipped) {
   expect_one_error(run(server({"evaluate", take_.string(), "--skip", "100"})), "--skip 100 leaves out all");
 }
