@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "base/json_text.h"
+#include "base/log.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/colour.h"
@@ -101,7 +102,10 @@ Status run(const Options& options, StopSignal& stop) {
     if (!written) return written;
     progress.update(static_cast<std::uint64_t>(i) + 1);
   }
-  if (stop.stopped()) return {};
+  if (stop.stopped()) {
+    log_info("stopped: a part of the views is in " + options.out);
+    return {};
+  }
   if (const Status made = make_folder(out / "colours"); !made) return made;
   for (Primary colour = 0; colour < 8; ++colour) {
     const Image8 picture = render_colour_capture(

@@ -248,7 +248,10 @@ Status run(const Options& options, StopSignal& stop) {
   if (!stripes) return stripes.error();
   code.stripes = *std::move(stripes);
   auto measured = measure_views(options.views, code, *board, options.threads, stop);
-  if (stop.stopped()) return {};
+  if (stop.stopped()) {
+    log_info("stopped: nothing was written to " + out);
+    return {};
+  }
   if (!measured) return measured.error();
   PinholeModel projector;
   projector.width = code.projector.width;

@@ -347,7 +347,8 @@ Status run(const Options& options, StopSignal& stop) {
   const Status scored = score_frames(**source, *timing, evaluation, stop);
   const Score score = judges.scorer.score();
   if (!scored || stop.stopped()) {
-    // A score of a part would not be comparable, but the pictures that there are want their page.
+    if (scored) log_info("stopped: there is no score, which would be of a part");
+    // The pictures that there are want their page all the same.
     if (!judges.pictures || score.frames == 0) return scored;
     const Status shown = judges.pictures->finish(
         options.take + ": its first " + counted(evaluation.done(), "frame") + ", broken off", score,

@@ -194,6 +194,11 @@ Status check_picture(const Options& options) {
                " is one of the pictures, and would be replaced: give --out another folder"};
 }
 
+Status stopped(const Options& options) {
+  log_info("stopped: nothing was written to " + options.out);
+  return {};
+}
+
 Status run(const Options& options, StopSignal& stop) {
   if (const Status kept = check_picture(options); !kept) return kept;
   std::optional<ImportedRig> rig;
@@ -219,13 +224,13 @@ Status run(const Options& options, StopSignal& stop) {
         return !stop.stopped();
       });
   progress.finish();
-  if (stop.stopped()) return {};
+  if (stop.stopped()) return stopped(options);
   if (!stack) return stack.error();
   WorkerPool pool(options.threads);
   auto maps = decode_gray(*stack, options.decode, pool);
   if (!maps) return maps.error().in(options.folder);
   if (maps->decoded == 0) return nothing_decoded(*stack, *maps, options);
-  if (stop.stopped()) return {};
+  if (stop.stopped()) return stopped(options);
   warn_of_pictures(*stack, *maps, options);
   Report report{.lit = maps->lit, .decoded = maps->decoded, .uncertain = maps->uncertain, .lone = maps->lone};
   std::optional<DensePoints> dense;

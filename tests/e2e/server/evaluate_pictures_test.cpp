@@ -139,6 +139,8 @@ TEST_F(SmallTake, AnEvaluationThatIsBrokenOffLeavesThePageOfItsPictures) {
   ASSERT_TRUE(eventually([&] { return fs::exists(others / "000001-texture.png"); }));
   stopped.signal(SIGTERM);
   ASSERT_EQ(stopped.wait(), 0) << stopped.err();
+  EXPECT_NE(stopped.err().find("stopped: there is no score"), std::string::npos) << stopped.err();
+  EXPECT_EQ(stopped.out(), "");
   shown(others);
 }
 
