@@ -200,6 +200,15 @@ void warn_of_size(const Geometry& g) {
               std::to_string(g.projector.height) + ", and the pattern the one that is given?");
 }
 
+/// What lies beside a view's pictures is taken for one of them, and a folder beside the views for a view.
+Status check_no_view(const fs::path& pictures, const fs::path& views) {
+  std::error_code ignored;
+  const fs::path within =
+      fs::weakly_canonical(pictures, ignored).lexically_relative(fs::weakly_canonical(views, ignored));
+  if (within.empty() || within == "." || *within.begin() == "..") return {};
+  return Error{pictures.string() + " is among the views: give residuals.png a folder of its own"};
+}
+
 Status run(const Options& options, StopSignal& stop) {
   auto board = parse_board(options.board);
   if (!board) return board.error();
@@ -216,6 +225,7 @@ Status run(const Options& options, StopSignal& stop) {
     reference = *read;
   }
   if (!options.pictures.empty()) {
+    if (const Status apart = check_no_view(options.pictures, options.views); !apart) return apart;
     if (const Status made = make_folder(options.pictures); !made) return made;
   }
   const std::string out = options.out.empty() ? options.update : options.out;

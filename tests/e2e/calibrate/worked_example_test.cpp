@@ -381,6 +381,12 @@ TEST(CalibrationExample, RefusalsAreOneLineAndExitOne) {
            "--update", rig},
           "--out " + rig + " begins a new one");
   refused({"import", "gray", empty, "--out", empty + "/o", "--projector", "64x48"}, "has 0 pictures");
+  fs::create_directory(folder / "view_00");
+  for (const std::string pictures : {"/view_00", "/residuals", "/view_00/../view_01/"})
+    refused({"calibrate", "geometry", empty, "--board", "chessboard:9x7:25mm", "--projector", "1024x768",
+             "--out", rig, "--pictures", empty + pictures},
+            "is among the views");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
   EXPECT_FALSE(fs::exists(rig));
 }
 
