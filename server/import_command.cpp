@@ -252,7 +252,10 @@ Status run(const Options& options, StopSignal& stop) {
   if (const Status s = write_png(out / kImportedPicture, stack->picture); !s) return s;
   if (rig) {
     if (const Status s = write_ply_points(out / "points.ply", dense->cloud); !s) return s;
-    if (const Status s = write_whole_file(out / "rig.yaml", to_yaml(rig->rig)); !s) return s;
+    std::error_code ignored;
+    const bool is_own = fs::equivalent(options.calibration, out / "rig.yaml", ignored);  // it may say more
+    if (const Status s = is_own ? Status() : write_whole_file(out / "rig.yaml", to_yaml(rig->rig)); !s)
+      return s;
   }
   print(report, options);
   return {};

@@ -362,6 +362,19 @@ TEST(CalibrationExample, CloudsToCompareAreOfTheSameUnit) {
   EXPECT_EQ(report(import).at("compare").at("nearest_mm").at("median"), 0);
 }
 
+TEST(CalibrationExample, AnImportLeavesItsCalibrationAsItIs) {
+  const TempFolder folder;
+  const std::string view = (folder / "views" / "view_00").string(), rig = (folder / "rig.yaml").string();
+  report({"calibrate", "example", "--out", folder.path().string(), "--code", "gray", "--views", "3", "--rig",
+          "plane,width=320,height=240", "--json"});
+  fs::rename(folder / "truth.yaml", rig);
+  std::ofstream(rig, std::ios::app) << "# of the bench by the window\n";
+  const auto before = read_whole_file(rig, 10000);
+  report({"import", "gray", view, "--calibration", rig, "--out", folder.path().string(), "--json"});
+  EXPECT_EQ(read_whole_file(rig, 10000).value(), *before);
+  EXPECT_TRUE(fs::exists(folder / "points.ply"));
+}
+
 TEST(CalibrationExample, RefusalsAreOneLineAndExitOne) {
   const TempFolder folder;
   const auto refused = [](const std::vector<std::string>& arguments, const std::string& words) {
