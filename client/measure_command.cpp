@@ -177,6 +177,7 @@ Command measure_command() {
             ->type_name("COLUMN,ROW,WIDTH,HEIGHT");
         app.add_option("--picture", o->picture,
                        "Draw how far what is seen lies before (red) or behind (blue)")
+            ->check(png_name())
             ->type_name("NAME.png");
         app.add_option("--seconds", o->input->seconds, "Of a live stream")
             ->check(number(0, 1e9))

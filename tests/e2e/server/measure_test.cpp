@@ -107,7 +107,9 @@ TEST_F(Measure, WhatCannotBeMeasuredIsSaid) {
   };
   expect_refused({"--region", "600,0,100,100"}, "not within the camera's picture of 640x480", 1);
   expect_refused({"--region", "0,0,3,3"}, "no plane in the region", 1);
-  expect_refused({"--picture", file}, "is the recording itself", 1);
+  std::filesystem::create_symlink(file, in("recorded.png"));
+  expect_refused({"--picture", in("recorded.png")}, "is the recording itself", 1);
+  expect_refused({"--picture", in("wall.jpg")}, "must end in .png", 2);
   expect_refused({"--picture", in("none") + "/wall.png"}, "wall.png", 1);
   for (const std::string wrong : {"1,2,3", "0,0,0,5", "-1,0,5,5", "1,2,3,4x", "1e3,0,1,1", ""})
     expect_refused({"--region", wrong}, "COLUMN,ROW,WIDTH,HEIGHT", 2);
