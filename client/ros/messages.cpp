@@ -4,10 +4,13 @@
 #include <Eigen/Geometry>
 #include <cctype>
 #include <cstdint>
+#include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "base/lens.h"
+#include "base/time.h"
 #include "codec/jpeg_texture.h"
 #include "codec/message_cdr.h"
 #include "codec/surface_check.h"
@@ -228,6 +231,10 @@ std::string ros_topic_name(const RosTopicType& type, const std::string& ros_name
 Result<std::optional<Bytes>> ros_message(RosTopic topic, const Frame3D& frame, const std::string& ros_name,
                                          const Rig* rig) {
   using Message = std::optional<Bytes>;
+  constexpr std::int64_t kLast_s = std::numeric_limits<std::int32_t>::max();  // of builtin_interfaces/Time
+  if (frame.time_ns / kNanosecondsPerSecond > kLast_s)
+    return Error{"frame " + std::to_string(frame.number) + " is of " + utc_text(frame.time_ns) +
+                 ", and ROS 2 has no times after " + utc_text(kLast_s * kNanosecondsPerSecond)};
   switch (topic) {
     case RosTopic::kPoints:
       if (auto status = check_surface(frame.surface); !status) return status.error();
