@@ -23,6 +23,11 @@ bool is_picture(const fs::path& file) {
   return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
 }
 
+/// What file systems and other programs keep beside pictures: "._00.png" of a Mac.
+bool is_hidden(const fs::path& file) {
+  return file.filename().native().starts_with('.');
+}
+
 bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
@@ -59,7 +64,8 @@ Result<std::vector<fs::path>> pictures_in(const fs::path& folder) {
   std::vector<fs::path> files;
   for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
     std::error_code ignored;
-    if (is_picture(it->path()) && it->is_regular_file(ignored)) files.push_back(it->path());
+    if (is_picture(it->path()) && !is_hidden(it->path()) && it->is_regular_file(ignored))
+      files.push_back(it->path());
   }
   if (code) return Error{"cannot read the folder " + folder.string() + ": " + code.message()};
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {

@@ -45,6 +45,7 @@ Image8 slide(std::size_t i) {
 TEST(GrayStack, OwnSlidesReadBack) {
   const TempFolder folder;
   ASSERT_TRUE(write_gray_slides(folder.path(), kWidth, kHeight).ok());
+  std::ofstream(folder / "._gray_00.png") << "what a Mac keeps beside a file";
   expect_identity(read_gray_stack(folder.path(), kWidth, kHeight));
 }
 
