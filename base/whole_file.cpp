@@ -121,4 +121,11 @@ Result<std::string> read_whole_file(const std::filesystem::path& path, std::size
   return all;
 }
 
+Result<std::string> read_whole_text(const std::filesystem::path& path, std::size_t most) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  auto text = read_whole_file(path, most);
+  if (text && text->starts_with(kMark)) text->erase(0, kMark.size());
+  return text;
+}
+
 }  // namespace relievo

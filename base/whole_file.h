@@ -32,6 +32,9 @@ Result<int> open_file_to_read(const std::filesystem::path& path);
 /// All of a file, nothing of what is larger than `most` bytes. Errors as of open_file_to_read().
 Result<std::string> read_whole_file(const std::filesystem::path& path, std::size_t most);
 
+/// The same of a text, without the mark that editors of Windows put before UTF-8.
+Result<std::string> read_whole_text(const std::filesystem::path& path, std::size_t most);
+
 /// Why a file could not be written, from errno, with what to do about it where that is known.
 std::string write_failure(int error);
 

@@ -159,7 +159,7 @@ std::string trouble(const std::string& content, StorageForm form) {
 
 /// Fails where the parser may not have it.
 Result<std::string> read_text(const std::filesystem::path& file, StorageForm form) {
-  auto content = read_whole_file(file, kMaxFileBytes);
+  auto content = read_whole_text(file, kMaxFileBytes);
   if (!content) return content;
   if (const std::string wrong = trouble(*content, form); !wrong.empty())
     return Error{file.string() + " " + wrong};

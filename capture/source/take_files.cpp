@@ -68,7 +68,7 @@ Status check_apart(const std::filesystem::path& folder, const std::filesystem::p
 
 Result<std::vector<TakeStamp>> read_timestamps(const std::filesystem::path& file) {
   const std::string name = file.string();
-  const auto text = read_whole_file(file, kMostTimestampBytes);
+  const auto text = read_whole_text(file, kMostTimestampBytes);
   if (!text) return text.error();
   std::istringstream in(*text);
   std::vector<TakeStamp> stamps;

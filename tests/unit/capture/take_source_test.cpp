@@ -175,8 +175,14 @@ TEST(TakeSource, TimestampsAreParsedStrictly) {
     ASSERT_FALSE(source) << refusal.content;
     EXPECT_THAT(source.error().message, HasSubstr(refusal.message));
   }
-  test::write_text(folder.path() / "timestamps.csv", "frame,time_s\r\n0,0\r\n");
-  EXPECT_TRUE(open_source("take:" + folder.path().string(), {}));
+  // As editors of Windows write them.
+  for (const char* text : {"rig.yaml", "pattern.yaml"})
+    test::write_text(folder.path() / text, "\xEF\xBB\xBF" + test::read_text(folder.path() / text));
+  test::write_text(folder.path() / "timestamps.csv",
+                   "\xEF\xBB\xBF"
+                   "frame,time_s\r\n0,0\r\n");
+  const auto marked = open_source("take:" + folder.path().string(), {});
+  EXPECT_TRUE(marked) << marked.error().message;
   test::write_text(folder.path() / "timestamps.csv", "frame,time_s\n0,0\n\n");  // as some editors end a file
   EXPECT_TRUE(open_source("take:" + folder.path().string(), {}));
 }
