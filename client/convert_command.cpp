@@ -229,12 +229,15 @@ Status convert(const Options& options, RecordedStream& recorded, Conversion& con
   while (!stop.stopped()) {
     const auto sample = recorded.next();
     if (!sample) return sample.error();
-    if (!*sample || (*sample)->receive_time_ns > range->to_ns) return conversion.finish();
+    if (!*sample || (*sample)->receive_time_ns > range->to_ns) break;
     if (auto added = conversion.add(**sample, (*sample)->receive_time_ns >= range->from_ns); !added)
       return added;
     progress.update(conversion.converted().frames);
   }
-  return Error{"stopped before the end; nothing was written"};
+  if (stop.stopped()) return Error{"stopped before the end; nothing was written"};
+  if (conversion.converted().frames == 0)
+    return Error{options.file + ": no frame in that range is whole, with the key frame it builds on"};
+  return conversion.finish();
 }
 
 void report(const Options& options, const Converted& converted, const RecordedStream& recorded) {

@@ -202,5 +202,31 @@ TEST(RecordFiles, ADamagedRecordingIsRecoveredAndPlays) {
   EXPECT_THAT(refused.err, Not(HasSubstr(".part")));
 }
 
+/// Few frames, in one chunk.
+void record_at_once(const fs::path& file) {
+  const auto served = run({program("relievo-server"), "serve", "--source",
+                           "sim:plane,width=160,height=120,stripes=30", "--web", "none", "--domain", kDomain,
+                           "--interface", "lo", "--fast", "--frames", "4", "--record", file});
+  ASSERT_EQ(served.status, 0) << served.err;
+}
+
+TEST(RecordFiles, WhereNoFrameIsWholeConvertWritesNoFile) {
+  const TempFolder folder;
+  const fs::path damaged = folder / "a.mcap", out = folder / "out.mcap";
+  record_at_once(damaged);
+  std::fstream file(damaged, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(static_cast<std::streamoff>(fs::file_size(damaged) / 2));
+  file << std::string(100, '\x06');
+  file.close();
+  for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--geometry", "grid"}}) {
+    std::vector<std::string> command{program("relievo"), "convert", damaged, "--out", out};
+    command.insert(command.end(), more.begin(), more.end());
+    const auto done = run(command);
+    EXPECT_EQ(done.status, 1) << done.out;
+    EXPECT_THAT(done.err, HasSubstr("no frame in that range is whole"));
+    EXPECT_FALSE(fs::exists(out));
+  }
+}
+
 }  // namespace
 }  // namespace relievo::test
