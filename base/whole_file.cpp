@@ -25,19 +25,22 @@ std::string what_it_is(mode_t mode) {
   return S_ISDIR(mode) ? "folder" : S_ISFIFO(mode) ? "pipe" : S_ISSOCK(mode) ? "socket" : "device";
 }
 
-/// The file that a rename is to replace, not the link to it. What is there and no file stays.
-Result<std::filesystem::path> where_it_leads(const std::filesystem::path& path) {
+}  // namespace
+
+Result<std::filesystem::path> where_to_write(const std::filesystem::path& path) {
   struct stat info {};
-  if (::stat(path.c_str(), &info) != 0) return path;  // a new file, or an error that writing it says
+  std::error_code failed;
+  if (::stat(path.c_str(), &info) != 0) {  // a new file, or an error that writing it says
+    if (errno != ENOENT) return path;
+    const auto target = std::filesystem::read_symlink(path, failed);
+    return failed ? path : where_to_write(path.parent_path() / target);
+  }
   if (!S_ISREG(info.st_mode))
     return Error{"cannot write " + path.string() + ": it is a " + what_it_is(info.st_mode) + ", not a file"};
-  std::error_code failed;
   auto target = std::filesystem::canonical(path, failed);
   if (failed) return Error{"cannot write " + path.string() + ": " + failed.message()};
   return target;
 }
-
-}  // namespace
 
 std::filesystem::path unfinished_name(const std::filesystem::path& path) {
   return path.string() + ".part" + std::to_string(::getpid());
@@ -51,7 +54,7 @@ Error told_of(const std::filesystem::path& path, Error error, const std::filesys
 }
 
 Status write_whole_file(const std::filesystem::path& named, std::span<const std::uint8_t> bytes) {
-  const auto leads = where_it_leads(named);
+  const auto leads = where_to_write(named);
   if (!leads) return leads.error();
   const std::filesystem::path& path = *leads;
   const auto failed = [&](int error) {

@@ -13,6 +13,10 @@
 
 namespace relievo {
 
+/// The file that a rename is to replace, where `path` is a link what it leads to, also where that is new.
+/// Fails on what is there and no file: a pipe, a device, a folder.
+Result<std::filesystem::path> where_to_write(const std::filesystem::path& path);
+
 /// Where to write what is to be `path` once it is whole: beside it, under a name of this process.
 std::filesystem::path unfinished_name(const std::filesystem::path& path);
 

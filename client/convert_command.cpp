@@ -7,10 +7,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "base/counted.h"
 #include "base/json_text.h"
+#include "base/whole_file.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "client/commands.h"
@@ -68,7 +70,16 @@ struct Converted {
 /// Sample after sample from one file into another.
 class Conversion {
  public:
-  Conversion(const Options& options, RecordedStream& recorded) : options_(options), recorded_(recorded) {}
+  /// `out` is not there yet.
+  Conversion(const Options& options, RecordedStream& recorded, std::filesystem::path out)
+      : options_(options), recorded_(recorded), out_(std::move(out)) {}
+  Conversion(const Conversion&) = delete;
+  Conversion& operator=(const Conversion&) = delete;
+  /// Leaves no part of a file.
+  ~Conversion() {
+    std::error_code ignored;
+    if (std::exchange(writer_, nullptr)) std::filesystem::remove(out_, ignored);
+  }
 
   Status begin() {
     if (options_.encode()) {
@@ -82,7 +93,7 @@ class Conversion {
     if (options_.encode() && infos_.empty())
       return Error{options_.file +
                    ": frames cannot be coded anew without the stream's description, and it is missing"};
-    auto writer = RecordingWriter::create(options_.out, {.sync_ns = -1});
+    auto writer = RecordingWriter::create(out_, {.sync_ns = -1});
     if (!writer) return writer.error();
     writer_ = *std::move(writer);
     for (const Topic topic : {Topic::kInfo, Topic::kFrame, Topic::kStatus}) {
@@ -127,7 +138,11 @@ class Conversion {
                             {sample.receive_time_ns, sample.source_time_ns, view->capture_time_ns});
   }
 
-  Status finish() { return writer_->finish(); }
+  Status finish() {
+    auto finished = writer_->finish();
+    if (finished) writer_.reset();
+    return finished;
+  }
   const Converted& converted() const { return converted_; }
 
  private:
@@ -207,6 +222,7 @@ class Conversion {
 
   const Options& options_;
   RecordedStream& recorded_;
+  const std::filesystem::path out_;
   std::unique_ptr<RecordingWriter> writer_;
   std::map<Topic, std::uint16_t> channels_;
   std::vector<RecordedInfo> infos_;
@@ -258,14 +274,13 @@ Status run(const Options& options, StopSignal& stop) {
   auto recorded = RecordedStream::open(options.file, options.stream);
   if (!recorded) return recorded.error();
   recorded->warn_if_cut();
-  if (std::filesystem::exists(options.out))
+  const auto out = where_to_write(options.out);
+  if (!out) return out.error();
+  std::error_code none;
+  if (std::filesystem::exists(*out, none))
     return Error{options.out.string() + " exists already: name another file, or remove it"};
-  Conversion conversion(options, *recorded);
-  if (auto done = convert(options, *recorded, conversion, stop); !done) {
-    std::error_code ignored;
-    std::filesystem::remove(options.out, ignored);
-    return done;
-  }
+  Conversion conversion(options, *recorded, *out);
+  if (auto done = convert(options, *recorded, conversion, stop); !done) return done;
   report(options, conversion.converted(), *recorded);
   return {};
 }

@@ -69,7 +69,9 @@ Result<RecoveredRecording> recover_recording(const fs::path& damaged, const fs::
   const RecordingSummary& from = (*reader)->summary();
   if (from.messages == 0)
     return Error{damaged.string() + " holds no whole message: nothing can be recovered"};
-  PartFile part(copy);
+  const auto target = where_to_write(copy);
+  if (!target) return target.error();
+  PartFile part(*target);
   auto writer = part.create();
   if (!writer) return writer.error();
   if (const Status copied = copy_description(from, **writer); !copied) return part.failed(copied.error());

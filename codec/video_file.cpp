@@ -37,7 +37,7 @@ struct FreePacket {
 
 struct VideoFile::State {
   fs::path file, unfinished;
-  const char* muxer;
+  bool is_mp4;
   AVFormatContext* context = nullptr;
   AVStream* stream = nullptr;
   VideoFormat format;
@@ -46,8 +46,8 @@ struct VideoFile::State {
   std::unique_ptr<AVPacket, FreePacket> packet{av_packet_alloc()};
   std::int64_t first_ns = 0, ticks = 0, duration_ticks = kUsualTicks;
 
-  State(fs::path name, const char* muxer_name)
-      : file(std::move(name)), unfinished(unfinished_name(file)), muxer(muxer_name) {}
+  State(fs::path name, bool as_mp4)
+      : file(std::move(name)), unfinished(unfinished_name(file)), is_mp4(as_mp4) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
@@ -65,7 +65,9 @@ struct VideoFile::State {
   Error cannot(int code) const { return Error{file.string() + " cannot be written: " + text_of(code)}; }
 
   Status begin() {
-    if (const int code = avformat_alloc_output_context2(&context, nullptr, muxer, nullptr); code < 0)
+    if (const int code =
+            avformat_alloc_output_context2(&context, nullptr, is_mp4 ? "mp4" : "matroska", nullptr);
+        code < 0)
       return cannot(code);
     if (const int code = avio_open(&context->pb, unfinished.c_str(), AVIO_FLAG_WRITE); code < 0)
       return cannot(code);
@@ -110,8 +112,10 @@ VideoFile::~VideoFile() = default;
 
 Result<VideoFile> VideoFile::create(const fs::path& file) {
   if (!is_video_name(file)) return Error{file.string() + ": a video's name ends in .mp4 or .mkv"};
+  auto target = where_to_write(file);
+  if (!target) return target.error();
   av_log_set_level(AV_LOG_ERROR);
-  return VideoFile(std::make_unique<State>(file, file.extension() == ".mp4" ? "mp4" : "matroska"));
+  return VideoFile(std::make_unique<State>(*std::move(target), file.extension() == ".mp4"));
 }
 
 Status VideoFile::add(std::span<const std::uint8_t> section, int width, int height, std::int64_t time_ns) {
@@ -140,7 +144,7 @@ Status VideoFile::add(std::span<const std::uint8_t> section, int width, int heig
   if (!is_first) {
     if (ticks <= s.ticks) return Error{"a frame is not later than the one before it"};
     s.duration_ticks = ticks - s.ticks;
-    if (s.file.extension() == ".mp4" && s.duration_ticks > kLongestTicks)
+    if (s.is_mp4 && s.duration_ticks > kLongestTicks)
       return Error{s.file.string() + " cannot be written: a gap of " +
                    std::to_string(s.duration_ticks / kTicks.den / 3600) +
                    " h between two frames is longer than MP4 holds; with a name that ends in .mkv it can be"};

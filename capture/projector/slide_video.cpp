@@ -149,6 +149,8 @@ Result<Packet> encode(AVCodecContext& codec, const Image8& picture, const SlideV
 
 Result<SlideVideo> write_slide_video(const fs::path& file, const Pattern& pattern,
                                      const SlideVideoOptions& options) {
+  const auto target = where_to_write(file);
+  if (!target) return target.error();
   av_log_set_level(AV_LOG_FATAL);
   AVRational rate = rational(options.frame_rate);
   if (!options.interlaced) rate = av_mul_q(rate, {2, 1});
@@ -175,7 +177,7 @@ Result<SlideVideo> write_slide_video(const fs::path& file, const Pattern& patter
     }
   }
 
-  Muxer muxer(file);
+  Muxer muxer(*target);
   if (auto opened = muxer.open(); !opened) return opened.error();
   AVStream* stream = avformat_new_stream(muxer.get(), nullptr);
   avcodec_parameters_from_context(stream->codecpar, codec->get());

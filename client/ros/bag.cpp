@@ -11,15 +11,15 @@ namespace relievo {
 namespace fs = std::filesystem;
 
 Result<RosBag> RosBag::create(const fs::path& file, const std::string& stream, std::optional<Rig> rig) {
-  std::error_code failed;
-  if (fs::is_directory(file, failed)) return Error{file.string() + " is a folder: name a file"};
+  const auto target = where_to_write(file);
+  if (!target) return target.error();
   RosBag bag;
-  bag.file_ = file;
+  bag.file_ = *target;
   bag.name_ = ros_name(stream);
   bag.rig_ = std::move(rig);
-  const fs::path unfinished = unfinished_name(file);
+  const fs::path unfinished = unfinished_name(bag.file_);
   auto writer = RecordingWriter::create(unfinished, {.sync_ns = -1, .profile = "ros2"});
-  if (!writer) return told_of(file, writer.error(), unfinished);
+  if (!writer) return told_of(bag.file_, writer.error(), unfinished);
   bag.unfinished_ = unfinished;
   bag.writer_ = *std::move(writer);
   return bag;

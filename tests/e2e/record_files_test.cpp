@@ -228,5 +228,28 @@ TEST(RecordFiles, WhereNoFrameIsWholeConvertWritesNoFile) {
   }
 }
 
+TEST(RecordFiles, LinksLeadConvertAndRecoverToTheirFile) {
+  const TempFolder folder;
+  const fs::path original = folder / "a.mcap", link = folder / "link.mcap", target = folder / "linked.mcap";
+  record_at_once(original);
+  fs::create_symlink("linked.mcap", link);
+  for (const std::string verb : {"convert", "recover"}) {
+    EXPECT_EQ(run({program("relievo"), verb, folder / "none.mcap", "--out", link}).status, 1);
+    const auto done = run({program("relievo"), verb, original, "--out", link});
+    EXPECT_EQ(done.status, 0) << done.err;
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_EQ(info(target)["frames"], info(original)["frames"]);
+    const auto again = run({program("relievo"), verb, original, "--out", link});
+    EXPECT_THAT(again.err, HasSubstr("exists already"));
+    EXPECT_TRUE(fs::remove(target));
+  }
+  EXPECT_EQ(run({program("relievo"), "convert", original, "--out", link, "--from", "99"}).status, 1);
+  EXPECT_TRUE(fs::is_symlink(link)) << "which nobody but its owner removes";
+  fs::create_symlink("circle.mcap", folder / "circle.mcap");
+  const auto circle = run({program("relievo"), "convert", original, "--out", folder / "circle.mcap"});
+  EXPECT_EQ(circle.status, 1);
+  EXPECT_THAT(circle.err, HasSubstr("cannot record to " + (folder / "circle.mcap").string()));
+}
+
 }  // namespace
 }  // namespace relievo::test

@@ -197,6 +197,26 @@ class Export(unittest.TestCase):
         self.assertEqual(notes.read_text(), "mine")
         self.assertEqual(list(self.path.glob("both.mp4.part*")), [notes])
 
+    def test_a_link_stays_one_and_what_is_no_file_is_refused(self):
+        for kind, name in (("video", "a.mp4"), ("video", "a.mkv"), ("ros2", "a.mcap")):
+            with self.subTest(kind), tempfile.TemporaryDirectory() as folder:
+                link, new, pipe = (pathlib.Path(folder, of + name) for of in ("link-", "new-", "pipe-"))
+                target = pathlib.Path(folder, "target")
+                target.write_text("old")
+                link.symlink_to("target")
+                new.symlink_to(f"{folder}/later")
+                os.mkfifo(pipe)
+                for out in (link, new):
+                    self.export("jpeg", kind, out)
+                    self.assertTrue(out.is_symlink())
+                    self.assertGreater(out.stat().st_size, 1000)
+                done = subprocess.run([RELIEVO, "export", self.path / "jpeg.mcap", "--format", kind, "--out", pipe],
+                                      capture_output=True, text=True)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(f"cannot write {pipe}: it is a pipe, not a file", done.stderr)
+                self.assertTrue(pipe.is_fifo())
+                self.assertEqual(len(os.listdir(folder)), 5)
+
     def test_a_range_between_key_frames_is_coded(self):
         file = self.path / "late.mp4"
         done = subprocess.run([RELIEVO, "export", self.path / "h264.mcap", "--format", "video", "--out", file,

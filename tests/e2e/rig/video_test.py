@@ -5,6 +5,7 @@
 usage: video_test.py RELIEVO_SERVER
 """
 import json
+import os
 import pathlib
 import signal
 import subprocess
@@ -86,6 +87,17 @@ class Video(unittest.TestCase):
         self.assertIn(str(self.path / "none" / "a.mkv") + " cannot be written", done.stderr)
         self.assertEqual(run("--out", self.path / "a.mkv", "--gray").returncode, 2)
         self.assertEqual(list(self.path.iterdir()), [])
+
+    def test_a_link_stays_one_and_a_pipe_is_refused(self):
+        link, pipe = self.path / "link.mkv", self.path / "pipe.mkv"
+        link.symlink_to("slides.mkv")
+        os.mkfifo(pipe)
+        self.assertEqual(run("--out", link, "--seconds", 0.1).returncode, 0)
+        self.assertTrue(link.is_symlink() and link.stat().st_size > 1000)
+        done = run("--out", pipe)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("it is a pipe, not a file", done.stderr)
+        self.assertTrue(pipe.is_fifo())
 
     def test_interrupted_leaves_nothing(self):
         child = subprocess.Popen([SERVER, "pattern", "--out", self.path / "long.mkv", "--seconds", "36000"])

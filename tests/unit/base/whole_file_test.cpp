@@ -48,6 +48,18 @@ TEST(WholeFile, ALinkStaysOneAndWhatItLeadsToIsReplaced) {
   EXPECT_EQ(read_whole_file(folder / "bench.yaml", 10).value(), "new");
 }
 
+TEST(WholeFile, ALinkToWhatIsNotThereYetStaysOne) {
+  const TempFolder folder;
+  std::filesystem::create_symlink("bench.yaml", folder / "link");
+  std::filesystem::create_symlink(folder / "link", folder / "rig.yaml");
+  std::filesystem::create_symlink(folder / "unplugged" / "rig.yaml", folder / "other.yaml");
+  ASSERT_TRUE(write_whole_file(folder / "rig.yaml", "new").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "rig.yaml"));
+  EXPECT_EQ(read_whole_file(folder / "bench.yaml", 10).value(), "new");
+  EXPECT_FALSE(write_whole_file(folder / "other.yaml", "new").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "other.yaml"));
+}
+
 TEST(WholeFile, APipeInItsPlaceStaysWhatItIs) {
   const TempFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
