@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <iterator>
 #include <limits>
@@ -92,6 +93,15 @@ double number_at(const char* bytes, const std::string& type) {
   return as(std::uint32_t{});
 }
 
+/// Also "nan", as programs write of points that are none, which >> takes for no number.
+void read_number(std::istream& in, double& value) {
+  std::string word;
+  if (!(in >> word)) return;
+  char* end = nullptr;
+  value = std::strtod(word.c_str(), &end);
+  if (*end != '\0') in.setstate(std::ios::failbit);
+}
+
 Result<PointCloud> read_points(std::istream& in) {
   auto header = read_header(in);
   if (!header) return header.error();
@@ -113,7 +123,7 @@ Result<PointCloud> read_points(std::istream& in) {
   std::string vertex(header->stride, '\0');
   for (std::size_t i = 0; i < header->vertices; ++i) {
     if (header->ascii) {
-      for (double& value : values) in >> value;
+      for (double& value : values) read_number(in, value);
     } else {
       in.read(vertex.data(), static_cast<std::streamsize>(vertex.size()));
       for (std::size_t p = 0; p < properties; ++p) {

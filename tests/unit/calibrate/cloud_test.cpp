@@ -89,6 +89,13 @@ TEST(PointCloud, PointsThatAreNoneAreSkipped) {
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->positions, (std::vector<Vec3f>{{1, 2, 3}, {4, 5, 6}}));
   EXPECT_EQ(read->colours, (std::vector<std::array<std::uint8_t, 3>>{{1, 1, 1}, {3, 3, 3}}));
+
+  std::ofstream(folder / "b.ply") << "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                                     "property float y\nproperty float z\nend_header\n"
+                                     "1 2 3\nnan nan nan\n-nan -inf inf\n4 +5 6e0\n";
+  const auto ascii = read_ply_points(folder / "b.ply");
+  ASSERT_TRUE(ascii.ok()) << ascii.error().message;
+  EXPECT_EQ(ascii->positions, read->positions);
 }
 
 TEST(PointCloud, APipeIsRefusedWithoutWaiting) {
@@ -110,6 +117,9 @@ TEST(PointCloud, HostilePlyIsAnError) {
   EXPECT_THAT(
       refused(head + "property float x\nproperty float y\nproperty float z\nend_header\n1234567890123"),
       testing::HasSubstr("ends after 1 of 4000000000 vertices"));
+  EXPECT_THAT(refused("ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                      "property float z\nend_header\n1 2 3\n4 5 z\n"),
+              testing::HasSubstr("ends after 1 of 2 vertices"));
   EXPECT_THAT(refused(head + "property list uchar int x\nend_header\n"), testing::HasSubstr("list"));
   EXPECT_THAT(refused(head + "property float x\nend_header\n"), testing::HasSubstr("no x, y, z"));
 }
