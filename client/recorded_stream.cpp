@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/counted.h"
+#include "base/foreign_text.h"
 #include "base/log.h"
 #include "codec/frame3d_codec.h"
 #include "idl/cdr.h"
@@ -17,8 +18,8 @@ namespace {
 
 // How far into a file a description is looked for: it is received with the first frames.
 constexpr int kInfoWithinSamples = 1000;
-constexpr std::size_t kMostTopics = 5, kMostTopicBytes = 100;  // that are named of another program's file
-constexpr std::size_t kMostSaid = 20;  // damaged parts: a long file can have tens of thousands
+constexpr std::size_t kMostTopics = 5;  // that are named of another program's file
+constexpr std::size_t kMostSaid = 20;   // damaged parts: a long file can have tens of thousands
 
 std::optional<Topic> topic_of(const RecordingChannel& channel) {
   if (channel.message_encoding != "cdr") return std::nullopt;
@@ -49,10 +50,7 @@ std::string what_else(const RecordingSummary& summary) {
       summary.schemas, [](const auto& schema) { return schema.encoding.starts_with("ros2"); });
   std::set<std::string> topics;
   for (const RecordingChannel& channel : summary.channels) {
-    std::string topic = channel.topic.substr(0, kMostTopicBytes);
-    for (char& c : topic)
-      if ((c >= 0 && c < ' ') || c == 0x7f) c = '?';  // it may end on a terminal
-    topics.insert(topic);
+    topics.insert(foreign_text(channel.topic));
   }
   const std::size_t more = topics.size() > kMostTopics ? topics.size() - kMostTopics : 0;
   while (topics.size() > kMostTopics) topics.erase(std::prev(topics.end()));

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "base/foreign_text.h"
 #include "codec/byte_io.h"
 #include "codec/mcap_message_index.h"
 #include "codec/mcap_scan.h"
@@ -196,7 +197,7 @@ class Reader final : public RecordingReader {
       if (is_first || same->second == std::pair(mine.encoding, mine.text)) continue;
       differ.insert(id);
       summary_.damage.push_back("recording " + std::to_string(channel_at_.size()) +
-                                " of the file has another " + mine.name +
+                                " of the file has another " + foreign_text(mine.name) +
                                 " than those before it: its messages of that kind are left out");
     }
     for (const auto& [id, channel] : recording.channels) {
@@ -314,7 +315,7 @@ class Reader final : public RecordingReader {
       const auto bytes = index.offset < end ? Result<Bytes>(Error{"it overlaps another one"})
                                             : file_->read(index.offset, index.length);
       if (!bytes) {
-        summary_.damage.push_back("attachment " + index.name + ": " + bytes.error().message);
+        summary_.damage.push_back("attachment " + foreign_text(index.name) + ": " + bytes.error().message);
         continue;
       }
       end = index.offset + index.length;
@@ -324,8 +325,8 @@ class Reader final : public RecordingReader {
                                   ? mcap::read_attachment(record->content)
                                   : std::optional<mcap::Attachment>();
       if (!attachment) {
-        summary_.damage.push_back("attachment " + index.name + " at byte " + std::to_string(index.offset) +
-                                  " is damaged");
+        summary_.damage.push_back("attachment " + foreign_text(index.name) + " at byte " +
+                                  std::to_string(index.offset) + " is damaged");
         continue;
       }
       if (summary_.recordings > 1 &&

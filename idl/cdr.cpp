@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/foreign_text.h"
 #include "codec/byte_io.h"
 #include "codec/frame3d_codec.h"
 
@@ -75,11 +76,7 @@ class Cursor {
       ok_ = false;
       return {};
     }
-    std::string clean(raw.begin(), raw.end() - 1);
-    for (char& c : clean) {
-      if ((c >= 0 && c < 0x20) || c == 0x7f) c = '?';  // it may end on a terminal
-    }
-    return clean;
+    return foreign_text(std::string(raw.begin(), raw.end() - 1), kMaxText);
   }
 
   /// What is there from here on.

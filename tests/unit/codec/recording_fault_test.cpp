@@ -105,6 +105,24 @@ TEST(RecordingFault, ADamagedAttachmentIsLeftOutAndNamed) {
   EXPECT_EQ(read_all(*reader).messages.size(), 6u);
 }
 
+// It is told on a terminal.
+TEST(RecordingFault, ADamagedAttachmentsNameIsTextAlone) {
+  test::TempFolder folder;
+  write_sample(folder / "a.mcap", 6);
+  Bytes bytes = read_file(folder / "a.mcap");
+  const std::string name = "pattern.yaml", other = "\x1b[2Jern\a\n\x7f\x01l";
+  for (auto at = bytes.begin();;) {
+    at = std::search(at, bytes.end(), name.begin(), name.end());
+    if (at == bytes.end()) break;
+    std::ranges::copy(other, at);
+  }
+  write_file(folder / "bad.mcap", bytes);
+  const auto reader = open(folder / "bad.mcap");
+  ASSERT_EQ(reader->summary().damage.size(), 1u);
+  EXPECT_NE(reader->summary().damage[0].find("attachment ?[2Jern????l at byte"), std::string::npos)
+      << reader->summary().damage[0];
+}
+
 /// Whatever the index says, and whether it is believed, is withstood.
 void look_around(RecordingReader& reader) {
   static_cast<void>(reader.times(0).ok());
