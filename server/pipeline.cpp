@@ -210,7 +210,10 @@ class ThreadedPipeline final : public Pipeline {
         if (info.live && another) log_warning(label_ + next.error().message);
         if (!info.live && another && errors_in_a_row > 0) log_warning(label_ + last_error.message);
         last_error = next.error();
-        if (!info.live) stats_.lost_in_capture(1);  // a camera counts its own
+        if (!info.live) {  // a camera counts its own
+          stats_.lost_in_capture(1);
+          ++lost;
+        }
         set_state(StreamState::kStalled, last_error.message);
         if (++errors_in_a_row >= kMaxSourceErrors) return last_error;
         continue;
@@ -275,7 +278,6 @@ class ThreadedPipeline final : public Pipeline {
       // The same slide twice tells of a frame that never came, unless it was dropped in the queue above, the
       // source has counted it, or a take starts again.
       const auto pass = source_.info().frames;
-      const bool starts_again = pass && *pass > 0 && item->frame.number % *pass == 0;
       steps.add(item->frame.time_ns, paced_.now().report());
       say_step(steps);
       if (!*result) offer(item->frame, nullptr, steps);
@@ -288,7 +290,7 @@ class ThreadedPipeline final : public Pipeline {
                      " frames: " + steps.advice()});
         continue;
       }
-      const bool consecutive = previous && item->number == *previous + 1 && !starts_again;
+      const bool consecutive = previous && item->number == *previous + 1 && !item->frame.starts_again;
       if (paced_.now().report().same_slide && consecutive) stats_.lost_in_capture(1);
       previous = item->number;
       if (!*result) {

@@ -27,6 +27,7 @@ struct CapturedFrame {
   Image8 picture;     // RGB: the interlaced picture, or the progressive one under the slide
   Image8 complement;  // progressive only: the picture under the complement, or what the scheme has for it
   std::uint64_t lost_before = 0;  // frames that the source knows it lost between the one before and this one
+  bool starts_again = false;      // a looped take from its start: the slide may be that of the frame before
 
   /// The exposure under the slide: every second row of an interlaced picture, or the whole first picture.
   View8 slide_field() const { return scan == Scan::kInterlaced ? field(0) : picture.view(); }
@@ -40,6 +41,7 @@ struct CapturedFrame {
     scan = other.scan;
     field_order = other.field_order;
     lost_before = other.lost_before;
+    starts_again = other.starts_again;
   }
   CapturedFrame clone() const {
     CapturedFrame out;

@@ -27,7 +27,7 @@ class TakeSource final : public FieldSource {
   TakeSource(fs::path take, SourceInfo info, std::vector<TakeStamp> stamps, bool loop)
       : take_(std::move(take)), info_(std::move(info)), stamps_(std::move(stamps)), loop_(loop) {
     const TakeStamp& last = stamps_.back();
-    pass_frames_ = last.frame + 1;
+    pass_frames_ = last.frame - stamps_.front().frame + 1;
     pass_ns_ = last.time_ns - stamps_.front().time_ns + std::llround(1e9 / info_.rig.frame_rate);
     if (loop_) cache_.resize(stamps_.size());
   }
@@ -53,8 +53,9 @@ class TakeSource final : public FieldSource {
     const std::size_t index = index_++;
     Result<Pictures> pictures = read(index);
     if (!pictures) return pictures.error();
-    read_any_ = true;
     CapturedFrame frame;
+    frame.starts_again = pass_ > 0 && !read_any_;
+    read_any_ = true;
     frame.number = stamps_[index].frame + pass_ * pass_frames_;
     frame.time_ns = stamps_[index].time_ns + static_cast<std::int64_t>(pass_) * pass_ns_;
     frame.scan = info_.rig.scan;

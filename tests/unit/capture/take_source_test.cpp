@@ -73,6 +73,20 @@ TEST(TakeSource, LoopGoesOnInNumberAndTime) {
     EXPECT_EQ((*frame)->number, t);
     EXPECT_NEAR(static_cast<double>((*frame)->time_ns), static_cast<double>(t) / 29.97 * 1e9, 3000);
     EXPECT_EQ((*frame)->picture.data()[7], test::small_pixel(t % 3, 7));
+    EXPECT_EQ((*frame)->starts_again, t == 3 || t == 6);
+  }
+}
+
+TEST(TakeSource, ALoopHasNoGapWhereNumbersDoNotBeginAtZero) {
+  test::TempFolder folder;
+  test::write_small_take(folder.path(), Scan::kInterlaced, 5);
+  test::write_text(folder.path() / "timestamps.csv", "frame,time_s\n2,0\n3,0.033\n4,0.067\n");
+  const auto source = open(folder.path(), true);
+  for (std::size_t t = 0; t < 8; ++t) {
+    auto frame = source->next();
+    ASSERT_TRUE(frame && *frame);
+    EXPECT_EQ((*frame)->number, 2 + t);
+    EXPECT_EQ((*frame)->picture.data()[7], test::small_pixel(2 + t % 3, 7));
   }
 }
 

@@ -54,8 +54,7 @@ TEST_F(PipelineTest, AFrameThatCannotBeReadIsCountedAndTheOthersGoOn) {
   EXPECT_EQ(numbers(sink_.frames()), (std::vector<std::uint64_t>{1, 2, 4, 7, 8}));
   const ServerStatus s = pipeline->status();
   EXPECT_EQ(s.frames_captured, 6U);
-  // Three torn ones; and 4 shows the slide of 2, so a drop was also known from content.
-  EXPECT_EQ(s.drops_capture, 4U);
+  EXPECT_EQ(s.drops_capture, 3U) << "each torn one once, though 4 shows the slide of 2";
   EXPECT_EQ(s.message, "");
 }
 

@@ -474,6 +474,20 @@ TEST_F(PipelineTest, ALiveSourcesTimesAreItsOwn) {
   EXPECT_GT(pipeline->status().latency_ms, 4000);
 }
 
+TEST_F(PipelineTest, ATakeThatStartsAgainHasLostNothing) {
+  ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
+    if (n >= 9) return ScriptedSource::end();
+    CapturedFrame frame = frames_(n % 3);  // the last one shows the slide of the first
+    frame.time_ns = frames_(n).time_ns;
+    frame.number = 100 + n;
+    frame.starts_again = n > 0 && n % 3 == 0;
+    return std::optional(std::move(frame));
+  });
+  const auto pipeline = make(source, {&sink_}, fast_and_lossless());
+  ASSERT_TRUE(pipeline->run());
+  EXPECT_EQ(pipeline->status().drops_capture, 0U);
+}
+
 TEST_F(PipelineTest, ADropInTheTakeIsCountedFromContent) {
   ScriptedSource source(scene_, [&](ScriptedSource&, std::uint64_t n) -> ScriptedSource::Next {
     if (n >= 8) return ScriptedSource::end();
