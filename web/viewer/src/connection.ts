@@ -9,8 +9,8 @@ import { VideoTextures } from './videoTexture';
 const kClockEveryMs = 4000;
 const kClockSoonMs = 500; // at first, since a page that is being built up answers late and lopsided, and where the gateway does not know yet
 const kClocksSoon = 6;
-const kSilenceMs = 30_000; // as the server has: a large frame on a slow line holds up the answers of the clock exchange, and tells of itself once it is whole
-const kOpeningMs = 12_000;
+const kSilenceMs = 12_000; // the clock exchange alone brings a message every 4 s
+const kLongestMs = 30_000; // as the server has: a large frame on a slow line holds up its answers, and tells of itself once it is whole
 
 export const utcNow = (): number => performance.timeOrigin + performance.now();
 
@@ -29,6 +29,7 @@ export class Connection {
   private attempt = 0;
   private retryAt: number | null = null; // performance.now()
   private lastHeard = 0;
+  private patienceMs = kSilenceMs; // longer where messages took as long, or a silence may have been such a message
   private lastClock = -Infinity;
   private clocks = 0; // compared since the socket opened
   private stopped = false;
@@ -112,6 +113,7 @@ export class Connection {
   }
 
   private receive(data: string | ArrayBuffer): void {
+    this.waitFor(performance.now() - this.lastHeard);
     this.lastHeard = performance.now();
     try {
       if (typeof data !== 'string') {
@@ -125,6 +127,10 @@ export class Connection {
       if (typeof data !== 'string') this.credit();
       this.events.nonsense(error instanceof Error ? error.message : String(error));
     }
+  }
+
+  private waitFor(silenceMs: number): void {
+    this.patienceMs = Math.min(Math.max(this.patienceMs, 2 * silenceMs), kLongestMs);
   }
 
   private compareClocks(t0: number, serverMs: number | null): void {
@@ -154,7 +160,10 @@ export class Connection {
       if (now >= this.retryAt) this.connect();
       return;
     }
-    if (now - this.lastHeard > (this.connected ? kSilenceMs : kOpeningMs)) return this.onLost();
+    if (now - this.lastHeard > (this.connected ? this.patienceMs : kSilenceMs)) {
+      if (this.connected) this.waitFor(this.patienceMs);
+      return this.onLost();
+    }
     if (this.connected && now - this.lastClock > (this.clocks < kClocksSoon ? kClockSoonMs : kClockEveryMs)) {
       this.lastClock = now;
       this.send({ type: 'time', t0: utcNow() });
