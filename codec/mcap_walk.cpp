@@ -137,7 +137,7 @@ class Walk {
   bool add_chunk(const RecordPlace& record) {
     auto chunk = read_chunk_place(file_, record);
     if (!chunk) return false;
-    const bool by_index = which_ == ReadChunks::kWhereNeeded;
+    const bool by_index = which_ == ReadChunks::kWhereNeeded && chunk->compression.empty();
     if (const auto places = by_index ? add_index(*chunk) : std::nullopt) {
       for (const MessagePlace& place : *places) count(place.channel_id, place.log_time);
     } else if (const auto records = read_chunk_records(file_, *chunk)) {
