@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A surface as a binary PLY file, as `relievo export` writes it. Pure.
+import { toSrgb } from './palette';
 import type { Surface } from './pick';
 
 export interface Pixels {
@@ -45,11 +46,8 @@ export function writePly(surface: Surface, picture: Pixels | null): Uint8Array<A
   return out;
 }
 
-/** IEC 61966-2-1, of 0..1. */
-const encoded = (linear: number): number => Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
-
 function colourAt(picture: Pixels | null, { coordinates, colours }: Surface, v: number): ArrayLike<number> {
-  if (picture === null || coordinates === null) return colours == null ? [180, 180, 180] : Array.from(colours.subarray(3 * v, 3 * v + 3), encoded);
+  if (picture === null || coordinates === null) return colours == null ? [180, 180, 180] : Array.from(colours.subarray(3 * v, 3 * v + 3), toSrgb);
   const place = (share: number, size: number): number => Math.min(size - 1, Math.max(0, Math.floor(share * size)));
   const column = place(coordinates[2 * v]!, picture.width);
   const row = place(coordinates[2 * v + 1]!, picture.height);

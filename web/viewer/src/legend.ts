@@ -2,7 +2,7 @@
 // What the surface's colours mean, beside it.
 import { element, make } from './dom';
 import type { Mode } from './display';
-import { depthColour, metres, niceStep, ticks, type Range } from './palette';
+import { depthColour, metres, niceStep, ticks, toSrgb, type Range } from './palette';
 import { confidenceColour, kBestSigma, kWorstSigma } from './quality';
 import { text } from './strings';
 
@@ -75,9 +75,6 @@ function normalLegend(): Node[] {
   context.putImageData(pixels, 0, 0);
   return [make('h2', {}, text.legend.normals), canvas, make('p', { className: 'quiet' }, text.legend.normalsHow)];
 }
-
-const toSrgb = (linear: number): number =>
-  Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
 
 /** A bar with 0 on top, on phones at the left; marks by their share of its length. */
 function bar(colour: (share: number) => readonly number[], marks: readonly (readonly [number, string])[]): HTMLElement {

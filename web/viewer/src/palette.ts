@@ -15,6 +15,10 @@ const kDepthStops: readonly Rgb[] = [
   [68, 1, 84],
 ];
 
+/** Of 0..1, IEC 61966-2-1. */
+export const toSrgb = (linear: number): number =>
+  Math.round(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055));
+
 /** 0 near (yellow) .. 1 far (violet). */
 export function depthColour(share: number): Rgb {
   const at = Math.min(1, Math.max(0, share)) * (kDepthStops.length - 1);
