@@ -45,6 +45,15 @@ const indices = (): Growing =>
     return attribute.setUsage(THREE.DynamicDrawUsage);
   }, 1);
 
+function copied(bitmap: ImageBitmap, onto: HTMLCanvasElement): HTMLCanvasElement {
+  if (onto.width !== bitmap.width) onto.width = bitmap.width;
+  if (onto.height !== bitmap.height) onto.height = bitmap.height;
+  const context = onto.getContext('2d')!;
+  context.globalCompositeOperation = 'copy';
+  context.drawImage(bitmap, 0, 0);
+  return onto;
+}
+
 export class SurfaceMesh {
   /** In a camera's frame (x right, y down, z forward), turned into three's (y up, z towards the viewer). */
   readonly object = new THREE.Group();
@@ -76,8 +85,11 @@ export class SurfaceMesh {
   private hasColours = false;
   private frame: Drawn | null = null;
 
-  /** `antialias`: the card takes several samples a pixel. */
-  constructor(antialias: boolean) {
+  /** `antialias`: the card takes several samples a pixel. `paper`: what pictures pass through; null: the card takes them as they come. */
+  constructor(
+    antialias: boolean,
+    private readonly paper: HTMLCanvasElement | null,
+  ) {
     this.materials = new Materials(this.texture, antialias);
     this.mesh = new THREE.Mesh(this.solid, this.materials.textured);
     this.wires = new THREE.LineSegments(this.lines, this.materials.wire);
@@ -173,7 +185,7 @@ export class SurfaceMesh {
     const size = `${bitmap.width}x${bitmap.height}`;
     if (size !== this.size) this.texture.dispose();
     this.size = size;
-    this.texture.image = bitmap;
+    this.texture.image = this.paper === null ? bitmap : copied(bitmap, this.paper);
     this.texture.needsUpdate = true;
   }
 

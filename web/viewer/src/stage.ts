@@ -49,7 +49,8 @@ export class Stage {
   show(surface: number, frame: Drawn): void {
     let mesh = this.meshes.get(surface);
     if (mesh === undefined) {
-      mesh = new SurfaceMesh(this.antialias);
+      // WebKit's port for Linux, where workers have no WebGL, gives the card nothing of a picture that a worker made.
+      mesh = new SurfaceMesh(this.antialias, 'ownerDocument' in this.canvas ? this.canvas.ownerDocument.createElement('canvas') : null);
       this.meshes.set(surface, mesh);
       this.scene.add(mesh.object);
     }
@@ -79,7 +80,8 @@ export class Stage {
   png(drawing: Drawing): Promise<Blob | null> {
     this.draw(drawing);
     const { canvas } = this; // it has this very drawing
-    return 'toBlob' in canvas ? new Promise((resolve) => canvas.toBlob(resolve)) : canvas.convertToBlob();
+    // In Firefox both kinds of canvas have a toBlob, and that of workers never calls back.
+    return 'convertToBlob' in canvas ? canvas.convertToBlob() : new Promise((resolve) => canvas.toBlob(resolve));
   }
 
   /** Draws for a headset until its session ends, at its own beat; its origin, where the person is now, is the rig's camera. */

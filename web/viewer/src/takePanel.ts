@@ -95,8 +95,9 @@ export class TakePanel {
       this.of.filming(null);
       setText(this.video, say.video);
       this.video.setAttribute('aria-pressed', 'false');
-      this.save(new Blob(parts, { type }), type.includes('mp4') ? 'mp4' : 'webm');
       mayLeave(video);
+      if (video.bytes === 0) return setText(this.status, say.noVideo); // though it says that it can
+      this.save(new Blob(parts, { type }), type.includes('mp4') ? 'mp4' : 'webm');
     };
     recorder.start(1000);
     this.recorder = recorder;
