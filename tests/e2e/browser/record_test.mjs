@@ -167,6 +167,11 @@ const checks = {
       return name !== null && name.clientWidth > 0 && name.scrollWidth <= name.clientWidth;
     };
     await eventually('its name is cut off', () => page.evaluate(isWhole));
+    await page.goBack();
+    await page.waitForURL(/\/\?stream=kept$/);
+    await inState(page, 'live');
+    await page.goForward();
+    await inState(page, 'file');
     await page.focus('#view');
     await toEnd(page);
     // What is shown comes behind what is sent.

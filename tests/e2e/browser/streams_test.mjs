@@ -236,6 +236,40 @@ const checks = {
     await page.close();
   },
 
+  async 'the browser goes back to the streams that were shown before, and on again'() {
+    const page = await open('/#mode=shaded');
+    const shows = async (name, count) => {
+      await page.waitForFunction((of) => window.relievo.diagnostics().stream === of, name);
+      await inState(page, 'live');
+      await besides(page, count);
+    };
+    await shows('ball', 0);
+    await page.keyboard.press('n');
+    await page.click(`${rowOf('other')} button:text-is("Show")`);
+    await shows('other', 0);
+    assert.match(page.url(), /\?stream=other$/);
+    await page.click(`${rowOf('ball')} button:text-is("Beside")`);
+    await shows('other', 1);
+    await page.goBack();
+    await shows('ball', 0);
+    assert.match(page.url(), /\?stream=ball#mode=shaded$/);
+    await page.evaluate(() => (location.hash = '#mode=depth')); // of what is shown
+    await page.waitForFunction(() => window.relievo.diagnostics().mode === 'depth');
+    await page.goBack();
+    await page.waitForFunction(() => window.relievo.diagnostics().mode === 'shaded');
+    await page.selectOption('#streams', 'other');
+    await page.selectOption('#streams', 'ball');
+    await page.evaluate(() => history.go(-2));
+    await page.evaluate(() => history.go(1));
+    await shows('other', 0);
+    await page.setInputFiles('#file', { name: 'own.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1\n1 0 1\n0 1 1\n3 0 1 2\n') });
+    await page.waitForFunction(() => window.relievo.diagnostics().file === 'own.ply');
+    assert.equal(new URL(page.url()).search, '', 'a file of this device is none of the server');
+    await page.goBack();
+    await shows('other', 0);
+    await page.close();
+  },
+
   async 'a stream is placed by what both see, and a link keeps it'() {
     const page = await open('/?stream=ball,other', { viewport: { width: 1200, height: 750 } });
     await besides(page, 1);

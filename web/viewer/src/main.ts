@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The viewer: chooses a stream, feeds its frames to the picture, says how it goes, does what a person asks.
+import { linkOf, sayShown, seeAs } from './addressBar';
 import { loadDisplay, storeDisplay, type Display } from './display';
 import { Choice } from './choice';
 import { listenToCommands, toggleFullscreen } from './commands';
@@ -21,7 +22,7 @@ import { wantedQuality, writtenOf, type ListedStream, type Quality } from './pro
 import { QualityControl, whyText, type Offered } from './qualityControl';
 import { RecordControl } from './recordControl';
 import { diagnosticsOf, report } from './reports';
-import { address, goTo, momentOf, namesOf, readShared, shareLink, type Shared, type Shown } from './share';
+import { namesOf, readShared, type Shared, type Shown } from './share';
 import { Session } from './session';
 import { present, type Presentation } from './state';
 import { text } from './strings';
@@ -139,36 +140,43 @@ class Viewer {
     fillHelp(this.panels.panel('help', text.help.title));
     listenToCommands(this, this.ui.canvas);
     this.change({});
-    this.openAddressed(new URLSearchParams(location.search));
+    this.openAddressed(this.shared);
     this.measure?.restore(this.shared.measured, namesOf(location.search));
-    window.addEventListener('hashchange', () => this.followLink()); // not of what the page writes itself
+    window.addEventListener('popstate', () => this.followAddress()); // not of what the page writes itself
     window.setInterval(() => this.refresh(), kRefreshMs);
     this.refresh();
   }
 
-  private openAddressed(wanted: URLSearchParams): void {
-    const [asked, ...besides] = (wanted.get('stream') ?? '').split(',').filter((n) => n !== '');
-    const recording = wanted.get('recording');
-    if (asked !== undefined) {
+  /** True where that is shown already. */
+  private openAddressed(shared: Shared): boolean {
+    const [asked, ...besides] = namesOf(location.search);
+    if (asked === undefined) return true;
+    if (!new URLSearchParams(location.search).has('stream')) {
+      if (asked === this.serverFile) return true;
       this.chosenByPerson = true;
-      this.watch(asked);
-      this.wantedBesides = besides.filter((name) => name !== asked);
-    } else if (recording !== null) {
-      this.chosenByPerson = true;
-      void this.openServerFile(recording, this.shared).then(() => (this.chosenByPerson = this.file !== null || this.stream !== null));
+      void this.openServerFile(asked, shared).then(() => (this.chosenByPerson = this.file !== null || this.stream !== null));
+      return false;
     }
+    this.chosenByPerson = true;
+    for (const name of this.companions?.names ?? []) if (!besides.includes(name)) this.companions!.remove(name);
+    this.wantedBesides = besides.filter((name) => name !== asked);
+    if (asked === this.stream) return true;
+    this.shared = shared;
+    this.posed = false;
+    this.watch(asked);
+    return false;
   }
 
-  /** A link to what is shown already, by a person's hand. */
-  private followLink(): void {
-    const { display, pose, moment, places, measured } = (this.shared = readShared(location.hash, this.display));
-    for (const [name, rigid] of places) this.view?.place(name, rigid);
-    this.change(display);
-    const navigator = this.view?.navigator;
-    if (pose !== null && navigator?.isRigView === false) navigator.pose = pose;
-    const playback = this.session.source?.playback;
-    if (moment !== null && playback !== undefined) goTo(playback, moment);
-    this.measure?.restore(measured, namesOf(location.search));
+  /** A link to what is shown already, by a person's hand, or the browser's way back to what was shown before. */
+  private followAddress(): void {
+    this.choice.make();
+    const shared = readShared(location.hash, this.display);
+    for (const [name, rigid] of shared.places) this.view?.place(name, rigid);
+    this.change(shared.display);
+    if (this.openAddressed(shared)) seeAs((this.shared = shared), this.view, this.session.source);
+    if (this.stream === namesOf(location.search)[0]) this.writeAddress(); // what detail is wanted may have been chosen since
+    this.measure?.restore(shared.measured, namesOf(location.search));
+    this.server.retryNow(); // says what is to be shown beside it
   }
 
   /** From now on; kept for the next visit. */
@@ -233,14 +241,8 @@ class Viewer {
 
   /** To what is seen now. */
   link(): string {
-    const navigator = this.view?.navigator;
-    const pose = navigator === undefined || navigator.isRigView ? null : navigator.pose;
-    const moment = momentOf(this.session.source?.playback ?? null);
-    const names = this.companions?.names ?? [];
-    const places = [...(this.view?.placedByHand ?? [])].filter(([name]) => names.includes(name));
-    const { addressed } = this;
-    const measured = this.measure?.shared(addressed === null ? [] : namesOf(address(location.href, addressed).search));
-    return shareLink(location.href, addressed, this.display, pose, moment, new Map(places), measured);
+    const { view, session, companions, measure, display, addressed } = this;
+    return linkOf({ view, session, companions, measure, display, shown: addressed });
   }
 
   // What the decoder should bring along.
@@ -253,18 +255,21 @@ class Viewer {
   }
 
   private choose(name: string): void {
+    const before = this.addressed;
     this.choice.make();
     this.chosenByPerson = true;
     this.shared = null;
+    this.wantedBesides = [];
     for (const beside of this.companions?.names ?? []) this.companions!.remove(beside);
     this.watch(name);
-    this.writeAddress();
+    this.writeAddress(before);
   }
 
   /** What of the server is shown, as an address says it. */
   private get addressed(): Shown | null {
     if (this.stream === null) return this.serverFile === null ? null : { kind: 'recording', name: this.serverFile };
-    return { kind: 'stream', name: [this.stream, ...(this.companions?.names ?? [])].join(','), quality: this.quality };
+    const names = [this.stream, ...(this.companions?.names ?? []), ...this.wantedBesides];
+    return { kind: 'stream', name: [...new Set(names)].join(','), quality: this.quality };
   }
 
   /** For this page's live streams, those that follow too. */
@@ -283,11 +288,9 @@ class Viewer {
     return { want: this.quality, now, of, offline: !source.connected };
   }
 
-  private writeAddress(): void {
-    if (this.addressed === null) return;
-    const url = address(location.href, this.addressed);
-    if (this.shared === null) url.hash = ''; // was of something else
-    history.replaceState(null, '', url);
+  /** `before`: was shown until a person chose something else. */
+  private writeAddress(before: Shown | null = null): void {
+    sayShown(this.addressed, before, this.shared !== null);
   }
 
   private watch(name: string): void {
@@ -337,28 +340,27 @@ class Viewer {
     const found = await (await import('./recordedMoment')).recordedAt(listed, shared.moment);
     if (this.stream !== listed.name) return;
     if (found === null) this.note = text.momentGone;
-    else await this.openServerFile(found.file, shared, async () => found.opened);
+    else await this.showFile(found.file, async () => found.opened, shared, found.file);
   }
 
-  private async openServerFile(name: string, shared: Shared | null, open: () => Promise<Opened> = () => openRemote(recordingUrl(name))): Promise<void> {
-    if (!(await this.showFile(name, open, shared))) return;
-    this.serverFile = name;
-    this.writeAddress();
+  private openServerFile(name: string, shared: Shared | null): Promise<void> {
+    return this.showFile(name, () => openRemote(recordingUrl(name)), shared, name);
   }
 
-  /** Whether it is shown. */
-  private async showFile(name: string, open: () => Promise<Opened>, shared: Shared | null = null): Promise<boolean> {
+  /** `shared`: by the link that asks for it; null: a person has chosen it. `serverFile`: one of the server's. */
+  private async showFile(name: string, open: () => Promise<Opened>, shared: Shared | null = null, serverFile: string | null = null): Promise<void> {
     const choice = this.choice.begin(name);
     this.refresh();
-    let shown = false;
     try {
       const opened = await open();
-      if (!this.choice.stillHolds(choice)) return false;
+      if (!this.choice.stillHolds(choice)) return;
+      const before = shared === null ? this.addressed : null;
       this.chosenByPerson = true;
       this.stream = null;
       this.file = name;
-      this.serverFile = null;
+      this.serverFile = serverFile;
       this.shared = shared;
+      this.writeAddress(before);
       if (this.view !== null) this.view.name = name;
       this.choice.opened();
       this.view?.restart(null, false);
@@ -367,13 +369,11 @@ class Viewer {
       this.session.watch(opened.kind === 'recording' ? (events) => opened.source(events, shared?.moment) : null);
       this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';
       if (opened.kind === 'surface') this.show(opened.frame);
-      shown = true;
     } catch (error) {
-      if (!this.choice.stillHolds(choice)) return false;
+      if (!this.choice.stillHolds(choice)) return;
       this.choice.failed(name, error, this.session.seen);
     }
     this.refresh();
-    return shown;
   }
 
   // Of the first stream, or of the one beside it that a person has chosen.

@@ -14,11 +14,11 @@ export interface Shown {
   readonly quality?: Quality | null; // that was chosen for a stream
 }
 
-/** Over an address; what else it asked for is gone. */
-export function address(page: string, { kind, name, quality }: Shown): URL {
+/** Over an address; what else it asked for is gone. Null: it is of nothing of the server. */
+export function address(page: string, shown: Shown | null): URL {
   const url = new URL(page);
-  url.search = `?${kind}=${name}`; // names hold no character that would have to be escaped
-  if (quality != null) url.search += `&quality=${quality}`;
+  url.search = shown === null ? '' : `?${shown.kind}=${shown.name}`; // names hold no character that would have to be escaped
+  if (shown?.quality != null) url.search += `&quality=${shown.quality}`;
   return url;
 }
 
@@ -72,8 +72,7 @@ export function shareLink(
   places: ReadonlyMap<string, Rigid> = new Map(),
   measured: Measured = { measurements: [], flatness: null },
 ): string {
-  const url = shown === null ? new URL(page) : address(page, shown);
-  if (shown === null) url.search = '';
+  const url = address(page, shown);
   const state = writeDisplay(display, null);
   state.delete('theme'); // is the reader's own
   if (pose !== null) {
