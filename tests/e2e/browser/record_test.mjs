@@ -413,6 +413,27 @@ const checks = {
     await page.close();
   },
 
+  async 'an order of which half an answer comes is said to have none, and can be given again'() {
+    const page = await openRecording();
+    await shownPast(page, 2);
+    await page.evaluate(() => {
+      const real = window.fetch;
+      window.fetch = (url, init) => {
+        if (init?.method !== 'POST') return real(url, init);
+        window.fetch = real;
+        const half = { start: (body) => init.signal.addEventListener('abort', () => body.error(init.signal.reason)) };
+        return Promise.resolve(new Response(new ReadableStream(half)));
+      };
+    });
+    await page.click('#tool-record');
+    await pillSays(page, 'the server does not answer');
+    await page.click('#tool-record');
+    await pressedIs(page, 'true');
+    await page.click('#tool-record');
+    await pressedIs(page, 'false');
+    await page.close();
+  },
+
   async 'how long it records is said by the server\'s clock'() {
     for (const ahead of [3600e3, -3600e3]) {
       const page = await newRecording({ viewport: { width: 800, height: 500 } });

@@ -30,6 +30,13 @@ interface Taken extends Running {
   info: StreamInfo | null; // the last that there was
 }
 
+interface Answer {
+  readonly status: number;
+  readonly told: ServerRecording | null; // null: an error, which `why` says
+  readonly why: string;
+  readonly now: number | undefined; // by the server's clock, UTC in ms
+}
+
 export interface Recorded {
   stream: string;
   source: LiveSource;
@@ -95,39 +102,47 @@ export class RecordControl {
   private async order(action: 'start' | 'stop'): Promise<void> {
     this.asking = true;
     const { of } = this;
-    const response = await this.ask({
+    const answer = await this.ask({
       method: 'POST',
       body: JSON.stringify({ action }),
       headers: { 'content-type': 'application/json' },
     });
-    const why = response === null ? say.unreachable : response.ok ? null : (await response.text()).trim();
     this.asking = false;
     if (this.of !== of) return;
     const isStart = action === 'start';
-    if (isStart && (response?.status === 404 || response?.status === 405)) {
+    if (isStart && (answer?.status === 404 || answer?.status === 405)) {
       this.serverHasNone = true; // also a server that knows no such thing
       this.start();
-    } else if (response?.status === 409) {
+    } else if (answer?.status === 409) {
       void this.follow(); // somebody else was quicker
-    } else if (why !== null) {
-      this.say(isStart ? say.failed(why) : say.notStopped(why), true);
+    } else if (answer?.told != null) {
+      this.take(answer.told, answer.now);
     } else {
-      this.take((await response!.json()) as ServerRecording, dateOf(response!));
+      const why = answer?.why ?? say.unreachable;
+      this.say(isStart ? say.failed(why) : say.notStopped(why), true);
     }
   }
 
   /** What the server's recording does meanwhile. */
   private async follow(): Promise<void> {
     const { of } = this;
-    const response = await this.ask({});
+    const answer = await this.ask({});
     if (this.of !== of) return;
-    if (response?.ok === true) this.take((await response.json()) as ServerRecording, dateOf(response));
+    if (answer?.told != null) this.take(answer.told, answer.now);
     else this.miss();
   }
 
-  private ask(init: RequestInit): Promise<Response | null> {
+  /** Null: no answer came, or not all of one. */
+  private async ask(init: RequestInit): Promise<Answer | null> {
     const url = new URL(`api/recording/${encodeURIComponent(this.of!.stream)}`, document.baseURI);
-    return fetch(url, { cache: 'no-store', signal: AbortSignal.timeout(kPatienceMs), ...init }).catch(() => null);
+    try {
+      const response = await fetch(url, { cache: 'no-store', signal: AbortSignal.timeout(kPatienceMs), ...init });
+      const { ok, status } = response;
+      const text = await response.text();
+      return { status, told: ok ? (JSON.parse(text) as ServerRecording) : null, why: text.trim(), now: dateOf(response) };
+    } catch {
+      return null;
+    }
   }
 
   /** `now`: by the server's clock, UTC in ms; this page's may be another. */
