@@ -131,6 +131,16 @@ const checks = {
     await note(page, 'as the camera sees them');
   },
 
+  async 'stripes that cannot be loaded are asked for again'() {
+    const page = await open('/', { serviceWorkers: 'block' }); // as on plain http from elsewhere
+    let refused = 0;
+    await page.route(/\/stripes-/, (route) => (++refused > 2 ? route.continue() : route.abort()));
+    for (const key of ['v', 'v']) await page.keyboard.press(key);
+    await note(page, 'as the camera sees them');
+    await page.close();
+    assert.deepEqual(complaints.splice(0).filter((c) => !/ERR_FAILED/.test(c)), []); // what the browser says of a file that does not come
+  },
+
   async 'no error, no request to another host'() {
     assert.deepEqual(complaints, []);
   },

@@ -6,10 +6,13 @@ import { Picture } from './picture';
 import { text } from './strings';
 import type { Stripes } from './stripes';
 
+const kAgainMs = 2000; // before what did not come is asked for again
+
 export class Pictures {
   private readonly texture = new Picture('picture');
   private stripes: Stripes | null = null; // loaded when they are wanted first
   private wantsStripes = false;
+  private isLoading = false; // them, or waits to do so again
   private camera: string | null = null;
   private frame: DecodedFrame | null = null;
 
@@ -18,7 +21,7 @@ export class Pictures {
     this.texture.on = split === 'picture' || split === 'both' || alone;
     this.wantsStripes = split === 'stripes' || split === 'both';
     document.body.classList.toggle('picture-alone', alone);
-    void this.setStripes();
+    this.setStripes();
   }
 
   /** What is on the screen: it is open until the next. */
@@ -40,15 +43,23 @@ export class Pictures {
     this.stripes?.point(at);
   }
 
-  private async setStripes(): Promise<void> {
-    if (this.stripes === null && this.wantsStripes) {
-      const { Stripes } = await import('./stripes');
-      if (this.stripes === null) {
-        this.stripes = new Stripes();
-        this.stripes.watch(this.camera);
-        if (this.frame !== null) this.stripes.show(this.frame);
-      }
-    }
+  private setStripes(): void {
     if (this.stripes !== null) this.stripes.on = this.wantsStripes;
+    else if (this.wantsStripes && !this.isLoading) this.loadStripes();
+  }
+
+  private loadStripes(): void {
+    this.isLoading = true;
+    const useStripes = ({ Stripes }: typeof import('./stripes')): void => {
+      this.stripes = new Stripes();
+      this.stripes.watch(this.camera);
+      if (this.frame !== null) this.stripes.show(this.frame);
+      this.setStripes();
+    };
+    const again = (): void => {
+      this.isLoading = false;
+      this.setStripes();
+    };
+    import('./stripes').then(useStripes, () => window.setTimeout(again, kAgainMs)); // the server has gone, and may come back
   }
 }
