@@ -30,6 +30,8 @@ export class History implements FrameStore {
   info: StreamInfo | null = null;
   private kept: Kept[] = [];
   private times_: Float64Array | null = null; // made when asked for
+  /** Told before a frame goes, and all before it. */
+  going: (index: number) => void = () => undefined;
 
   constructor(
     readonly limits: Readonly<HistoryLimits> = kHistoryLimits,
@@ -78,8 +80,8 @@ export class History implements FrameStore {
     const copy = message.slice(0);
     this.kept.push({ prefix, message: copy, atMs, info: this.info, ...dependence });
     this.bytes += message.byteLength;
-    this.trim();
     this.times_ = null;
+    this.trim();
     return copy;
   }
 
@@ -130,9 +132,11 @@ export class History implements FrameStore {
   }
 
   private clear(): void {
+    this.going(this.end - 1);
     this.first = this.end;
     this.kept = [];
     this.bytes = 0;
+    this.times_ = null;
   }
 
   // What is left begins with a key frame: the others before it could not be shown.
@@ -144,7 +148,9 @@ export class History implements FrameStore {
   }
 
   private drop(): number {
+    this.going(this.first);
     this.bytes -= this.kept.shift()!.message.byteLength;
+    this.times_ = null;
     return ++this.first;
   }
 }

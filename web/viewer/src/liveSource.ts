@@ -5,7 +5,7 @@ import { Connection } from './connection';
 import { Credit } from './credit';
 import type { FrameStore } from './frameStore';
 import { History } from './history';
-import type { Loop } from './playback';
+import { frameAt, type Loop } from './playback';
 import type { FramePrefix, Quality } from './protocol';
 import type { FrameSource, Kept, Playback, SourceEvents } from './source';
 import type { Refusal } from './state';
@@ -54,6 +54,7 @@ export class LiveSource implements FrameSource, Playback {
       },
     };
     this.history = new History(undefined, stream);
+    this.history.going = (index) => this.holdRange(index);
     this.connection = new Connection(stream, received, server);
   }
 
@@ -73,19 +74,23 @@ export class LiveSource implements FrameSource, Playback {
     return this.history;
   }
   get store(): FrameStore {
-    return this.history;
+    return this.player?.store ?? this.history;
   }
   get following(): boolean {
     return this.live || this.returning;
   }
   get times(): Float64Array {
-    return this.history.times;
+    return this.store.times;
   }
   get startMs(): number {
-    return this.history.startMs;
+    return this.store.startMs;
   }
   get first(): number {
-    return this.history.first;
+    return this.store.first;
+  }
+  get newestMs(): number {
+    const { times, startMs } = this.history;
+    return startMs + (times[times.length - 1] ?? 0);
   }
   get index(): number {
     return this.player?.index ?? Math.max(this.first, this.history.end - 1);
@@ -106,10 +111,10 @@ export class LiveSource implements FrameSource, Playback {
     return this.player?.loop ?? null;
   }
   isKey(index: number): boolean | null {
-    return this.history.isKey(index);
+    return this.store.isKey(index);
   }
   gapBefore(index: number): number {
-    return this.history.gapBefore(index);
+    return this.store.gapBefore(index);
   }
 
   /** Oldest first; to be read only. */
@@ -133,15 +138,21 @@ export class LiveSource implements FrameSource, Playback {
     if (speed !== 1 || !this.live) this.shifted(true)?.setSpeed(speed);
   }
   setLoop(loop: Loop | null): void {
-    if (loop !== null || !this.live) this.shifted(true)?.setLoop(loop);
+    if (loop === null && this.live) return;
+    const player = this.shifted(true);
+    if (loop === null && player !== null) player.store = this.history;
+    player?.setLoop(loop);
   }
 
   /** The page goes on when it has what the next frame builds on. */
   follow(): void {
-    if (this.player === null) return;
+    const { player } = this;
+    if (player === null) return;
     this.returning = true;
-    this.player.pause();
-    this.player.seek(Infinity);
+    player.pause();
+    player.setLoop(null);
+    player.store = this.history;
+    player.seek(Infinity);
   }
 
   /** The page has shown this many frames, or skipped them, whoever sent them. */
@@ -198,6 +209,15 @@ export class LiveSource implements FrameSource, Playback {
     if (playing) player.play();
     this.topUp(); // what comes is kept from now on, whether the page is ready or not
     return player;
+  }
+
+  // What a person has repeated stays while they do; the frames up to `index` go.
+  private holdRange(index: number): void {
+    const { history, player } = this;
+    if (player === null || player.loop === null || player.store !== history) return;
+    let key = history.first + frameAt(history.times, player.loop.from);
+    while (key > index && history.isKey(key) === false) --key;
+    if (key <= index) player.store = history.held();
   }
 
   private becomeLive(): void {

@@ -81,6 +81,8 @@ export interface Playback {
   readonly loop: Loop | null;
   /** Of a live stream: whether what comes next is shown; null: a recording. */
   readonly following: boolean | null;
+  /** UTC of the last frame that came, which `times` may end before; null: a recording. */
+  readonly newestMs: number | null;
   /** Whether a frame decodes alone; null: not known yet. */
   isKey(index: number): boolean | null;
   /** Frames lost before this one. */

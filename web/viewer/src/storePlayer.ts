@@ -38,6 +38,7 @@ export interface PlayerEvents extends Pick<SourceEvents, 'frame' | 'nonsense' | 
 
 export class StorePlayer implements Playback {
   readonly following: boolean | null = null;
+  readonly newestMs: number | null = null;
   private readonly clock: PlayClock;
   private wanted: number | null; // to be shown whether it plays or not
   private last = -1; // sent
@@ -56,11 +57,11 @@ export class StorePlayer implements Playback {
 
   /** Begins with the first frame; `credits`: how many frames the page can take now. */
   constructor(
-    readonly store: FrameStore,
+    public store: FrameStore,
     private readonly handed: PlayerEvents,
     private credits = 1,
   ) {
-    this.clock = new PlayClock(store);
+    this.clock = new PlayClock(this);
     this.wanted = store.first;
   }
 

@@ -207,8 +207,8 @@ export class Timeline {
 
   private timeText(p: Playback, position: number): string {
     if (this.absolute) return absoluteText(p.startMs + position);
-    if (p.following === null) return `${clockText(position)} / ${clockText(this.end)}`;
-    return say.behind(clockText(Math.max(0, this.end - position)));
+    if (p.newestMs === null) return `${clockText(position)} / ${clockText(this.end)}`;
+    return say.behind(clockText(Math.max(0, p.newestMs - p.startMs - position)));
   }
 
   private drawMarks(p: Playback): void {
