@@ -166,7 +166,7 @@ const checks = {
     await page.keyboard.press('o');
   },
 
-  async 'a file dropped on the page is opened: an exported PLY'(page) {
+  async 'of files dropped on the page the first that can be is opened, and it is said: an exported PLY'(page) {
     const index = 5;
     await seek(page, index);
     await still(page); // of the range that was repeated a frame may still be on its way
@@ -176,12 +176,13 @@ const checks = {
     await page.evaluate((data) => {
       const content = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
       const transfer = new DataTransfer();
-      transfer.items.add(new File([content], 'surface.ply'));
+      for (const name of ['notes.txt', 'surface.ply', 'another.ply']) transfer.items.add(new File([content], name));
       for (const type of ['dragover', 'drop']) {
         document.body.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
       }
     }, bytes);
     await page.waitForFunction(() => window.relievo.diagnostics().file === 'surface.ply');
+    assert.match(await page.textContent('#source'), /^surface\.ply: one of 3 files/);
     await still(page);
     assert.equal(await page.isVisible('#timeline'), false);
     const after = await page.evaluate(() => window.relievo.extent());

@@ -7,11 +7,12 @@ const kAccept = '.mcap,.ply,.glb';
 export class FilePicker {
   private readonly input = make('input', { type: 'file', accept: kAccept, hidden: true, id: 'file' });
 
-  constructor(opened: (file: File) => void) {
+  /** `given`: one, or several that were dropped at once. */
+  constructor(given: (files: readonly [File, ...File[]]) => void) {
     document.body.append(this.input);
     this.input.onchange = () => {
       const file = this.input.files?.[0];
-      if (file !== undefined) opened(file);
+      if (file !== undefined) given([file]);
       this.input.value = ''; // the same one may be chosen again
     };
     const drop = element('drop');
@@ -26,8 +27,8 @@ export class FilePicker {
     window.addEventListener('drop', (event) => {
       event.preventDefault();
       drop.hidden = true;
-      const file = event.dataTransfer?.files[0];
-      if (file !== undefined) opened(file);
+      const [file, ...others] = event.dataTransfer?.files ?? [];
+      if (file !== undefined) given([file, ...others]);
     });
   }
 

@@ -13,7 +13,7 @@ import { fillHelp } from './helpPanel';
 import { addImmersive, addStatistics, addTake, Measuring, Rest, Streams } from './laterParts';
 import { Legend } from './legend';
 import { LiveSource } from './liveSource';
-import { openFile, openRemote, recordingUrl, type Opened } from './openFile';
+import { firstOf, openFile, openRemote, recordingUrl, type Opened } from './openFile';
 import { Panels } from './panels';
 import { Pictures } from './pictures';
 import type { DecodedFrame, Notice } from './messages';
@@ -104,7 +104,7 @@ class Viewer {
       unusable: (message) => (this.problem = text.noDecoder(message)),
       signIn: () => void (hasUnsaved() || this.measure?.isOpen || location.reload()), // the page that the server answers with asks for a token
     });
-    const picker = new FilePicker((file) => void this.showFile(file.name, () => openFile(file)));
+    const picker = new FilePicker((files) => void this.showFile(firstOf(files).name, () => openFile(files)));
     this.panels.action('open', () => picker.ask());
     this.record = new RecordControl(this.panels.action('record', () => undefined));
     this.companions = this.view === null ? null : new Companions(this.view, () => this.refresh());
@@ -367,7 +367,7 @@ class Viewer {
       this.posed = false;
       this.record.watch(null);
       this.session.watch(opened.kind === 'recording' ? (events) => opened.source(events, shared?.moment) : null);
-      this.note = opened.kind === 'recording' && opened.note !== null ? opened.note : '';
+      this.note = opened.note ?? '';
       if (opened.kind === 'surface') this.show(opened.frame);
     } catch (error) {
       if (!this.choice.stillHolds(choice)) return;

@@ -22,7 +22,7 @@ export interface OpenedRecording {
 
 export type Opened =
   | OpenedRecording
-  | { kind: 'surface'; frame: DecodedFrame };
+  | { kind: 'surface'; frame: DecodedFrame; note: string | null };
 
 async function openRecording(bytes: Bytes, isGrowing = (): boolean => false, note: string | null = null): Promise<OpenedRecording> {
   const [{ Recording }, { RecordingSource }] = await Promise.all([import('./recording'), import('./recordingSource')]);
@@ -40,18 +40,25 @@ export async function openRemote(url: URL, fetch?: Fetch): Promise<OpenedRecordi
   return openRecording(file, () => file.isGrowing, file.isCut ? text.file.wasCut : null);
 }
 
-/** Throws a FileError. */
-export async function openFile(file: File): Promise<Opened> {
-  const kind = /\.(mcap|ply|glb)$/i.exec(file.name)?.[1]!.toLowerCase();
+const kindOf = ({ name }: File): string | undefined => /\.(mcap|ply|glb)$/i.exec(name)?.[1]!.toLowerCase();
+
+/** Of several, which are shown one at a time, the first that may be shown. Throws a FileError. */
+export async function openFile(files: readonly [File, ...File[]]): Promise<Opened> {
+  const file = firstOf(files);
+  const kind = kindOf(file);
   if (kind === undefined) throw new FileError(text.file.otherKind);
   if (file.size === 0) throw new FileError(text.file.empty);
   const read = await (kind === 'mcap' ? recordingReader() : surfaceReader()).catch(() => {
     throw new FileError(text.file.noReader);
   });
-  return read(file).catch((error: unknown) => {
+  const opened = await read(file).catch((error: unknown) => {
     throw fileError(error);
   });
+  if (files.length > 1) opened.note = [opened.note ?? [], text.file.oneOf(files.length)].flat().join('; ');
+  return opened;
 }
+
+export const firstOf = (files: readonly [File, ...File[]]): File => files.find((file) => kindOf(file) !== undefined) ?? files[0];
 
 type Reader = (file: File) => Promise<Opened>;
 
@@ -64,6 +71,6 @@ async function surfaceReader(): Promise<Reader> {
   const { readSurface } = await import('./surfaceFile');
   return async (file) => {
     if (file.size > kMaxSurfaceBytes) throw new FileError(text.file.tooLarge(file.size, kMaxSurfaceBytes));
-    return { kind: 'surface', frame: await readSurface(file.name, await file.arrayBuffer()) };
+    return { kind: 'surface', frame: await readSurface(file.name, await file.arrayBuffer()), note: null };
   };
 }

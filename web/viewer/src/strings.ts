@@ -265,6 +265,7 @@ export const text = {
     playing: 'Recording',
     paused: 'Paused',
     note: (name: string, note: string) => `${name}: ${note}`,
+    oneOf: (files: number) => `one of ${files} files, which are shown one at a time`,
     otherKind: 'only .mcap, .ply and .glb files can be shown',
     noReader: 'what reads such files cannot be loaded: the server does not answer. Try again when it does',
     empty: 'it is empty: copy it anew from where it was made',

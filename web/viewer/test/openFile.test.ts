@@ -25,7 +25,7 @@ const png = Uint8Array.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0, 
 type Content = Uint8Array | string;
 const bytes = (content: Content): Uint8Array<ArrayBuffer> =>
   typeof content === 'string' ? new TextEncoder().encode(content) : content.slice();
-const open = (name: string, ...content: Content[]): Promise<Opened> => openFile(new File(content.map(bytes), name));
+const open = (name: string, ...content: Content[]): Promise<Opened> => openFile([new File(content.map(bytes), name)]);
 const refused = (name: string, words: string, ...content: Content[]): Promise<void> =>
   expect(open(name, ...content), name).rejects.toThrow(new FileError(words));
 
@@ -40,12 +40,12 @@ describe('any file', () => {
     const gone = Object.assign(new File(['ply'], 'gone.ply'), {
       arrayBuffer: () => Promise.reject(new DOMException('A requested file could not be found', 'NotFoundError')),
     });
-    await expect(openFile(gone)).rejects.toThrow(new FileError(say.unreadable));
+    await expect(openFile([gone])).rejects.toThrow(new FileError(say.unreadable));
   });
   it('of a surface that is too large is not read', async () => {
     const size = kMaxSurfaceBytes + 1;
     const large = { name: 'a.ply', size, arrayBuffer: () => Promise.reject(new Error('it was read')) } as unknown as File;
-    await expect(openFile(large)).rejects.toThrow(new FileError(say.tooLarge(size, kMaxSurfaceBytes)));
+    await expect(openFile([large])).rejects.toThrow(new FileError(say.tooLarge(size, kMaxSurfaceBytes)));
   });
 });
 
