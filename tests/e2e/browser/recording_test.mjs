@@ -222,6 +222,7 @@ const checks = {
       await page.setViewportSize(size);
       await page.waitForSelector('#source', { state: 'visible' });
       assert.match(await page.textContent('#source'), /cut\.mcap.*cut short/);
+      assert.equal(await page.getAttribute('#source', 'title'), await page.textContent('#source'));
       assert.equal(await page.evaluate(() => document.querySelector('#streams').selectedOptions[0].text), 'Choose…');
     }
     const isWhole = () => page.evaluate(() => document.querySelector('#source').scrollWidth <= document.querySelector('#source').clientWidth);

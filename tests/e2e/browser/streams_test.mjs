@@ -181,6 +181,7 @@ const checks = {
     await shownPast(page, (await look(page)).shown + 6);
     const choice = page.getByLabel('Stream that the time line is of');
     assert.deepEqual(await choice.locator('option').allTextContents(), ['ball', 'other']);
+    assert.match(await choice.getAttribute('title'), /: ball$/);
     const wide = page.viewportSize();
     await page.setViewportSize({ width: 390, height: 844 });
     const top = async (of) => (await page.locator(`#timeline ${of}`).boundingBox()).y;
@@ -248,6 +249,7 @@ const checks = {
     await page.click(`${rowOf('other')} button:text-is("Show")`);
     await shows('other', 0);
     assert.match(page.url(), /\?stream=other$/);
+    assert.equal(await page.getAttribute('#streams', 'title'), 'other');
     await page.click(`${rowOf('ball')} button:text-is("Beside")`);
     await shows('other', 1);
     await page.goBack();

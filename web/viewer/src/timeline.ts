@@ -20,7 +20,7 @@ export class Timeline {
   private readonly live = button(say.live, '', () => this.playback?.follow());
   private readonly speed = make('select', { title: say.speed });
   private readonly range = button(say.range, say.rangeTitle, () => this.cycleLoop());
-  private readonly streams = make('select', { title: say.stream, hidden: true, className: 'stream' });
+  private readonly streams = make('select', { hidden: true, className: 'stream' });
   private offered = '';
   private playback: Playback | null = null;
   private begun: Loop | null = null; // without an end of its own yet: what is there grows beyond it
@@ -75,6 +75,7 @@ export class Timeline {
     }
     const at = Math.max(0, [...streams.keys()].indexOf(chosen ?? ''));
     if (this.streams.selectedIndex !== at) this.streams.selectedIndex = at;
+    this.streams.title = `${say.stream}: ${this.streams.value}`; // where there is no room for its name
   }
 
   /** Also again and again: nothing happens where it is the one shown. */

@@ -129,12 +129,15 @@ export class Ui {
     const key = JSON.stringify([names, chosen]);
     const shown = chosen ?? source;
     document.title = shown === '' ? text.product : `${text.product} · ${shown}`;
-    setText(element('source'), note === '' ? source : text.file.note(source, note));
-    element('source').classList.toggle('matters', note !== '' || (chosen === null && source !== '')); // no list says it
+    const said = element('source');
+    setText(said, note === '' ? source : text.file.note(source, note));
+    said.title = said.textContent; // where there is no room for all of it
+    said.classList.toggle('matters', note !== '' || (chosen === null && source !== '')); // no list says it
     if (key === this.shownStreams) return;
     this.shownStreams = key;
     element('picker').hidden = names.length === 0;
     const select = element<HTMLSelectElement>('streams');
+    select.title = chosen ?? '';
     select.replaceChildren(
       ...names.map((name) => {
         const option = document.createElement('option');

@@ -143,7 +143,7 @@ class RigPage {
     }
     if (this.stream === null || !names.includes(this.stream)) this.stream = names[0]!;
     if (!away) this.away = null;
-    this.streams.value = this.stream;
+    this.streams.value = this.streams.title = this.stream;
     this.streams.dataset['listed'] = away ? '' : '1';
     this.remember();
     if (this.stream !== this.away) return true;
