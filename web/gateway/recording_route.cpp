@@ -12,6 +12,7 @@
 #include <cstring>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "codec/mcap_records.h"
 #include "web/gateway/byte_range.h"
@@ -173,12 +174,19 @@ std::size_t FilePart::read(std::uint64_t offset, std::span<std::uint8_t> into) c
 
 namespace {
 
+HttpReply not_opened(int error, bool of_folder) {
+  if (error == ENOENT || error == ENOTDIR || (of_folder && error == ELOOP))
+    return text_reply(404, "the recording is gone");
+  return text_reply(503, "the recording cannot be read: " + std::generic_category().message(error));
+}
+
 HttpReply reply_to(const Asked& asked) {
   const int follow = asked.of_folder ? O_NOFOLLOW : 0;  // what somebody links to from there is none of ours
   const int descriptor = open(asked.recording.file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
   struct stat status {};
-  if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
-    if (descriptor >= 0) close(descriptor);
+  if (descriptor < 0) return not_opened(errno, asked.of_folder);
+  if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
+    close(descriptor);
     return text_reply(404, "the recording is gone");
   }
   const auto version = version_of(asked, status);

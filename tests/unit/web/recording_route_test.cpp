@@ -209,6 +209,14 @@ TEST_F(Recordings, AFileThatChangedIsAnotherOne) {
   EXPECT_EQ(get().status, 404);
 }
 
+TEST_F(Recordings, AFileThatCannotBeReadIsNotGone) {
+  std::filesystem::remove(file);
+  std::filesystem::create_symlink(file, file);
+  const auto response = get();
+  EXPECT_EQ(response.status, 503);
+  EXPECT_EQ(response.body, "the recording cannot be read: Too many levels of symbolic links\n");
+}
+
 TEST_F(Recordings, AreComparedByAnyOfTheirTags) {
   const std::string etag = get().headers.at("etag");
   EXPECT_EQ(get("If-None-Match: W/\"other\", W/" + etag + "\r\n").status, 304);
