@@ -417,6 +417,7 @@ const checks = {
       [kHide, kShow],
     ]) {
       await page.waitForFunction((before) => window.number_ > before, await page.evaluate(() => window.number_));
+      await page.evaluate(() => void (window.states_.length = 0)); // a busy machine's stream may have stalled before
       await player(page, away);
       await turned(page);
       const before = await count();
@@ -428,8 +429,8 @@ const checks = {
       assert.ok(after.drawn - before.drawn <= 1, `${away}: drew ${after.drawn - before.drawn}`);
       await player(page, back);
       await page.waitForFunction((number) => window.number_ > number, least);
+      assert.deepEqual(await page.evaluate(() => window.states_), [], `${away}`);
     }
-    assert.deepEqual(await page.evaluate(() => window.states_), []);
   }),
 
   'out of sight from the start, it has a picture and says so': on('/page.html', { before: countFrames }, async (page) => {

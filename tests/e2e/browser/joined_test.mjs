@@ -60,24 +60,30 @@ async function depthsOf(page, file, expected) {
       ([index, wanted]) => window.relievo.diagnostics().playback.index === index && window.relievo.surface()?.number === wanted,
       [i, number],
     );
-    depths.push((await page.evaluate(() => window.relievo.surface())).depth.toFixed(6));
+    depths.push((await page.evaluate(() => window.relievo.surface())).depth);
   }
   assert.equal((await look(page)).errors, 0, (await look(page)).lastError);
   return depths;
+}
+
+// A page decodes its first frames in TypeScript, until the WebAssembly is there, which rounds elsewhere.
+function assertSame(depths, expected) {
+  assert.equal(depths.length, expected.length);
+  for (const [i, depth] of depths.entries()) assert.ok(Math.abs(depth - expected[i]) < 1e-6 * depth, `frame ${i}: ${depth}, not ${expected[i]}`);
 }
 
 let whole;
 const checks = {
   async 'recordings that were joined are one'(page) {
     whole = await depthsOf(page, joined('whole', ...parts), numbers.flat());
-    assert.ok(new Set(whole).size > Math.max(...kFrames) / 2, 'the surfaces are all alike');
+    assert.ok(new Set(whole.map((depth) => depth.toFixed(6))).size > Math.max(...kFrames) / 2, 'the surfaces are all alike');
     assert.doesNotMatch(await page.textContent('#source'), /cut short|left out/);
   },
 
   async 'they are what recover makes of them'(page) {
     const out = join(scratch, 'recovered.mcap');
     assert.equal(recover(joined('whole', ...parts), out), whole.length);
-    assert.deepEqual(await depthsOf(page, out, numbers.flat()), whole);
+    assertSame(await depthsOf(page, out, numbers.flat()), whole);
   },
 
   async 'behind one that was cut short the next is there, and it is said'(page) {
@@ -87,7 +93,7 @@ const checks = {
     const left = count - kFrames[0] - kFrames[2]; // of the second
     assert.ok(left >= 0 && left < kFrames[1], `${count} frames`);
     const some = await depthsOf(page, file, [...numbers[0], ...numbers[1].slice(0, left), ...numbers[2]]);
-    assert.deepEqual(some, [...whole.slice(0, kFrames[0] + left), ...whole.slice(kFrames[0] + kFrames[1])]);
+    assertSame(some, [...whole.slice(0, kFrames[0] + left), ...whole.slice(kFrames[0] + kFrames[1])]);
     assert.match(await page.textContent('#source'), /cut short|left out/);
   },
 

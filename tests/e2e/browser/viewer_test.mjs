@@ -258,8 +258,9 @@ const checks = {
     await inState(page, 'live');
   },
 
-  async 'far from its server it gets the frames that there are, not two in each round trip'() {
-    const kWay_ms = 400;
+  async 'far from its server it gets the frames that there are, not two in each round trip'(resting) {
+    await resting.goto('about:blank'); // until it is needed again it draws nothing
+    const kWay_ms = 600;
     const late = createServer((near) => {
       const far = connect(feeder.port, '127.0.0.1');
       for (const [from, to] of [[near, far], [far, near]]) {
@@ -272,11 +273,11 @@ const checks = {
     const page = await newPage({ viewport: { width: 400, height: 300 } });
     await page.goto(`http://127.0.0.1:${late.address().port}/`);
     await shownPast(page, 1);
-    // Two would be 2.5 a second, of 8 that there are.
+    // Two would be 1.7 a second, of 8 that there are; a slow machine draws few more.
     await eventually('no more come than two in a round trip', async () => {
       const { received } = await look(page);
       await page.waitForTimeout(4000);
-      return (await look(page)).received - received > 16;
+      return (await look(page)).received - received > 10;
     });
     await page.close();
     late.close();
@@ -417,6 +418,8 @@ const checks = {
   },
 
   async 'the page draws by itself where workers do not, also after the driver took the picture away'(page) {
+    await page.goto(origin);
+    await shownPast(page, 1);
     const workers = page.workers().length;
     const near = await newPage({ viewport: { width: 800, height: 500 } });
     const warnings = [];
