@@ -23,15 +23,12 @@ mkdirSync(briefFolder);
 const serve = ['--source', 'sim:object,width=320,height=240,stripes=60,rate=6', '--key-interval', '5'];
 const server = await Server.start(serverPath, serve);
 const recordingServer = await Server.start(serverPath, [...serve, '--stream', 'kept', '--record-dir', folder, '--pre-roll', '30s']);
-// Its recordings are played to their ends, so little comes before.
-const briefServer = await Server.start(serverPath, [...serve, '--stream', 'brief', '--record-dir', briefFolder, '--pre-roll', '1s']);
 const browser = await launchChromium();
 const complaints = [];
 const { open } = pagesOf(browser, server.address, complaints);
 const { open: openRecording, newPage: newRecording } = pagesOf(browser, recordingServer.address, complaints);
-const goneServer = await Server.start(serverPath, [...serve, '--stream', 'gone']);
-const { newPage: newGone } = pagesOf(browser, goneServer.address, complaints);
-const { open: openBrief } = pagesOf(browser, briefServer.address, complaints);
+let briefServer; // its recordings are played to their ends, so little comes before
+let openBrief;
 const playback = (page) => page.evaluate(() => window.relievo.diagnostics().playback);
 const kKept = 12;
 async function order(action, server = recordingServer, stream = 'kept') {
@@ -118,6 +115,8 @@ const checks = {
     const { keys } = await playback(page);
     assert.equal(keys[0], true);
     assert.equal((await look(page)).errors, 0);
+    await page.close();
+    await server.kill(); // what follows has others
   },
 
   async 'a server with a folder records there'() {
@@ -301,6 +300,8 @@ const checks = {
   },
 
   async 'what is being written plays, grows, and goes on at its end until it is whole'() {
+    briefServer = await Server.start(serverPath, [...serve, '--stream', 'brief', '--record-dir', briefFolder, '--pre-roll', '1s']);
+    ({ open: openBrief } = pagesOf(browser, briefServer.address, complaints));
     const page = await openBrief();
     await shownPast(page, 2);
     const before = readdirSync(briefFolder);
@@ -452,7 +453,9 @@ const checks = {
   },
 
   async 'on plain http from elsewhere what was received is saved also once the server has gone'() {
-    const page = await newGone({ viewport: { width: 800, height: 500 } });
+    await recordingServer.kill(); // it is not needed any more
+    const goneServer = await Server.start(serverPath, [...serve, '--stream', 'gone']);
+    const page = await newRecording({ viewport: { width: 800, height: 500 } });
     await page.addInitScript(() => delete Navigator.prototype.serviceWorker); // as where nothing keeps the page
     await page.goto(goneServer.address);
     await page.waitForFunction(() => window.relievo?.diagnostics().playback?.times.length > 4);
@@ -501,10 +504,7 @@ try {
   failed = await runChecks(checks, await open());
 } finally {
   await browser.close();
-  await server.kill();
-  await recordingServer.kill();
-  await briefServer.kill();
-  await goneServer.kill();
+  await Server.killAll();
   rmSync(scratch, { recursive: true, force: true });
 }
 process.exit(failed === 0 ? 0 : 1);

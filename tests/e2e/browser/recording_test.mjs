@@ -306,6 +306,7 @@ const checks = {
     await inState(page, 'live');
     await page.waitForFunction(() => window.relievo.diagnostics().playback.following === true); // no longer the file's
     await page.waitForFunction(() => document.querySelector('#card').hidden); // nor what was said of another
+    await page.close(); // what follows has pages of its own
   },
 
   async 'a stream that is chosen while a recording opens stays chosen, also when it goes'() {
