@@ -42,7 +42,6 @@ const folder = join(scratch, 'folder');
 mkdirSync(folder);
 const allowed = ['--allow-origin', origin, '--allow-origin', foreign];
 const rig = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--record-dir', folder, ...allowed]);
-const guarded = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--stream', 'guarded', '--token-file', tokens, ...allowed]);
 const browser = await launchChromium();
 const complaints = [];
 
@@ -306,11 +305,13 @@ const checks = {
   }),
 
   'a gateway that wants a token says so, and takes one from src': on('/page.html', { at: foreign }, async (page) => {
+    const guarded = await Server.start(serverPath, ['--source', kSource, '--key-interval', '5', '--stream', 'guarded', '--token-file', tokens, ...allowed]);
     await set(page, { src: `${guarded.address}/?stream=guarded` });
     await says(page, /token/i);
     assert.equal(await player(page, (p) => p.state), 'failed');
     await set(page, { src: `${guarded.address}/?stream=guarded&token=${kToken}` });
     await when(page, (p) => p.state === 'live');
+    await guarded.kill();
   }),
 
   'what cannot be shown says why': on('/page.html', {}, async (page) => {
@@ -524,8 +525,7 @@ try {
   }
 } finally {
   await browser.close();
-  await rig.kill();
-  await guarded.kill();
+  await Server.killAll();
   web.close();
   lax.close();
   rmSync(scratch, { recursive: true, force: true });

@@ -121,6 +121,7 @@ try {
   const plain = await open(browser, `http://192.0.2.1:${port}/?stream=ball`);
   await more(plain, 3);
   await saysWhy(plain);
+  await plain.close();
   console.log('ok: without WebCodecs');
 
   const recorded = recordObject(process.argv[3], join(scratch, 'video.mcap'), { rate: 6, frames: 5, options: ['--texture', 'h264'] });
