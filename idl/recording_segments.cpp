@@ -58,12 +58,15 @@ std::vector<fs::path> RecordingSegments::there_but(const fs::path& open) const {
   return files;
 }
 
-fs::path RecordingSegments::next() const {
-  const std::vector<fs::path> before = there();
-  const std::uint64_t number = before.empty() ? 0 : *number_of(before.back(), file_) + 1;
+fs::path RecordingSegments::at(std::uint64_t number) const {
   char digits[32];
   std::snprintf(digits, sizeof digits, "_%06llu", static_cast<unsigned long long>(number));
   return file_.parent_path() / (file_.stem().string() + digits + file_.extension().string());
+}
+
+fs::path RecordingSegments::next() const {
+  const std::vector<fs::path> before = there();
+  return at(before.empty() ? 0 : *number_of(before.back(), file_) + 1);
 }
 
 bool RecordingSegments::is_full(std::uint64_t bytes, double duration_s) const {

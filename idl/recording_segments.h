@@ -19,6 +19,8 @@ class RecordingSegments {
   RecordingSegments(std::filesystem::path file, const SegmentOptions& options)
       : file_(std::move(file)), options_(options) {}
 
+  /// The one of this number.
+  std::filesystem::path at(std::uint64_t number) const;
   /// The one after the last that is there.
   std::filesystem::path next() const;
   /// True where a segment of this size and length is to end, before the next frame that decodes alone.

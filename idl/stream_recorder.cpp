@@ -17,19 +17,20 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kTick = 100ms;
-constexpr auto kLook = 5s;           // at the disk's room
-constexpr auto kArrival = 500ms;     // of a stream's last frames
-constexpr std::size_t kAtOnce = 32;  // samples, before who asks for the state may look
+constexpr auto kLook = 5s;                 // at the disk's room
+constexpr auto kArrival = 500ms;           // of a stream's last frames
+constexpr std::int64_t kMostAhead_s = 60;  // of its time in a recording's name
+constexpr std::size_t kAtOnce = 32;        // samples, before who asks for the state may look
 
 /// "face-2026-11-22T07-05-00Z.mcap", in the folder.
 std::filesystem::path new_target(const std::filesystem::path& folder, const std::string& stream,
-                                 std::int64_t now_ns) {
-  return unused_name(folder / (stream + utc_text(now_ns, "-%Y-%m-%dT%H-%M-%SZ") + ".mcap"));
+                                 std::int64_t time_s) {
+  return folder / (stream + utc_text(time_s * kNanosecondsPerSecond, "-%Y-%m-%dT%H-%M-%SZ") + ".mcap");
 }
 
-/// What is written first of it.
+/// What is written first of it, unless that is there already.
 std::filesystem::path first_file(const std::filesystem::path& target, const SegmentOptions& segments) {
-  return segments.split() ? RecordingSegments(target, segments).next() : target;
+  return segments.split() ? RecordingSegments(target, segments).at(0) : target;
 }
 
 }  // namespace
@@ -80,7 +81,11 @@ Status StreamRecorder::start() {
     return Error{end_ ? "the recording before is still being written to its end: try again"
                       : "'" + options_.stream + "' is being recorded already"};
   const std::int64_t now_ns = utc_now_ns();
-  target_ = new_target(options_.folder, options_.stream, now_ns);
+  // No two of ours are called the same, so that the disk, which may be slow, need not be asked here.
+  const std::int64_t now_s = now_ns / kNanosecondsPerSecond;
+  const bool is_taken = now_s <= named_s_ && named_s_ - now_s < kMostAhead_s;  // else the clock was set back
+  named_s_ = is_taken ? named_s_ + 1 : now_s;
+  target_ = new_target(options_.folder, options_.stream, named_s_);
   state_ = {.activity = RecordingActivity::kRecording,
             .file = first_file(target_, options_.recording.segments).filename(),
             .room_bytes = state_.room_bytes,
@@ -182,8 +187,11 @@ void StreamRecorder::write_some(std::unique_lock<std::mutex>& lock) {
   lock.unlock();
 
   if (info) {
-    recorder_ = std::make_unique<Recorder>(Recorder::Options{
-        .file = target, .stream = options_.stream, .recording = options_.recording, .keeps_name = true});
+    recorder_ = std::make_unique<Recorder>(
+        Recorder::Options{.file = options_.recording.segments.split() ? target : unused_name(target),
+                          .stream = options_.stream,
+                          .recording = options_.recording,
+                          .keeps_name = true});
     to_recorder_ = recorder_->callbacks();
     write(*info);
   }

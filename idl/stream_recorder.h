@@ -47,7 +47,8 @@ class StreamRecorder {
 
   /// A new file in the folder, STREAM-2026-11-22T07-05-00Z.mcap, or where it is to be split the first of
   /// several, ...Z_000000.mcap, that begins with the pre-roll. Fails where
-  /// one is being recorded. What the disk has against it shows in state().
+  /// one is being recorded. What the disk has against it shows in state(), as does another name where it has
+  /// a file of this one.
   Status start();
   /// What came until now is in the file; it is whole when is_open() no longer says so. Fails where nothing is
   /// being recorded.
@@ -77,7 +78,8 @@ class StreamRecorder {
   std::optional<RawSample> info_;  // as received last
   RecordingState state_;
   std::shared_ptr<const GrowingRecording> growing_;  // of state_.file
-  std::filesystem::path target_;                     // as Recorder::Options::file
+  std::filesystem::path target_;                     // as Recorder::Options::file, while that is unused
+  std::int64_t named_s_ = 0;                         // UTC, in its name
   bool open_ = false;                                // state_.file is being written
   std::uint64_t next_ = 0;                           // the first of the ring that is not in it
   std::optional<std::uint64_t> end_;                 // where it ends, once that is asked for

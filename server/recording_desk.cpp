@@ -16,7 +16,10 @@ void RecordingDesk::remove(const std::string& stream, const RecordingState& last
   if (!last.file.empty()) last_[stream] = last;
 }
 
-void RecordingDesk::add(const Recorder& recorder) {
+void RecordingDesk::add(const Recorder& recorder, const std::filesystem::path& file) {
+  const auto folder = file.has_parent_path() ? file.parent_path() : ".";
+  std::error_code ignored;
+  if (!std::filesystem::equivalent(folder, folder_, ignored)) return;
   const std::lock_guard lock(mutex_);
   others_.insert(&recorder);
 }
@@ -24,12 +27,6 @@ void RecordingDesk::add(const Recorder& recorder) {
 void RecordingDesk::remove(const Recorder& recorder) {
   const std::lock_guard lock(mutex_);
   others_.erase(&recorder);
-}
-
-bool RecordingDesk::writes(const Recorder& recorder, const std::string& file) const {
-  const std::filesystem::path now = recorder.file();
-  std::error_code ignored;
-  return now.filename() == file && std::filesystem::equivalent(now, folder_ / file, ignored);
 }
 
 std::optional<RecordingState> RecordingDesk::state(const std::string& stream) const {
@@ -61,8 +58,9 @@ bool RecordingDesk::is_open(const std::string& file) const {
   const std::lock_guard lock(mutex_);
   return std::any_of(recorders_.begin(), recorders_.end(),
                      [&](const auto& one) { return one.second->is_open(file); }) ||
-         std::any_of(others_.begin(), others_.end(),
-                     [&](const Recorder* other) { return other->is_open() && writes(*other, file); });
+         std::any_of(others_.begin(), others_.end(), [&](const Recorder* other) {
+           return other->is_open() && other->file().filename() == file;
+         });
 }
 
 std::shared_ptr<const GrowingRecording> RecordingDesk::growing(const std::string& file) const {
@@ -70,7 +68,7 @@ std::shared_ptr<const GrowingRecording> RecordingDesk::growing(const std::string
   for (const auto& [stream, recorder] : recorders_)
     if (auto growing = recorder->growing(file)) return growing;
   for (const Recorder* other : others_)
-    if (writes(*other, file)) return other->growing();
+    if (other->file().filename() == file) return other->growing();
   return nullptr;
 }
 

@@ -25,8 +25,9 @@ class RecordingDesk final : public RecordingControl {
   /// the stream until the next recorder's first recording.
   void add(const std::string& stream, StreamRecorder& recorder);
   void remove(const std::string& stream, const RecordingState& last);
-  /// One whose files are made without being asked for, in this folder perhaps. Lives until it is removed.
-  void add(const Recorder& recorder);
+  /// One whose files, beside `file`, are made without being asked for, in this folder perhaps. Lives until it
+  /// is removed.
+  void add(const Recorder& recorder, const std::filesystem::path& file);
   void remove(const Recorder& recorder);
 
   std::optional<RecordingState> state(const std::string& stream) const override;
@@ -37,13 +38,11 @@ class RecordingDesk final : public RecordingControl {
   std::shared_ptr<const GrowingRecording> growing(const std::string& file) const override;
 
  private:
-  bool writes(const Recorder& recorder, const std::string& file) const;
-
   const std::filesystem::path folder_;
   mutable std::mutex mutex_;
   std::map<std::string, StreamRecorder*> recorders_;
   std::map<std::string, RecordingState> last_;
-  std::set<const Recorder*> others_;
+  std::set<const Recorder*> others_;  // that write to this folder
 };
 
 }  // namespace relievo

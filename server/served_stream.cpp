@@ -275,7 +275,7 @@ Status RunningStream::announce(const std::string& uri) {
     if (const Status started = recording_.start(config_.record, name_, around_.config, *publisher_, stop_);
         !started)
       return started;
-    if (around_.desk != nullptr) around_.desk->add(*recording_.recorder);
+    if (around_.desk != nullptr) around_.desk->add(*recording_.recorder, config_.record);
   }
   if (around_.desk != nullptr) {
     on_request_.emplace(*around_.desk, name_);

@@ -17,8 +17,8 @@ namespace {
 constexpr std::chrono::seconds kRetry{5};
 constexpr std::size_t kLargestRigFile = 1 << 20;  // they have a few kilobytes
 
-/// What is in the files that a camera's stream names; one that cannot be read has
-/// its own words when the stream is opened.
+/// What is in the files that a camera's stream names, for which a disk may be waited for; one that cannot be
+/// read has its own words when the stream is opened.
 std::string files_of(const StreamConfig& config) {
   std::string all;
   if (!config.source.starts_with("v4l2:")) return all;
@@ -40,16 +40,20 @@ StreamSet::~StreamSet() {
 }
 
 void StreamSet::apply(const std::vector<StreamConfig>& configs) {
-  std::map<std::string, const StreamConfig*> wanted;
-  for (const StreamConfig& config : configs) wanted[name_of(config)] = &config;
+  struct Wanted {
+    const StreamConfig* config;
+    std::string files;
+  };
+  std::map<std::string, Wanted> wanted;
+  for (const StreamConfig& config : configs) wanted[name_of(config)] = {&config, files_of(config)};
   std::vector<std::unique_ptr<Entry>> old;
   std::unique_lock lock(mutex_);
   if (stopping_) return;
   applying_ = true;
   for (auto it = entries_.begin(); it != entries_.end();) {
     const auto found = wanted.find(it->first);
-    if (found != wanted.end() && *found->second == it->second->config &&
-        files_of(*found->second) == it->second->files) {
+    if (found != wanted.end() && *found->second.config == it->second->config &&
+        found->second.files == it->second->files) {
       wanted.erase(found);
       ++it;
       continue;
@@ -67,10 +71,10 @@ void StreamSet::apply(const std::vector<StreamConfig>& configs) {
   }
   lock.lock();
   if (stopping_) wanted.clear();
-  for (const auto& [name, config] : wanted) {
+  for (auto& [name, begins] : wanted) {
     auto& entry = entries_[name] = std::make_unique<Entry>();
-    entry->config = *config;
-    entry->files = files_of(*config);
+    entry->config = *begins.config;
+    entry->files = std::move(begins.files);
     entry->retries = retries_ || was_applied_;
     entry->paused = paused_.count(name) != 0;
     entry->again = entry->tried_before = was_applied_;
@@ -149,11 +153,14 @@ Status StreamSet::pause(const std::string& stream) {
 }
 
 void StreamSet::resume(const std::string& stream) {
+  const auto config = config_of(stream);
+  // Which may be new, and are those that it opens. A disk may be slow: nobody else is to wait for it.
+  std::string files = config ? files_of(*config) : "";
   const std::lock_guard lock(mutex_);
   paused_.erase(stream);
   const auto found = entries_.find(stream);
   if (found == entries_.end()) return;
-  found->second->files = files_of(found->second->config);  // which may be new, and are those that it opens
+  if (found->second->config == config) found->second->files = std::move(files);
   found->second->paused = false;
   changed_.notify_all();
 }

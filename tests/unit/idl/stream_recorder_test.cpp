@@ -8,8 +8,10 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
 #include <set>
 
+#include "base/time.h"
 #include "codec/recording.h"
 #include "idl/cdr.h"
 #include "tests/support/key_frames.h"
@@ -157,6 +159,24 @@ TEST_F(RecordedOnRequest, OneAfterTheOtherEachWithItsPreRoll) {
   }
   EXPECT_NE(files[0], files[1]);
   EXPECT_NE(files[1], files[2]);
+}
+
+// As of a server before this one, that was ended and started again within a second.
+TEST_F(RecordedOnRequest, AFileThatIsThereAlreadyStays) {
+  start({.pre_roll_s = 3600});
+  publish(10);
+  const std::int64_t now_ns = utc_now_ns();
+  for (int s = -1; s < 60; ++s) {
+    std::ofstream(folder_ / utc_text(now_ns + s * kNanosecondsPerSecond, "face-%Y-%m-%dT%H-%M-%SZ.mcap"))
+        << "another";
+  }
+  ASSERT_TRUE(recorder_->start());
+  ASSERT_TRUE(records(10));
+  EXPECT_THAT(recorder_->state().file, MatchesRegex("face-20..-..-..T..-..-..Z-2\\.mcap"));
+  EXPECT_TRUE(recorder_->is_open(recorder_->state().file));
+  ASSERT_TRUE(recorder_->stop());
+  ASSERT_TRUE(closes());
+  EXPECT_EQ(frames_in(recorder_->state().file).size(), 10U);
 }
 
 TEST_F(RecordedOnRequest, IsSplitAndKeptAsIsSaidOfRecordings) {
