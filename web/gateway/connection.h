@@ -67,7 +67,8 @@ class ConnectionHost {
   /// How long a WebSocket message may take to leave.
   virtual std::chrono::milliseconds message_time() const = 0;
   /// Calls `read`, which may wait for a disk, on a thread beside the loop's, and then `done` on the loop's.
-  virtual void from_disk(std::function<void()> read, std::function<void()> done) = 0;
+  /// `takes_long`: on a thread of which there is one.
+  virtual void from_disk(std::function<void()> read, std::function<void()> done, bool takes_long) = 0;
   virtual void add(std::shared_ptr<Connection> connection) = 0;
   virtual void remove(const std::shared_ptr<Connection>& connection) = 0;
 };

@@ -32,36 +32,43 @@ std::shared_ptr<CutRecordings::Entry> CutRecordings::entry_of(const FileMark& ma
   return entries_.front();
 }
 
+std::shared_ptr<const GrowingRecording> CutRecordings::find(Found& found, Walk& walk, const Make& make) {
+  std::unique_lock lock(found.making, std::defer_lock);
+  walk.allowed ? lock.lock() : void(lock.try_lock());
+  if (!lock || (!found.made && !walk.allowed)) {
+    walk.needed = true;
+    return nullptr;
+  }
+  if (!std::exchange(found.made, true)) found.recording = make();
+  return found.recording;
+}
+
 std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::filesystem::path& file,
-                                                                const struct stat& status) {
+                                                                const struct stat& status, Walk& walk) {
   const FileMark mark = mark_of(status);
   if (std::abs(utc_now_ns() - mark.time_ns) < kLeft_ns) return nullptr;
-  const auto entry = entry_of(mark);
-  const std::lock_guard lock(entry->making);
-  if (entry->made) return entry->index;
-  entry->made = true;
-  if (auto index = index_cut_recording(file)) entry->index = *std::move(index);
-  const std::string advice = "; `relievo recover` makes a sound copy";
-  if (entry->index)
-    log_warning(file.string() + " was cut short: pages are given what is whole of it, " +
-                std::to_string(entry->index->bytes()) + " of " + std::to_string(mark.bytes) +
-                " bytes, with an index that is not in it" + advice);
-  else
-    log_warning(file.string() + " was cut short, or is damaged: pages read all of it to open it" + advice);
-  return entry->index;
+  return find(entry_of(mark)->index, walk, [&] {
+    const auto index = index_cut_recording(file);
+    const auto found = index ? *index : nullptr;
+    const std::string advice = "; `relievo recover` makes a sound copy";
+    if (found)
+      log_warning(file.string() + " was cut short: pages are given what is whole of it, " +
+                  std::to_string(found->bytes()) + " of " + std::to_string(mark.bytes) +
+                  " bytes, with an index that is not in it" + advice);
+    else
+      log_warning(file.string() + " was cut short, or is damaged: pages read all of it to open it" + advice);
+    return found;
+  });
 }
 
 std::shared_ptr<const GrowingRecording> CutRecordings::growth_of(const std::filesystem::path& file,
-                                                                 const struct stat& status) {
-  const auto entry = entry_of(mark_of(status));
-  const std::lock_guard lock(entry->making);
-  if (!std::exchange(entry->walked, true)) {
+                                                                 const struct stat& status, Walk& walk) {
+  return find(entry_of(mark_of(status))->growth, walk, [&] {
     RecordingFollower follower(file);
     // The second time for the last chunk, with nothing behind it. What is damaged ends what there is.
     if (follower.look()) static_cast<void>(follower.look().ok());
-    entry->growth = follower.growing();
-  }
-  return entry->growth;
+    return follower.growing();
+  });
 }
 
 }  // namespace relievo

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -14,27 +15,39 @@
 
 namespace relievo {
 
-/// Any thread.
+/// Whether all of a long file may be gone through, which others are to wait for; and whether that is what it
+/// takes.
+struct Walk {
+  bool allowed = false, needed = false;
+};
+
+/// Any thread. What was found of the last few files is kept. Null, too, where a walk is needed and not
+/// allowed.
 class CutRecordings {
  public:
   /// Of a file without an end, which is `status` now. Null where it may still be written (it was so in the
-  /// last 5 s), or an index would leave out what is in it. Of the last few files they are kept, so that one
-  /// is made once, and said in the log; that may wait for the disk, as long as reading the file does.
+  /// last 5 s), or an index would leave out what is in it. One is made once, and said in the log.
   std::shared_ptr<const GrowingRecording> index_of(const std::filesystem::path& file,
-                                                   const struct stat& status);
+                                                   const struct stat& status, Walk& walk);
 
-  /// How the file grew, as somebody may have read it then. Never null; may read the heads of all its records.
+  /// How the file grew, as somebody may have read it then.
   std::shared_ptr<const GrowingRecording> growth_of(const std::filesystem::path& file,
-                                                    const struct stat& status);
+                                                    const struct stat& status, Walk& walk);
 
  private:
+  /// Made by one, while who may not walk goes on.
+  struct Found {
+    std::mutex making;
+    bool made = false;
+    std::shared_ptr<const GrowingRecording> recording;
+  };
   struct Entry {
     FileMark mark;
-    std::mutex making;
-    bool made = false, walked = false;
-    std::shared_ptr<const GrowingRecording> index, growth;
+    Found index, growth;
   };
+  using Make = std::function<std::shared_ptr<const GrowingRecording>()>;
   std::shared_ptr<Entry> entry_of(const FileMark& mark);
+  static std::shared_ptr<const GrowingRecording> find(Found& found, Walk& walk, const Make& make);
 
   std::mutex mutex_;
   std::list<std::shared_ptr<Entry>> entries_;  // the one asked for last is the first

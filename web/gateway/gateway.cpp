@@ -117,8 +117,8 @@ class Server : public Gateway, private ConnectionHost {
   }
   std::chrono::milliseconds request_time() const override { return options_.request_time; }
   std::chrono::milliseconds message_time() const override { return options_.message_time; }
-  void from_disk(std::function<void()> read, std::function<void()> done) override {
-    net::post(disk_, [this, read = std::move(read), done = std::move(done)]() mutable {
+  void from_disk(std::function<void()> read, std::function<void()> done, bool takes_long) override {
+    net::post(takes_long ? walks_ : disk_, [this, read = std::move(read), done = std::move(done)]() mutable {
       read();
       // `read` goes along: what it holds, the last of a session perhaps, ends on the loop's thread.
       net::post(io_, [read = std::move(read), done = std::move(done)] { done(); });
@@ -142,6 +142,7 @@ class Server : public Gateway, private ConnectionHost {
   net::io_context io_{1};
   CutRecordings cuts_;                   // outlives what reads them
   net::thread_pool disk_{kDiskThreads};  // waits for slow disks, so that the loop does not
+  net::thread_pool walks_{1};            // goes through long files, so that those do not
   std::unique_ptr<Listener> listener_;
   net::steady_timer shutdown_deadline_{io_};
   std::set<std::shared_ptr<Connection>> connections_;

@@ -208,8 +208,9 @@ void HttpSession::answer(HttpReply content, bool head, unsigned version, bool ke
       [self = shared_from_this(), made, headers = std::move(content.headers), head, version, keep_alive] {
         if (self->finished_) return;
         made->headers.insert(made->headers.end(), headers.begin(), headers.end());
-        self->reply(std::move(*made), head, version, keep_alive);
-      });
+        self->answer(std::move(*made), head, version, keep_alive);
+      },
+      content.takes_long);
 }
 
 void HttpSession::upgrade(const HttpReply& granted) {
@@ -267,7 +268,8 @@ void HttpSession::send_file(std::uint64_t offset, bool keep_alive) {
                    n] { *n = file->read(offset, self->file_bytes_); },
                   [self = shared_from_this(), offset, n, keep_alive] {
                     if (!self->finished_) self->send_part(offset, *n, keep_alive);
-                  });
+                  },
+                  false);
 }
 
 void HttpSession::send_part(std::uint64_t offset, std::size_t n, bool keep_alive) {

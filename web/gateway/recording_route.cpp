@@ -71,6 +71,7 @@ std::uint64_t growing_bytes(std::string_view etag, const struct stat& file) {
 struct Asked {
   OfferedRecording recording;
   CutRecordings& cuts;
+  Walk walk{};  // through its file
   bool of_folder = false;
   bool needs_token = false;
   std::string range, if_range, if_match, if_none_match;
@@ -105,34 +106,35 @@ std::optional<Version> version_now(const struct stat& file, const GrowingRecordi
 
 /// As version_with(), also of a file that is written no more. How that grew is read from itself: it may be
 /// another by now than its writer, which is done with it, remembers.
-std::optional<Version> version_with(const std::string& etag, const struct stat& file, const Asked& asked) {
+std::optional<Version> version_with(const std::string& etag, const struct stat& file, Asked& asked) {
   const OfferedRecording& recording = asked.recording;
   if (!recording.has_index) return version_with(etag, file, recording.growing.get());
   if (growing_bytes(etag, file) == 0) return std::nullopt;
-  return version_with(etag, file, asked.cuts.growth_of(recording.file, file).get());
+  return version_with(etag, file, asked.cuts.growth_of(recording.file, file, asked.walk).get());
 }
 
 /// What is to be read of a recording; nothing where it has only just been begun.
-std::optional<Version> version_of(const Asked& asked, const struct stat& file) {
+std::optional<Version> version_of(Asked& asked, const struct stat& file) {
   const OfferedRecording& recording = asked.recording;
   if (auto version = version_with(asked.if_range, file, asked)) return version;
   if (!recording.has_index) return version_now(file, recording.growing.get());
   const bool ended = has_end(recording.file);
-  if (const auto index = ended ? nullptr : asked.cuts.index_of(recording.file, file)) {
+  if (const auto index = ended ? nullptr : asked.cuts.index_of(recording.file, file, asked.walk)) {
     Version version{.whole = {index->bytes(), index->end_at(index->bytes())}, .etag = {}};
     version.etag = whole_etag(kCut, file, version.whole);
     return version;
   }
   // Not left for long enough to be cut: to who followed it, it is what it was.
   if (!ended && growing_bytes(asked.if_none_match, file) > 0)
-    if (auto version = version_now(file, asked.cuts.growth_of(recording.file, file).get())) return version;
+    if (auto version = version_now(file, asked.cuts.growth_of(recording.file, file, asked.walk).get()))
+      return version;
   const bool finished = recording.whole && (ended || !asked.of_folder);
   return Version{{static_cast<std::uint64_t>(file.st_size)}, etag_of(file), finished};
 }
 
 /// Whether who asks for what was added to a file that grew has the begin of another one, to which no part of
 /// this one belongs.
-bool has_another(const Asked& asked, const struct stat& file) {
+bool has_another(Asked& asked, const struct stat& file) {
   return asked.if_none_match.starts_with('"' + std::string(kGrowing) + '-') &&
          !version_with(asked.if_none_match, file, asked);
 }
@@ -180,7 +182,8 @@ HttpReply not_opened(int error, bool of_folder) {
   return text_reply(503, "the recording cannot be read: " + std::generic_category().message(error));
 }
 
-HttpReply reply_to(const Asked& asked) {
+/// By one after the other where a walk is needed, so that it is done once, and holds nobody else up.
+HttpReply reply_to(Asked asked) {
   const int follow = asked.of_folder ? O_NOFOLLOW : 0;  // what somebody links to from there is none of ours
   const int descriptor = open(asked.recording.file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | follow);
   struct stat status {};
@@ -190,6 +193,14 @@ HttpReply reply_to(const Asked& asked) {
     return text_reply(404, "the recording is gone");
   }
   const auto version = version_of(asked, status);
+  const bool of_another = asked.if_range.empty() && has_another(asked, status);
+  if (asked.walk.needed) {
+    close(descriptor);
+    asked.walk = {.allowed = true};
+    HttpReply reply = reply_from_disk([asked = std::move(asked)] { return reply_to(asked); });
+    reply.takes_long = true;
+    return reply;
+  }
   if (!version) {
     close(descriptor);
     return text_reply(404, "the recording has only just begun: ask again in a second");
@@ -200,7 +211,7 @@ HttpReply reply_to(const Asked& asked) {
   reply.content_type = "application/octet-stream";
   ByteRange range{0, size};
   RangeKind kind = RangeKind::kWhole;
-  const bool of_this = asked.if_range.empty() ? !has_another(asked, status) : asked.if_range == etag;
+  const bool of_this = asked.if_range.empty() ? !of_another : asked.if_range == etag;
   if (of_this) kind = parse_range(asked.range, size, range);
   const std::string of = "/" + std::to_string(size);
   const bool finished = version->finished && kind != RangeKind::kUnsatisfiable;

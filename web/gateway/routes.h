@@ -56,8 +56,9 @@ struct HttpReply {
   std::string_view fixed_body;           // instead of `body`: bytes that live as long as the program
   std::shared_ptr<const FilePart> file;  // instead of both
   // Makes the reply instead of all that is above, on a thread that may wait for a disk; not called where
-  // empty.
+  // empty. What it makes may be one to be made so, in turn.
   std::function<HttpReply()> from_disk;
+  bool takes_long = false;  // that, as long as reading a long file: one of these at a time
   std::vector<std::pair<std::string, std::string>> headers;  // in place of, or beside, those of every reply
   std::optional<WsTarget> websocket;                         // no reply: upgrade
   std::optional<Refusal> refusal;                            // to be counted

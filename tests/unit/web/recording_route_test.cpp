@@ -4,30 +4,37 @@
 #include "web/gateway/recording_route.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "codec/recording.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/web/gateway_fixture.h"
 #include "web/gateway/byte_range.h"
 
 namespace {
 std::mutex stuck_disk;
+std::atomic<ino_t> on_disk{0};  // the file that is alone there; 0: all are
 std::atomic<int> waiting_reads{0};
 }  // namespace
 
 // In place of the system's, for the gateway's reads of recordings.
 extern "C" ssize_t pread(int descriptor, void* into, size_t bytes, off_t offset) {
-  ++waiting_reads;
-  { const std::lock_guard lock(stuck_disk); }
-  --waiting_reads;
+  struct stat file {};
+  if (on_disk == 0 || (fstat(descriptor, &file) == 0 && file.st_ino == on_disk)) {
+    ++waiting_reads;
+    { const std::lock_guard lock(stuck_disk); }
+    --waiting_reads;
+  }
   return syscall(SYS_pread64, descriptor, into, bytes, offset);
 }
 
@@ -147,6 +154,47 @@ TEST_F(Recordings, ADiskTakesItsTime) {
   EXPECT_TRUE(eventually([] { return waiting_reads == 1; }));
   std::this_thread::sleep_for(600ms);
   stuck_disk.unlock();
+}
+
+// A long one that was cut short is gone through once, for all who ask for it, and nobody else waits.
+TEST_F(Recordings, OneIsIndexedForAllAndHoldsNobodyElseUp) {
+  const auto cut = folder / "cut.mcap";
+  {
+    auto writer = *RecordingWriter::create(cut, {.chunk_ns = 0, .keeps_name = true});
+    ASSERT_TRUE(writer->add_channel({"T", "omgidl", "struct T {};"}, {"t", "cdr", "T", {}}));
+    for (std::uint32_t i = 1; i <= 3; ++i) {
+      ASSERT_TRUE(writer->write({0, i, i, i, Bytes(1000, 7)}));
+      ASSERT_TRUE(writer->flush_if_due(i));
+    }
+    ASSERT_TRUE(writer->finish());
+  }
+  std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 100);
+  std::filesystem::last_write_time(cut, std::filesystem::last_write_time(cut) - std::chrono::hours(1));
+  gateway->announce(make_info("cut"));
+  gateway->offer("cut", {.file = cut, .whole = false});
+  struct stat status {};
+  ASSERT_EQ(stat(cut.c_str(), &status), 0);
+  on_disk = status.st_ino;
+  stuck_disk.lock();
+  {
+    std::promise<void> read;
+    std::vector<std::jthread> readers;
+    for (int i = 0; i < 4; ++i)
+      readers.emplace_back([&] {
+        const auto got = request(port, "GET", "/recordings/cut.mcap", "Range: bytes=0-9\r\n");
+        EXPECT_EQ(got.status, 206);
+        EXPECT_EQ(got.headers.at("etag").substr(0, 5), "\"cut-");
+      });
+    EXPECT_TRUE(eventually([] { return waiting_reads > 0; }));
+    readers.emplace_back([&] {
+      EXPECT_EQ(get().body, content);
+      read.set_value();
+    });
+    EXPECT_EQ(read.get_future().wait_for(kPatience / 6), std::future_status::ready);
+    EXPECT_EQ(waiting_reads, 1);
+    stuck_disk.unlock();
+  }
+  on_disk = 0;
 }
 
 TEST_F(Recordings, AreListedAndReadInParts) {
