@@ -86,12 +86,16 @@ FileMark mark_of(const struct stat& file) {
 }
 
 FileMark settled_mark_of(const std::filesystem::path& file) {
-  constexpr std::int64_t kTick_ns = 20'000'000;  // longer than any clock takes by which files' times go
   const FileMark mark = mark_of(file);
+  return let_settle(mark) ? mark_of(file) : mark;
+}
+
+bool let_settle(const FileMark& mark) {
+  constexpr std::int64_t kTick_ns = 20'000'000;  // longer than any clock takes by which files' times go
   const std::int64_t age_ns = utc_now_ns() - mark.time_ns;
-  if (age_ns < 0 || age_ns > kTick_ns) return mark;
+  if (age_ns < 0 || age_ns > kTick_ns) return false;
   std::this_thread::sleep_for(std::chrono::nanoseconds(kTick_ns - age_ns));
-  return mark_of(file);
+  return true;
 }
 
 Result<Tokens> Tokens::load(const std::filesystem::path& file) {

@@ -33,6 +33,8 @@ FileMark mark_of(const struct stat& file);
 /// leaves the same time, so this waits it out, 20 ms at most. Of a file that is being written there may be
 /// none.
 FileMark settled_mark_of(const std::filesystem::path& file);
+/// That wait; false where there was none.
+bool let_settle(const FileMark& mark);
 
 /// Tokens that open a gateway, from a file that may change.
 class Tokens {

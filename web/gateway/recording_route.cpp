@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "codec/mcap_records.h"
+#include "web/gateway/access.h"
 #include "web/gateway/byte_range.h"
 #include "web/gateway/cut_recordings.h"
 #include "web/gateway/entity_tag.h"
@@ -192,6 +193,8 @@ HttpReply reply_to(Asked asked) {
     close(descriptor);
     return text_reply(404, "the recording is gone");
   }
+  // Its tag is made of its time.
+  if (asked.recording.has_index && let_settle(mark_of(status))) static_cast<void>(fstat(descriptor, &status));
   const auto version = version_of(asked, status);
   const bool of_another = asked.if_range.empty() && has_another(asked, status);
   if (asked.walk.needed) {
