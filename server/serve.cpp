@@ -75,8 +75,11 @@ void say_which_encoder(const std::vector<StreamConfig>& streams) {
 /// What a running server cannot change.
 void say_what_waits(const ServeConfig& now, const ServeConfig& wanted) {
   std::string waits;
+  int count = 0;
   const auto compare = [&](const auto& a, const auto& b, const char* name) {
-    if (!(a == b)) waits += (waits.empty() ? "" : ", ") + std::string(name);
+    if (a == b) return;
+    waits += ", " + std::string(name);
+    ++count;
   };
   compare(now.domain, wanted.domain, "domain");
   compare(now.interface, wanted.interface, "interface");
@@ -86,7 +89,8 @@ void say_what_waits(const ServeConfig& now, const ServeConfig& wanted) {
   compare(now.record_folder, wanted.record_folder, "the recordings' folder");
   compare(now.pre_roll, wanted.pre_roll, "pre_roll");
   compare(now.projector, wanted.projector, "[projector]");
-  if (!waits.empty()) log_warning("of the new configuration, " + waits + " needs a restart");
+  if (count > 0)
+    log_warning("of the new configuration" + waits + (count > 1 ? " need" : " needs") + " a restart");
 }
 
 /// The folder that it is in is there, as find_mistake() has it.
@@ -107,7 +111,9 @@ Status reload(const ServeConfig& now, const ReadAgain& again, Gateway* gateway, 
   if (!wanted) return wanted.error();
   if (now.streams.empty() != wanted->streams.empty())
     return Error{"between one stream and tables [[stream]] the server must be restarted"};
-  if (const Status made = make_record_folder(*wanted); !made) return made;
+  if (wanted->record_folder == now.record_folder) {  // it may have gone; another one waits for a restart
+    if (const Status made = make_record_folder(*wanted); !made) return made;
+  }
   if (gateway != nullptr) {
     if (const Status applied = gateway->apply(wanted->gateway); !applied) return applied;
   }

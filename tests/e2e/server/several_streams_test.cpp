@@ -427,11 +427,15 @@ TEST_F(SeveralStreams, AReloadAppliesTokensAndSaysWhatNeedsARestart) {
   const std::string tables = table("left", "one") + table("right", "two");
   write(tables + "[gateway]\ntoken_file = \"" + (folder_ / "tokens").string() + "\"\n", "keys = \"none\"\n");
   ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
-  EXPECT_THAT(server.process().err(), HasSubstr("keys needs a restart"));
+  EXPECT_THAT(server.process().err(), HasSubstr(", keys needs a restart"));
   EXPECT_TRUE(eventually([&] { return request(server.port(), "GET", "/api/streams").status == 401; }));
   write(tables + "[gateway]\ntoken_file = \"/nowhere\"\n");
   ASSERT_TRUE(reloaded(server, "nothing was changed")) << server.process().err();
   EXPECT_EQ(request(server.port(), "GET", "/api/streams").status, 401);
+  write(tables + "[recording]\nfolder = \"" + (folder_ / "elsewhere").string() + "\"\npre_roll = \"1s\"\n");
+  ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
+  EXPECT_THAT(server.process().err(), HasSubstr(", the recordings' folder, pre_roll need a restart"));
+  EXPECT_FALSE(fs::exists(folder_ / "elsewhere")) << "nothing is recorded there yet";
   write(tables);
   ASSERT_TRUE(reloaded(server, "was read again")) << server.process().err();
   EXPECT_TRUE(eventually([&] { return request(server.port(), "GET", "/api/streams").status == 200; }));
