@@ -10,6 +10,7 @@
 #include "capture/pattern/schedule.h"
 #include "capture/reconstruct/rows.h"
 #include "capture/reconstruct/texture.h"
+#include "capture/reconstruct/white_rows.h"
 
 namespace relievo {
 namespace {
@@ -25,79 +26,6 @@ constexpr float kMostGain = 2;
 
 float mix(const std::array<float, 9>& m, std::size_t row, const float* rgb) {
   return m[3 * row] * rgb[0] + m[3 * row + 1] * rgb[1] + m[3 * row + 2] * rgb[2];
-}
-
-// The loops over every sample, compiled for wider registers too: the same operations, so the same results.
-#define RELIEVO_INLINE __attribute__((always_inline)) inline
-
-RELIEVO_INLINE void store_sum(const float* a, const float* b, int samples, std::uint8_t* to) {
-  for (int i = 0; i < samples; ++i)
-    to[i] = static_cast<std::uint8_t>(static_cast<int>(std::min(std::max(a[i] + b[i] + 0.5F, 0.F), 255.F)));
-}
-
-/// |a - b| of every sample, with one more at both ends like its neighbour: to[-1] to to[samples].
-RELIEVO_INLINE void differences(const std::uint8_t* a, const std::uint8_t* b, int samples, std::int16_t* to) {
-  for (int i = 0; i < samples; ++i) to[i] = static_cast<std::int16_t>(std::abs(a[i] - b[i]));
-  to[-1] = to[0];
-  to[samples] = to[samples - 1];
-}
-
-/// Between `above` and `below`, the nearer to the one whose differences are smaller; sums of three samples in
-/// a row, which for green are the pixel's own three.
-RELIEVO_INLINE void weigh(const float* above, const float* below, const std::int16_t* d_above,
-                          const std::int16_t* d_below, int samples, float* to) {
-  for (int i = 0; i < samples; ++i) {
-    const auto a = static_cast<float>(d_above[i - 1] + d_above[i] + d_above[i + 1]);
-    const auto b = static_cast<float>(d_below[i - 1] + d_below[i] + d_below[i + 1]);
-    const float fa = a * a + RowKernels::kAlike * RowKernels::kAlike;
-    const float fb = b * b + RowKernels::kAlike * RowKernels::kAlike;
-    to[i] = below[i] + fb / (fa + fb) * (above[i] - below[i]);
-  }
-}
-
-/// One row of an interlaced picture and those beside it.
-struct RowView {
-  const std::uint8_t *own, *field_above, *field_below;  // values of the row, and of the next of its own field
-  const float *above, *below;                           // light of the rows beside it, of the other field
-  int samples;
-};
-struct RowScratch {
-  std::int16_t *above, *below;
-};
-RELIEVO_INLINE void other_body(const RowView& row, const RowScratch& scratch, float* to) {
-  differences(row.own, row.field_above, row.samples, scratch.above);
-  differences(row.own, row.field_below, row.samples, scratch.below);
-  weigh(row.above, row.below, scratch.above, scratch.below, row.samples, to);
-}
-#undef RELIEVO_INLINE
-
-struct Loops {
-  void (*other)(const RowView& row, const RowScratch& scratch, float* to);  // the other field's light there
-  void (*store_sum)(const float* a, const float* b, int samples, std::uint8_t* to);
-};
-void other_portable(const RowView& row, const RowScratch& scratch, float* to) {
-  other_body(row, scratch, to);
-}
-void store_sum_portable(const float* a, const float* b, int samples, std::uint8_t* to) {
-  store_sum(a, b, samples, to);
-}
-#if defined(__x86_64__)
-[[gnu::target("avx2")]] void other_avx2(const RowView& row, const RowScratch& scratch, float* to) {
-  other_body(row, scratch, to);
-}
-[[gnu::target("avx2")]] void store_sum_avx2(const float* a, const float* b, int samples, std::uint8_t* to) {
-  store_sum(a, b, samples, to);
-}
-#endif
-
-const Loops& loops() {
-  static const Loops best = [] {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) return Loops{other_avx2, store_sum_avx2};
-#endif
-    return Loops{other_portable, store_sum_portable};
-  }();
-  return best;
 }
 
 }  // namespace
@@ -185,7 +113,7 @@ void WhiteTexture::level(float* row, int width) const {
 void WhiteTexture::store_sum(const Scratch& scratch, int samples, std::uint8_t* to) const {
   const float* own = scratch.own.data();
   const float* other = scratch.other.data();
-  if (response_.is_straight()) return loops().store_sum(own, other, samples, to);
+  if (response_.is_straight()) return white_kernels().store_sum(own, other, samples, to);
   for (int i = 0; i < samples; ++i) to[i] = response_.value_of(own[i] + other[i]);
 }
 
@@ -218,8 +146,8 @@ void WhiteTexture::interlaced_row(const CapturedFrame& frame, int y, Scratch& sc
     response_.light_of(row, 3 * width, to.data());
     return to.data();
   };
-  loops().other(
-      {own, field_above, field_below, light(above, scratch.own), light(below, scratch.beside), 3 * width},
+  white_kernels().other_field(
+      {own, field_above, field_below, light(above, scratch.own), light(below, scratch.beside)}, 3 * width,
       {scratch.above.data() + 1, scratch.below.data() + 1}, scratch.other.data());
   light(own, scratch.own);
   if (level_)
