@@ -75,10 +75,11 @@ bool doubtful(const float* column, std::ptrdiff_t line, float sigma_px, float mo
 
 }  // namespace
 
-std::size_t give_up_doubtful(const MovingPlaces& moving, WorkerPool& pool, DecodedGrid& grid) {
+std::size_t give_up_doubtful(const MovingPlaces& moving, int width, WorkerPool& pool, DecodedGrid& grid) {
   constexpr float kGivenUp = std::numeric_limits<float>::infinity();  // a standard deviation
   const std::ptrdiff_t next_line = grid.column_px(1) - grid.column_px(0);
   const float wide_px = wide_stripe_px(grid);
+  const auto last_px = static_cast<float>(width - 1);
   std::atomic<std::size_t> given_up{0};
   // All are judged before any is taken away.
   pool.for_ranges(grid.lines(), [&](int begin, int end, int) {
@@ -87,6 +88,7 @@ std::size_t give_up_doubtful(const MovingPlaces& moving, WorkerPool& pool, Decod
       for (int b = 0; b < grid.boundaries(); ++b) {
         const float column_px = row.column_px[b];
         const float sigma_px = row.sigma_px[b];
+        if (column_px < 0 || column_px > last_px) row.sigma_px[b] = kGivenUp;
         if (column_px != column_px || sigma_px < kSure_px) continue;
         const float most_px = moving.around(line, column_px) >= kMoves ? kMostMoving_px : kMost_px;
         if (doubtful(row.column_px + b, next_line, sigma_px, most_px, wide_px)) row.sigma_px[b] = kGivenUp;

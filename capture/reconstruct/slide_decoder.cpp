@@ -243,7 +243,7 @@ void SlideDecoder::State::decode_quickly(const CapturedFrame& pair, WorkerPool& 
   recovered.clear();
   const std::size_t carried = persistence.carry(moving, pool, places, recovered);
   const std::size_t weighed = weigh(places, pool, out);
-  const std::size_t doubtful = give_up_doubtful(moving, pool, out);
+  const std::size_t doubtful = give_up_doubtful(moving, newer.quick.width, pool, out);
   smooth_across(pool, out);
   report.filters.unsupported = quick_counts.unsupported;
   report.filters.completed = quick_counts.completed;
@@ -419,7 +419,7 @@ bool SlideDecoder::decode(const SlideView& view, WorkerPool& pool, ReconstructRe
   // Without an earlier frame under the slide nothing tells what moves.
   if (clear && s.have_same) s.look_again(rows, pool, report);
   report.filters.duplicate = s.fill(pool, out);
-  report.filters.rejected += give_up_doubtful(s.moving, pool, out);
+  report.filters.rejected += give_up_doubtful(s.moving, s.newer.difference.width, pool, out);
   smooth_across(pool, out);
   if (clear) {
     const std::size_t second =

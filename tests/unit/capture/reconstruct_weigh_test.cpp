@@ -118,7 +118,7 @@ std::size_t doubtful(Frame& f, DecodedGrid& grid) {
       if (f.result.boundary[Frame::at(line, b)] >= 0) grid.put(line, b, e.column_px, e.sigma_px, 1);
     }
   }
-  return give_up_doubtful(f.moving(), f.pool, grid);
+  return give_up_doubtful(f.moving(), kWidth_px, f.pool, grid);
 }
 bool known(const DecodedGrid& grid, int line, int boundary) {
   return grid.column_px(line)[boundary] == grid.column_px(line)[boundary];
@@ -135,6 +135,23 @@ TEST(Doubtful, WhatIsOutOfLineWithLittleToTellItsPlace) {
   EXPECT_EQ(doubtful(f, grid), 1U);
   EXPECT_FALSE(known(grid, 7, 5));
   EXPECT_TRUE(known(grid, 13, 3));
+}
+
+// To where its motion between the fields, or its neighbours', has carried it: a stream has no place for it.
+TEST(Doubtful, WhatIsBesideThePicture) {
+  DecodedGrid grid;
+  Frame f;
+  for (int line = 0; line < kLines; ++line) {
+    f.move(line, 0, -Frame::place(line, 0), 0.02F);
+    f.move(line, kBoundaries - 1, static_cast<float>(kWidth_px - 1) - Frame::place(line, kBoundaries - 1),
+           0.02F);
+  }
+  EXPECT_EQ(doubtful(f, grid), 0U) << "the first and the last column";
+  f.move(7, 0, -0.1F, 0.02F);
+  f.move(13, kBoundaries - 1, 0.1F, 0.3F);
+  EXPECT_EQ(doubtful(f, grid), 2U);
+  EXPECT_FALSE(known(grid, 7, 0));
+  EXPECT_FALSE(known(grid, 13, kBoundaries - 1));
 }
 
 TEST(Doubtful, WhereThingsMoveSooner) {
