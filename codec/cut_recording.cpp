@@ -74,11 +74,13 @@ std::optional<mcap::AttachmentIndex> read_whole(const mcap::File& file, mcap::At
 
 }  // namespace
 
-Result<std::shared_ptr<const GrowingRecording>> index_cut_recording(const std::filesystem::path& path) {
-  const auto file = mcap::File::open(path);
+Result<std::shared_ptr<const GrowingRecording>> index_cut_recording(const std::filesystem::path& path,
+                                                                    const std::atomic<bool>* stop) {
+  const auto file = mcap::File::open(path, stop);
   if (!file) return file.error();
   auto found = mcap::read_contents(**file, mcap::ReadContents::kByIndex);
   if (!found) return found.error();
+  if (stop != nullptr && *stop) return Error{"reading " + path.string() + " was stopped"};
   const std::shared_ptr<const GrowingRecording> none;
   mcap::Contents& contents = found->front();
   auto& chunks = contents.chunks;

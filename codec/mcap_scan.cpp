@@ -130,7 +130,7 @@ bool Contents::add(const std::optional<Channel>& channel) {
   return channel.has_value();
 }
 
-Result<std::unique_ptr<File>> File::open(const std::filesystem::path& path) {
+Result<std::unique_ptr<File>> File::open(const std::filesystem::path& path, const std::atomic<bool>* stop) {
   const auto handle = open_file_to_read(path);
   if (!handle) return handle.error();
   struct stat info {};
@@ -138,7 +138,8 @@ Result<std::unique_ptr<File>> File::open(const std::filesystem::path& path) {
     ::close(*handle);
     return Error{"cannot read " + path.string() + ": " + std::generic_category().message(errno)};
   }
-  return std::unique_ptr<File>(new File(*handle, path.string(), static_cast<std::uint64_t>(info.st_size)));
+  return std::unique_ptr<File>(
+      new File(*handle, path.string(), static_cast<std::uint64_t>(info.st_size), stop));
 }
 
 File::~File() {
@@ -149,6 +150,7 @@ Result<Bytes> File::read(std::uint64_t offset, std::uint64_t length) const {
   if (offset > size_ || length > size_ - offset)
     return Error{"bytes " + std::to_string(offset) + " to " + std::to_string(offset) + " + " +
                  std::to_string(length) + " are behind the end of the file"};
+  if (stop_ != nullptr && *stop_) return Error{"reading " + name_ + " was stopped"};
   Bytes bytes(static_cast<std::size_t>(length));
   std::size_t done = 0;
   while (done < bytes.size()) {

@@ -2,6 +2,7 @@
 // What an MCAP file holds: from its index or, where that is missing, by going through it.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -19,7 +20,9 @@ namespace relievo::mcap {
 /// A file opened for reading. Any offset and length may be asked for. One thread.
 class File {
  public:
-  static Result<std::unique_ptr<File>> open(const std::filesystem::path& path);
+  /// `stop`, where there is one, outlives it: once it is set nothing is read any more.
+  static Result<std::unique_ptr<File>> open(const std::filesystem::path& path,
+                                            const std::atomic<bool>* stop = nullptr);
   ~File();
   File(const File&) = delete;
   File& operator=(const File&) = delete;
@@ -31,12 +34,13 @@ class File {
   std::uint64_t bytes_read() const { return bytes_read_; }  // by read() so far
 
  private:
-  File(int handle, std::string name, std::uint64_t size)
-      : handle_(handle), name_(std::move(name)), size_(size) {}
+  File(int handle, std::string name, std::uint64_t size, const std::atomic<bool>* stop)
+      : handle_(handle), name_(std::move(name)), size_(size), stop_(stop) {}
 
   const int handle_;
   const std::string name_;
   const std::uint64_t size_;
+  const std::atomic<bool>* const stop_;
   mutable std::uint64_t bytes_read_ = 0;
 };
 

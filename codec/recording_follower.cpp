@@ -16,7 +16,7 @@ constexpr std::uint64_t kChunkHeadBytes = mcap::kRecordHeaderBytes + 3 * 8 + 4; 
 }  // namespace
 
 Result<RecordingFollower::Found> RecordingFollower::look() {
-  const auto file = mcap::File::open(file_);
+  const auto file = mcap::File::open(file_, stop_);
   if (!file) return finished_ ? Result<Found>(Found::kFinished) : file.error();
   const std::uint64_t size = (*file)->size();
   if (size >= at_ && !(is_there(first_, **file) && is_there(last_, **file))) return Found::kAnother;

@@ -3,6 +3,7 @@
 // whole.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -26,7 +27,9 @@ class RecordingFollower {
     kAnother,   // recording is there in its place: this one is done with
   };
 
-  explicit RecordingFollower(std::filesystem::path file) : file_(std::move(file)) {}
+  /// `stop`, where there is one, outlives it: once it is set, look() fails soon.
+  explicit RecordingFollower(std::filesystem::path file, const std::atomic<bool>* stop = nullptr)
+      : file_(std::move(file)), stop_(stop) {}
 
   /// Reads what was added since the last call; to be called every few tenths of a second. A chunk counts when
   /// something is behind it, or nothing came since the call before: its message indexes come after it. Fails
@@ -48,6 +51,7 @@ class RecordingFollower {
   void commit();
 
   const std::filesystem::path file_;
+  const std::atomic<bool>* const stop_;
   std::uint64_t at_ = 0;    // how far it was read: whole records
   std::uint64_t size_ = 0;  // when it was last looked at
   bool behind_data_ = false, has_footer_ = false, finished_ = false;

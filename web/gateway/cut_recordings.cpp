@@ -48,7 +48,8 @@ std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::files
   const FileMark mark = mark_of(status);
   if (std::abs(utc_now_ns() - mark.time_ns) < kLeft_ns) return nullptr;
   return find(entry_of(mark)->index, walk, [&] {
-    const auto index = index_cut_recording(file);
+    const auto index = index_cut_recording(file, &stopped_);
+    if (stopped_) return std::shared_ptr<const GrowingRecording>();
     const auto found = index ? *index : nullptr;
     const std::string advice = "; `relievo recover` makes a sound copy";
     if (found)
@@ -64,7 +65,7 @@ std::shared_ptr<const GrowingRecording> CutRecordings::index_of(const std::files
 std::shared_ptr<const GrowingRecording> CutRecordings::growth_of(const std::filesystem::path& file,
                                                                  const struct stat& status, Walk& walk) {
   return find(entry_of(mark_of(status))->growth, walk, [&] {
-    RecordingFollower follower(file);
+    RecordingFollower follower(file, &stopped_);
     // The second time for the last chunk, with nothing behind it. What is damaged ends what there is.
     if (follower.look()) static_cast<void>(follower.look().ok());
     return follower.growing();

@@ -3,6 +3,7 @@
 // files stay as they are.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -34,6 +35,9 @@ class CutRecordings {
   std::shared_ptr<const GrowingRecording> growth_of(const std::filesystem::path& file,
                                                     const struct stat& status, Walk& walk);
 
+  /// Ends what is being made, for a gateway that stops: nothing is found any more.
+  void stop() { stopped_ = true; }
+
  private:
   /// Made by one, while who may not walk goes on.
   struct Found {
@@ -49,6 +53,7 @@ class CutRecordings {
   std::shared_ptr<Entry> entry_of(const FileMark& mark);
   static std::shared_ptr<const GrowingRecording> find(Found& found, Walk& walk, const Make& make);
 
+  std::atomic<bool> stopped_ = false;
   std::mutex mutex_;
   std::list<std::shared_ptr<Entry>> entries_;  // the one asked for last is the first
 };

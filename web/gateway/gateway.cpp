@@ -293,6 +293,7 @@ void Server::remove(const std::shared_ptr<Connection>& connection) {
 
 void Server::shut_down() {
   stopping_ = true;
+  cuts_.stop();
   listener_->close();
   const auto closing = connections_;  // each leaves the set as it closes
   for (const auto& connection : closing) connection->close();

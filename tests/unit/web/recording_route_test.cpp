@@ -25,6 +25,7 @@ namespace {
 std::mutex stuck_disk;
 std::atomic<ino_t> on_disk{0};  // the file that is alone there; 0: all are
 std::atomic<int> waiting_reads{0};
+std::atomic<bool> slow_disk{false};
 }  // namespace
 
 // In place of the system's, for the gateway's reads of recordings.
@@ -33,6 +34,7 @@ extern "C" ssize_t pread(int descriptor, void* into, size_t bytes, off_t offset)
   if (on_disk == 0 || (fstat(descriptor, &file) == 0 && file.st_ino == on_disk)) {
     ++waiting_reads;
     { const std::lock_guard lock(stuck_disk); }
+    if (slow_disk) std::this_thread::sleep_for(std::chrono::milliseconds(20));
     --waiting_reads;
   }
   return syscall(SYS_pread64, descriptor, into, bytes, offset);
@@ -90,6 +92,26 @@ class Recordings : public GatewayTest {
   }
   Response get(const std::string& headers = {}) {
     return request(port, "GET", "/recordings/face.mcap", headers);
+  }
+  /// As "cut", a recording without an end, that is alone on the disk.
+  void offer_cut(std::uint32_t chunks) {
+    const auto cut = folder / "cut.mcap";
+    {
+      auto writer = *RecordingWriter::create(cut, {.chunk_ns = 0, .sync_ns = -1});
+      ASSERT_TRUE(writer->add_channel({"T", "omgidl", "struct T {};"}, {"t", "cdr", "T", {}}));
+      for (std::uint32_t i = 1; i <= chunks; ++i) {
+        ASSERT_TRUE(writer->write({0, i, i, i, Bytes(1000, 7)}));
+        ASSERT_TRUE(writer->flush_if_due(i));
+      }
+      ASSERT_TRUE(writer->finish());
+    }
+    std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 100);
+    std::filesystem::last_write_time(cut, std::filesystem::last_write_time(cut) - std::chrono::hours(1));
+    gateway->announce(make_info("cut"));
+    gateway->offer("cut", {.file = cut, .whole = false});
+    struct stat status {};
+    ASSERT_EQ(stat(cut.c_str(), &status), 0);
+    on_disk = status.st_ino;
   }
 
   TempFolder folder;
@@ -158,23 +180,7 @@ TEST_F(Recordings, ADiskTakesItsTime) {
 
 // A long one that was cut short is gone through once, for all who ask for it, and nobody else waits.
 TEST_F(Recordings, OneIsIndexedForAllAndHoldsNobodyElseUp) {
-  const auto cut = folder / "cut.mcap";
-  {
-    auto writer = *RecordingWriter::create(cut, {.chunk_ns = 0, .keeps_name = true});
-    ASSERT_TRUE(writer->add_channel({"T", "omgidl", "struct T {};"}, {"t", "cdr", "T", {}}));
-    for (std::uint32_t i = 1; i <= 3; ++i) {
-      ASSERT_TRUE(writer->write({0, i, i, i, Bytes(1000, 7)}));
-      ASSERT_TRUE(writer->flush_if_due(i));
-    }
-    ASSERT_TRUE(writer->finish());
-  }
-  std::filesystem::resize_file(cut, std::filesystem::file_size(cut) - 100);
-  std::filesystem::last_write_time(cut, std::filesystem::last_write_time(cut) - std::chrono::hours(1));
-  gateway->announce(make_info("cut"));
-  gateway->offer("cut", {.file = cut, .whole = false});
-  struct stat status {};
-  ASSERT_EQ(stat(cut.c_str(), &status), 0);
-  on_disk = status.st_ino;
+  offer_cut(3);
   stuck_disk.lock();
   {
     std::promise<void> read;
@@ -194,6 +200,20 @@ TEST_F(Recordings, OneIsIndexedForAllAndHoldsNobodyElseUp) {
     EXPECT_EQ(waiting_reads, 1);
     stuck_disk.unlock();
   }
+  on_disk = 0;
+}
+
+// Going through one may take half an hour: who ends the server does not wait for that.
+TEST_F(Recordings, AWalkEndsWithTheGateway) {
+  offer_cut(3000);
+  slow_disk = true;
+  TcpClient asks(port);
+  asks.send("GET /recordings/cut.mcap HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+  EXPECT_TRUE(eventually([] { return waiting_reads > 0; }));
+  const auto begin = std::chrono::steady_clock::now();
+  gateway.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kPatience / 6);
+  slow_disk = false;
   on_disk = 0;
 }
 
