@@ -61,10 +61,11 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
   void send_part(std::uint64_t offset, std::size_t n, bool keep_alive);
   void on_replied(bool keep_alive);
   void on_failed(Io io, Refusal why);
+  void wait_for_disk(std::function<void()> read, std::function<void()> done, bool takes_long = false);
   void finish();
 
   ConnectionHost& host_;
-  const std::shared_ptr<Transport> transport_;
+  std::shared_ptr<Transport> transport_;  // until finished
   const std::shared_ptr<net::ssl::context> tls_;
   beast::flat_buffer buffer_{kHeaderLimit + kBodyLimit + kReadAtOnce};
   std::optional<http::request_parser<http::string_body>> parser_;
@@ -82,6 +83,7 @@ class HttpSession : public HttpConnection, public std::enable_shared_from_this<H
 void HttpSession::start() {
   transport_->expire_after(host_.request_time());
   transport_->handshake(tls_, [self = shared_from_this()](Io io) {
+    if (self->finished_) return;
     if (io != Io::kDone) return self->on_failed(io, Refusal::kTls);
     self->await_request();
   });
@@ -201,16 +203,24 @@ void HttpSession::on_request() {
 
 void HttpSession::answer(HttpReply content, bool head, unsigned version, bool keep_alive) {
   if (!content.from_disk) return reply(std::move(content), head, version, keep_alive);
-  transport_->expire_never();  // the disk is waited for, not the client
   const auto made = std::make_shared<HttpReply>();
-  host_.from_disk(
-      [self = shared_from_this(), make = std::move(content.from_disk), made] { *made = make(); },
-      [self = shared_from_this(), made, headers = std::move(content.headers), head, version, keep_alive] {
-        if (self->finished_) return;
-        made->headers.insert(made->headers.end(), headers.begin(), headers.end());
-        self->answer(std::move(*made), head, version, keep_alive);
-      },
-      content.takes_long);
+  wait_for_disk([make = std::move(content.from_disk), made] { *made = make(); },
+                [this, made, headers = std::move(content.headers), head, version, keep_alive] {
+                  made->headers.insert(made->headers.end(), headers.begin(), headers.end());
+                  answer(std::move(*made), head, version, keep_alive);
+                },
+                content.takes_long);
+}
+
+/// Not for the client, which has time until then, but is let go where it leaves.
+void HttpSession::wait_for_disk(std::function<void()> read, std::function<void()> done, bool takes_long) {
+  const auto self = shared_from_this();
+  transport_->expire_where_left(host_.request_time(), [self] { self->finish(); });
+  host_.from_disk([self, read = std::move(read)] { read(); },
+                  [self, done = std::move(done)] {
+                    if (!self->finished_) done();
+                  },
+                  takes_long);
 }
 
 void HttpSession::upgrade(const HttpReply& granted) {
@@ -262,14 +272,9 @@ void HttpSession::send_file(std::uint64_t offset, bool keep_alive) {
     return on_replied(keep_alive);
   }
   file_bytes_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kFileAtOnce, left)));
-  transport_->expire_never();  // as in answer()
   const auto n = std::make_shared<std::size_t>(0);
-  host_.from_disk([self = shared_from_this(), file = content_.file, offset,
-                   n] { *n = file->read(offset, self->file_bytes_); },
-                  [self = shared_from_this(), offset, n, keep_alive] {
-                    if (!self->finished_) self->send_part(offset, *n, keep_alive);
-                  },
-                  false);
+  wait_for_disk([this, file = content_.file, offset, n] { *n = file->read(offset, file_bytes_); },
+                [this, offset, n, keep_alive] { send_part(offset, *n, keep_alive); });
 }
 
 void HttpSession::send_part(std::uint64_t offset, std::size_t n, bool keep_alive) {
@@ -305,6 +310,7 @@ void HttpSession::on_failed(Io io, Refusal why) {
 void HttpSession::finish() {
   if (std::exchange(finished_, true)) return;
   transport_->close();
+  transport_.reset();  // and its place, whatever the disk keeps
   host_.remove(shared_from_this());
 }
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "web/gateway/acknowledged_bytes.h"
+#include "web/gateway/tcp_state.h"
 
 namespace relievo {
 namespace {
@@ -59,6 +59,7 @@ class TcpTransport : public Transport, public std::enable_shared_from_this<TcpTr
     set_deadline(time, acknowledged_bytes(socket_.native_handle()));
   }
   void expire_never() override;
+  void expire_where_left(std::chrono::milliseconds time, std::function<void()> left) override;
   void linger(std::function<void()> done) override;
   void close() override;
   const Peer& peer() const override { return peer_; }
@@ -145,6 +146,17 @@ void TcpTransport::set_deadline(std::chrono::milliseconds time, std::optional<st
 void TcpTransport::expire_never() {
   ++deadline_;
   timer_.cancel();
+}
+
+void TcpTransport::expire_where_left(std::chrono::milliseconds time, std::function<void()> left) {
+  const std::uint64_t deadline = ++deadline_;
+  timer_.expires_after(time);
+  timer_.async_wait([weak = weak_from_this(), deadline, time, left = std::move(left)](ErrorCode error) {
+    const auto self = weak.lock();
+    if (error || !self || self->deadline_ != deadline) return;
+    if (!has_left(self->socket_.native_handle())) return self->expire_where_left(time, left);
+    left();
+  });
 }
 
 void TcpTransport::linger(std::function<void()> done) {

@@ -56,6 +56,9 @@ class Transport {
   /// then.
   virtual void expire_where_stuck(std::chrono::milliseconds time) = 0;
   virtual void expire_never() = 0;
+  /// The same; but `left` is called, once, where the client is found to have left: it is looked every `time`,
+  /// until another of these calls.
+  virtual void expire_where_left(std::chrono::milliseconds time, std::function<void()> left) = 0;
 
   /// Says that nothing more is sent, and waits, a second at most, until the client closes too: closing with
   /// unread bytes would reset the connection, and the client might never read the last answer.

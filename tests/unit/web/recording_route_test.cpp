@@ -217,6 +217,24 @@ TEST_F(Recordings, AWalkEndsWithTheGateway) {
   on_disk = 0;
 }
 
+// A page that asks again and again while a disk stands still would use up all that its address may have.
+TEST_F(Recordings, WhoLeavesBeforeTheDiskAnswersLeavesTheirPlaces) {
+  start({.port = 0, .web = {.max_per_address = 3}, .request_time = 300ms});
+  gateway->announce(make_info());
+  gateway->offer("face", {.file = file});
+  stuck_disk.lock();
+  {
+    std::vector<TcpClient> leave;
+    for (int i = 0; i < 3; ++i) {
+      leave.emplace_back(port).send("GET /recordings/face.mcap HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+      EXPECT_TRUE(eventually([&] { return waiting_reads == std::min(i + 1, 2); }));
+    }
+    EXPECT_NE(request(port, "GET", "/healthz").status, 200) << "they are there yet";
+  }
+  EXPECT_TRUE(eventually([&] { return request(port, "GET", "/healthz").status == 200; }, kPatience / 4));
+  stuck_disk.unlock();
+}
+
 TEST_F(Recordings, AreListedAndReadInParts) {
   const auto stream = nlohmann::json::parse(request(port, "GET", "/api/streams").body)["streams"][0];
   EXPECT_EQ(stream["recording"], "recordings/face.mcap");
