@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <filesystem>
 #include <optional>
 
 namespace relievo {
@@ -29,13 +28,6 @@ CLI::Option* add_size_option(CLI::App& app, const std::string& names, Size& size
       ->check([](const std::string& text) {
         return parse_size(text) ? std::string() : text + " is no size such as 1024x768";
       });
-}
-
-Status make_folder(const std::string& folder) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) return Error{"cannot make the folder " + folder + ": " + failed.message()};
-  return {};
 }
 
 }  // namespace relievo

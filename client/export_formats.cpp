@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/export_formats.h"
 
+#include <optional>
 #include <string>
 
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "client/picture_video.h"
 #include "client/ros/bag.h"
@@ -18,15 +20,17 @@ namespace {
 namespace fs = std::filesystem;
 using Made = Result<std::unique_ptr<ExportWriter>>;
 
-/// A file a frame, by FrameNames. The folder comes with the first, so that a failure leaves no empty one.
+/// A file a frame, by FrameNames. The folder comes with the first.
 class FolderWriter : public ExportWriter {
  public:
   explicit FolderWriter(fs::path folder) : folder_(std::move(folder)) {}
 
   Status add(const Frame3D& frame, std::span<const std::uint8_t>) override {
-    std::error_code error;
-    fs::create_directories(folder_, error);
-    if (error) return Error{"cannot make the folder " + folder_.string() + ": " + error.message()};
+    if (!made_) {
+      auto made = NewFolder::create(folder_);
+      if (!made) return made.error();
+      made_.emplace(*std::move(made));
+    }
     return write(folder_, names_.name(frame), frame);
   }
 
@@ -34,6 +38,7 @@ class FolderWriter : public ExportWriter {
   virtual Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) = 0;
 
   fs::path folder_;
+  std::optional<NewFolder> made_;
   FrameNames names_;
 };
 

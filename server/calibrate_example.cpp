@@ -8,6 +8,7 @@
 
 #include "base/json_text.h"
 #include "base/log.h"
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/board_scene.h"
 #include "capture/calibrate/colour.h"
@@ -16,7 +17,6 @@
 #include "capture/pattern/bcsl.h"
 #include "capture/source/sim/renderer.h"
 #include "cli/progress.h"
-#include "cli/size_option.h"
 #include "server/calibrate_commands.h"
 
 namespace relievo {
@@ -79,7 +79,8 @@ Status run(const Options& options, StopSignal& stop) {
                  " has views of an earlier run, which would be calibrated with these: give a new folder or "
                  "remove it"};
   }
-  if (const Status made = make_folder(out / "views"); !made) return made;
+  const auto views = NewFolder::create(out / "views");
+  if (!views) return views.error();
   if (stripes) {
     const Status written = write_whole_file(out / "views" / "pattern.yaml", to_yaml(*stripes));
     if (!written) return written;
@@ -94,7 +95,8 @@ Status run(const Options& options, StopSignal& stop) {
     char name[32];
     std::snprintf(name, sizeof name, "view_%02d", i);
     const fs::path folder = out / "views" / name;
-    if (const Status made = make_folder(folder); !made) return made;
+    const auto made = NewFolder::create(folder);
+    if (!made) return made.error();
     const Status written =
         stripes
             ? write_stripe_view(folder, render_stripe_view(rig, *board, pose, *stripes, spec->defocus, how))
@@ -106,7 +108,8 @@ Status run(const Options& options, StopSignal& stop) {
     log_info("stopped: a part of the views is in " + options.out);
     return {};
   }
-  if (const Status made = make_folder(out / "colours"); !made) return made;
+  const auto colours = NewFolder::create(out / "colours");
+  if (!colours) return colours.error();
   for (Primary colour = 0; colour < 8; ++colour) {
     const Image8 picture = render_colour_capture(
         rig, colour, distance_m, {.noise = spec->noise, .ambient = spec->ambient, .seed = options.seed});

@@ -10,6 +10,7 @@
 
 #include "base/json_text.h"
 #include "base/log.h"
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/compare_rigs.h"
 #include "capture/calibrate/coverage.h"
@@ -224,9 +225,12 @@ Status run(const Options& options, StopSignal& stop) {
     if (!read) return read.error();
     reference = *read;
   }
+  std::optional<NewFolder> pictures;
   if (!options.pictures.empty()) {
     if (const Status apart = check_no_view(options.pictures, options.views); !apart) return apart;
-    if (const Status made = make_folder(options.pictures); !made) return made;
+    auto made = NewFolder::create(options.pictures);
+    if (!made) return made.error();
+    pictures.emplace(*std::move(made));
   }
   const std::string out = options.out.empty() ? options.update : options.out;
   ViewCode code{.stripes = {}, .projector = options.projector};

@@ -10,6 +10,7 @@
 
 #include "base/counted.h"
 #include "base/log.h"
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/colour.h"
 #include "capture/calibrate/coverage.h"
@@ -96,7 +97,8 @@ class ViewTaker {
     if (!view.refused.empty()) return not_used(view.refused);
     if (coverage_.repeats(view)) return not_used("the board is where it was in a view before; move it");
     const fs::path folder = fs::path(options_.folder) / name;
-    if (const Status made = make_folder(folder); !made) return made.error();
+    const auto made = NewFolder::create(folder);
+    if (!made) return made.error();
     if (const Status written = write_stripe_view(folder, *stack); !written) {
       std::error_code ignored;
       fs::remove_all(folder, ignored);  // this run's own: a part of it would be no view
@@ -146,7 +148,8 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
   if (info.rig.projector.width == 0) {
     return Error{options.source + " does not know the projector: give its size with --projector"};
   }
-  if (const Status made = make_folder(options.folder); !made) return made.error();
+  const auto folder = NewFolder::create(options.folder);
+  if (!folder) return folder.error();
   const fs::path pattern = fs::path(options.folder) / "pattern.yaml";
   std::error_code ignored;
   if (fs::exists(pattern, ignored)) {
@@ -198,7 +201,8 @@ Result<SourceInfo> take_board_views(const LiveOptions& options, const Board& boa
 Status take_colour_captures(const LiveOptions& options, StopSignal& stop) {
   auto source = open_source(options.source, {.camera = options.camera});
   if (!source) return source.error();
-  if (const Status made = make_folder(options.folder); !made) return made;
+  const auto folder = NewFolder::create(options.folder);
+  if (!folder) return folder.error();
   Progress progress("calibrate", "frames");
   bool done = false;
   const StoppedSource ended(**source, stop);

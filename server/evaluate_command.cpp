@@ -340,7 +340,7 @@ Status run(const Options& options, StopSignal& stop) {
     if (const Status apart = check_apart(options.pictures, options.take); !apart) return apart;
     auto made = EvaluationPictures::create(options.pictures, reconstructor->rig(), reconstructor->pattern());
     if (!made) return made.error();
-    judges.pictures = *std::move(made);
+    judges.pictures.emplace(*std::move(made));
   }
 
   Evaluation evaluation(options, info, *reconstructor, judges);

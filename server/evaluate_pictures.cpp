@@ -99,10 +99,9 @@ CapturedFrame in_light(const CapturedFrame& frame, const Rig& rig) {
 
 Result<EvaluationPictures> EvaluationPictures::create(const std::filesystem::path& folder, const Rig& rig,
                                                       const Pattern& pattern) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) return Error{"cannot make the folder " + folder.string() + ": " + failed.message()};
-  return EvaluationPictures(folder, rig, pattern);
+  auto made = NewFolder::create(folder);
+  if (!made) return made.error();
+  return EvaluationPictures(folder, *std::move(made), rig, pattern);
 }
 
 Status EvaluationPictures::add(const CapturedFrame& frame, int slide, const Frame3D& result,

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/filter_counts.h"
+#include "base/new_folder.h"
 #include "base/result.h"
 #include "capture/evaluate/pictures.h"
 #include "capture/evaluate/score.h"
@@ -32,10 +33,11 @@ class EvaluationPictures {
     std::size_t vertices, wrong, boundaries, found;
     double median_um_per_m;
   };
-  EvaluationPictures(std::filesystem::path folder, const Rig& rig, const Pattern& pattern)
-      : folder_(std::move(folder)), rig_(rig), pattern_(pattern) {}
+  EvaluationPictures(std::filesystem::path folder, NewFolder made, const Rig& rig, const Pattern& pattern)
+      : folder_(std::move(folder)), made_(std::move(made)), rig_(rig), pattern_(pattern) {}
 
   std::filesystem::path folder_;
+  NewFolder made_;
   Rig rig_;
   Pattern pattern_;
   std::vector<Page> pages_;

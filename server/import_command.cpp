@@ -9,6 +9,7 @@
 
 #include "base/json_text.h"
 #include "base/log.h"
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
@@ -245,7 +246,8 @@ Status run(const Options& options, StopSignal& stop) {
     report.reference_points = reference->positions.size();
     report.nearest = quantiles_of(nearest_distances(dense->cloud.positions, reference->positions));
   }
-  if (const Status made = make_folder(options.out); !made) return made;
+  const auto folder = NewFolder::create(options.out);
+  if (!folder) return folder.error();
   const fs::path out = options.out;
   if (const Status s = write_npy(out / kImportedColumns, maps->columns); !s) return s;
   if (const Status s = write_npy(out / kImportedRows, maps->rows); !s) return s;

@@ -12,6 +12,7 @@
 #include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "capture/calibrate/gray_stack.h"
 #include "capture/calibrate/pictures.h"
@@ -218,7 +219,8 @@ Status run(const Options& options, StopSignal& stop) {
   const auto pattern = pattern_of(options.pattern);
   if (!pattern) return pattern.error();
   if (const Status fits = fits_projector(*pattern, options.size.width); !fits) return fits;
-  if (const Status made = make_folder(options.out); !made) return made;
+  const auto folder = NewFolder::create(options.out);
+  if (!folder) return folder.error();
   if (options.both_axes) return write_both_axes(options, *pattern);
   const std::vector<std::string> order = names_in_order(options, *pattern);
   if (const Status alone = refuse_other_pictures(options.out, order); !alone) return alone;

@@ -15,6 +15,7 @@
 #include "base/counted.h"
 #include "base/json_text.h"
 #include "base/log.h"
+#include "base/new_folder.h"
 #include "base/time.h"
 #include "capture/reconstruct/reconstructor.h"
 #include "capture/source/field_source.h"
@@ -194,9 +195,8 @@ Status run(const Options& options, StopSignal& stop) {
   if (uri.starts_with(kTake)) {
     if (const Status apart = check_apart(options.out, uri.substr(kTake.size())); !apart) return apart;
   }
-  std::error_code failed;
-  const bool made = fs::create_directories(options.out, failed);
-  if (failed) return Error{"cannot make the folder " + options.out + ": " + failed.message()};
+  const auto folder = NewFolder::create(options.out);
+  if (!folder) return folder.error();
   const auto numbers = numbers_of(uri, (*source)->info());
   if (!numbers) return numbers.error();
   remove_earlier(options.out, *numbers);
@@ -239,7 +239,6 @@ Status run(const Options& options, StopSignal& stop) {
   }
   totals.textures = reconstructor->textures();
   progress.finish();
-  if (made && totals.reconstructed == 0) fs::remove(options.out, failed);
   print(totals, steps, options);
   if (totals.scheme == Scheme::kWhiteFrame && totals.white == 0 && !steps.message().empty())
     log_warning(steps.message());

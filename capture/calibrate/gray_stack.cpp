@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "base/new_folder.h"
 #include "capture/calibrate/pictures.h"
 #include "capture/picture_file.h"
 
@@ -209,9 +210,8 @@ std::string gray_slide_name(std::size_t number) {
 
 Status write_gray_slides(const fs::path& folder, int projector_width, int projector_height,
                          const std::function<bool(std::size_t, std::size_t)>& on_slide) {
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code) return Error{"cannot make the folder " + folder.string() + ": " + code.message()};
+  const auto made = NewFolder::create(folder);
+  if (!made) return made.error();
   const auto slides = gray_slides(projector_width, projector_height);
   for (std::size_t i = 0; i < slides.size(); ++i) {
     if (on_slide && !on_slide(i, slides.size()))

@@ -2,8 +2,10 @@
 #include "client/shot/output.h"
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 
+#include "base/new_folder.h"
 #include "client/picture_video.h"
 #include "codec/export.h"
 #include "codec/frame_names.h"
@@ -33,15 +35,18 @@ class Folder final : public ShotOutput {
 
  private:
   Result<std::string> write(const Frame3D& frame, const Image8& picture) override {
-    std::error_code error;
-    fs::create_directories(folder_, error);
-    if (error) return Error{"cannot make the folder " + folder_.string() + ": " + error.message()};
+    if (!made_) {
+      auto made = NewFolder::create(folder_);
+      if (!made) return made.error();
+      made_.emplace(*std::move(made));
+    }
     const fs::path file = folder_ / (names_.name(frame) + ".png");
     if (auto status = write_png(file, picture.view()); !status) return status.error();
     return file.string();
   }
 
   fs::path folder_;
+  std::optional<NewFolder> made_;
   FrameNames names_;
 };
 

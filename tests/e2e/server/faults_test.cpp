@@ -348,7 +348,7 @@ TEST_F(ServerFault, NoRoomForTheReconstruction) {
     script += " '" + word + "'";
   const Finished done = run({"/bin/bash", "-c", script});
   expect_one_error(done, out_.string());
-  EXPECT_EQ(names_in(out_), std::set<std::string>{}) << "a half-written file was left";
+  EXPECT_FALSE(fs::exists(out_)) << "a half-written file was left, or a folder for none";
 }
 
 class ServerSignal : public TakeTest, public ::testing::WithParamInterface<int> {};
