@@ -8,6 +8,7 @@ import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { eventually, kPatienceMs, launchChromium } from './chromium.mjs';
+import { countFrames, hangingDecoders, kHide, kShow, moveOut, turned } from './embedded_page.mjs';
 import { recordObject } from './recorded.mjs';
 import { Server } from './server.mjs';
 import { packed, player, serveSite, shot } from './site.mjs';
@@ -45,31 +46,6 @@ const rig = await Server.start(serverPath, ['--source', kSource, '--key-interval
 const browser = await launchChromium();
 const complaints = [];
 
-/** Moves the page's player into a window of its own, which is returned, and the page into the background. */
-async function moveOut(page) {
-  const [popup] = await Promise.all([
-    page.waitForEvent('popup'),
-    page.evaluate(() => {
-      window.moved_ = document.querySelector('relievo-player');
-      window.popup_ = window.open('about:blank', 'popup', 'width=400,height=300');
-    }),
-  ]);
-  await page.evaluate(() => {
-    // As in the background: nothing is drawn, timers come late, if ever.
-    window.requestAnimationFrame = () => 0;
-    window.setTimeout = () => 0;
-    window.setInterval = () => 0;
-    Object.defineProperty(document, 'hidden', { value: true });
-    document.dispatchEvent(new Event('visibilitychange'));
-    window.popup_.document.body.append(window.moved_);
-    window.frames_ = [];
-    window.moved_.addEventListener('frame', ({ detail }) => window.frames_.push(detail.number));
-    window.moved_.style.width = '300px';
-  });
-  popup.setDefaultTimeout(kPatienceMs);
-  return popup;
-}
-
 async function newPage(path = '/page.html', { at = origin, before } = {}) {
   const page = await browser.newPage({ viewport: { width: 720, height: 560 } });
   page.setDefaultTimeout(kPatienceMs);
@@ -100,44 +76,7 @@ const on = (path, options, check) => async () => {
   await page.close();
 };
 
-/** Counts frames as the page gets them. */
-const countFrames = (page) =>
-  page.addInitScript(() => {
-    window.received_ = 0;
-    const { WebSocket } = window;
-    window.WebSocket = class extends WebSocket {
-      constructor(...rest) {
-        super(...rest);
-        this.addEventListener('message', ({ data }) => (window.received_ += typeof data === 'string' ? 0 : 1));
-      }
-    };
-  });
-/** While the page's `hang_` is set no decoder hears what it is asked for; the next worker that is started ends that. */
-const hangingDecoders = (page) =>
-  page.addInitScript(() => {
-    const { Worker } = window;
-    window.Worker = class extends Worker {
-      constructor(...of) {
-        super(...of);
-        window.hang_ = false;
-      }
-      postMessage(message, ...rest) {
-        if (!(window.hang_ && message.type === 'decode')) super.postMessage(message, ...rest);
-      }
-    };
-  });
-/** Until the page has drawn itself twice, and knows what of it is in sight. */
-const turned = (page) => page.evaluate(() => new Promise((resolve) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(resolve))))));
 const publishedOf = async ({ address }) => (await (await fetch(`${address}/api/streams`)).json()).streams[0]?.status?.frames_published ?? 0;
-/** A tab in the background, as far as a page is told of it; pages without a window are never hidden. */
-const kHide = () => {
-  Object.defineProperty(document, 'hidden', { configurable: true, get: () => true });
-  document.dispatchEvent(new Event('visibilitychange'));
-};
-const kShow = () => {
-  delete document.hidden;
-  document.dispatchEvent(new Event('visibilitychange'));
-};
 
 const checks = {
   'what a page sets before the element is defined holds': on('/early.html', {}, async (page) => {
