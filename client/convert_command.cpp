@@ -16,6 +16,7 @@
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "client/commands.h"
+#include "client/range_frames.h"
 #include "client/recorded_stream.h"
 #include "client/time_range.h"
 #include "codec/foxglove.h"
@@ -63,7 +64,7 @@ EncodeOptions encode_options(const Options& options, TextureCodec recorded) {
 
 struct Converted {
   std::uint64_t frames = 0;
-  std::uint64_t unreadable = 0;                     // and left out
+  LeftOut left_out;
   std::uint64_t bytes_before = 0, bytes_after = 0;  // of frames
 };
 
@@ -125,16 +126,12 @@ class Conversion {
       return options_.encode() || !needed_later(sample) ? Status() : copy(sample);
     }
     if (!options_.encode() && !foxglove_) return copy(sample);
-    const auto frame = view ? decoder_.decode(view->data) : Result<Frame3D>(view.error());
-    if (!frame) {
-      ++converted_.unreadable;
-      return {};
-    }
-    if (auto status = options_.encode() ? encode(sample, *view, *frame) : copy(sample); !status)
+    if (!converted_.left_out.decode(view, decoder_, frame_)) return {};
+    if (auto status = options_.encode() ? encode(sample, *view, frame_) : copy(sample); !status)
       return status;
     if (!foxglove_) return {};
     const RecordedInfo* info = info_of(sample, infos_);
-    return foxglove_->write(*writer_, *frame, info == nullptr ? nullptr : &info->info.rig.camera,
+    return foxglove_->write(*writer_, frame_, info == nullptr ? nullptr : &info->info.rig.camera,
                             {sample.receive_time_ns, sample.source_time_ns, view->capture_time_ns});
   }
 
@@ -231,6 +228,7 @@ class Conversion {
   std::optional<FrameEncoder> encoder_;  // of its rig
   std::optional<FoxgloveChannels> foxglove_;
   FrameDecoder decoder_;
+  Frame3D frame_;
   TextureCodec texture_ = TextureCodec::kNone;  // the last one recorded
   bool chain_begun_ = false;                    // of textures that build on each other
   Converted converted_;
@@ -251,23 +249,23 @@ Status convert(const Options& options, RecordedStream& recorded, Conversion& con
     progress.update(conversion.converted().frames);
   }
   if (stop.stopped()) return Error{"stopped before the end; nothing was written"};
-  if (conversion.converted().frames == 0)
-    return Error{options.file + ": no frame in that range is whole, with the key frame it builds on"};
+  if (conversion.converted().frames == 0) return conversion.converted().left_out.all().in(options.file);
   return conversion.finish();
 }
 
 void report(const Options& options, const Converted& converted, const RecordedStream& recorded) {
   if (options.json) {
-    const nlohmann::json j = {
-        {"file", options.out.string()},           {"frames", converted.frames},
-        {"unreadable", converted.unreadable},     {"damaged", recorded.damaged()},
-        {"bytes_before", converted.bytes_before}, {"bytes_after", converted.bytes_after}};
+    const nlohmann::json j = {{"file", options.out.string()},
+                              {"frames", converted.frames},
+                              {"unreadable", converted.left_out.frames()},
+                              {"damaged", recorded.damaged()},
+                              {"bytes_before", converted.bytes_before},
+                              {"bytes_after", converted.bytes_after}};
     std::puts(json_text(j).c_str());
     return;
   }
-  std::printf("%s: %s\n", options.out.c_str(), counted(converted.frames, "frame").c_str());
-  if (converted.unreadable > 0)
-    std::printf("%s could not be decoded: left out\n", counted(converted.unreadable, "frame").c_str());
+  if (converted.left_out.unreadable == 0)
+    std::printf("%s: %s\n", options.out.c_str(), counted(converted.frames, "frame").c_str());
 }
 
 Status run(const Options& options, StopSignal& stop) {
@@ -281,8 +279,10 @@ Status run(const Options& options, StopSignal& stop) {
     return Error{options.out.string() + " exists already: name another file, or remove it"};
   Conversion conversion(options, *recorded, *out);
   if (auto done = convert(options, *recorded, conversion, stop); !done) return done;
-  report(options, conversion.converted(), *recorded);
-  return {};
+  const Converted& converted = conversion.converted();
+  report(options, converted, *recorded);
+  return converted.left_out.told(counted(converted.frames, "frame") + " " + is_or_are(converted.frames) +
+                                 " in " + options.out.string());
 }
 
 }  // namespace

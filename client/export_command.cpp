@@ -10,7 +10,6 @@
 
 #include "base/counted.h"
 #include "base/json_text.h"
-#include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
@@ -147,10 +146,7 @@ Status run(const Options& options, StopSignal& stop) {
                               " in " + options.out.string();
   if (exported->stopped) return Error{"stopped early: " + written};
   const LeftOut& left_out = exported->left_out;
-  if (left_out.unreadable > 0) return Error{left_out.text() + "; the other " + written};
-  if (exported->written == 0)
-    return Error{options.file + ": no frame in that range is whole, with the key frame it builds on"};
-  if (left_out.frames() > 0) log_warning(left_out.text());
+  if (exported->written == 0) return left_out.all().in(options.file);
   if (options.json) {
     std::puts(json_text(nlohmann::json({{"frames", exported->written},
                                         {format_named(options.format).is_one_file ? "file" : "folder",
@@ -159,10 +155,10 @@ Status run(const Options& options, StopSignal& stop) {
                                         {"unreadable", left_out.frames()},
                                         {"damaged", recorded->damaged()}}))
                   .c_str());
-  } else {
+  } else if (left_out.unreadable == 0) {
     std::puts(written.c_str());
   }
-  return {};
+  return left_out.told(written);
 }
 
 }  // namespace

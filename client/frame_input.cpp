@@ -6,20 +6,18 @@
 #include <chrono>
 #include <cmath>
 
-#include "base/log.h"
 #include "base/time.h"
 #include "cli/checks.h"
 #include "cli/progress.h"
 #include "client/input.h"
 #include "client/latest_frame.h"
 #include "client/options.h"
-#include "client/range_frames.h"
 #include "client/recorded_stream.h"
 
 namespace relievo {
 namespace {
 
-Result<std::uint64_t> visit_recording(const FrameInput& input, const FrameVisit& visit, StopSignal& stop) {
+Result<LeftOut> visit_recording(const FrameInput& input, const FrameVisit& visit, StopSignal& stop) {
   auto recorded = RecordedStream::open(input.input, input.stream);
   if (!recorded) return recorded.error();
   if (const Status free = recorded->check_output(visit.out); !free) return free.error();
@@ -42,13 +40,11 @@ Result<std::uint64_t> visit_recording(const FrameInput& input, const FrameVisit&
     if (Status seen = visit.frame((*next)->frame, camera); !seen) return seen.error();
     progress.update(++count);
   }
-  if (count == 0 && !stop.stopped()) return Error{input.input + ": no frame in that range can be decoded"};
-  const LeftOut& left_out = frames->left_out();
-  if (left_out.frames() > 0) log_warning(left_out.text());
-  return left_out.frames();
+  if (count == 0 && !stop.stopped()) return frames->left_out().all().in(input.input);
+  return frames->left_out();
 }
 
-Result<std::uint64_t> visit_live(const FrameInput& input, const FrameVisit& visit, StopSignal& stop) {
+Result<LeftOut> visit_live(const FrameInput& input, const FrameVisit& visit, StopSignal& stop) {
   LatestFrame latest;
   auto subscriber = Subscriber::create(*input.domain, input.input, latest.callbacks());
   if (!subscriber) return subscriber.error();
@@ -65,7 +61,7 @@ Result<std::uint64_t> visit_live(const FrameInput& input, const FrameVisit& visi
   if (count == 0 && !stop.stopped())
     return Error{"no frame of a stream '" + input.input + "' came in " + duration_text(input.wait_s) +
                  ": is its server running? `relievo streams` lists what there is"};
-  return std::uint64_t{0};
+  return LeftOut();
 }
 
 }  // namespace
@@ -86,7 +82,7 @@ std::shared_ptr<FrameInput> add_frame_input(CLI::App& app) {
   return input;
 }
 
-Result<std::uint64_t> visit_frames(const FrameInput& input, const FrameVisit& visit, StopSignal& stop) {
+Result<LeftOut> visit_frames(const FrameInput& input, const FrameVisit& visit, StopSignal& stop) {
   const auto file = is_file(input.input);
   if (!file) return file.error();
   return *file ? visit_recording(input, visit, stop) : visit_live(input, visit, stop);

@@ -13,7 +13,7 @@
 #include "base/result.h"
 #include "base/rig.h"
 #include "cli/program.h"
-#include "client/time_range.h"
+#include "client/range_frames.h"
 #include "idl/transport.h"
 
 namespace CLI {
@@ -43,8 +43,7 @@ struct FrameVisit {
 };
 
 /// Until the frames end, one fails or `stop` stops. A live stream's frames are left out where looking at them
-/// takes longer than they come. Returns how many could not be decoded, which is logged. Fails where there is
-/// none.
-Result<std::uint64_t> visit_frames(const FrameInput& input, const FrameVisit& visit, StopSignal& stop);
+/// takes longer than they come. Returns those that could not be decoded. Fails where there are no others.
+Result<LeftOut> visit_frames(const FrameInput& input, const FrameVisit& visit, StopSignal& stop);
 
 }  // namespace relievo

@@ -129,6 +129,7 @@ Status run(const Options& options, StopSignal& stop) {
        }},
       stop);
   if (!measured) return measured.error();
+  if (measured->frames() > 0) log_warning(measured->text());
   if (meter.empty()) return Error{"stopped before a frame was measured"};
   const ShapeReport report = meter.meter().report();
   if (report.frames == 0)

@@ -98,6 +98,9 @@ Status run(const Options& options, StopSignal& stop) {
   } else {
     std::printf("%s played\n", counted(frames, "frame").c_str());
   }
+  if (refused > 0)
+    return Error{counted(refused, "sample") + " of " + options.file +
+                 " could not be published; the others were played"};
   return {};
 }
 

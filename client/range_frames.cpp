@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/counted.h"
+#include "base/log.h"
 #include "idl/cdr.h"
 
 namespace relievo {
@@ -18,11 +19,31 @@ bool is_between(const FrameView& frame, const std::optional<RawSample>& followin
 
 }  // namespace
 
+bool LeftOut::decode(const Result<FrameView>& frame, FrameDecoder& decoder, Frame3D& out) {
+  if (frame && read_frame_header(frame->data) && !decoder.can_decode(frame->data)) {
+    ++without_key_frame;
+    return false;
+  }
+  const Status decoded = frame ? decoder.decode(frame->data, out) : Status(frame.error());
+  if (!decoded && unreadable++ == 0) first_problem = decoded.error().message;
+  return decoded.ok();
+}
+
 std::string LeftOut::text() const {
   const std::string why =
       unreadable > 0 ? first_problem : "the key frame before is damaged, or not in the recording";
   return counted(frames(), "frame") + " could not be decoded and " + (frames() == 1 ? "was" : "were") +
          " left out: " + why;
+}
+
+Error LeftOut::all() const {
+  return {unreadable > 0 ? text() : "no frame in that range is whole, with the key frame it builds on"};
+}
+
+Status LeftOut::told(const std::string& written) const {
+  if (unreadable > 0) return Error{text() + "; the other " + written};
+  if (frames() > 0) log_warning(text());
+  return {};
 }
 
 Result<RangeFrames> RangeFrames::open(RecordedStream& recorded, const TimeRange& range) {
@@ -41,18 +62,7 @@ Result<std::optional<DecodedFrame>> RangeFrames::next() {
       if (view) (void)decoder_.remember(view->data);  // those in the range may build on it
       continue;
     }
-    if (!view) {
-      leave_out(view.error());
-      continue;
-    }
-    if (read_frame_header(view->data) && !decoder_.can_decode(view->data)) {
-      ++left_out_.without_key_frame;
-      continue;
-    }
-    if (auto status = decoder_.decode(view->data, out.frame); !status) {
-      leave_out(status.error());
-      continue;
-    }
+    if (!left_out_.decode(view, decoder_, out.frame)) continue;
     out.frame.between = is_between(*view, ahead_);
     out.frame.time_ns = rising(out.frame.time_ns, out.sample.receive_time_ns);
     out.data = view->data;
@@ -76,10 +86,6 @@ std::int64_t RangeFrames::rising(std::int64_t time_ns, std::int64_t received_ns)
     later_ns_ = *time_ns_ + std::max(received_ns - received_ns_, kLeast_ns) - time_ns;
   received_ns_ = received_ns;
   return *(time_ns_ = time_ns + later_ns_);
-}
-
-void RangeFrames::leave_out(const Error& problem) {
-  if (left_out_.unreadable++ == 0) left_out_.first_problem = problem.message;
 }
 
 }  // namespace relievo

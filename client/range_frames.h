@@ -12,6 +12,7 @@
 #include "client/recorded_stream.h"
 #include "client/time_range.h"
 #include "codec/frame3d_codec.h"
+#include "idl/cdr.h"
 
 namespace relievo {
 
@@ -28,8 +29,15 @@ struct LeftOut {
   std::uint64_t without_key_frame = 0;  // what they build on is not there
 
   std::uint64_t frames() const { return unreadable + without_key_frame; }
-  /// For a log, where there are some: how many, and why.
+  /// False where it cannot be decoded, and is counted here; `out` then holds nothing of meaning.
+  bool decode(const Result<FrameView>& frame, FrameDecoder& decoder, Frame3D& out);
+  /// Where there are some: how many, and why.
   std::string text() const;
+  /// Where no frame could be decoded.
+  Error all() const;
+  /// At the end, where others could. Fails where bytes are wrong, saying what became of the others:
+  /// `written`, "7 frames are in DIR". Logs those that the recording itself lacks something of.
+  Status told(const std::string& written) const;
 };
 
 /// One thread.
@@ -48,7 +56,6 @@ class RangeFrames {
  private:
   RangeFrames(RecordedStream& recorded, const TimeRange& range) : recorded_(&recorded), range_(range) {}
   Status read_ahead();
-  void leave_out(const Error& problem);
   std::int64_t rising(std::int64_t time_ns, std::int64_t received_ns);
 
   RecordedStream* recorded_;

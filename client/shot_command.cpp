@@ -98,16 +98,16 @@ Status run(const Options& options, StopSignal& stop) {
     nlohmann::json j{{"pictures", output.count()},
                      {"out", options.out},
                      {"last", output.last()},
-                     {"unreadable", *left_out}};
+                     {"unreadable", left_out->frames()}};
     if (options.mode == "depth") j["depth_m"] = {camera.depth().from_m, camera.depth().to_m};
     std::puts(json_text(j).c_str());
-  } else {
+  } else if (left_out->unreadable == 0) {
     std::puts(output.count() == 1 ? output.last().c_str() : written.c_str());
   }
   if (options.mode == "depth" && !options.json)
     log_info("depth from " + std::to_string(camera.depth().from_m) + " m (yellow) to " +
              std::to_string(camera.depth().to_m) + " m (violet)");
-  return {};
+  return left_out->told(written);
 }
 
 }  // namespace

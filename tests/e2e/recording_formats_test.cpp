@@ -200,6 +200,67 @@ TEST(RecordingFormats, TexturesStayAsTheyAreUnlessOthersAreAskedFor) {
   }
 }
 
+/// A copy in which the geometry of one frame is nonsense; its CRCs are right.
+void copy_damaged(const std::filesystem::path& from, const std::filesystem::path& to, int which) {
+  auto reader = RecordingReader::open(from);
+  auto writer = RecordingWriter::create(to, {});
+  ASSERT_TRUE(reader.ok() && writer.ok());
+  const RecordingSummary& summary = (*reader)->summary();
+  for (const RecordingChannel& channel : summary.channels) {
+    const auto schema = std::ranges::find(summary.schemas, channel.schema, &RecordingSchema::name);
+    ASSERT_TRUE((*writer)->add_channel(*schema, channel).ok());
+  }
+  for (auto message = (*reader)->next(); message.ok() && *message; message = (*reader)->next()) {
+    if (summary.channels[(*message)->channel].topic == "relievo/frame" && which-- == 0) {
+      auto view = *read_frame_cdr((*message)->data);
+      Bytes damaged(view.data.begin(), view.data.end());
+      std::fill(damaged.begin() + 100, damaged.begin() + 400, std::uint8_t{0xff});
+      view.data = damaged;
+      (*message)->data = write_frame_cdr(view);
+    }
+    ASSERT_TRUE((*writer)->write(**message).ok());
+  }
+  ASSERT_TRUE((*writer)->finish().ok());
+}
+
+TEST(RecordingFormats, WhatCannotBeDecodedIsAFailureAndTheOthersAreThere) {
+  const TempFolder folder;
+  const std::string whole = folder / "whole.mcap", damaged = folder / "damaged.mcap";
+  const auto served = run({program("relievo-server"), "serve", "--source",
+                           "sim:plane,width=160,height=120,stripes=30", "--web", "none", "--domain", kDomain,
+                           "--interface", "lo", "--fast", "--frames", "8", "--record", whole});
+  ASSERT_EQ(served.status, 0) << served.err;
+  ASSERT_NO_FATAL_FAILURE(copy_damaged(whole, damaged, 2));
+  const auto count = recorded_frames(whole).size();
+  const std::vector<std::pair<std::string, std::vector<std::string>>> hows = {
+      {"export", {"--format", "ply"}},
+      {"export", {"--format", "ros2"}},
+      {"convert", {"--geometry", "grid"}},
+      {"convert", {"--foxglove"}},
+      {"shot", {}}};
+  for (const auto& [verb, more] : hows) {
+    SCOPED_TRACE(verb);
+    const std::string out = folder / (more.empty() ? "pictures" : more.back() == "ply" ? "ply" : "out.mcap");
+    std::vector<std::string> command{program("relievo"), verb, damaged, "--out", out, "--json"};
+    command.insert(command.end(), more.begin(), more.end());
+    const auto done = run(command);
+    EXPECT_EQ(done.status, 1);
+    EXPECT_THAT(done.err, HasSubstr("1 frame could not be decoded and was left out: "));
+    EXPECT_THAT(done.err, HasSubstr("; the other " + std::to_string(count - 1)));
+    EXPECT_EQ(nlohmann::json::parse(done.out)["unreadable"], 1) << done.out;
+    EXPECT_TRUE(std::filesystem::exists(out));
+    std::filesystem::remove_all(out);
+    command.insert(command.end(), {"--frames", "2"});
+    const auto none = run(command);
+    EXPECT_EQ(none.status, 1);
+    EXPECT_THAT(none.err, HasSubstr("damaged.mcap: 1 frame could not be decoded and was left out: "));
+    EXPECT_EQ(none.out, "");
+    EXPECT_FALSE(std::filesystem::exists(out));
+  }
+  EXPECT_EQ(run({program("relievo"), "convert", damaged, "--out", folder / "copy.mcap"}).status, 0)
+      << "copied as it is";
+}
+
 /// Some frames of an object in this quality.
 void record_object(const std::filesystem::path& file, const std::string& quality) {
   Process server({program("relievo-server"), "serve", "--source", "sim:object,width=320,height=240",
