@@ -2,6 +2,7 @@
 #include "client/range_frames.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "base/counted.h"
@@ -15,6 +16,11 @@ namespace {
 bool is_between(const FrameView& frame, const std::optional<RawSample>& following) {
   const auto next = following ? read_frame_cdr(following->cdr) : Result<FrameView>(Error{});
   return next && next->number == frame.number && next->sequence == frame.sequence + 1;
+}
+
+/// Of numbers from 0 on; the largest there is where that is less.
+std::int64_t sum(std::int64_t a, std::int64_t b) {
+  return a + std::min(b, std::numeric_limits<std::int64_t>::max() - a);
 }
 
 }  // namespace
@@ -82,10 +88,11 @@ Status RangeFrames::read_ahead() {
 
 std::int64_t RangeFrames::rising(std::int64_t time_ns, std::int64_t received_ns) {
   constexpr std::int64_t kLeast_ns = 1'000'000;
-  if (time_ns_ && time_ns + later_ns_ <= *time_ns_)
-    later_ns_ = *time_ns_ + std::max(received_ns - received_ns_, kLeast_ns) - time_ns;
+  time_ns = std::max<std::int64_t>(time_ns, 0);  // so that no difference of two is too large
+  if (time_ns_ && later_ns_ <= *time_ns_ - time_ns)
+    later_ns_ = sum(*time_ns_ - time_ns, std::max(received_ns - received_ns_, kLeast_ns));
   received_ns_ = received_ns;
-  return *(time_ns_ = time_ns + later_ns_);
+  return *(time_ns_ = sum(time_ns, later_ns_));
 }
 
 }  // namespace relievo

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "codec/frame_names.h"
 #include "tests/support/make_recording.h"
 #include "tests/support/replace_in.h"
@@ -78,24 +80,35 @@ void damage(const std::filesystem::path& file, std::uint64_t number) {
   FAIL();
 }
 
-// A video or an animation of a recording over a restart: sources that count from their start begin at 0
-// again.
-TEST(RangeFrames, TimesGoOnWhereTheyBeginAnew) {
+/// Of frames whose cameras' stamps are these.
+std::vector<std::int64_t> times_of(const std::vector<std::int64_t>& stamps) {
   const test::TempFolder folder;
   test::MadeRecording made(folder / "a.mcap");
-  const std::vector<std::uint64_t> numbers = {0, 1, 2, 0, 1};
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    made.add(numbers[i], numbers[i], kStart_ns + static_cast<std::int64_t>(i) * kStep_ns,
-             static_cast<std::int64_t>(numbers[i]) * 33'000'000);
+  for (std::size_t i = 0; i < stamps.size(); ++i)
+    made.add(i, i, kStart_ns + static_cast<std::int64_t>(i) * kStep_ns, stamps[i]);
   made.finish();
   auto recorded = RecordedStream::open(folder / "a.mcap", "");
   auto frames = RangeFrames::open(*recorded, *find_range({}, *recorded));
-  std::vector<std::int64_t> times;
+  std::vector<std::int64_t> out;
   for (auto next = frames->next(); next && *next; next = frames->next())
-    times.push_back((*next)->frame.time_ns);
-  ASSERT_EQ(times.size(), numbers.size());
+    out.push_back((*next)->frame.time_ns);
+  return out;
+}
+
+// A video or an animation of a recording over a restart: sources that count from their start begin at 0
+// again.
+TEST(RangeFrames, TimesGoOnWhereTheyBeginAnew) {
+  const auto times = times_of({0, 33'000'000, 66'000'000, 0, 33'000'000});
+  ASSERT_EQ(times.size(), 5u);
   EXPECT_EQ(times[3] - times[2], kStep_ns);
   EXPECT_EQ(times[4] - times[3], times[1] - times[0]);
+}
+
+// Of a damaged clock, or made to do harm.
+TEST(RangeFrames, TimesThatCannotBeAreAsNearAsThereIs) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  EXPECT_THAT(times_of({kMost - 5, 7, kMost, 8}), ElementsAre(kMost - 5, kMost, kMost, kMost));
+  EXPECT_THAT(times_of({std::numeric_limits<std::int64_t>::min(), 5, kMost}), ElementsAre(0, 5, kMost));
 }
 
 TEST(RangeFrames, WhatBuildsOnADamagedKeyFrameIsCounted) {
