@@ -100,7 +100,7 @@ Result<std::unique_ptr<ExportWriter>> make_writer(const Options& options, Record
                       .draco = options.draco};
   if (options.format == "depth" || options.format == "ros2") {
     auto rig = find_rig(recorded, range);
-    if (!rig) return rig.error();
+    if (!rig) return rig.error().in(options.file);
     target.rig = *std::move(rig);
   }
   return format_named(options.format).make(target);
@@ -110,7 +110,7 @@ Result<Exported> export_frames(const Options& options, RecordedStream& recorded,
   const auto range = find_range(*options.range, recorded);
   if (!range) return range.error().in(options.file);
   const auto writer = make_writer(options, recorded, *range);
-  if (!writer) return writer.error().in(options.file);
+  if (!writer) return writer.error();
   auto frames = RangeFrames::open(recorded, *range);
   if (!frames) return frames.error();
   Exported exported;

@@ -136,8 +136,10 @@ class VideoCopier final : public ExportWriter {
     if (!layout) return layout.error();
     const auto section = layout->sections.texture;
     if (layout->header.texture != TextureCodec::kH264 || section.empty()) return Error{kMixed};
-    auto status = file_.add(section, frame.texture.width(), frame.texture.height(), frame.time_ns);
-    return status ? status : Status(status.error().in(kMixed));
+    const Image8& texture = frame.texture;
+    if (auto fits = file_.check(section, texture.width(), texture.height()); !fits)
+      return fits.error().in(kMixed);
+    return file_.add(section, texture.width(), texture.height(), frame.time_ns);
   }
   Status finish() override { return file_.finish(); }
 

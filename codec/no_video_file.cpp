@@ -18,6 +18,9 @@ VideoFile::~VideoFile() = default;
 Status VideoFile::add(std::span<const std::uint8_t>, int, int, std::int64_t) {
   return Error{"this build cannot write video"};
 }
+Status VideoFile::check(std::span<const std::uint8_t>, int, int) const {
+  return Error{"this build cannot write video"};
+}
 Status VideoFile::finish() {
   return Error{"this build cannot write video"};
 }

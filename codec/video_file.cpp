@@ -25,6 +25,8 @@ constexpr std::int64_t kLongestTicks = std::numeric_limits<std::int32_t>::max();
 constexpr std::int64_t kUsualTicks = 3000;  // of a picture after which none comes, and none came before
 
 std::string text_of(int code) {
+  constexpr int kMostErrno = 4095;
+  if (const int error = AVUNERROR(code); error > 0 && error <= kMostErrno) return write_failure(error);
   char text[AV_ERROR_MAX_STRING_SIZE];
   return av_strerror(code, text, sizeof text) == 0 ? text : "error " + std::to_string(code);
 }
@@ -62,7 +64,8 @@ struct VideoFile::State {
     context = nullptr;
     return code;
   }
-  Error cannot(int code) const { return Error{file.string() + " cannot be written: " + text_of(code)}; }
+  Error cannot(const std::string& why) const { return {"cannot write " + file.string() + ": " + why}; }
+  Error cannot(int code) const { return cannot(text_of(code)); }
 
   Status begin() {
     if (const int code =
@@ -118,25 +121,29 @@ Result<VideoFile> VideoFile::create(const fs::path& file) {
   return VideoFile(std::make_unique<State>(*std::move(target), file.extension() == ".mp4"));
 }
 
-Status VideoFile::add(std::span<const std::uint8_t> section, int width, int height, std::int64_t time_ns) {
-  State& s = *state_;
+Status VideoFile::check(std::span<const std::uint8_t> section, int width, int height) const {
+  const State& s = *state_;
   const VideoFormat format = h264_texture_format(width, height);
   const auto unit = h264_access_unit(section);
   const auto is_key = check_access_unit(unit, format);
   if (!is_key) return is_key.error().in("texture");
   const bool is_first = s.context == nullptr;
-  if (*is_key) {
-    Bytes sets;
-    append_parameter_sets(unit, sets);
-    if (is_first) {
-      s.format = format;
-      s.parameter_sets = std::move(sets);
-    } else if (s.format != format || s.parameter_sets != sets) {
-      return Error{"the texture's video begins anew with other settings: it does not fit one file as it is"};
-    }
-  }
+  if (is_first && !*is_key) return Error{"the texture's video does not begin with a key frame"};
+  if (is_first || !*is_key) return {};
+  Bytes sets;
+  append_parameter_sets(unit, sets);
+  if (s.format == format && s.parameter_sets == sets) return {};
+  return Error{"the texture's video begins anew with other settings: it does not fit one file as it is"};
+}
+
+Status VideoFile::add(std::span<const std::uint8_t> section, int width, int height, std::int64_t time_ns) {
+  if (auto fits = check(section, width, height); !fits) return fits;
+  State& s = *state_;
+  const auto unit = h264_access_unit(section);
+  const bool is_first = s.context == nullptr;
   if (is_first) {
-    if (!*is_key) return Error{"the texture's video does not begin with a key frame"};
+    s.format = h264_texture_format(width, height);
+    append_parameter_sets(unit, s.parameter_sets);
     s.first_ns = time_ns;
     if (auto status = s.begin(); !status) return status;
   }
@@ -145,9 +152,8 @@ Status VideoFile::add(std::span<const std::uint8_t> section, int width, int heig
     if (ticks <= s.ticks) return Error{"a frame is not later than the one before it"};
     s.duration_ticks = ticks - s.ticks;
     if (s.is_mp4 && s.duration_ticks > kLongestTicks)
-      return Error{s.file.string() + " cannot be written: a gap of " +
-                   std::to_string(s.duration_ticks / kTicks.den / 3600) +
-                   " h between two frames is longer than MP4 holds; with a name that ends in .mkv it can be"};
+      return s.cannot("a gap of " + std::to_string(s.duration_ticks / kTicks.den / 3600) +
+                      " h between two frames is longer than MP4 holds; a name that ends in .mkv holds it");
     if (auto status = s.write_last(); !status) return status;
   }
   s.ticks = ticks;
@@ -156,7 +162,7 @@ Status VideoFile::add(std::span<const std::uint8_t> section, int width, int heig
   if (const int code = av_new_packet(s.packet.get(), static_cast<int>(s.unit.size())); code < 0)
     return s.cannot(code);
   std::memcpy(s.packet->data, s.unit.data(), s.unit.size());
-  s.packet->flags = *is_key ? AV_PKT_FLAG_KEY : 0;
+  s.packet->flags = *check_access_unit(unit, s.format) ? AV_PKT_FLAG_KEY : 0;
   return {};
 }
 
@@ -168,7 +174,7 @@ Status VideoFile::finish() {
   if (const int code = s.close(); code < 0) return s.cannot(code);
   std::error_code failed;
   fs::rename(s.unfinished, s.file, failed);
-  if (failed) return Error{s.file.string() + " cannot be written: " + failed.message()};
+  if (failed) return s.cannot(failed.message());
   return {};
 }
 

@@ -29,6 +29,8 @@ class VideoFile {
   /// A section of texture codec 4 as it is, of a texture of that size. All of a file are of one size and of
   /// one encoder; the first builds on no other, the next ones each on the one before; times rise.
   Status add(std::span<const std::uint8_t> section, int width, int height, std::int64_t time_ns);
+  /// Whether it can be added as what it is; else another encoder is needed for all of the file.
+  Status check(std::span<const std::uint8_t> section, int width, int height) const;
 
   /// At least one picture was added.
   Status finish();

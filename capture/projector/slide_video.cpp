@@ -35,6 +35,8 @@ using Picture = std::unique_ptr<AVFrame, FreeWith<av_frame_free>>;
 using Packet = std::unique_ptr<AVPacket, FreeWith<av_packet_free>>;
 
 std::string text_of(int code) {
+  constexpr int kMostErrno = 4095;
+  if (const int error = AVUNERROR(code); error > 0 && error <= kMostErrno) return write_failure(error);
   char text[AV_ERROR_MAX_STRING_SIZE] = {};
   av_strerror(code, text, sizeof text);
   return text;
@@ -64,15 +66,15 @@ class Muxer {
     if (const int code = avformat_alloc_output_context2(&context_, nullptr, "matroska", nullptr); code < 0)
       return Error{"no Matroska writer: " + text_of(code)};
     if (const int code = avio_open(&context_->pb, file_.c_str(), AVIO_FLAG_WRITE); code < 0)
-      return Error{name_.string() + " cannot be written: " + text_of(code)};
+      return Error{"cannot write " + name_.string() + ": " + text_of(code)};
     return {};
   }
   Status keep() {
     if (const int code = close(); code < 0)
-      return Error{name_.string() + " cannot be written to its end: " + text_of(code)};
+      return Error{"cannot write " + name_.string() + ": " + text_of(code)};
     std::error_code failed;
     fs::rename(file_, name_, failed);
-    if (failed) return Error{name_.string() + " cannot be written: " + failed.message()};
+    if (failed) return Error{"cannot write " + name_.string() + ": " + failed.message()};
     file_.clear();
     return {};
   }
@@ -199,10 +201,10 @@ Result<SlideVideo> write_slide_video(const fs::path& file, const Pattern& patter
     packet->stream_index = 0;
     av_packet_rescale_ts(packet.get(), (*codec)->time_base, stream->time_base);
     if (const int code = av_interleaved_write_frame(muxer.get(), packet.get()); code < 0)
-      return Error{file.string() + " cannot be written: " + text_of(code)};
+      return Error{"cannot write " + file.string() + ": " + text_of(code)};
   }
   if (const int code = av_write_trailer(muxer.get()); code < 0)
-    return Error{file.string() + " cannot be finished: " + text_of(code)};
+    return Error{"cannot write " + file.string() + ": " + text_of(code)};
   if (auto kept = muxer.keep(); !kept) return kept.error();
   return out;
 }

@@ -60,7 +60,7 @@ Status RosBag::finish() {
   if (auto status = writer_->finish(); !status) return told_of(file_, status.error(), unfinished_);
   std::error_code failed;
   fs::rename(unfinished_, file_, failed);
-  if (failed) return Error{file_.string() + " cannot be written: " + failed.message()};
+  if (failed) return Error{"cannot write " + file_.string() + ": " + failed.message()};
   writer_.reset();
   return {};
 }

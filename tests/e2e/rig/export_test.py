@@ -7,6 +7,7 @@ usage: export_test.py RELIEVO_SERVER RELIEVO
 import json
 import os
 import pathlib
+import resource
 import struct
 import subprocess
 import sys
@@ -214,8 +215,29 @@ class Export(unittest.TestCase):
                                       capture_output=True, text=True)
                 self.assertEqual(done.returncode, 1)
                 self.assertIn(f"cannot write {pipe}: it is a pipe, not a file", done.stderr)
+                self.assertNotIn("jpeg.mcap", done.stderr, "it is not the recording that fails")
                 self.assertTrue(pipe.is_fifo())
                 self.assertEqual(len(os.listdir(folder)), 5)
+
+    def test_where_there_is_no_room_no_folder_is_left(self):
+        def no_room():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+        recording, above = self.path / "jpeg.mcap", self.path / "full"
+        kinds = ("ply", "obj", "glb", "png", "depth")
+        for how in (*(("export", recording, "--format", kind) for kind in kinds), ("shot", recording)):
+            done = subprocess.run([RELIEVO, *how, "--out", above / "out"], capture_output=True, text=True,
+                                  preexec_fn=no_room, restore_signals=False)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(f"cannot write {above}/out/", done.stderr)
+            self.assertFalse(above.exists(), how)
+
+    def test_a_video_that_cannot_be_written_is_not_said_to_need_coding(self):
+        file = self.path / "none" / "a.mp4"
+        done = subprocess.run([RELIEVO, "export", self.path / "h264.mcap", "--format", "video", "--out", file],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"error: cannot write {file}: there is no such folder", done.stderr)
 
     def test_a_range_between_key_frames_is_coded(self):
         file = self.path / "late.mp4"

@@ -84,7 +84,7 @@ class Video(unittest.TestCase):
     def test_refusals(self):
         done = run("--out", self.path / "none" / "a.mkv")
         self.assertEqual(done.returncode, 1)
-        self.assertIn(str(self.path / "none" / "a.mkv") + " cannot be written", done.stderr)
+        self.assertIn(f"cannot write {self.path}/none/a.mkv: there is no such folder", done.stderr)
         self.assertEqual(run("--out", self.path / "a.mkv", "--gray").returncode, 2)
         self.assertEqual(list(self.path.iterdir()), [])
 
