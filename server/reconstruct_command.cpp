@@ -238,6 +238,10 @@ Status run(const Options& options, StopSignal& stop) {
     }
   }
   totals.textures = reconstructor->textures();
+  if (stop.stopped()) {
+    totals.frames = std::max(totals.frames, (*source)->info().frames.value_or(0));
+    log_info("stopped: a part of the frames is reconstructed");
+  }
   progress.finish();
   print(totals, steps, options);
   if (totals.scheme == Scheme::kWhiteFrame && totals.white == 0 && !steps.message().empty())
@@ -246,7 +250,7 @@ Status run(const Options& options, StopSignal& stop) {
   if (totals.unreadable > 0) {
     return Error{std::to_string(totals.unreadable) + " of " + std::to_string(totals.frames) +
                  " frames could not be read (the last: " + last_error.message +
-                 (totals.reconstructed > 0 ? "); the others are reconstructed" : ")")};
+                 (totals.reconstructed > 0 && !stop.stopped() ? "); the others are reconstructed" : ")")};
   }
   if (totals.reconstructed == 0 && !stop.stopped()) {
     if (steps.status().mixed > 0) return Error{"no frame could be reconstructed: " + steps.advice()};

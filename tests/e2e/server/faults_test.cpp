@@ -374,6 +374,15 @@ TEST_P(ServerSignal, EndsSimulateWithNothingHalfWritten) {
   EXPECT_EQ(names_in(folder_.path()), std::set<std::string>{"take"});
 }
 
+TEST_P(ServerSignal, EndsReconstructSayingOfHowManyFrames) {
+  Process process(server({"reconstruct", "sim:walk,width=1280,height=960", "--out", out_.string()}));
+  ASSERT_TRUE(eventually([&] { return names_in(out_).size() > 1; })) << process.err();
+  process.signal(GetParam());
+  EXPECT_EQ(process.wait(), 0) << process.err();
+  EXPECT_THAT(process.out(), testing::HasSubstr(" of 80 frames reconstructed into " + out_.string()));
+  EXPECT_THAT(process.err(), testing::HasSubstr("stopped: a part of the frames is reconstructed"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Signals, ServerSignal, ::testing::Values(SIGINT, SIGTERM, SIGHUP),
                          [](const auto& number) { return std::string(sigabbrev_np(number.param)); });
 
