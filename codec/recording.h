@@ -63,7 +63,7 @@ class RecordingWriter {
     // tried again. Null: nothing can be.
     std::function<bool()> make_room = nullptr;
   };
-  /// Fails, saying why, where the file exists already or cannot be made; never touches an existing file.
+  /// Fails, saying why, where the file exists or cannot be made, also where a link leads; changes no file.
   static Result<std::unique_ptr<RecordingWriter>> create(const std::filesystem::path& file,
                                                          const Options& options);
   virtual ~RecordingWriter() = default;  // finishes the file as finish() does, errors lost

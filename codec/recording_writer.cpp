@@ -334,7 +334,9 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std::file
                                                                  const Options& options) {
   if (options.chunk_bytes == 0 || options.chunk_bytes > mcap::kMaxChunkBytes / 2 || options.chunk_ns < 0)
     return Error{"chunk_bytes must be 1 to 536870912 and chunk_ns not negative"};
-  const auto open_new = [&] { return ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644); };
+  const auto leads = where_to_write(file);
+  const std::filesystem::path& path = leads ? *leads : file;  // the latter fails below
+  const auto open_new = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644); };
   int handle = open_new();
   while (handle < 0 && (errno == ENOSPC || errno == EDQUOT) && options.make_room && options.make_room())
     handle = open_new();
@@ -344,12 +346,12 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const std::file
                    ": it exists already; give another name or remove it"};
     return Error{"cannot record to " + file.string() + ": " + write_failure(errno)};
   }
-  auto writer = std::make_unique<Writer>(handle, file, options);
+  auto writer = std::make_unique<Writer>(handle, path, options);
   if (auto status = writer->start(); !status) {
-    ::unlink(file.c_str());
+    ::unlink(path.c_str());
     return status.error();
   }
-  sync_folder(file);
+  sync_folder(path);
   return std::unique_ptr<RecordingWriter>(std::move(writer));
 }
 

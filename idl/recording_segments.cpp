@@ -135,9 +135,11 @@ Status check_record_folder(const fs::path& folder) {
 
 Status check_recording_target(const fs::path& file, bool split) {
   std::error_code error;
-  if (!split && fs::exists(file, error))
+  const auto leads = split ? Result<fs::path>(file) : where_to_write(file);
+  if (!leads) return leads.error();
+  if (!split && fs::exists(*leads, error))
     return Error{"cannot record to " + file.string() + ": it exists already; give another name or remove it"};
-  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  const fs::path folder = leads->has_parent_path() ? leads->parent_path() : fs::path(".");
   if (!fs::is_directory(folder, error))
     return Error{"cannot record to " + file.string() + ": there is no folder " + folder.string()};
   return check_record_folder(folder);

@@ -239,6 +239,21 @@ TEST(Recording, AnExistingFileIsNotTouched) {
   EXPECT_FALSE(RecordingWriter::create(folder / "none/a.mcap", {}).ok());
 }
 
+TEST(Recording, ALinkToWhatIsNotThereYetIsFollowed) {
+  test::TempFolder folder;
+  std::filesystem::create_symlink("b.mcap", folder / "link.mcap");
+  write_sample(folder / "link.mcap", 5);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.mcap"));
+  EXPECT_EQ(open(folder / "b.mcap")->summary().messages, 5u);
+  EXPECT_FALSE(RecordingWriter::create(folder / "link.mcap", {}).ok()) << "now it is there";
+
+  std::filesystem::create_symlink("d.mcap", folder / "other.mcap");
+  auto writer = create(folder / "other.mcap", {.chunk_ns = 0, .keeps_name = true});
+  ASSERT_TRUE(writer->add_channel(schema(), channel("t")).ok());
+  ASSERT_TRUE(writer->write(message(0, 0, 10)).ok());
+  EXPECT_TRUE(writer->write(message(0, 1, 10)).ok()) << "it was not renamed";
+}
+
 TEST(Recording, MisuseIsRefused) {
   test::TempFolder folder;
   auto writer = create(folder / "a.mcap");
