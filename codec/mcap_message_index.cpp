@@ -64,27 +64,31 @@ Result<std::vector<MessagePlace>> from_chunk(const File& file, const ChunkIndex&
   if (!base) return base.error();
   const auto records = read_chunk_records(file, chunk);
   if (!records) return records.error();
-  std::vector<MessagePlace> out;
-  std::span<const std::uint8_t> rest(*records);
-  while (!rest.empty()) {
-    const std::uint64_t offset = records->size() - rest.size();
-    const auto record = take_record(rest);
-    if (!record) return Error{"a record is cut short"};
-    if (record->op != Op::kMessage) continue;
-    const auto message = read_message(record->content);
-    if (!message) return Error{"a message is malformed"};
-    out.push_back({message->first.log_time, message->first.channel_id, *base + offset});
-  }
-  return out;
+  return message_places(*records, *base);
 }
 
 }  // namespace
 
 Result<std::vector<MessagePlace>> read_message_places(const File& file, const ChunkIndex& chunk) {
   auto indexed = from_indexes(file, chunk);
-  auto places = indexed ? Result(std::move(*indexed)) : from_chunk(file, chunk);
-  if (places) std::ranges::stable_sort(*places, {}, &MessagePlace::log_time);
-  return places;
+  if (!indexed) return from_chunk(file, chunk);
+  std::ranges::stable_sort(*indexed, {}, &MessagePlace::log_time);
+  return *std::move(indexed);
+}
+
+Result<std::vector<MessagePlace>> message_places(std::span<const std::uint8_t> records, std::uint64_t base) {
+  std::vector<MessagePlace> out;
+  for (auto rest = records; !rest.empty();) {
+    const std::uint64_t offset = records.size() - rest.size();
+    const auto record = take_record(rest);
+    if (!record) return Error{"a record is cut short"};
+    if (record->op != Op::kMessage) continue;
+    const auto message = read_message(record->content);
+    if (!message) return Error{"a message is malformed"};
+    out.push_back({message->first.log_time, message->first.channel_id, base + offset});
+  }
+  std::ranges::stable_sort(out, {}, &MessagePlace::log_time);
+  return out;
 }
 
 }  // namespace relievo::mcap

@@ -20,4 +20,7 @@ struct MessagePlace {
 /// chunk. Where there are none, from the chunk itself. Fails where it cannot be read.
 Result<std::vector<MessagePlace>> read_message_places(const File& file, const ChunkIndex& chunk);
 
+/// The same of a chunk's records; offsets are from `base`, where they begin.
+Result<std::vector<MessagePlace>> message_places(std::span<const std::uint8_t> records, std::uint64_t base);
+
 }  // namespace relievo::mcap

@@ -126,12 +126,12 @@ class Reader final : public RecordingReader {
       if (found && ends_by_[i] <= *found) break;  // neither this chunk nor any before it reaches further
       const Chunk& chunk = chunks_[i];
       if (chunk.start_time > latest) continue;
-      const auto places = mcap::read_message_places(*file_, chunk);
-      if (!places || places->empty()) continue;
-      // Their places are in it, not in the file.
-      const auto records =
-          chunk.compression.empty() ? Result<Bytes>(Bytes()) : mcap::read_chunk_records(*file_, chunk);
+      const bool plain = chunk.compression.empty();  // else places are in its records, not in the file
+      const auto records = plain ? Result<Bytes>(Bytes()) : mcap::read_chunk_records(*file_, chunk);
       if (!records) continue;
+      const auto places =
+          plain ? mcap::read_message_places(*file_, chunk) : mcap::message_places(*records, 0);
+      if (!places) continue;
       for (auto place = places->rbegin(); place != places->rend(); ++place) {
         if (place->log_time > latest) continue;
         if (found && place->log_time <= *found) break;

@@ -133,6 +133,14 @@ TEST_P(Compressed, IsReadAsItWasBefore) {
   EXPECT_EQ(read_all(*now).messages.size(), static_cast<std::size_t>(kMessages - 12));
 }
 
+TEST_P(Compressed, AChunkIsReadOnceToFindWhatIsInIt) {
+  const auto reader = open(file_);
+  const std::uint64_t before = reader->bytes_read();
+  EXPECT_EQ(reader->find_last(kStart_ns + kMessages * kStep_ns, [](auto, auto) { return false; }),
+            std::nullopt);
+  EXPECT_LE(reader->bytes_read() - before, data_bytes());
+}
+
 TEST_P(Compressed, CutShortAllThatIsWholeIsRead) {
   std::size_t before = 0;
   for (std::size_t bytes = mcap::kMagic.size(); bytes <= data_bytes(); bytes += 7) {

@@ -4,7 +4,7 @@ import { writeStreamInfo } from './cdrWriter';
 import { Decoder } from './decoder';
 import { kTextureJpeg, parseFrame } from './frame';
 import { closePictures } from './frameMemory';
-import { publishMsOf, type FrameStore } from './frameStore';
+import { publishMsOf, type FrameStore, type StoredFrame } from './frameStore';
 import type { DecodedFrame } from './messages';
 import type { StreamInfo } from './protocol';
 import { FrameNames, type RangeFormat } from './rangeFrames';
@@ -70,17 +70,24 @@ async function asSurfaces(order: RangeOrder, before: number[], indices: number[]
   const names = new FrameNames();
   const frames = new Frames();
   let damaged = 0;
+  let next: StoredFrame | null = null; // the frame behind, where it can be read
   try {
-    for (const index of before) await frames.decode(store, index).catch(() => null); // what builds on it tells
+    for (const index of before)
+      await store
+        .read(index)
+        .then((stored) => frames.decode(stored))
+        .catch(() => null); // what builds on it tells
     for (const [done, index] of indices.entries()) {
       cancelled.throwIfAborted();
-      const { frame, jpeg } = await frames.decode(store, index);
+      const stored = next ?? (await store.read(index));
+      next = index + 1 < store.first + store.times.length ? await store.read(index + 1).catch(() => null) : null;
+      const { frame, jpeg } = await frames.decode(stored);
       if (frame === null) {
         ++damaged;
       } else {
         const content = format === 'ply' ? plyOf(frame) : await glbOf(frame, jpeg);
         closePictures(frame);
-        const name = names.name(frame.number, await numberOf(store, index + 1));
+        const name = names.name(frame.number, next === null ? null : numberOf(next));
         if (!zip.add(`${name}.${format}`, content)) throw new Error(text.take.tooLarge(done, kMostBytes));
       }
       progress(done + 1);
@@ -92,11 +99,9 @@ async function asSurfaces(order: RangeOrder, before: number[], indices: number[]
   return { content: zip.finish(), frames: indices.length - damaged, damaged };
 }
 
-/** The camera's number of a frame; null where there is none, or it cannot be read. */
-async function numberOf(store: FrameStore, index: number): Promise<number | null> {
-  if (index >= store.first + store.times.length) return null;
+/** The camera's number of a frame; null where it is damaged. */
+function numberOf({ prefix, message }: StoredFrame): number | null {
   try {
-    const { prefix, message } = await store.read(index);
     return Number(parseFrame(new Uint8Array(message, prefix.bytes)).header.number);
   } catch {
     return null;
@@ -121,8 +126,7 @@ class Frames {
   }
 
   /** `frame` null: it is damaged. `jpeg`: its texture, where it is one. */
-  async decode(store: FrameStore, index: number): Promise<{ frame: DecodedFrame | null; jpeg: Uint8Array | null }> {
-    const { prefix, message } = await store.read(index);
+  async decode({ prefix, message }: StoredFrame): Promise<{ frame: DecodedFrame | null; jpeg: Uint8Array | null }> {
     const jpeg = jpegOf(new Uint8Array(message, prefix.bytes));
     const frame = await new Promise<DecodedFrame | null>((resolve) => {
       this.waiting = resolve;

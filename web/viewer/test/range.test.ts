@@ -1,14 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 // Proves: a range has the frames that are seen in it, described as they were, and a ZIP file no more than it may.
-import { describe, expect, it } from 'vitest';
+import { describe, expect, it, vi } from 'vitest';
 import { writeStreamInfo } from '../src/cdrWriter';
+import type { FrameStore } from '../src/frameStore';
 import { History } from '../src/history';
 import { bytesOf } from '../src/mcap';
+import type { DecodedFrame } from '../src/messages';
 import { exportRange } from '../src/rangeExport';
 import { FrameNames, framesBetween } from '../src/rangeFrames';
 import { Recording } from '../src/recording';
 import { ZipWriter } from '../src/zip';
 import { kInfo } from './streamInfo';
+
+const kEmpty: Omit<DecodedFrame, 'id' | 'number'> = {
+  type: 'frame',
+  positions: new Float32Array(),
+  coordinates: null,
+  normals: null,
+  triangles: new Uint32Array(),
+  edges: null,
+  quality: null,
+  texture: null,
+  notice: null,
+  extent: null,
+  decodeMs: 0,
+};
+
+/** A decoder that finds nothing in any frame. */
+vi.mock('../src/workers', () => ({
+  startDecoder: () => {
+    const worker = {
+      onmessage: (_: { data: DecodedFrame }): void => undefined,
+      postMessage: ({ id }: { id: number }) => queueMicrotask(() => worker.onmessage({ data: { ...kEmpty, id, number: id } })),
+      terminate: () => undefined,
+    };
+    return worker;
+  },
+}));
 
 describe('framesBetween', () => {
   const store = { times: Float64Array.from([0, 100, 200, 300]), first: 7 };
@@ -52,7 +80,7 @@ describe('a range of a live stream', () => {
     return view.buffer;
   }
 
-  it('is described as its frames were when they came', async () => {
+  function sixFrames(): FrameStore {
     const history = new History({ ms: 1e9, bytes: 1e9 }, 'face');
     for (let i = 0; i < 6; ++i) {
       if (i % 3 === 0) history.info = { ...kInfo, stripes: 3, source: `sim:${i}` }; // a server that was started again
@@ -60,8 +88,22 @@ describe('a range of a live stream', () => {
       const kept = history.add({ bytes: 48, sequence: i, captureMs: ms, publishMs: ms, sentMs: ms, drops: 0 }, message(1000 + i));
       expect(kept).not.toBeNull();
     }
+    return history.held();
+  }
+
+  it('is read once, with the frame behind it', async () => {
+    vi.stubGlobal('window', globalThis);
+    const store = sixFrames();
+    const read = vi.spyOn(store, 'read');
+    const order = { store, range: [1, 3] as const, description: null, progress: () => undefined, cancelled: new AbortController().signal };
+    expect((await exportRange({ ...order, format: 'ply' })).frames).toBe(3);
+    expect(read.mock.calls.map(([index]) => index)).toEqual([1, 2, 3, 4]);
+  });
+
+  it('is described as its frames were when they came', async () => {
+    const store = sixFrames();
     const sources = async (range: [number, number]): Promise<(string | undefined)[]> => {
-      const order = { store: history.held(), range, format: 'mcap' as const, description: writeStreamInfo({ ...kInfo, source: 'now' }) };
+      const order = { store, range, format: 'mcap' as const, description: writeStreamInfo({ ...kInfo, source: 'now' }) };
       const { content, frames } = await exportRange({ ...order, progress: () => undefined, cancelled: new AbortController().signal });
       const recording = await Recording.open(bytesOf(content));
       return Array.from({ length: frames }, (_, i) => recording.infoAt((1000 + range[0] + i) * 1000)?.source);
