@@ -69,8 +69,12 @@ std::optional<Contents> read_index(const File& file) {
     if (!ok) return std::nullopt;
   }
   // Without these a reader could not tell what the file holds: go through it.
-  if (!has_statistics || contents.statistics.chunks != contents.chunks.size()) return std::nullopt;
-  if (contents.statistics.messages > 0 && contents.statistics.channel_messages.empty()) return std::nullopt;
+  const Statistics& statistics = contents.statistics;
+  const auto is_known = [&](const auto& of) { return contents.channels.contains(of.first); };
+  if (!has_statistics || statistics.chunks != contents.chunks.size()) return std::nullopt;
+  if (statistics.messages > 0 && (contents.chunks.empty() || statistics.channel_messages.empty()))
+    return std::nullopt;
+  if (!std::ranges::all_of(statistics.channel_messages, is_known)) return std::nullopt;
   return contents;
 }
 

@@ -43,7 +43,10 @@ class Walk {
     if (done_.size() == 1) done_[0].recovered = done_[0].recovered || !plain_end_;
     const auto has_chunks = [](const Contents& contents) { return !contents.chunks.empty(); };
     if (loose_messages_ && std::ranges::none_of(done_, has_chunks))
-      return Error{file_.name() + ": messages outside chunks are not supported"};
+      return Error{
+          file_.name() +
+          ": its messages lie outside of chunks, where they are not read: `mcap compress` of MCAP's own " +
+          "tools puts them into some"};
     return std::move(done_);
   }
 

@@ -354,6 +354,31 @@ TEST(RecordingFormats, OtherMcapReadersDecodeEverySample) {
   EXPECT_EQ(json["topics"].size(), 3u);
 }
 
+TEST(RecordingFormats, WhatOtherMcapWritersMakeOfARecordingIsRead) {
+  const std::filesystem::path js = RELIEVO_MCAP_JS;
+  if (!std::filesystem::exists(js / "node_modules/@mcap/core"))
+    GTEST_SKIP() << "npm packages are missing: run npm ci --prefix tests/e2e/mcap_js";
+  const TempFolder folder;
+  const auto file = folder / "a.mcap";
+  ASSERT_NO_FATAL_FAILURE(record_face(file, 3000, 20));
+  const auto made = run({"/usr/bin/env", "node", js / "rewrite.mjs", file, folder.path().string()});
+  ASSERT_EQ(made.status, 0) << made.err;
+  for (const std::string name : nlohmann::json::parse(made.out)) {
+    SCOPED_TRACE(name);
+    const auto other = folder / (name + ".mcap");
+    if (name == "unchunked") {
+      const auto done = run({program("relievo"), "info", other});
+      EXPECT_EQ(done.status, 1);
+      EXPECT_THAT(done.err, HasSubstr("unchunked.mcap: its messages lie outside of chunks"));
+      continue;
+    }
+    const auto description = info(other);
+    EXPECT_EQ(description["frames"], 20);
+    EXPECT_EQ(description["attachments"].size(), 3u);
+    EXPECT_EQ(recorded_frames(other), recorded_frames(file));
+  }
+}
+
 TEST(RecordingFormats, RecordingsThatWereJoinedAreAllReadAndMadeOne) {
   const TempFolder folder;
   ASSERT_NO_FATAL_FAILURE(record_face(folder / "a.mcap", 3000, 12));
