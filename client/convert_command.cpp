@@ -62,6 +62,18 @@ EncodeOptions encode_options(const Options& options, TextureCodec recorded) {
   return out;
 }
 
+/// Throws CLI::ValidationError where something is asked for that the geometry does not have.
+void check_geometry(const Options& options) {
+  const std::string name = options.geometry.value_or("grid");
+  const auto check = [&](const char* option, bool given, const std::vector<std::string>& its) {
+    if (given && std::ranges::find(its, name) == its.end())
+      throw CLI::ValidationError(option, "there is none in " + name + ": it is of --geometry " + its.front());
+  };
+  check("--bound", options.bound_px.has_value(), {"visual"});
+  check("--draco-speed", options.draco_speed.has_value(), {"draco-mesh"});
+  check("--step-bits", options.step_bits.has_value(), {"grid", "metric", "draco-grid"});
+}
+
 struct Converted {
   std::uint64_t frames = 0;
   LeftOut left_out;
@@ -334,6 +346,7 @@ Command convert_command() {
             "Besides, the texture as foxglove.CompressedImage with its CameraCalibration, and the surface as "
             "foxglove.SceneUpdate");
         app.add_flag("--json", options->json, "Print the result as JSON");
+        app.final_callback([options] { check_geometry(*options); });
         app.footer(
             "Examples:\n"
             "  relievo convert face.mcap --out part.mcap --from 10 --to 20\n"

@@ -196,7 +196,11 @@ Command export_command() {
             ->type_name("NAME");
         options->range = add_range_options(app);
         app.add_flag("--json", options->json, "Print the result as JSON");
-        app.final_callback([options] {
+        app.final_callback([options, &app] {
+          if (options->reencode && options->format != "video")
+            throw CLI::ValidationError("--reencode", "there is no video in " + options->format);
+          if (app.count("--depth-unit") > 0 && options->format != "depth")
+            throw CLI::ValidationError("--depth-unit", "there is no depth picture in " + options->format);
           if (options->draco && !format_named(options->format).has_draco)
             throw CLI::ValidationError(
                 "--draco", "there is no Draco in " + options->format + ": it is of glb and animation");
