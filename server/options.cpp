@@ -15,6 +15,7 @@ void add_decoder_option(CLI::App& app, Decoder& decoder) {
       ->check([](const std::string& name) {
         return decoder_named(name) ? std::string() : "give ordered, quick or paper, not '" + name + "'";
       })
+      ->default_str(std::string(decoder_name(decoder)))
       ->type_name("NAME");
 }
 
