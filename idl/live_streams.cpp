@@ -102,7 +102,9 @@ Status check_name_is_free(const Domain& domain, const std::string& stream, std::
     const auto live = take_live_writer(reader->get(), stream);
     if (!live) return live.error();
     if (*live != 0) {
-      return Error{"a stream named '" + stream + "' is already live in this domain: choose another name"};
+      return Error{"a stream named '" + stream +
+                   "' is already live in this domain: give another --domain, or " +
+                   "a server another --stream"};
     }
   }
   return {};

@@ -252,7 +252,8 @@ TEST(Transport, NameAlreadyLiveIsRefused) {
   ASSERT_TRUE(first);
   const auto second = Publisher::create(kDomain, test::example_info("taken"));
   ASSERT_FALSE(second.ok());
-  EXPECT_THAT(second.error().message, HasSubstr("'taken' is already live"));
+  EXPECT_THAT(second.error().message,
+              HasSubstr("'taken' is already live in this domain: give another --domain"));
   EXPECT_FALSE(RawPublisher::create(kDomain, "taken").ok());
   first.reset();
   EXPECT_TRUE(Publisher::create(kDomain, test::example_info("taken")).ok());
