@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/counted.h"
+#include "base/new_folder.h"
 #include "base/whole_file.h"
 #include "capture/source/npy.h"
 #include "capture/source/take_files.h"
@@ -134,6 +135,8 @@ Status write(const fs::path& take, FieldSource& source, const std::function<cons
   std::error_code code;
   const fs::path whole = target_of(take);
   if (const Status free = check_free(take, whole); !free && !options.keep_written) return free;
+  const auto above = NewFolder::create(whole.parent_path());
+  if (!above) return above.error().in(take.string() + " cannot be created");
   PartialFolder partial(partial_name(whole.parent_path(), whole));
   for (const char* folder : {"frames", "truth"}) {
     if (!fs::create_directories(partial.path() / folder, code) && code) {

@@ -121,7 +121,7 @@ TEST(TakeWriter, StoppedLeavesNothingBehind) {
   test::TempFolder folder;
   const auto source = small_sim("");
   std::atomic<bool> stop{false};
-  const Status stopped = write_take(folder.path() / "take", *source,
+  const Status stopped = write_take(folder.path() / "new" / "take", *source,
                                     {.progress = [&](std::uint64_t n) { stop = n == 2; }, .stop = &stop});
   ASSERT_FALSE(stopped);
   EXPECT_THAT(stopped.error().message, HasSubstr("stopped"));
