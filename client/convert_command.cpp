@@ -76,6 +76,7 @@ void check_geometry(const Options& options) {
 
 struct Converted {
   std::uint64_t frames = 0;
+  std::uint64_t before = 0;  // of these: before the range, which builds on them
   LeftOut left_out;
   std::uint64_t bytes_before = 0, bytes_after = 0;  // of frames
 };
@@ -135,7 +136,9 @@ class Conversion {
     const auto view = read_frame_cdr(sample.cdr);
     if (!wanted) {
       if (view) (void)decoder_.remember(view->data);
-      return options_.encode() || !needed_later(sample) ? Status() : copy(sample);
+      if (options_.encode() || !needed_later(sample)) return {};
+      ++converted_.before;
+      return copy(sample);
     }
     if (!options_.encode() && !foxglove_) return copy(sample);
     if (!converted_.left_out.decode(view, decoder_, frame_)) return {};
@@ -258,26 +261,30 @@ Status convert(const Options& options, RecordedStream& recorded, Conversion& con
     if (!*sample || (*sample)->receive_time_ns > range->to_ns) break;
     if (auto added = conversion.add(**sample, (*sample)->receive_time_ns >= range->from_ns); !added)
       return added;
-    progress.update(conversion.converted().frames);
+    progress.update(conversion.converted().frames - conversion.converted().before);
   }
   if (stop.stopped()) return Error{"stopped before the end; nothing was written"};
-  if (conversion.converted().frames == 0) return conversion.converted().left_out.all().in(options.file);
+  const Converted& converted = conversion.converted();
+  if (converted.frames == converted.before) return converted.left_out.all().in(options.file);
   return conversion.finish();
 }
 
 void report(const Options& options, const Converted& converted, const RecordedStream& recorded) {
   if (options.json) {
-    const nlohmann::json j = {{"file", options.out.string()},
-                              {"frames", converted.frames},
-                              {"unreadable", converted.left_out.frames()},
-                              {"damaged", recorded.damaged()},
-                              {"bytes_before", converted.bytes_before},
-                              {"bytes_after", converted.bytes_after}};
+    const nlohmann::json j = {
+        {"file", options.out.string()},        {"frames", converted.frames},
+        {"frames_before", converted.before},   {"unreadable", converted.left_out.frames()},
+        {"damaged", recorded.damaged()},       {"bytes_before", converted.bytes_before},
+        {"bytes_after", converted.bytes_after}};
     std::puts(json_text(j).c_str());
     return;
   }
-  if (converted.left_out.unreadable == 0)
-    std::printf("%s: %s\n", options.out.c_str(), counted(converted.frames, "frame").c_str());
+  if (converted.left_out.unreadable > 0) return;  // which is told with the others
+  std::printf("%s: %s", options.out.c_str(), counted(converted.frames, "frame").c_str());
+  if (converted.before > 0)
+    std::printf(", the first %llu from before the range: it builds on them",
+                static_cast<unsigned long long>(converted.before));
+  std::puts("");
 }
 
 Status run(const Options& options, StopSignal& stop) {

@@ -197,6 +197,12 @@ TEST(RecordingFormats, TexturesStayAsTheyAreUnlessOthersAreAskedFor) {
     EXPECT_TRUE(std::equal(part.begin() + static_cast<std::ptrdiff_t>(kept - 2), part.end(),
                            before.begin() + static_cast<std::ptrdiff_t>(kept)));
     EXPECT_EQ(is_chain, part[0] != before[2]);
+    const auto copied = run(
+        {program("relievo"), "convert", original, "--out", folder / (texture + ".part"), "--frames", "2:10"});
+    EXPECT_EQ(copied.out.find("11 frames, the first 2 from before the range: it builds on them") !=
+                  std::string::npos,
+              is_chain)
+        << copied.out;
   }
 }
 
