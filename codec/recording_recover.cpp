@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 /// A new file under a name of its own until it is complete.
 class PartFile {
  public:
-  explicit PartFile(fs::path whole) : whole_(std::move(whole)), part_(whole_.string() + ".part") {}
+  explicit PartFile(fs::path whole) : whole_(std::move(whole)), part_(unfinished_name(whole_)) {}
   PartFile(const PartFile&) = delete;
   PartFile& operator=(const PartFile&) = delete;
   ~PartFile() {

@@ -292,6 +292,11 @@ TEST_F(RecordingRecover, AFileMadeToBeSlowIsReadAllTheSame) {
   EXPECT_TRUE(std::ranges::includes(recovered_from(folder_, bytes), all_but(15, kMessages - 1)));
 }
 
+TEST_F(RecordingRecover, WhatAKilledRecoveryLeftIsNotInTheWay) {
+  write_file(folder_ / "copy.mcap.part", {});
+  EXPECT_TRUE(recover_recording(folder_ / "a.mcap", folder_ / "copy.mcap", always).ok());
+}
+
 TEST_F(RecordingRecover, RefusesWhatItCannotDoAndLeavesNoFile) {
   write_file(folder_ / "there.mcap", {});
   const auto over = recover_recording(folder_ / "a.mcap", folder_ / "there.mcap", always);
