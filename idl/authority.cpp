@@ -285,12 +285,12 @@ class NewFolder {
     NewFolder folder;
     folder.named_ = path;
     folder.final_ = parent;
-    folder.path_ = parent;
-    folder.path_ += ".part";
+    const fs::path part = parent.string() + ".part";
     fs::create_directories(parent.parent_path(), error);
-    const bool made = !error && fs::create_directory(folder.path_, error);
+    const bool made = !error && fs::create_directory(part, error);
     if (error) return Error{"cannot make " + path.string() + ": " + error.message()};
-    if (!made) return Error{folder.path_.string() + " is in the way: remove it"};
+    if (!made) return Error{part.string() + " is in the way: remove it"};  // which is not ours
+    folder.path_ = part;
     fs::permissions(folder.path_, fs::perms::owner_all, error);
     return folder;
   }

@@ -141,6 +141,15 @@ TEST_F(UserKeys, AFullDiskIsToldByTheNameAskedFor) {
   }
 }
 
+TEST_F(UserKeys, WhatIsInTheWayIsLeftWhereItIs) {
+  fs::create_directory(folder_ / "new.part");
+  std::ofstream(folder_ / "new.part" / "notes") << "mine\n";
+  const auto done = run({"relievo", "keys", "init", "--keys", folder_ / "new"});
+  EXPECT_EQ(done.status, 1);
+  EXPECT_THAT(done.err, HasSubstr("new.part is in the way"));
+  EXPECT_TRUE(fs::exists(folder_ / "new.part" / "notes"));
+}
+
 TEST_F(UserKeys, RenewingReplacesADamagedCertificate) {
   make_keys(where_);
   const fs::path identity = fs::path(where_) / "identity.pem";
