@@ -184,7 +184,7 @@ void print_frames(const FrameTotals& totals) {
                 joined(totals.texture_codecs).c_str(), totals.texture_width, totals.texture_height);
   }
   if (totals.unreadable > 0) {
-    std::printf("unreadable  %s %s of no format this version reads\n",
+    std::printf("unreadable  %s %s damaged, or of a format that this version does not read\n",
                 counted(totals.unreadable, "frame").c_str(), is_or_are(totals.unreadable));
   }
 }
