@@ -95,7 +95,8 @@ void refuse_empty_values(const CLI::App& app) {
 // Results that could not be written (a full disk, a closed pipe) are a failure, not silence.
 int flush_results(const std::string& name, int code) {
   std::cout.flush();
-  if (std::fflush(stdout) == 0 && std::cout.good()) return code;
+  // What was more than the buffer holds has failed before.
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return code;
   say_failed(name, "cannot write the results to standard output: it is closed or its disk is full");
   return code == kExitDone ? kExitFailed : code;
 }

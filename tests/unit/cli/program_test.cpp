@@ -4,11 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <thread>
@@ -71,6 +73,22 @@ std::vector<Command> one_command(std::function<Status(int, StopSignal&)> action)
              app.add_option("--count", *count, "how many");
              return [action, count](StopSignal& stop) { return action(*count, stop); };
            }}};
+}
+
+TEST(Program, ResultsThatCannotBeWrittenAreAFailure) {
+  for (const std::size_t bytes : {10, 100'000}) {
+    const auto commands = one_command([&](int, StopSignal&) {
+      std::puts(std::string(bytes, 'x').c_str());
+      return Status();
+    });
+    EXPECT_EXIT(
+        {
+          if (std::freopen("/dev/full", "w", stdout) == nullptr) _exit(7);
+          _exit(exit_code(commands, {"work"}));
+        },
+        testing::ExitedWithCode(kExitFailed), "cannot write the results")
+        << bytes;
+  }
 }
 
 TEST(Program, SaysFailuresToProgramsToo) {
