@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -121,11 +120,7 @@ Status write_picture(const std::filesystem::path& file, const Image8& image) {
   } catch (const std::exception& e) {
     return Error{name + " cannot be encoded: " + e.what()};
   }
-  std::ofstream out(file, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (!out) return Error{name + " cannot be written: is the disk full?"};
-  return {};
+  return write_whole_file(file, bytes);
 }
 
 }  // namespace relievo

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -45,14 +44,6 @@ class PartialFolder {
  private:
   fs::path path_;
 };
-
-Status write_text(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.close();
-  if (!out) return Error{file.string() + " cannot be written: is the disk full?"};
-  return {};
-}
 
 Status write_frame(const fs::path& take, std::uint64_t number, const CapturedFrame& frame,
                    const ImageF& truth) {
@@ -124,7 +115,7 @@ Status write_texts(const fs::path& take, const SourceInfo& info, const std::vect
   const std::pair<const char*, std::string> texts[] = {
       {"rig.yaml", to_yaml(info.rig)}, {"pattern.yaml", to_yaml(info.pattern)}, {"timestamps.csv", times}};
   for (const auto& [name, text] : texts) {
-    if (Status s = write_text(take / name, text); !s) return s;
+    if (Status s = write_whole_file(take / name, text); !s) return s;
   }
   return {};
 }
