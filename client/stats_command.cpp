@@ -110,6 +110,7 @@ Status run(const Options& options, StopSignal& stop) {
     if (!options.json && now_ns > before_ns) print_line(options, before, now, seconds(now_ns - before_ns));
     before = now;
     before_ns = now_ns;
+    if (std::ferror(stdout) != 0) return {};  // nobody reads on; the program says so
     if (stopped || (options.seconds > 0 && seconds(now_ns - begin_ns) >= options.seconds)) break;
   }
   if (options.json) print_json(options, before, seconds(before_ns - begin_ns));

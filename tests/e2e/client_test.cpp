@@ -101,6 +101,15 @@ TEST(Client, DoctorSaysWhatItFoundAndFailsWhereThereIsTrouble) {
   EXPECT_THAT(failed.out, HasSubstr("--folder"));
 }
 
+TEST(Client, StatsEndWhereNobodyReadsThem) {
+  std::vector<std::string> command = {"/bin/sh", "-c", "exec \"$0\" \"$@\" > /dev/full"};
+  for (const std::string& word : relievo({"stats", "absent", "--domain", kDomain, "--interface", "lo"}))
+    command.push_back(word);
+  const auto done = test::run(command);
+  EXPECT_EQ(done.status, 1);
+  EXPECT_THAT(done.err, HasSubstr("cannot write the results"));
+}
+
 TEST(Client, FailuresAreExitOneAndOneLine) {
   const test::TempFolder folder;
   std::ofstream(folder / "text.mcap") << "no recording\n";
