@@ -452,7 +452,7 @@ const checks = {
     }
   },
 
-  async 'on plain http from elsewhere what was received is saved also once the server has gone'() {
+  async 'on plain http from elsewhere what was received is saved also once the server has gone, and panels open'() {
     await recordingServer.kill(); // it is not needed any more
     const goneServer = await Server.start(serverPath, [...serve, '--stream', 'gone']);
     const page = await newRecording({ viewport: { width: 800, height: 500 } });
@@ -461,7 +461,7 @@ const checks = {
     await page.waitForFunction(() => window.relievo?.diagnostics().playback?.times.length > 4);
     await page.click('#tool-record');
     await pressedIs(page, 'true');
-    const parts = ['takePanel', 'rangeExport', 'recordingFile', 'sample', 'cdrWriter'];
+    const parts = ['takePanel', 'streamsPanel', 'statisticsPanel', 'rangeExport', 'recordingFile', 'sample', 'cdrWriter'];
     await page.waitForFunction((all) => {
       const loaded = performance.getEntriesByType('resource').map(({ name }) => name);
       return all.every((part) => loaded.some((name) => name.includes(`/${part}-`)));
@@ -478,6 +478,8 @@ const checks = {
     await save(() => page.click('#tool-record'));
     await page.keyboard.press('t');
     await save(() => page.click('#panel-take button:text-is("MCAP")'));
+    await page.keyboard.press('i');
+    await page.waitForFunction(() => /vertices/.test(document.querySelector('#panel-statistics')?.textContent));
     await page.close();
   },
 

@@ -133,7 +133,8 @@ export async function addImmersive(view: View, failed: (why: string) => void): P
 const kAskMs = 5000; // whether a picture is on its way
 const kIdleWithinMs = 2000;
 
-const loadSaving = () => Promise.all([import('./takePanel'), import('./rangeExport'), import('./cdrWriter'), import('./surfaceFiles')]);
+const loadPanels = () => Promise.all([import('./streamsPanel'), import('./statisticsPanel'), import('./takePanel')]);
+const loadSaving = () => Promise.all([import('./rangeExport'), import('./cdrWriter'), import('./surfaceFiles')]);
 
 /** Loads what nobody has asked for yet, and keeps the page for when its server is not there; behind the first picture, or where none comes. */
 export class Rest {
@@ -161,8 +162,9 @@ export class Rest {
 
   private load(): void {
     void this.measuring?.load().catch(() => undefined); // its panel says so and tries again
-    // Only in secure contexts keeps the browser the page. Elsewhere it has to have by now what saves what it has received.
-    if (!('serviceWorker' in navigator)) loadSaving().catch(() => undefined);
+    // Only in secure contexts keeps the browser the page. Elsewhere it has to have by now what saves what it has received, and
+    // its panels: a part that once did not come Firefox does not ask for again.
+    if (!('serviceWorker' in navigator)) Promise.all([loadPanels(), loadSaving()]).catch(() => undefined);
     else if (import.meta.env.PROD) void navigator.serviceWorker.register('sw.js').catch(() => undefined);
   }
 }
