@@ -9,6 +9,7 @@ const kKept = 64; // blocks
 const kTries = 4;
 const kPatienceMs = 16_000; // while nothing of a part comes: a gateway gives up after 15 s
 const kFirstWaitMs = 300; // before a second try; twice as long before each further one
+const kLongestLine = 300; // letters
 const kChanged = 'the recording has changed on the server: open it anew';
 
 export type Fetch = (url: URL, init: RequestInit) => Promise<Response>;
@@ -54,6 +55,8 @@ export class RemoteFile implements Bytes {
       head = await fetch(url, first);
     }
     if (head.status === 416) throw new Error('it is empty: what recorded it ended before the first frame');
+    const told = head.status === 503 ? await lineOf(head) : '';
+    if (told !== '') throw new Unavailable(told);
     const { size, etag } = versionOf(head);
     return new RemoteFile(url, size, etag, fetch);
   }
@@ -173,6 +176,13 @@ async function bodyOf({ body }: Response, hear: () => void): Promise<Uint8Array>
     if (value === undefined) return new Uint8Array(await new Blob(parts).arrayBuffer());
     parts.push(value);
   }
+}
+
+/** What a gateway says in a line of text; empty: the answer is another. */
+async function lineOf(answer: Response): Promise<string> {
+  if (answer.headers.get('content-type')?.startsWith('text/plain') !== true) return '';
+  const text = (await answer.text().catch(() => '')).trim();
+  return text.length > kLongestLine || text.includes('\n') ? '' : text;
 }
 
 function versionOf(head: Response): { size: number; etag: string } {

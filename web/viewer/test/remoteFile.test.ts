@@ -205,6 +205,10 @@ describe('RemoteFile', () => {
   it('is not opened where the server gives no parts', async () => {
     await expect(RemoteFile.open(url, async () => new Response('all of it', { status: 200 }))).rejects.toThrow('HTTP 200');
     await expect(RemoteFile.open(url, async () => new Response('', { status: 404 }))).rejects.toThrow('it is not there (HTTP 404)');
+    const told = new Response('the recording cannot be read: Permission denied\n', { status: 503, headers: { 'content-type': 'text/plain' } });
+    await expect(RemoteFile.open(url, async () => told)).rejects.toThrow(/^the recording cannot be read: Permission denied$/);
+    const page = new Response('<p>busy</p>', { status: 503, headers: { 'content-type': 'text/html' } });
+    await expect(RemoteFile.open(url, async () => page)).rejects.toThrow('HTTP 503');
     const empty = new Response('', { status: 416, headers: { 'content-range': 'bytes */0', etag: '"1"' } });
     await expect(RemoteFile.open(url, async () => empty)).rejects.toThrow('it is empty');
   });
