@@ -9,14 +9,21 @@ namespace fs = std::filesystem;
 
 Result<NewFolder> NewFolder::create(const fs::path& folder) {
   NewFolder out;
+  if (const Status made = out.make(folder); !made) return made.error();
+  return out;
+}
+
+Status NewFolder::make(const fs::path& folder) {
   std::error_code failed;
+  std::vector<fs::path> missing;
   for (fs::path level = folder;
        !level.empty() && fs::symlink_status(level, failed).type() == fs::file_type::not_found;
        level = level.parent_path())
-    out.made_.push_back(level);
+    missing.push_back(level);
+  made_.insert(made_.begin(), missing.begin(), missing.end());
   fs::create_directories(folder, failed);
   if (failed) return Error{"cannot make the folder " + folder.string() + ": " + failed.message()};
-  return out;
+  return {};
 }
 
 NewFolder::~NewFolder() {

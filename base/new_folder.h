@@ -16,6 +16,8 @@ class NewFolder {
   /// None yet.
   NewFolder() = default;
   static Result<NewFolder> create(const std::filesystem::path& folder);
+  /// The same for one that is held already; nothing is done where the folder is there.
+  Status make(const std::filesystem::path& folder);
   NewFolder(NewFolder&&) = default;
   NewFolder& operator=(NewFolder&&) = delete;
   ~NewFolder();

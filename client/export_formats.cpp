@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client/export_formats.h"
 
-#include <optional>
 #include <string>
 
 #include "base/new_folder.h"
@@ -26,11 +25,7 @@ class FolderWriter : public ExportWriter {
   explicit FolderWriter(fs::path folder) : folder_(std::move(folder)) {}
 
   Status add(const Frame3D& frame, std::span<const std::uint8_t>) override {
-    if (!made_) {
-      auto made = NewFolder::create(folder_);
-      if (!made) return made.error();
-      made_.emplace(*std::move(made));
-    }
+    if (const Status made = made_.make(folder_); !made) return made;
     return write(folder_, names_.name(frame), frame);
   }
 
@@ -38,7 +33,7 @@ class FolderWriter : public ExportWriter {
   virtual Status write(const fs::path& folder, const std::string& name, const Frame3D& frame) = 0;
 
   fs::path folder_;
-  std::optional<NewFolder> made_;
+  NewFolder made_;
   FrameNames names_;
 };
 

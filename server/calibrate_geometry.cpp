@@ -225,12 +225,10 @@ Status run(const Options& options, StopSignal& stop) {
     if (!read) return read.error();
     reference = *read;
   }
-  std::optional<NewFolder> pictures;
+  NewFolder pictures;
   if (!options.pictures.empty()) {
     if (const Status apart = check_no_view(options.pictures, options.views); !apart) return apart;
-    auto made = NewFolder::create(options.pictures);
-    if (!made) return made.error();
-    pictures.emplace(*std::move(made));
+    if (const Status made = pictures.make(options.pictures); !made) return made;
   }
   const std::string out = options.out.empty() ? options.update : options.out;
   ViewCode code{.stripes = {}, .projector = options.projector};

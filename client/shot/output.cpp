@@ -2,7 +2,6 @@
 #include "client/shot/output.h"
 
 #include <filesystem>
-#include <optional>
 #include <utility>
 
 #include "base/new_folder.h"
@@ -35,18 +34,14 @@ class Folder final : public ShotOutput {
 
  private:
   Result<std::string> write(const Frame3D& frame, const Image8& picture) override {
-    if (!made_) {
-      auto made = NewFolder::create(folder_);
-      if (!made) return made.error();
-      made_.emplace(*std::move(made));
-    }
+    if (const Status made = made_.make(folder_); !made) return made.error();
     const fs::path file = folder_ / (names_.name(frame) + ".png");
     if (auto status = write_png(file, picture.view()); !status) return status.error();
     return file.string();
   }
 
   fs::path folder_;
-  std::optional<NewFolder> made_;
+  NewFolder made_;
   FrameNames names_;
 };
 
